@@ -1,0 +1,25 @@
+//! Vectors, rotations, poses and twists in `D` = 2 and 3 dimensions.
+//!
+//! What is the same in every dimension is written once for `D`; what is not (the number of rotations, the
+//! cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and `Dim<3>` only.
+//!
+//! ```
+//! use gluey_geom::{Twist, Vector, Spin};
+//! let shear: Twist<2> = Twist { velocity: Vector::<2>::new(0.2, 0.0), spin: Spin::<2>::new(-0.5) };
+//! let at_rim = shear.velocity_at(&Vector::<2>::new(0.0, 0.1));
+//! assert!((at_rim.x - 0.25).abs() < 1e-15);
+//! ```
+
+mod aabb;
+mod motion;
+mod space;
+
+pub use aabb::Aabb;
+pub use motion::{Particle, Pose, Twist};
+pub use space::{Dim, Rotation, Space, Spin};
+
+/// A point, displacement or velocity in `D` dimensions.
+pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
+
+/// A second-order tensor in `D` dimensions.
+pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;

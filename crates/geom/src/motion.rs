@@ -1,0 +1,93 @@
+//! Poses, twists and round particles.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Dim, Rotation, Space, Spin, Vector};
+
+/// Position of the centre and orientation of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Pose<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Centre.
+    pub position: Vector<D>,
+    /// Orientation relative to the body's own frame.
+    pub orientation: Rotation<D>,
+}
+
+impl<const D: usize> Pose<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// A body at `position` in its reference orientation.
+    pub fn at(position: Vector<D>) -> Self {
+        Self { position, orientation: Dim::<D>::identity() }
+    }
+}
+
+/// Rigid-body velocity: that of the centre and the spin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Twist<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity of the centre.
+    pub velocity: Vector<D>,
+    /// Angular velocity.
+    pub spin: Spin<D>,
+}
+
+impl<const D: usize> Default for Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn default() -> Self {
+        Self { velocity: Vector::zeros(), spin: Dim::<D>::zero_spin() }
+    }
+}
+
+impl<const D: usize> Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity `U + w x r` of the material point at `r` from the centre.
+    pub fn velocity_at(&self, r: &Vector<D>) -> Vector<D> {
+        self.velocity + Dim::<D>::cross_spin(&self.spin, r)
+    }
+
+    /// The linear combination `a * self + b * other`.
+    pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
+        Self { velocity: self.velocity * a + other.velocity * b, spin: self.spin * a + other.spin * b }
+    }
+}
+
+/// A rigid disc (2D) or sphere (3D).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Particle<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Centre and orientation.
+    pub pose: Pose<D>,
+    /// Radius `a > 0`.
+    pub radius: f64,
+}
+
+impl<const D: usize> Particle<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// A particle of the given radius at `position`.
+    pub fn new(position: Vector<D>, radius: f64) -> Self {
+        Self { pose: Pose::at(position), radius }
+    }
+
+    /// Gap `D_ij = |X_i X_j| - (a_i + a_j)` to another particle (Verdon et al. 2010, eq. 14).
+    pub fn gap(&self, other: &Self) -> f64 {
+        (other.pose.position - self.pose.position).norm() - (self.radius + other.radius)
+    }
+}

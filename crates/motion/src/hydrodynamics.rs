@@ -1,0 +1,80 @@
+//! The trait that stands between the flow and the particles.
+
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+
+/// Predicts the velocities of particles from their positions, without contact.
+pub trait Hydrodynamics<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Why a prediction failed.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Writes into `twists` the velocity and spin of each particle at time `t`; both slices have one entry a
+    /// particle, in the same order.
+    fn predict(
+        &mut self,
+        t: f64,
+        particles: &[Particle<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), Self::Error>;
+
+    /// Sets the factor of the imposed shear rate (1 = as configured, -1 = reversed).
+    fn set_shear_factor(&mut self, factor: f64);
+
+    /// Size and effort of the last prediction.
+    fn statistics(&self) -> FlowStatistics {
+        FlowStatistics::default()
+    }
+
+    /// The flow fields of the last prediction, for output; `None` where the model has none.
+    fn fields(&self) -> Option<Fields<D>> {
+        None
+    }
+
+    /// Everything beyond the particles that the next prediction depends on (warm starts), as bytes.
+    fn checkpoint(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    /// Restores what [`Hydrodynamics::checkpoint`] gave; `false` if the bytes do not fit this model.
+    fn resume(&mut self, state: &[u8]) -> bool {
+        state.is_empty()
+    }
+}
+
+/// Size and effort of one flow prediction.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlowStatistics {
+    /// Cells of the mesh.
+    pub cell_count: usize,
+    /// Velocity and pressure unknowns of the mesh.
+    pub dof_count: usize,
+    /// Linear solves.
+    pub solve_count: usize,
+    /// Krylov iterations, or refinement sweeps of a direct solver, over all solves.
+    pub iteration_count: usize,
+    /// Seconds spent in each named phase (mesh, assembly, factorisation, ...), in order.
+    pub phases: Vec<(&'static str, f64)>,
+}
+
+/// The flow fields on a mesh of quadratic cells, ready to be written.
+///
+/// The `3^D` nodes of a cell are ordered with x fastest, then y (then z).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fields<const D: usize> {
+    /// Node positions.
+    pub points: Vec<Vector<D>>,
+    /// Node indices of all cells, `3^D` a cell.
+    pub cells: Vec<u32>,
+    /// Velocity at the nodes.
+    pub velocity: Vec<Vector<D>>,
+    /// Pressure at the nodes.
+    pub pressure: Vec<f64>,
+    /// Viscosity at the nodes.
+    pub viscosity: Vec<f64>,
+    /// Level set at the nodes: signed distance, positive inside the particles.
+    pub level_set: Vec<f64>,
+    /// Rigidity multiplier at the nodes (zero in formulations without one).
+    pub multiplier: Vec<Vector<D>>,
+}
