@@ -1,0 +1,235 @@
+//! A case: everything a run depends on, as read from a TOML file and checked once.
+//!
+//! ```
+//! let text = r#"
+//! name = "one-disc"
+//! dimension = 2
+//! [[particles]]
+//! position = [0.5, 0.7]
+//! radius = 0.05
+//! [time]
+//! step = 0.025
+//! end = 1.0
+//! "#;
+//! let case = gluey::Case::parse(text, "one-disc.toml")?;
+//! assert_eq!(case.step_count(), 40);
+//! # Ok::<(), gluey::CaseError>(())
+//! ```
+
+mod error;
+mod load;
+mod names;
+mod suggest;
+mod validate;
+
+pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
+pub use names::{Boundary, Formulation, Hydrodynamics, Scheme, Solver, Strategy, UnknownName};
+
+use serde::{Deserialize, Serialize};
+
+/// A complete, checked description of one run.
+///
+/// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Name of the case, used for output files: letters, digits, `-` and `_`.
+    pub name: String,
+    /// Dimension of space, 2 or 3.
+    pub dimension: usize,
+    /// The imposed shear rate `gamma_dot`: the undisturbed velocity is `gamma_dot (y - y_mid) e_x`.
+    #[serde(default = "one")]
+    pub shear_rate: f64,
+    /// Name of a reference solution to compare with, see [`crate::reference::NAMES`].
+    #[serde(default)]
+    pub reference: Option<String>,
+    /// The box of fluid.
+    #[serde(default)]
+    pub domain: DomainSpec,
+    /// The particles at time 0.
+    pub particles: Vec<ParticleSpec>,
+    /// Time stepping.
+    pub time: TimeSpec,
+    /// Contact.
+    #[serde(default)]
+    pub contact: ContactSpec,
+    /// Flow.
+    #[serde(default)]
+    pub flow: FlowSpec,
+}
+
+/// The box of fluid.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DomainSpec {
+    /// Corner with the smallest coordinates; the origin when absent.
+    pub lower: Option<Vec<f64>>,
+    /// Corner with the largest coordinates; (1, 1[, 1]) when absent.
+    pub upper: Option<Vec<f64>>,
+    /// Condition on the boundary.
+    pub boundary: Boundary,
+}
+
+/// A particle at time 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParticleSpec {
+    /// Centre, one coordinate a dimension.
+    pub position: Vec<f64>,
+    /// Radius `a > 0`.
+    pub radius: f64,
+}
+
+/// Time stepping.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeSpec {
+    /// Time step `dt > 0`.
+    pub step: f64,
+    /// End of the run; the last step ends at the first multiple of `step` that is not before it.
+    pub end: f64,
+    /// Scheme.
+    #[serde(default)]
+    pub scheme: Scheme,
+    /// The shear is reversed at the first step that starts at this time or later.
+    #[serde(default)]
+    pub reverse_at: Option<f64>,
+}
+
+/// Contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactSpec {
+    /// What keeps particles from overlapping.
+    pub strategy: Strategy,
+    /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
+    pub exact_gap: bool,
+}
+
+/// Flow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FlowSpec {
+    /// Who predicts the velocities.
+    pub hydrodynamics: Hydrodynamics,
+    /// How rigidity enters.
+    pub formulation: Formulation,
+    /// How the equations are solved.
+    pub solver: Solver,
+    /// Relative tolerance of the residual of a linear solve.
+    pub tolerance: f64,
+    /// The mesh.
+    pub mesh: MeshSpec,
+    /// Parameters of the `paper` formulation.
+    pub paper: PaperSpec,
+    /// Parameters of the `rigid-dofs` formulation.
+    #[serde(rename = "rigid-dofs")]
+    pub rigid_dofs: RigidDofsSpec,
+}
+
+/// The 2^D-tree mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MeshSpec {
+    /// The finest cells have at least this many edges in a radius of the smallest particle.
+    pub cells_per_radius: f64,
+    /// Cells are at least `2^-coarsest_level` of the box.
+    pub coarsest_level: u32,
+    /// Cells of the finest level kept on either side of each particle's surface.
+    pub band: f64,
+}
+
+/// Parameters of the `paper` formulation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PaperSpec {
+    /// Viscosity of the particles over that of the fluid, `r`.
+    pub viscosity_ratio: f64,
+    /// Uzawa iterations a step.
+    pub uzawa_steps: usize,
+    /// Step of the Uzawa iteration, `0 < rho < 4`.
+    pub rho: f64,
+    /// Width of the viscosity ramp inside the surface, in cells.
+    pub ramp: f64,
+}
+
+/// Parameters of the `rigid-dofs` formulation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RigidDofsSpec {
+    /// A node is rigid where the signed distance (positive inside) is at least this many cells.
+    pub offset: f64,
+}
+
+impl Default for ContactSpec {
+    fn default() -> Self {
+        Self { strategy: Strategy::default(), exact_gap: true }
+    }
+}
+
+impl Default for FlowSpec {
+    fn default() -> Self {
+        Self {
+            hydrodynamics: Hydrodynamics::default(),
+            formulation: Formulation::default(),
+            solver: Solver::default(),
+            tolerance: 1e-8,
+            mesh: MeshSpec::default(),
+            paper: PaperSpec::default(),
+            rigid_dofs: RigidDofsSpec::default(),
+        }
+    }
+}
+
+impl Default for MeshSpec {
+    fn default() -> Self {
+        Self { cells_per_radius: 6.4, coarsest_level: 3, band: 2.0 }
+    }
+}
+
+impl Default for PaperSpec {
+    fn default() -> Self {
+        Self { viscosity_ratio: 1e3, uzawa_steps: 1, rho: 1.0, ramp: 1.0 }
+    }
+}
+
+impl Default for RigidDofsSpec {
+    fn default() -> Self {
+        Self { offset: -0.1 }
+    }
+}
+
+impl Case {
+    /// Number of time steps.
+    pub fn step_count(&self) -> usize {
+        let count = self.time.end / self.time.step;
+        (count - 1e-9 * count.max(1.0)).ceil() as usize
+    }
+
+    /// Mean radius of all particles: the `a` of every "over a".
+    pub fn mean_radius(&self) -> f64 {
+        self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64
+    }
+
+    /// Lower corner of the box, one coordinate a dimension.
+    pub fn lower(&self) -> Vec<f64> {
+        self.domain.lower.clone().unwrap_or_else(|| vec![0.0; self.dimension])
+    }
+
+    /// Upper corner of the box, one coordinate a dimension.
+    pub fn upper(&self) -> Vec<f64> {
+        self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
+    }
+
+    /// How the flow is modelled, as reports name it: the formulation, or the analytic model's name.
+    pub fn flow_name(&self) -> &'static str {
+        match self.flow.hydrodynamics {
+            Hydrodynamics::Stokes => self.flow.formulation.name(),
+            Hydrodynamics::PairMobility => self.flow.hydrodynamics.name(),
+        }
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}

@@ -1,0 +1,334 @@
+//! What can be wrong with a case, with the numbers needed to mend it.
+
+use std::fmt;
+use std::io;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::names::UnknownName;
+
+/// A case could not be used.
+#[derive(Debug, Error)]
+pub enum CaseError {
+    /// The file could not be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file was read, but something in it is wrong.
+    #[error(transparent)]
+    Invalid(Box<CaseIssue>),
+}
+
+/// One thing that is wrong in a case file, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaseIssue {
+    /// The file.
+    pub file: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1, in characters.
+    pub column: usize,
+    /// Bytes of `text` to point at.
+    pub span: Range<usize>,
+    /// The key, e.g. `particles[1].radius`.
+    pub key: Key,
+    /// The value as written, when there is one.
+    pub value: Option<String>,
+    /// What is wrong.
+    pub problem: Problem,
+}
+
+impl fmt::Display for CaseIssue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}: ", self.file.display(), self.line, self.column)?;
+        match (&self.key.is_root(), &self.value) {
+            (true, _) => {}
+            (false, Some(value)) => write!(f, "{} = {value}: ", self.key)?,
+            (false, None) => write!(f, "{}: ", self.key)?,
+        }
+        write!(f, "{}", self.problem)
+    }
+}
+
+impl std::error::Error for CaseIssue {}
+
+/// A place in a case: names of tables and keys, indices of arrays.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Key(pub Vec<KeyPart>);
+
+/// One step down a [`Key`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum KeyPart {
+    /// A key of a table.
+    Name(String),
+    /// An entry of an array, from 0.
+    Index(usize),
+}
+
+impl Key {
+    /// Whether this is the case as a whole.
+    pub fn is_root(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The key below this one in a table.
+    pub fn name(&self, name: &str) -> Self {
+        self.with(KeyPart::Name(name.to_owned()))
+    }
+
+    /// The entry below this one in an array.
+    pub fn index(&self, index: usize) -> Self {
+        self.with(KeyPart::Index(index))
+    }
+
+    fn with(&self, part: KeyPart) -> Self {
+        let mut parts = self.0.clone();
+        parts.push(part);
+        Self(parts)
+    }
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (depth, part) in self.0.iter().enumerate() {
+            match part {
+                KeyPart::Name(name) if depth == 0 => write!(f, "{name}")?,
+                KeyPart::Name(name) => write!(f, ".{name}")?,
+                KeyPart::Index(index) => write!(f, "[{index}]")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What is wrong with a value of a case.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum Problem {
+    /// Not TOML.
+    #[error("not valid TOML: {message}")]
+    Syntax {
+        /// What the parser says.
+        message: String,
+    },
+    /// A key that has no default is absent.
+    #[error("missing key `{name}`")]
+    MissingKey {
+        /// The key.
+        name: String,
+        /// An example of a line that would be right.
+        example: &'static str,
+    },
+    /// A key that nothing reads.
+    #[error("unknown key `{name}`")]
+    UnknownKey {
+        /// The key as written.
+        name: String,
+        /// The nearest known key.
+        suggestion: Option<String>,
+        /// All keys known here.
+        known: Vec<String>,
+    },
+    /// A value of another type.
+    #[error("wrong type: found {found}")]
+    WrongType {
+        /// What stands there.
+        found: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// A name that is none of the known ones.
+    #[error("{0}")]
+    UnknownName(UnknownName),
+    /// Something serde has no better word for.
+    #[error("{message}")]
+    Malformed {
+        /// What the parser says.
+        message: String,
+    },
+    /// Neither 2 nor 3.
+    #[error("dimension {found} is not implemented")]
+    Dimension {
+        /// The dimension asked for.
+        found: usize,
+    },
+    /// NaN or infinite.
+    #[error("{found} is not a finite number")]
+    NotFinite {
+        /// The value.
+        found: f64,
+    },
+    /// A number outside its range.
+    #[error("{found} is out of range")]
+    OutOfRange {
+        /// The value.
+        found: f64,
+        /// The range, in words: `greater than 0`.
+        range: String,
+    },
+    /// A vector with another number of coordinates than the dimension.
+    #[error("{found} coordinates in {dimension}D")]
+    CoordinateCount {
+        /// Coordinates given.
+        found: usize,
+        /// Coordinates needed.
+        dimension: usize,
+    },
+    /// The upper corner is not above the lower one.
+    #[error("the box is empty along {axis}: lower {lower}, upper {upper}")]
+    EmptyBox {
+        /// Name of the axis.
+        axis: char,
+        /// Lower bound.
+        lower: f64,
+        /// Upper bound.
+        upper: f64,
+    },
+    /// Edges whose ratio is not a whole number cannot be filled with cubes of one size.
+    #[error("edge {edge} along {axis} is not a whole multiple of the shortest edge {shortest}")]
+    UnevenBox {
+        /// Name of the axis.
+        axis: char,
+        /// Its edge.
+        edge: f64,
+        /// The shortest edge.
+        shortest: f64,
+    },
+    /// A particle wider than the box.
+    #[error("particle {particle} of diameter {diameter} does not fit in a box of edge {edge} along {axis}")]
+    TooBig {
+        /// Its number, from 1.
+        particle: usize,
+        /// Its diameter.
+        diameter: f64,
+        /// The edge of the box it exceeds.
+        edge: f64,
+        /// Name of the axis.
+        axis: char,
+    },
+    /// A particle that sticks out of the box.
+    #[error("particle {particle} sticks out of the box by {excess:.6e} along {axis}")]
+    OutsideBox {
+        /// Its number, from 1.
+        particle: usize,
+        /// How far.
+        excess: f64,
+        /// Name of the axis.
+        axis: char,
+        /// The interval its centre may lie in along that axis.
+        range: (f64, f64),
+    },
+    /// Two particles that overlap at the start.
+    #[error("particles {first} and {second} overlap at the start: gap {gap:.6e}")]
+    Overlap {
+        /// Number of the first particle, from 1.
+        first: usize,
+        /// Number of the second particle.
+        second: usize,
+        /// Their gap, negative.
+        gap: f64,
+        /// Distance of the centres.
+        distance: f64,
+        /// Sum of the radii.
+        contact_distance: f64,
+    },
+    /// No particles at all.
+    #[error("no particles")]
+    NoParticles,
+    /// A mesh finer than the tree can number.
+    #[error("{cells_per_radius} cells a radius of {radius} need level {level} of the tree")]
+    MeshTooFine {
+        /// Cells asked for.
+        cells_per_radius: f64,
+        /// The smallest radius.
+        radius: f64,
+        /// Level needed.
+        level: f64,
+        /// Finest level possible.
+        finest: u32,
+        /// The largest number of cells a radius at that level.
+        largest: f64,
+    },
+    /// The coarsest cells would be finer than the finest.
+    #[error("level {found} is finer than the finest cells, level {finest}")]
+    CoarseTooFine {
+        /// Level asked for.
+        found: u32,
+        /// Level of the finest cells.
+        finest: u32,
+    },
+    /// More steps than can be counted or waited for.
+    #[error("{end} / {step} are {steps:.3e} steps")]
+    TooManySteps {
+        /// End of the run.
+        end: f64,
+        /// Time step.
+        step: f64,
+        /// Number of steps.
+        steps: f64,
+    },
+    /// A choice that does not go with the rest of the case.
+    #[error("\"{choice}\" needs {needs}, but the case has {found}")]
+    Unfit {
+        /// The choice.
+        choice: &'static str,
+        /// What it needs.
+        needs: &'static str,
+        /// What the case has.
+        found: String,
+    },
+    /// A name with characters that do not belong in a file name.
+    #[error("not a name")]
+    BadName,
+}
+
+impl Problem {
+    /// What would be right.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::Syntax { .. } | Self::Malformed { .. } => "see the case format in the README".into(),
+            Self::MissingKey { example, .. } => format!("add a line like `{example}`"),
+            Self::UnknownKey { suggestion, known, .. } => unknown_key_hint(suggestion.as_deref(), known),
+            Self::WrongType { expected, .. } => format!("expected {expected}"),
+            Self::UnknownName(name) => name.hint(),
+            Self::Dimension { .. } => "dimension is 2 or 3".into(),
+            Self::NotFinite { .. } => "expected a finite number".into(),
+            Self::OutOfRange { range, .. } => format!("expected a number {range}"),
+            Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
+            Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
+            Self::UnevenBox { edge, shortest, .. } => {
+                format!("the mesh is made of cubes: take {}", (edge / shortest).round().max(1.0) * shortest)
+            }
+            Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
+            Self::OutsideBox { axis, range, .. } => {
+                format!("{axis} of the centre must lie between {} and {}", range.0, range.1)
+            }
+            Self::Overlap { distance, contact_distance, .. } => {
+                format!("the centres are {distance} apart, at least {contact_distance} is needed")
+            }
+            Self::NoParticles => "add a [[particles]] table with `position` and `radius`".into(),
+            Self::MeshTooFine { finest, largest, .. } => {
+                format!("the tree has {finest} levels: at most {largest:.3} cells a radius")
+            }
+            Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
+            Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
+            Self::Unfit { needs, .. } => format!("it needs {needs}"),
+            Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
+        }
+    }
+}
+
+fn unknown_key_hint(suggestion: Option<&str>, known: &[String]) -> String {
+    let known = known.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
+    match suggestion {
+        Some(near) => format!("did you mean `{near}`? Keys known here: {known}"),
+        None => format!("keys known here: {known}"),
+    }
+}

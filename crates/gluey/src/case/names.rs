@@ -1,0 +1,147 @@
+//! The choices a case file makes by name.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::suggest::closest;
+
+/// A name that is none of the known ones.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("`{found}` is not a known {what}")]
+pub struct UnknownName {
+    /// What was to be named: `strategy`, `formulation`, ...
+    pub what: &'static str,
+    /// The name as given.
+    pub found: String,
+    /// All names that would be right.
+    pub known: &'static [&'static str],
+}
+
+impl UnknownName {
+    /// What would be right, with the nearest name first.
+    pub fn hint(&self) -> String {
+        let choices = self.known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+        match closest(&self.found, self.known.iter().copied()) {
+            Some(near) => format!("did you mean \"{near}\"? One of {choices}"),
+            None => format!("one of {choices}"),
+        }
+    }
+}
+
+/// An enum whose variants have names: `Display`, `FromStr`, serde and the list of all of them.
+macro_rules! named {
+    ($(#[$doc:meta])* $type:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $name:literal),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        pub enum $type {
+            $($(#[$variant_doc])* #[serde(rename = $name)] $variant),+
+        }
+
+        impl $type {
+            /// All choices, in the order of the documentation.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+            /// Their names, in the same order.
+            pub const NAMES: &'static [&'static str] = &[$($name),+];
+
+            /// The name used in case files and on the command line.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+
+        impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl FromStr for $type {
+            type Err = UnknownName;
+
+            fn from_str(found: &str) -> Result<Self, UnknownName> {
+                Self::ALL.iter().copied().find(|choice| choice.name() == found).ok_or_else(|| UnknownName {
+                    what: $what,
+                    found: found.to_owned(),
+                    known: Self::NAMES,
+                })
+            }
+        }
+    };
+}
+
+named! {
+    /// What keeps particles from overlapping.
+    Strategy, "strategy" {
+        /// Nothing: the flow alone decides.
+        None = "none",
+        /// Push overlapping pairs apart along the line of centres after the move.
+        VelocityCorrection = "velocity-correction",
+        /// Project the velocities on those that do not overlap, without memory (gamma = 0).
+        Inelastic = "inelastic",
+        /// Project with memory: a pair sticks until it was pulled as hard as it was pushed (Verdon et al. 2010).
+        #[default]
+        Gluey = "gluey",
+    }
+}
+
+named! {
+    /// How rigidity of the particles enters the flow equations.
+    Formulation, "formulation" {
+        /// Viscosity ratio and Uzawa multiplier, as in the paper: soft near contact.
+        #[default]
+        Paper = "paper",
+        /// Velocity nodes inside particles take part in their rigid motion exactly.
+        RigidDofs = "rigid-dofs",
+    }
+}
+
+named! {
+    /// Who predicts the velocities of the particles.
+    Hydrodynamics, "hydrodynamics" {
+        /// Finite-element Stokes flow in the box.
+        #[default]
+        Stokes = "stokes",
+        /// Two equal spheres in unbounded shear flow (Batchelor and Green 1972); 3D only.
+        PairMobility = "pair-mobility",
+    }
+}
+
+named! {
+    /// How the Stokes equations are solved.
+    Solver, "solver" {
+        /// Direct in 2D, multigrid in 3D.
+        #[default]
+        Auto = "auto",
+        /// Sparse factorisation.
+        Direct = "direct",
+        /// Krylov iteration with a multigrid preconditioner.
+        Multigrid = "multigrid",
+    }
+}
+
+named! {
+    /// Time stepping of the particles.
+    Scheme, "time scheme" {
+        /// Explicit Euler (Verdon et al. 2010, eq. 11).
+        Euler = "euler",
+        /// Adams-Bashforth of order two, the first step Euler (eq. 12).
+        #[default]
+        AdamsBashforth2 = "adams-bashforth-2",
+    }
+}
+
+named! {
+    /// Condition on the boundary of the box.
+    Boundary, "boundary" {
+        /// The velocity of undisturbed shear, `rate (y - y_mid) e_x`, on the whole boundary.
+        #[default]
+        Couette = "couette",
+        /// Moving walls below and above (y), periodic in x (and z).
+        Periodic = "periodic",
+    }
+}

@@ -1,0 +1,256 @@
+//! What a case must satisfy beyond its types.
+
+use super::Case;
+use super::error::{Key, Problem};
+use super::names::{Hydrodynamics, UnknownName};
+use crate::reference;
+
+/// A value that makes no sense, and its key.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Violation {
+    pub key: Key,
+    pub problem: Problem,
+}
+
+type Check = Result<(), Violation>;
+
+/// Finest level of the tree: two bits of 21 a coordinate are kept for the nodes between the corners.
+const FINEST_LEVEL: u32 = 19;
+/// Largest number of steps.
+const MAX_STEPS: f64 = 1e9;
+const AXES: [char; 3] = ['x', 'y', 'z'];
+
+/// The first thing wrong with `case`, in the order of the file format.
+pub(super) fn check(case: &Case) -> Check {
+    let root = Key::default();
+    check_name(&case.name, root.name("name"))?;
+    if !(2..=3).contains(&case.dimension) {
+        return fail(root.name("dimension"), Problem::Dimension { found: case.dimension });
+    }
+    finite(case.shear_rate, root.name("shear_rate"))?;
+    check_reference(case, root.name("reference"))?;
+    check_domain(case, &root.name("domain"))?;
+    check_particles(case, &root.name("particles"))?;
+    check_time(case, &root.name("time"))?;
+    check_flow(case, &root.name("flow"))
+}
+
+fn check_name(name: &str, key: Key) -> Check {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match !name.is_empty() && name.len() <= 64 && name.chars().all(fits) {
+        true => Ok(()),
+        false => fail(key, Problem::BadName),
+    }
+}
+
+fn check_reference(case: &Case, key: Key) -> Check {
+    match &case.reference {
+        Some(name) if !reference::NAMES.contains(&name.as_str()) => {
+            let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
+            fail(key, Problem::UnknownName(problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_domain(case: &Case, key: &Key) -> Check {
+    coordinates(&case.lower(), case.dimension, key.name("lower"))?;
+    coordinates(&case.upper(), case.dimension, key.name("upper"))?;
+    let (lower, upper) = (case.lower(), case.upper());
+    for d in 0..case.dimension {
+        if upper[d] <= lower[d] {
+            let problem = Problem::EmptyBox { axis: AXES[d], lower: lower[d], upper: upper[d] };
+            return fail(key.name("upper"), problem);
+        }
+    }
+    match case.flow.hydrodynamics {
+        Hydrodynamics::Stokes => check_cubes(&edges(case), key),
+        Hydrodynamics::PairMobility => Ok(()),
+    }
+}
+
+/// The mesh is a row of cubes along each axis.
+fn check_cubes(edges: &[f64], key: &Key) -> Check {
+    let shortest = smallest(edges.iter().copied());
+    for (d, &edge) in edges.iter().enumerate() {
+        let ratio = edge / shortest;
+        if (ratio - ratio.round()).abs() > 1e-9 * ratio {
+            return fail(key.name("upper"), Problem::UnevenBox { axis: AXES[d], edge, shortest });
+        }
+    }
+    Ok(())
+}
+
+fn check_particles(case: &Case, key: &Key) -> Check {
+    if case.particles.is_empty() {
+        return fail(key.clone(), Problem::NoParticles);
+    }
+    for (index, particle) in case.particles.iter().enumerate() {
+        let key = key.index(index);
+        coordinates(&particle.position, case.dimension, key.name("position"))?;
+        positive(particle.radius, key.name("radius"))?;
+        check_inside(case, index, &key)?;
+    }
+    check_overlaps(case, key)
+}
+
+fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
+    let particle = &case.particles[index];
+    let (lower, upper) = (case.lower(), case.upper());
+    for d in 0..case.dimension {
+        let axis = AXES[d];
+        let range = (lower[d] + particle.radius, upper[d] - particle.radius);
+        if range.0 >= range.1 {
+            let (diameter, edge) = (2.0 * particle.radius, upper[d] - lower[d]);
+            return fail(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
+        }
+        let excess = (range.0 - particle.position[d]).max(particle.position[d] - range.1);
+        if excess > 0.0 {
+            let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
+            return fail(key.name("position"), problem);
+        }
+    }
+    Ok(())
+}
+
+fn check_overlaps(case: &Case, key: &Key) -> Check {
+    for (second, b) in case.particles.iter().enumerate() {
+        for (first, a) in case.particles[..second].iter().enumerate() {
+            let squares = a.position.iter().zip(&b.position).map(|(x, y)| (x - y).powi(2));
+            let distance = squares.sum::<f64>().sqrt();
+            let contact_distance = a.radius + b.radius;
+            if distance < contact_distance {
+                let (first, gap) = (first + 1, distance - contact_distance);
+                let problem = Problem::Overlap { first, second: second + 1, gap, distance, contact_distance };
+                return fail(key.index(second).name("position"), problem);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_time(case: &Case, key: &Key) -> Check {
+    let time = &case.time;
+    positive(time.step, key.name("step"))?;
+    positive(time.end, key.name("end"))?;
+    let steps = time.end / time.step;
+    if steps > MAX_STEPS {
+        let problem = Problem::TooManySteps { end: time.end, step: time.step, steps };
+        return fail(key.name("step"), problem);
+    }
+    match time.reverse_at {
+        Some(reverse_at) => positive(reverse_at, key.name("reverse_at")),
+        None => Ok(()),
+    }
+}
+
+fn check_flow(case: &Case, key: &Key) -> Check {
+    let flow = &case.flow;
+    between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
+    check_mesh(case, &key.name("mesh"))?;
+    check_paper(case, &key.name("paper"))?;
+    between(flow.rigid_dofs.offset, -1.0, 1.0, key.name("rigid-dofs").name("offset"))?;
+    match flow.hydrodynamics {
+        Hydrodynamics::PairMobility => check_pair_mobility(case, key.name("hydrodynamics")),
+        Hydrodynamics::Stokes => Ok(()),
+    }
+}
+
+fn check_mesh(case: &Case, key: &Key) -> Check {
+    let mesh = &case.flow.mesh;
+    positive(mesh.cells_per_radius, key.name("cells_per_radius"))?;
+    if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
+        return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
+    }
+    let radius = smallest(case.particles.iter().map(|particle| particle.radius));
+    let root_edge = smallest(edges(case).into_iter());
+    let level = (mesh.cells_per_radius * root_edge / radius).log2().ceil().max(0.0);
+    if level > f64::from(FINEST_LEVEL) {
+        let largest = radius / root_edge * f64::from(1u32 << FINEST_LEVEL);
+        let cells_per_radius = mesh.cells_per_radius;
+        let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest: FINEST_LEVEL, largest };
+        return fail(key.name("cells_per_radius"), problem);
+    }
+    if f64::from(mesh.coarsest_level) > level {
+        let problem = Problem::CoarseTooFine { found: mesh.coarsest_level, finest: level as u32 };
+        return fail(key.name("coarsest_level"), problem);
+    }
+    Ok(())
+}
+
+fn check_paper(case: &Case, key: &Key) -> Check {
+    let paper = &case.flow.paper;
+    if !(paper.viscosity_ratio >= 1.0 && paper.viscosity_ratio <= 1e12) {
+        return out_of_range(paper.viscosity_ratio, "from 1 to 1e12", key.name("viscosity_ratio"));
+    }
+    if !(1..=10_000).contains(&paper.uzawa_steps) {
+        return out_of_range(paper.uzawa_steps as f64, "from 1 to 10000", key.name("uzawa_steps"));
+    }
+    between(paper.rho, 0.0, 4.0, key.name("rho"))?;
+    if !(paper.ramp >= 0.0 && paper.ramp <= 100.0) {
+        return out_of_range(paper.ramp, "from 0 to 100", key.name("ramp"));
+    }
+    Ok(())
+}
+
+/// The analytic model knows two equal spheres in unbounded shear.
+fn check_pair_mobility(case: &Case, key: Key) -> Check {
+    let choice = Hydrodynamics::PairMobility.name();
+    let needs = "dimension 3 and two particles of equal radius";
+    let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
+    let found = match (case.dimension, radii.as_slice()) {
+        (3, [a, b]) if a == b => return Ok(()),
+        (3, [a, b]) => format!("radii {a} and {b}"),
+        (3, _) => format!("{} particles", radii.len()),
+        (dimension, _) => format!("dimension {dimension}"),
+    };
+    fail(key, Problem::Unfit { choice, needs, found })
+}
+
+fn coordinates(values: &[f64], dimension: usize, key: Key) -> Check {
+    if values.len() != dimension {
+        return fail(key, Problem::CoordinateCount { found: values.len(), dimension });
+    }
+    values.iter().enumerate().try_for_each(|(index, &value)| finite(value, key.index(index)))
+}
+
+fn finite(value: f64, key: Key) -> Check {
+    match value.is_finite() {
+        true => Ok(()),
+        false => fail(key, Problem::NotFinite { found: value }),
+    }
+}
+
+fn positive(value: f64, key: Key) -> Check {
+    finite(value, key.clone())?;
+    match value > 0.0 {
+        true => Ok(()),
+        false => out_of_range(value, "greater than 0", key),
+    }
+}
+
+/// `lower < value < upper`.
+fn between(value: f64, lower: f64, upper: f64, key: Key) -> Check {
+    finite(value, key.clone())?;
+    match lower < value && value < upper {
+        true => Ok(()),
+        false => out_of_range(value, &format!("between {lower} and {upper}, without the ends"), key),
+    }
+}
+
+fn out_of_range(found: f64, range: &str, key: Key) -> Check {
+    finite(found, key.clone())?;
+    fail(key, Problem::OutOfRange { found, range: range.to_owned() })
+}
+
+fn fail(key: Key, problem: Problem) -> Check {
+    Err(Violation { key, problem })
+}
+
+fn edges(case: &Case) -> Vec<f64> {
+    case.lower().iter().zip(case.upper()).map(|(lower, upper)| upper - lower).collect()
+}
+
+fn smallest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::INFINITY, f64::min)
+}
