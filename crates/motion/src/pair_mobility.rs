@@ -1,0 +1,109 @@
+//! Two equal, force- and torque-free spheres in an unbounded linear flow, exactly (Batchelor and Green 1972,
+//! DOI 10.1017/S0022112072002927).
+//!
+//! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they should and
+//! overlap, as they do in a fluid solver that does not resolve the lubrication film.
+
+use gluey_geom::{Dim, Particle, Space, Twist};
+
+use crate::{Hydrodynamics, LinearFlow, MobilityTable};
+
+/// Why a pair has no velocities.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PairMobilityError {
+    /// The model knows two spheres.
+    #[error("the pair mobility moves exactly 2 spheres, not {count}")]
+    ParticleCount {
+        /// How many there were.
+        count: usize,
+    },
+    /// The model knows equal spheres.
+    #[error("the pair mobility needs equal positive radii, not {first} and {second}")]
+    UnequalRadii {
+        /// Radius of particle 0.
+        first: f64,
+        /// Radius of particle 1.
+        second: f64,
+    },
+    /// The line of centres has no direction.
+    #[error("the centres of particles 0 and 1 are a distance {distance} apart: no line of centres")]
+    NoDirection {
+        /// Zero or not a number.
+        distance: f64,
+    },
+}
+
+/// Exact pair hydrodynamics as a cheap [`Hydrodynamics`].
+///
+/// Overlapping spheres (gap + offset <= 0) move as at contact: no relative normal velocity, tangential and spin
+/// coefficients at their limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairMobility {
+    flow: LinearFlow<3>,
+    factor: f64,
+    offset: f64,
+    table: MobilityTable,
+}
+
+impl PairMobility {
+    /// Two spheres in `flow`, exactly.
+    pub fn new(flow: LinearFlow<3>) -> Self {
+        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new() }
+    }
+
+    /// The same with the mobility evaluated at `gap + offset` (`offset` in radii), to imitate a soft solver.
+    pub fn with_gap_offset(mut self, offset: f64) -> Self {
+        self.offset = offset;
+        self
+    }
+}
+
+impl Hydrodynamics<3> for PairMobility {
+    type Error = PairMobilityError;
+
+    fn predict(
+        &mut self,
+        _t: f64,
+        particles: &[Particle<3>],
+        twists: &mut [Twist<3>],
+    ) -> Result<(), PairMobilityError> {
+        let (first, second) = equal_pair(particles)?;
+        let flow = self.flow.scaled(self.factor);
+        let r = second.pose.position - first.pose.position;
+        let distance = r.norm();
+        if !(distance > 0.0 && distance.is_finite()) {
+            return Err(PairMobilityError::NoDirection { distance });
+        }
+        let n = r / distance;
+        let mobility = self.table.at(distance / first.radius - 2.0 + self.offset);
+
+        let strain = flow.strain_rate() * r;
+        let normal = n * n.dot(&strain);
+        let relative = Dim::<3>::cross_spin(&flow.spin(), &r)
+            + normal * mobility.one_minus_a
+            + (strain - normal) * mobility.one_minus_b;
+        // By symmetry the mid-point moves with the fluid.
+        let middle = flow.velocity(&((first.pose.position + second.pose.position) * 0.5));
+        let spin = flow.spin() + Dim::<3>::moment(&n, &(strain / distance)) * mobility.spin;
+        for (twist, side) in twists.iter_mut().zip([-0.5, 0.5]) {
+            *twist = Twist { velocity: middle + relative * side, spin };
+        }
+        Ok(())
+    }
+
+    fn set_shear_factor(&mut self, factor: f64) {
+        self.factor = factor;
+    }
+}
+
+fn equal_pair(particles: &[Particle<3>]) -> Result<(&Particle<3>, &Particle<3>), PairMobilityError> {
+    let [first, second] = particles else {
+        return Err(PairMobilityError::ParticleCount { count: particles.len() });
+    };
+    let (a, b) = (first.radius, second.radius);
+    // Radii read from decimal text may differ in the last digit.
+    if !(a > 0.0 && (a - b).abs() <= 1e-12 * a) {
+        return Err(PairMobilityError::UnequalRadii { first: a, second: b });
+    }
+    Ok((first, second))
+}

@@ -1,0 +1,180 @@
+//! Order, reversal, rotation and checkpoint of the integrators.
+
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
+use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
+
+fn unit<const D: usize>(axis: usize) -> Vector<D> {
+    Vector::<D>::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 })
+}
+
+/// A particle off the centre of a rigidly turning flow, so that the exact answer is a circle.
+fn turning<const D: usize>() -> LinearFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    let mut gradient = Matrix::<D>::zeros();
+    (gradient[(0, 1)], gradient[(1, 0)]) = (-1.0, 1.0);
+    LinearFlow { gradient, origin: Vector::zeros() }
+}
+
+fn step<const D: usize>(
+    flow: &mut BackgroundFlow<D>,
+    integrator: &mut Integrator<D>,
+    dt: f64,
+    particles: &mut [Particle<D>],
+) where
+    Dim<D>: Space<D>,
+{
+    let mut twists = vec![Twist::default(); particles.len()];
+    flow.predict(0.0, particles, &mut twists).expect("cannot fail");
+    integrator.advance(dt, particles, &twists);
+}
+
+fn quarter_turn_error<const D: usize>(scheme: Scheme, step_count: usize) -> f64
+where
+    Dim<D>: Space<D>,
+{
+    let mut particles = [Particle::new(unit::<D>(0), 0.1)];
+    let (mut flow, mut integrator) = (BackgroundFlow::new(turning::<D>()), Integrator::new(scheme));
+    let dt = std::f64::consts::FRAC_PI_2 / step_count as f64;
+    for _ in 0..step_count {
+        step(&mut flow, &mut integrator, dt, &mut particles);
+    }
+    let turned = Dim::<D>::rotate(&particles[0].pose.orientation, &unit::<D>(0));
+    assert!((turned - unit::<D>(1)).norm() < 1e-12, "a constant spin turns exactly");
+    (particles[0].pose.position - unit::<D>(1)).norm()
+}
+
+fn check_order<const D: usize>()
+where
+    Dim<D>: Space<D>,
+{
+    for (scheme, order) in [(Scheme::Euler, 1.0), (Scheme::AdamsBashforth2, 2.0)] {
+        let errors = [40, 80, 160, 320].map(|n| quarter_turn_error::<D>(scheme, n));
+        for pair in errors.windows(2) {
+            let slope = (pair[0] / pair[1]).log2();
+            assert!((slope - order).abs() < 0.1, "{scheme}: slope {slope}, errors {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn euler_is_first_order_and_adams_bashforth_second() {
+    check_order::<2>();
+    check_order::<3>();
+}
+
+#[test]
+fn the_linear_form_is_what_advance_does() {
+    let dt = 0.1;
+    let mut flow = BackgroundFlow::new(turning::<2>());
+    for (scheme, rates) in [(Scheme::Euler, [0.1, 0.1]), (Scheme::AdamsBashforth2, [0.1, 0.15])] {
+        let mut integrator = Integrator::new(scheme);
+        let mut particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
+        for rate in rates {
+            assert!((integrator.rate(dt) - rate).abs() < 1e-16);
+            let (mut drift, mut twists) = ([Vector::zeros()], [Twist::default()]);
+            integrator.drift(dt, &mut drift);
+            flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
+            let expected = particles[0].pose.position + (twists[0].velocity * integrator.rate(dt) + drift[0]);
+            integrator.advance(dt, &mut particles, &twists);
+            assert_eq!(particles[0].pose.position, expected);
+        }
+    }
+}
+
+/// Error of coming back after `n` steps there and `n` back.
+fn return_error(scheme: Scheme, n: usize, turn: fn(&mut Integrator<2>)) -> f64 {
+    let dt = 1.0 / n as f64;
+    let mut flow = BackgroundFlow::new(turning::<2>());
+    let mut integrator = Integrator::new(scheme);
+    let start = Vector::<2>::new(1.0, 0.3);
+    let mut particles = [Particle::new(start, 0.1)];
+    for factor in [1.0, -1.0] {
+        flow.set_shear_factor(factor);
+        for _ in 0..n {
+            step(&mut flow, &mut integrator, dt, &mut particles);
+        }
+        turn(&mut integrator);
+    }
+    (particles[0].pose.position - start).norm()
+}
+
+#[test]
+fn reversal_keeps_second_order_and_ignoring_it_does_not() {
+    let slope = |turn| {
+        let errors = [100, 200].map(|n| return_error(Scheme::AdamsBashforth2, n, turn));
+        (f64::log2(errors[0] / errors[1]), errors[1])
+    };
+    let (reversed, error) = slope(Integrator::reverse);
+    assert!(reversed > 1.9 && error < 1e-4, "slope {reversed}, error {error:e}");
+    let (ignored, _) = slope(|_| ());
+    assert!(ignored < 1.2, "slope {ignored}");
+    assert!(slope(Integrator::restart).0 > 1.9);
+}
+
+#[test]
+fn the_step_after_a_reversal_goes_back_over_the_last() {
+    let dt = 0.01;
+    let mut flow = BackgroundFlow::new(turning::<2>());
+    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let mut particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
+    for _ in 0..9 {
+        step(&mut flow, &mut integrator, dt, &mut particles);
+    }
+    let before = particles[0].pose.position;
+    step(&mut flow, &mut integrator, dt, &mut particles);
+    flow.set_shear_factor(-1.0);
+    integrator.reverse();
+    step(&mut flow, &mut integrator, dt, &mut particles);
+    let error = (particles[0].pose.position - before).norm();
+    assert!(error < dt.powi(3), "{error:e}");
+}
+
+#[test]
+fn a_checkpoint_resumes_bit_for_bit() {
+    let mut flow = BackgroundFlow::new(turning::<3>());
+    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let mut particles = [Particle::new(Vector::<3>::new(1.0, 0.3, 0.2), 0.1)];
+    for _ in 0..5 {
+        step(&mut flow, &mut integrator, 0.1, &mut particles);
+    }
+    let bytes = postcard::to_stdvec(&integrator).expect("serialises");
+    let mut resumed: Integrator<3> = postcard::from_bytes(&bytes).expect("comes back");
+    let mut others = particles;
+    for _ in 0..5 {
+        step(&mut flow, &mut integrator, 0.1, &mut particles);
+        step(&mut flow, &mut resumed, 0.1, &mut others);
+    }
+    assert_eq!(particles, others);
+}
+
+#[test]
+fn schemes_have_names() {
+    for scheme in [Scheme::Euler, Scheme::AdamsBashforth2] {
+        assert_eq!(scheme.to_string().parse(), Ok(scheme));
+    }
+    assert!("leapfrog".parse::<Scheme>().is_err());
+}
+
+fn check_shear<const D: usize>()
+where
+    Dim<D>: Space<D>,
+{
+    let mut flow = BackgroundFlow::new(LinearFlow::<D>::shear(2.0, 0.5));
+    flow.set_shear_factor(-1.0);
+    let mut twists = [Twist::default()];
+    let particle = Particle::new(Vector::<D>::repeat(0.75), 0.1);
+    flow.predict(0.0, &[particle], &mut twists).expect("cannot fail");
+    assert_eq!(twists[0].velocity, unit::<D>(0) * -0.5);
+    // Clockwise at half the shear rate, reversed; about z in 3D.
+    let spin = Dim::<D>::spin_slice(&twists[0].spin);
+    assert_eq!(spin.last(), Some(&1.0));
+    assert!(spin.iter().rev().skip(1).all(|w| *w == 0.0));
+}
+
+#[test]
+fn shear_carries_and_turns() {
+    check_shear::<2>();
+    check_shear::<3>();
+}
