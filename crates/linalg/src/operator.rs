@@ -1,0 +1,184 @@
+//! What iterative methods ask of a matrix and of its approximate inverse, and the simplest of these.
+
+use crate::{Scalar, vector};
+
+/// A square linear operator that is known by its action.
+pub trait LinOp<T> {
+    /// Number of rows, equal to the number of columns.
+    fn dim(&self) -> usize;
+
+    /// `y = A x`. All of `y` is overwritten; nothing is allocated.
+    fn apply(&mut self, x: &[T], y: &mut [T]);
+}
+
+/// An approximate inverse `M^-1` of an operator.
+pub trait Preconditioner<T> {
+    /// `z = M^-1 r`. All of `z` is overwritten; nothing is allocated.
+    fn apply(&mut self, r: &[T], z: &mut [T]);
+}
+
+impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
+    fn dim(&self) -> usize {
+        (**self).dim()
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        (**self).apply(x, y);
+    }
+}
+
+impl<T, M: Preconditioner<T> + ?Sized> Preconditioner<T> for &mut M {
+    fn apply(&mut self, r: &[T], z: &mut [T]) {
+        (**self).apply(r, z);
+    }
+}
+
+/// An operator or preconditioner given by a closure `|x, y| ...` that sets `y`.
+pub struct FnOp<F> {
+    dim: usize,
+    action: F,
+}
+
+impl<F> FnOp<F> {
+    /// The operator of dimension `dim` whose action is `action(x, y)`.
+    pub fn new(dim: usize, action: F) -> Self {
+        Self { dim, action }
+    }
+}
+
+impl<T, F: FnMut(&[T], &mut [T])> LinOp<T> for FnOp<F> {
+    fn dim(&self) -> usize {
+        self.dim
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        (self.action)(x, y);
+    }
+}
+
+impl<T, F: FnMut(&[T], &mut [T])> Preconditioner<T> for FnOp<F> {
+    fn apply(&mut self, r: &[T], z: &mut [T]) {
+        (self.action)(r, z);
+    }
+}
+
+/// No preconditioning: `z = r`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Identity;
+
+impl<T: Copy> Preconditioner<T> for Identity {
+    fn apply(&mut self, r: &[T], z: &mut [T]) {
+        z.copy_from_slice(r);
+    }
+}
+
+/// Jacobi's preconditioner: division by a diagonal.
+#[derive(Clone, Debug)]
+pub struct Jacobi<T> {
+    inverse: Vec<T>,
+}
+
+/// The entry of a diagonal that has no inverse.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("diagonal entry {row} is {value:e} and cannot be inverted")]
+pub struct BadDiagonal {
+    /// Index of the entry.
+    pub row: usize,
+    /// Its value: zero, infinite or NaN.
+    pub value: f64,
+}
+
+impl<T: Scalar> Jacobi<T> {
+    /// Division by `diagonal`, whose entries are finite and not zero.
+    pub fn new(diagonal: &[T]) -> Result<Self, BadDiagonal> {
+        let mut jacobi = Self { inverse: vec![T::ONE; diagonal.len()] };
+        jacobi.refill(diagonal)?;
+        Ok(jacobi)
+    }
+
+    /// Takes a new diagonal of the same length.
+    pub fn refill(&mut self, diagonal: &[T]) -> Result<(), BadDiagonal> {
+        for (row, (inverse, &d)) in self.inverse.iter_mut().zip(diagonal).enumerate() {
+            *inverse = T::ONE / d;
+            if !(inverse.is_finite() && d.is_finite()) {
+                return Err(BadDiagonal { row, value: d.to_f64() });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<T: Scalar> Preconditioner<T> for Jacobi<T> {
+    fn apply(&mut self, r: &[T], z: &mut [T]) {
+        for (z, (&r, &inverse)) in z.iter_mut().zip(r.iter().zip(&self.inverse)) {
+            *z = r * inverse;
+        }
+    }
+}
+
+/// A single-precision preconditioner seen from double precision.
+///
+/// The residual is scaled to norm one before it is rounded, so that neither small nor large residuals leave the
+/// range of `f32`. The result is not a linear function of `r` to more than seven digits: use it inside a *flexible*
+/// Krylov method ([`crate::Fgmres`]), never inside a fixed one.
+#[derive(Clone, Debug)]
+pub struct SinglePrecision<M> {
+    inner: M,
+    r: Vec<f32>,
+    z: Vec<f32>,
+}
+
+impl<M: Preconditioner<f32>> SinglePrecision<M> {
+    /// Wraps `inner` for vectors of length `dim`.
+    pub fn new(dim: usize, inner: M) -> Self {
+        Self { inner, r: vec![0.0; dim], z: vec![0.0; dim] }
+    }
+
+    /// The wrapped preconditioner.
+    pub fn inner_mut(&mut self) -> &mut M {
+        &mut self.inner
+    }
+}
+
+impl<M: Preconditioner<f32>> Preconditioner<f64> for SinglePrecision<M> {
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let norm = vector::norm(r);
+        if norm == 0.0 {
+            z.fill(0.0);
+            return;
+        }
+        for (single, &double) in self.r.iter_mut().zip(r) {
+            *single = (double / norm) as f32;
+        }
+        self.inner.apply(&self.r, &mut self.z);
+        for (double, &single) in z.iter_mut().zip(&self.z) {
+            *double = f64::from(single) * norm;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jacobi_divides_and_names_the_bad_row() {
+        let mut jacobi = Jacobi::new(&[2.0, -4.0]).expect("invertible");
+        let mut z = [0.0; 2];
+        jacobi.apply(&[1.0, 1.0], &mut z);
+        assert_eq!(z, [0.5, -0.25]);
+        assert_eq!(Jacobi::new(&[1.0, 0.0]).expect_err("zero"), BadDiagonal { row: 1, value: 0.0 });
+        assert!(Jacobi::new(&[f64::NAN]).is_err());
+        assert!(Jacobi::new(&[f64::INFINITY]).is_err());
+    }
+
+    #[test]
+    fn single_precision_keeps_the_scale() {
+        let mut m = SinglePrecision::new(2, Identity);
+        let mut z = [0.0; 2];
+        m.apply(&[3e-120, -4e-120], &mut z);
+        assert!((z[0] / 3e-120 - 1.0).abs() < 1e-6 && (z[1] / -4e-120 - 1.0).abs() < 1e-6);
+        m.apply(&[0.0, 0.0], &mut z);
+        assert_eq!(z, [0.0, 0.0]);
+    }
+}

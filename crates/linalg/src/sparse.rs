@@ -1,0 +1,425 @@
+//! Sparse matrices in compressed rows: the pattern apart from the values, so that a steady mesh refills only values.
+
+use std::sync::Arc;
+
+use crate::{LinOp, Scalar};
+
+/// Positions of the entries of a sparse matrix, row by row, columns ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    column_count: usize,
+    /// Row `i` holds entries `row_start[i] .. row_start[i + 1]`.
+    row_start: Vec<u32>,
+    columns: Vec<u32>,
+}
+
+/// Why a pattern or a matrix was refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SparseError {
+    /// A row or column lies outside the matrix.
+    #[error("entry ({row}, {column}) lies outside a matrix of {row_count} x {column_count}")]
+    OutOfRange {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        column: usize,
+        /// Rows of the matrix.
+        row_count: usize,
+        /// Columns of the matrix.
+        column_count: usize,
+    },
+    /// The matrix has an entry outside the pattern.
+    #[error("entry ({row}, {column}) is not in the pattern")]
+    NotInPattern {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        column: usize,
+    },
+    /// More entries than 32-bit indices can count.
+    #[error("{entry_count} entries are more than 32-bit indices can count")]
+    TooLarge {
+        /// Number of entries.
+        entry_count: usize,
+    },
+    /// The number of values is not the number of entries.
+    #[error("{found} values for a pattern of {expected} entries")]
+    WrongLength {
+        /// Entries of the pattern.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+}
+
+impl Pattern {
+    /// Pattern of a square matrix of dimension `dim` that couples all unknowns of a group with each other; a group is
+    /// typically the unknowns of a cell. The diagonal is always in it, and the pattern is symmetric.
+    pub fn from_groups<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
+        let touching = Touching::new(dim, groups)?;
+        let mut builder = RowBuilder::new(dim, dim);
+        for row in 0..dim {
+            builder.insert(row);
+            for &group in touching.groups_of(row) {
+                for &column in groups[group as usize].as_ref() {
+                    builder.insert(column);
+                }
+            }
+            builder.close_row()?;
+        }
+        Ok(builder.pattern)
+    }
+
+    /// Pattern of the entries `(row, column)`, in any order, repetitions allowed.
+    pub fn from_entries(
+        row_count: usize,
+        column_count: usize,
+        entries: &[(usize, usize)],
+    ) -> Result<Self, SparseError> {
+        let mut sorted = entries.to_vec();
+        sorted.sort_unstable();
+        let mut builder = RowBuilder::new(row_count, column_count);
+        let mut next = sorted.iter().peekable();
+        for row in 0..row_count {
+            while let Some(&(_, column)) = next.next_if(|entry| entry.0 == row) {
+                if column >= column_count {
+                    return Err(SparseError::OutOfRange { row, column, row_count, column_count });
+                }
+                builder.insert(column);
+            }
+            builder.close_row()?;
+        }
+        match next.next() {
+            Some(&(row, column)) => Err(SparseError::OutOfRange { row, column, row_count, column_count }),
+            None => Ok(builder.pattern),
+        }
+    }
+
+    /// Number of rows.
+    pub fn row_count(&self) -> usize {
+        self.row_start.len() - 1
+    }
+
+    /// Number of columns.
+    pub fn column_count(&self) -> usize {
+        self.column_count
+    }
+
+    /// Number of entries.
+    pub fn entry_count(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Columns of a row, ascending.
+    pub fn columns_of(&self, row: usize) -> &[u32] {
+        &self.columns[self.range(row)]
+    }
+
+    /// Positions of the entries of a row in the array of values.
+    pub fn range(&self, row: usize) -> std::ops::Range<usize> {
+        self.row_start[row] as usize..self.row_start[row + 1] as usize
+    }
+
+    /// Position of an entry in the array of values.
+    pub fn position(&self, row: usize, column: usize) -> Option<usize> {
+        let range = self.range(row);
+        let column = u32::try_from(column).ok()?;
+        self.columns[range.clone()].binary_search(&column).ok().map(|offset| range.start + offset)
+    }
+
+    /// Whether the matrix is square and has entry `(j, i)` wherever it has `(i, j)`.
+    pub fn is_symmetric(&self) -> bool {
+        if self.row_count() != self.column_count {
+            return false;
+        }
+        // Rows are visited in ascending order, so the next unseen entry of row j must be the row at hand.
+        let mut seen = self.row_start[..self.row_count()].to_vec();
+        for row in 0..self.row_count() {
+            for &column in self.columns_of(row) {
+                let column = column as usize;
+                let cursor = seen[column];
+                if cursor == self.row_start[column + 1] || self.columns[cursor as usize] as usize != row {
+                    return false;
+                }
+                seen[column] += 1;
+            }
+        }
+        true
+    }
+
+    pub(crate) fn row_start(&self) -> &[u32] {
+        &self.row_start
+    }
+
+    pub(crate) fn columns(&self) -> &[u32] {
+        &self.columns
+    }
+}
+
+/// The groups that touch each unknown.
+struct Touching {
+    start: Vec<u32>,
+    groups: Vec<u32>,
+}
+
+impl Touching {
+    fn new<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
+        let mut start = vec![0u32; dim + 1];
+        let total: usize = groups.iter().map(|group| group.as_ref().len()).sum();
+        if u32::try_from(total).is_err() {
+            return Err(SparseError::TooLarge { entry_count: total });
+        }
+        for &dof in groups.iter().flat_map(|group| group.as_ref()) {
+            if dof >= dim {
+                let (row, column) = (dof, dof);
+                return Err(SparseError::OutOfRange { row, column, row_count: dim, column_count: dim });
+            }
+            start[dof + 1] += 1;
+        }
+        for dof in 0..dim {
+            start[dof + 1] += start[dof];
+        }
+        let mut end = start.clone();
+        let mut touching = vec![0u32; total];
+        for (group, dofs) in groups.iter().enumerate() {
+            for &dof in dofs.as_ref() {
+                touching[end[dof] as usize] = group as u32;
+                end[dof] += 1;
+            }
+        }
+        Ok(Self { start, groups: touching })
+    }
+
+    fn groups_of(&self, dof: usize) -> &[u32] {
+        &self.groups[self.start[dof] as usize..self.start[dof + 1] as usize]
+    }
+}
+
+/// Collects the columns of one row after the other.
+struct RowBuilder {
+    pattern: Pattern,
+    /// One more than the last row that has this column.
+    mark: Vec<u32>,
+}
+
+impl RowBuilder {
+    fn new(row_count: usize, column_count: usize) -> Self {
+        let mut row_start = Vec::with_capacity(row_count + 1);
+        row_start.push(0);
+        Self {
+            pattern: Pattern { column_count, row_start, columns: Vec::new() },
+            mark: vec![0; column_count],
+        }
+    }
+
+    fn insert(&mut self, column: usize) {
+        let stamp = self.pattern.row_start.len() as u32;
+        if self.mark[column] != stamp {
+            self.mark[column] = stamp;
+            self.pattern.columns.push(column as u32);
+        }
+    }
+
+    fn close_row(&mut self) -> Result<(), SparseError> {
+        let Pattern { row_start, columns, .. } = &mut self.pattern;
+        let begin = row_start[row_start.len() - 1] as usize;
+        columns[begin..].sort_unstable();
+        let end =
+            u32::try_from(columns.len()).map_err(|_| SparseError::TooLarge { entry_count: columns.len() })?;
+        row_start.push(end);
+        Ok(())
+    }
+}
+
+/// A sparse matrix: a shared pattern and its own values.
+#[derive(Clone, Debug)]
+pub struct SparseMatrix<T = f64> {
+    pattern: Arc<Pattern>,
+    values: Vec<T>,
+}
+
+impl<T: Scalar> SparseMatrix<T> {
+    /// The zero matrix of a pattern.
+    pub fn zeros(pattern: Arc<Pattern>) -> Self {
+        let values = vec![T::ZERO; pattern.entry_count()];
+        Self { pattern, values }
+    }
+
+    /// The matrix with the given values, in the order of the pattern.
+    pub fn new(pattern: Arc<Pattern>, values: Vec<T>) -> Result<Self, SparseError> {
+        let (expected, found) = (pattern.entry_count(), values.len());
+        if expected != found {
+            return Err(SparseError::WrongLength { expected, found });
+        }
+        Ok(Self { pattern, values })
+    }
+
+    /// The sum of the triplets `(row, column, value)`.
+    pub fn from_triplets(
+        row_count: usize,
+        column_count: usize,
+        triplets: &[(usize, usize, T)],
+    ) -> Result<Self, SparseError> {
+        let entries: Vec<_> = triplets.iter().map(|&(row, column, _)| (row, column)).collect();
+        let pattern = Pattern::from_entries(row_count, column_count, &entries)?;
+        let mut matrix = Self::zeros(Arc::new(pattern));
+        for &(row, column, value) in triplets {
+            matrix.add(row, column, value)?;
+        }
+        Ok(matrix)
+    }
+
+    /// The pattern.
+    pub fn pattern(&self) -> &Arc<Pattern> {
+        &self.pattern
+    }
+
+    /// The values in the order of the pattern.
+    pub fn values(&self) -> &[T] {
+        &self.values
+    }
+
+    /// The values, for refilling by position (see [`Pattern::position`]).
+    pub fn values_mut(&mut self) -> &mut [T] {
+        &mut self.values
+    }
+
+    /// Overwrites all values, in the order of the pattern.
+    pub fn copy_values(&mut self, values: &[T]) -> Result<(), SparseError> {
+        let (expected, found) = (self.values.len(), values.len());
+        if expected != found {
+            return Err(SparseError::WrongLength { expected, found });
+        }
+        self.values.copy_from_slice(values);
+        Ok(())
+    }
+
+    /// Sets all values to zero and keeps the pattern.
+    pub fn clear(&mut self) {
+        self.values.fill(T::ZERO);
+    }
+
+    /// Adds to one entry.
+    pub fn add(&mut self, row: usize, column: usize, value: T) -> Result<(), SparseError> {
+        let position = self.pattern.position(row, column).ok_or(SparseError::NotInPattern { row, column })?;
+        self.values[position] += value;
+        Ok(())
+    }
+
+    /// Adds a dense block, stored row by row, to the rows and columns `dofs`.
+    pub fn add_block(&mut self, dofs: &[usize], block: &[T]) -> Result<(), SparseError> {
+        debug_assert_eq!(block.len(), dofs.len() * dofs.len());
+        for (&row, values) in dofs.iter().zip(block.chunks_exact(dofs.len())) {
+            for (&column, &value) in dofs.iter().zip(values) {
+                self.add(row, column, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The entry, or zero where the pattern has none.
+    pub fn get(&self, row: usize, column: usize) -> T {
+        self.pattern.position(row, column).map_or(T::ZERO, |position| self.values[position])
+    }
+
+    /// The diagonal.
+    pub fn diagonal(&self) -> Vec<T> {
+        (0..self.pattern.row_count()).map(|row| self.get(row, row)).collect()
+    }
+
+    /// `y = A x`.
+    pub fn multiply(&self, x: &[T], y: &mut [T]) {
+        for (row, y) in y.iter_mut().enumerate() {
+            *y = self.row_product(row, x);
+        }
+    }
+
+    /// `y += a A x`.
+    pub fn multiply_add(&self, a: f64, x: &[T], y: &mut [T]) {
+        let a = T::from_f64(a);
+        for (row, y) in y.iter_mut().enumerate() {
+            *y += a * self.row_product(row, x);
+        }
+    }
+
+    /// `y += a A^T x`.
+    pub fn transpose_multiply_add(&self, a: f64, x: &[T], y: &mut [T]) {
+        let a = T::from_f64(a);
+        for (row, &x) in x.iter().enumerate() {
+            let range = self.pattern.range(row);
+            for (&column, &value) in self.pattern.columns[range.clone()].iter().zip(&self.values[range]) {
+                y[column as usize] += a * x * value;
+            }
+        }
+    }
+
+    fn row_product(&self, row: usize, x: &[T]) -> T {
+        let range = self.pattern.range(row);
+        let columns = &self.pattern.columns[range.clone()];
+        columns.iter().zip(&self.values[range]).fold(T::ZERO, |sum, (&c, &v)| sum + v * x[c as usize])
+    }
+}
+
+impl<T: Scalar> LinOp<T> for SparseMatrix<T> {
+    fn dim(&self) -> usize {
+        self.pattern.row_count()
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        self.multiply(x, y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_couple_their_members() {
+        let pattern = Pattern::from_groups(5, &[vec![0, 2], vec![2, 3, 0]]).expect("valid");
+        let rows: Vec<&[u32]> = (0..5).map(|row| pattern.columns_of(row)).collect();
+        assert_eq!(rows, [&[0u32, 2, 3][..], &[1], &[0, 2, 3], &[0, 2, 3], &[4]]);
+        assert!(pattern.is_symmetric());
+        assert_eq!(pattern.position(3, 2), Some(8));
+        assert_eq!(pattern.position(3, 1), None);
+        assert!(matches!(Pattern::from_groups(2, &[[2usize]]), Err(SparseError::OutOfRange { row: 2, .. })));
+    }
+
+    #[test]
+    fn triplets_add_up() {
+        let a = SparseMatrix::from_triplets(2, 3, &[(1, 2, 4.0), (0, 0, 1.0), (1, 2, -1.0), (1, 0, 2.0)])
+            .expect("valid");
+        let mut y = [0.0; 2];
+        a.multiply(&[1.0, 10.0, 100.0], &mut y);
+        assert_eq!(y, [1.0, 302.0]);
+        let mut x = [1.0; 3];
+        a.transpose_multiply_add(2.0, &[1.0, 1.0], &mut x);
+        assert_eq!(x, [7.0, 1.0, 7.0]);
+        a.multiply_add(-1.0, &[1.0, 10.0, 100.0], &mut y);
+        assert_eq!(y, [0.0, 0.0]);
+        assert!(!a.pattern().is_symmetric());
+        assert!(SparseMatrix::from_triplets(2, 2, &[(2, 0, 1.0)]).is_err());
+        assert!(SparseMatrix::from_triplets(2, 2, &[(0, 2, 1.0)]).is_err());
+    }
+
+    #[test]
+    fn a_one_sided_entry_is_not_symmetric() {
+        let entries = [(0, 0), (0, 1), (1, 1), (2, 1), (2, 2), (1, 2)];
+        assert!(!Pattern::from_entries(3, 3, &entries).expect("valid").is_symmetric());
+    }
+
+    #[test]
+    fn refilling_keeps_the_pattern() {
+        let pattern = Arc::new(Pattern::from_groups(3, &[[0, 1], [1, 2]]).expect("valid"));
+        let mut a = SparseMatrix::zeros(pattern.clone());
+        for scale in [1.0, 3.0] {
+            a.clear();
+            a.add_block(&[0, 1], &[scale, -scale, -scale, scale]).expect("in pattern");
+            a.add_block(&[2, 1], &[scale, -scale, -scale, scale]).expect("in pattern");
+            assert_eq!(a.diagonal(), [scale, 2.0 * scale, scale]);
+            assert_eq!(a.get(1, 2), -scale);
+        }
+        assert!(Arc::ptr_eq(a.pattern(), &pattern));
+        assert_eq!(a.add(0, 2, 1.0), Err(SparseError::NotInPattern { row: 0, column: 2 }));
+    }
+}

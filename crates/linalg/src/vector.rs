@@ -1,0 +1,177 @@
+//! Vector kernels with a fixed order of summation.
+//!
+//! A sum is taken in blocks of [`BLOCK`] entries, each with [`LANES`] partial sums that the compiler keeps in
+//! vector registers; the sums of the blocks are added in `f64` from first to last. The order depends on the
+//! length alone, so equal inputs give equal bits.
+
+use crate::Scalar;
+
+/// Entries summed in the precision of the scalar before the sum goes over to `f64`.
+const BLOCK: usize = 1024;
+
+/// Independent partial sums in a block.
+const LANES: usize = 16;
+
+/// Scalar product `x . y`.
+pub fn dot<T: Scalar>(x: &[T], y: &[T]) -> f64 {
+    debug_assert_eq!(x.len(), y.len());
+    x.chunks(BLOCK).zip(y.chunks(BLOCK)).map(|(x, y)| dot_block(x, y)).sum()
+}
+
+fn dot_block<T: Scalar>(x: &[T], y: &[T]) -> f64 {
+    let mut lanes = [T::ZERO; LANES];
+    let (x_full, x_rest) = x.as_chunks::<LANES>();
+    let (y_full, y_rest) = y.as_chunks::<LANES>();
+    for (x, y) in x_full.iter().zip(y_full) {
+        for lane in 0..LANES {
+            lanes[lane] += x[lane] * y[lane];
+        }
+    }
+    for (lane, (&x, &y)) in lanes.iter_mut().zip(x_rest.iter().zip(y_rest)) {
+        *lane += x * y;
+    }
+    fold(lanes)
+}
+
+/// Sum of the partial sums, as a balanced tree.
+fn fold<T: Scalar>(mut lanes: [T; LANES]) -> f64 {
+    let mut width = LANES / 2;
+    while width > 0 {
+        for lane in 0..width {
+            let upper = lanes[lane + width];
+            lanes[lane] += upper;
+        }
+        width /= 2;
+    }
+    lanes[0].to_f64()
+}
+
+/// Euclidean norm; NaN or infinite if an entry is.
+pub fn norm<T: Scalar>(x: &[T]) -> f64 {
+    dot(x, x).sqrt()
+}
+
+/// `y += a x`.
+pub fn axpy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
+    debug_assert_eq!(x.len(), y.len());
+    let a = T::from_f64(a);
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y += a * x;
+    }
+}
+
+/// `y = a x + b y`.
+pub fn axpby<T: Scalar>(a: f64, x: &[T], b: f64, y: &mut [T]) {
+    debug_assert_eq!(x.len(), y.len());
+    let (a, b) = (T::from_f64(a), T::from_f64(b));
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y = a * x + b * *y;
+    }
+}
+
+/// `x *= a`.
+pub fn scale<T: Scalar>(a: f64, x: &mut [T]) {
+    let a = T::from_f64(a);
+    for x in x {
+        *x *= a;
+    }
+}
+
+/// `y = a x`.
+pub fn scaled_copy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
+    debug_assert_eq!(x.len(), y.len());
+    let a = T::from_f64(a);
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y = a * x;
+    }
+}
+
+/// `r = b - r`, which turns `A x` held in `r` into the residual.
+pub fn residual_from_product<T: Scalar>(b: &[T], r: &mut [T]) {
+    debug_assert_eq!(b.len(), r.len());
+    for (r, &b) in r.iter_mut().zip(b) {
+        *r = b - *r;
+    }
+}
+
+/// Whether every entry is finite.
+pub fn all_finite<T: Scalar>(x: &[T]) -> bool {
+    // 0 x is zero for finite x and NaN otherwise, so one reduction without branches decides.
+    x.chunks(BLOCK).all(|block| block.iter().fold(T::ZERO, |sum, &x| sum + x * T::ZERO) == T::ZERO)
+}
+
+/// A fixed vector with entries spread over (-1, 1) that has a part in every eigenvector in practice
+/// (splitmix64 of the index; Steele, Lea and Flood 2014, 10.1145/2660193.2660195).
+pub fn fill_pseudo_random<T: Scalar>(seed: u64, x: &mut [T]) {
+    let mut state = seed;
+    for x in x {
+        *x = T::from_f64(2.0 * uniform(&mut state) - 1.0);
+    }
+}
+
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dot_is_exact_on_integers_of_every_length() {
+        for n in [0, 1, 15, 16, 17, 1023, 1024, 1025, 5000] {
+            let x: Vec<f64> = (0..n).map(|i| (i % 7) as f64 - 3.0).collect();
+            let y: Vec<f64> = (0..n).map(|i| (i % 5) as f64 - 1.0).collect();
+            let expected: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
+            assert_eq!(dot(&x, &y), expected, "n = {n}");
+        }
+    }
+
+    #[test]
+    fn single_precision_sums_lose_little() {
+        let x = vec![0.1f32; 1 << 20];
+        let exact = (0.1f32 as f64).powi(2) * x.len() as f64;
+        assert!((dot(&x, &x) / exact - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn updates_do_what_they_say() {
+        let x = [1.0, 2.0, 3.0];
+        let mut y = [1.0, 1.0, 1.0];
+        axpy(2.0, &x, &mut y);
+        assert_eq!(y, [3.0, 5.0, 7.0]);
+        axpby(1.0, &x, -1.0, &mut y);
+        assert_eq!(y, [-2.0, -3.0, -4.0]);
+        residual_from_product(&x, &mut y);
+        assert_eq!(y, [3.0, 5.0, 7.0]);
+        scaled_copy(0.5, &x, &mut y);
+        scale(2.0, &mut y);
+        assert_eq!(y, x);
+    }
+
+    #[test]
+    fn a_single_bad_entry_is_seen() {
+        let mut x = vec![1.0f32; 3000];
+        assert!(all_finite(&x));
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            x[2047] = bad;
+            assert!(!all_finite(&x));
+        }
+        assert!(all_finite::<f64>(&[f64::MAX, -f64::MAX, f64::MAX]));
+    }
+
+    #[test]
+    fn pseudo_random_vectors_repeat_and_differ_by_seed() {
+        let (mut a, mut b, mut c) = ([0.0f64; 100], [0.0; 100], [0.0; 100]);
+        fill_pseudo_random(1, &mut a);
+        fill_pseudo_random(1, &mut b);
+        fill_pseudo_random(2, &mut c);
+        assert_eq!(a, b);
+        assert_ne!(a, c);
+        assert!(a.iter().all(|x| x.abs() < 1.0));
+    }
+}
