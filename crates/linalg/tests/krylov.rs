@@ -1,0 +1,249 @@
+//! Krylov methods against the direct solver, in mixed precision, and every way to fail.
+
+mod support;
+
+use std::sync::Arc;
+
+use gluey_linalg::{
+    Cg, CgParams, DirectSpd, Fgmres, FgmresParams, FnOp, Identity, Jacobi, KrylovError, KrylovReport,
+    Ordering, Reference, RefinementParams, SinglePrecision, SparseMatrix, Symbolic, vector,
+};
+use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d};
+
+fn fgmres(
+    params: FgmresParams,
+    a: &mut SparseMatrix,
+    b: &[f64],
+    x: &mut [f64],
+) -> Result<KrylovReport, KrylovError> {
+    Fgmres::new(params).solve(a, &mut Identity, b, x, Reference::RightHandSide)
+}
+
+fn direct(a: &SparseMatrix) -> DirectSpd {
+    let symbolic = Symbolic::new(a.pattern().clone(), Ordering::Amd).expect("symmetric");
+    let mut solver = DirectSpd::new(Arc::new(symbolic), RefinementParams::default()).expect("fits");
+    solver.factorise(a.values()).expect("positive definite");
+    solver
+}
+
+/// A convection-diffusion matrix: not symmetric.
+fn upwind(n: usize) -> SparseMatrix {
+    let mut triplets = Vec::new();
+    for row in 0..n {
+        triplets.push((row, row, 3.0 + 0.01 * row as f64));
+        if row > 0 {
+            triplets.extend([(row, row - 1, -2.0), (row - 1, row, -0.5)]);
+        }
+    }
+    SparseMatrix::from_triplets(n, n, &triplets).expect("in range")
+}
+
+#[test]
+fn both_methods_agree_with_the_direct_solver() {
+    let mut a = laplacian_2d(25);
+    let b = pseudo_random(1, 625);
+    let mut expected = vec![0.0; 625];
+    direct(&a).solve(&b, &mut expected).expect("solvable");
+    let mut jacobi = Jacobi::new(&a.diagonal()).expect("positive");
+    let mut x = vec![0.0; 625];
+    let params = CgParams { relative_tolerance: 1e-12, ..Default::default() };
+    Cg::new(625, params).solve(&mut a, &mut jacobi, &b, &mut x, Reference::RightHandSide).expect("converges");
+    assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
+    x.fill(0.0);
+    let params =
+        FgmresParams { relative_tolerance: 1e-12, restart: 30, max_iterations: 2000, ..Default::default() };
+    fgmres(params, &mut a, &b, &mut x).expect("converges");
+    assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
+}
+
+#[test]
+fn small_systems_end_in_as_many_steps_as_unknowns() {
+    let mut a = upwind(6);
+    let b = pseudo_random(2, 6);
+    let mut x = [0.0; 6];
+    let params = FgmresParams { relative_tolerance: 1e-13, ..Default::default() };
+    let report = fgmres(params, &mut a, &b, &mut x).expect("converges");
+    assert!(report.iterations <= 6);
+    assert!(relative_residual(&a, &b, &x) < 1e-13);
+    let report = Cg::new(4, CgParams::default())
+        .solve(&mut laplacian_2d(2), &mut Identity, &b[..4], &mut x[..4], Reference::RightHandSide)
+        .expect("converges");
+    assert!(report.iterations <= 4);
+}
+
+#[test]
+fn an_exact_preconditioner_needs_one_step() {
+    let mut a = laplacian_2d(15);
+    let b = pseudo_random(1, 225);
+    let mut x = vec![0.0; 225];
+    let mut exact = direct(&a);
+    let report = Fgmres::new(FgmresParams::default())
+        .solve(&mut a, &mut exact, &b, &mut x, Reference::RightHandSide)
+        .expect("converges");
+    assert_eq!(report.iterations, 1);
+    x.fill(0.0);
+    let report = Cg::new(225, CgParams::default())
+        .solve(&mut a, &mut exact, &b, &mut x, Reference::RightHandSide)
+        .expect("converges");
+    assert_eq!(report.iterations, 1);
+}
+
+#[test]
+fn the_history_falls_and_ends_with_the_true_residual() {
+    let mut a = upwind(300);
+    let b = pseudo_random(1, 300);
+    let mut x = pseudo_random(2, 300);
+    let mut solver =
+        Fgmres::new(FgmresParams { restart: 7, relative_tolerance: 1e-10, ..Default::default() });
+    let report =
+        solver.solve(&mut a, &mut Identity, &b, &mut x, Reference::RightHandSide).expect("converges");
+    let history = solver.residual_history();
+    assert_eq!(history.len(), report.iterations + 1);
+    assert_eq!(history[0], report.initial_norm);
+    assert_eq!(history[report.iterations], report.residual_norm);
+    assert!(history.windows(2).all(|pair| pair[1] <= pair[0] * (1.0 + 1e-10)));
+    let size = vector::norm(&b);
+    assert!((relative_residual(&a, &b, &x) * size / report.residual_norm - 1.0).abs() < 1e-3);
+    assert!(report.residual_norm <= 1e-10 * size);
+}
+
+#[test]
+fn references_and_guesses_decide_when_to_stop() {
+    let mut a = laplacian_2d(10);
+    let b = pseudo_random(1, 100);
+    let mut solved = vec![0.0; 100];
+    direct(&a).solve(&b, &mut solved).expect("solvable");
+    let mut x = solved.clone();
+    let report = fgmres(FgmresParams::default(), &mut a, &b, &mut x).expect("converges");
+    assert_eq!((report.iterations, &x), (0, &solved));
+
+    let mut near = solved.clone();
+    near.iter_mut().for_each(|x| *x *= 1.0 + 1e-3);
+    let counts: Vec<usize> = [Reference::RightHandSide, Reference::InitialResidual, Reference::Norm(1e3)]
+        .into_iter()
+        .map(|reference| {
+            let mut x = near.clone();
+            let mut cg = Cg::new(100, CgParams::default());
+            cg.solve(&mut a, &mut Identity, &b, &mut x, reference).expect("converges").iterations
+        })
+        .collect();
+    assert!(counts[2] < counts[0] && counts[0] < counts[1], "{counts:?}");
+
+    let mut x = vec![1.0; 100];
+    let params = FgmresParams { absolute_floor: 1e-6, ..Default::default() };
+    let report = fgmres(params, &mut a, &[0.0; 100], &mut x).expect("the floor stops it");
+    assert!(report.residual_norm <= 1e-6 && report.iterations > 0);
+}
+
+#[test]
+fn a_single_precision_preconditioner_reaches_double_precision() {
+    let saddle = laplacian_2d(40);
+    let n = 1600;
+    let double = saddle.values();
+    let single: Vec<f32> = double.iter().map(|&v| v as f32).collect();
+    let mut a32 = SparseMatrix::new(saddle.pattern().clone(), single).expect("same pattern");
+    // The inner iteration stops early and in single precision: a different operator in every step.
+    let params = CgParams { relative_tolerance: 1e-2, ..Default::default() };
+    let mut inner = Cg::<f32>::new(n, params);
+    let inner = FnOp::new(n, move |r: &[f32], z: &mut [f32]| {
+        z.fill(0.0);
+        inner.solve(&mut a32, &mut Identity, r, z, Reference::RightHandSide).expect("converges");
+    });
+    let mut a = saddle.clone();
+    let b = pseudo_random(1, n);
+    let mut x = vec![0.0; n];
+    let params = FgmresParams { relative_tolerance: 1e-10, ..Default::default() };
+    let report = Fgmres::new(params)
+        .solve(&mut a, &mut SinglePrecision::new(n, inner), &b, &mut x, Reference::RightHandSide)
+        .expect("converges");
+    assert!(relative_residual(&saddle, &b, &x) <= 1e-10);
+    assert!(report.iterations <= 10, "{report:?}");
+}
+
+#[test]
+fn runs_repeat_bit_for_bit_and_reuse_their_workspace() {
+    let mut saddle = stokes_2d(6, |x, _| 1.0 + 10.0 * x);
+    let b = pseudo_random(1, saddle.is_pressure.len());
+    let mut solver =
+        Fgmres::new(FgmresParams { relative_tolerance: 1e-6, restart: 300, ..Default::default() });
+    let mut run = || {
+        let mut x = vec![0.0; b.len()];
+        let report = solver.solve(&mut saddle.matrix, &mut Identity, &b, &mut x, Reference::RightHandSide);
+        (report, x)
+    };
+    let first = run();
+    assert!(first.0.is_ok(), "{first:?}");
+    assert_eq!(first, run());
+}
+
+#[test]
+fn giving_up_returns_the_history_and_the_best_iterate() {
+    let mut a = laplacian_2d(30);
+    let b = pseudo_random(1, 900);
+    let mut x = vec![0.0; 900];
+    let params = FgmresParams { max_iterations: 5, relative_tolerance: 1e-12, ..Default::default() };
+    let error = fgmres(params, &mut a, &b, &mut x).expect_err("five steps are too few");
+    let KrylovError::NotConverged { iterations: 5, residual_norm, history, .. } = error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(history.len(), 6);
+    assert!(residual_norm < history[0]);
+    assert!((relative_residual(&a, &b, &x) * vector::norm(&b) / residual_norm - 1.0).abs() < 1e-9);
+    x.fill(0.0);
+    let params = CgParams { max_iterations: 5, ..Default::default() };
+    let error = Cg::new(900, params).solve(&mut a, &mut Identity, &b, &mut x, Reference::RightHandSide);
+    assert!(
+        matches!(error, Err(KrylovError::NotConverged { iterations: 5, ref history, .. }) if history.len() == 6)
+    );
+}
+
+#[test]
+fn a_singular_operator_ends_without_looping() {
+    let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (1, 1, 0.0)]).expect("in range");
+    let mut x = [0.0; 2];
+    let error = fgmres(FgmresParams::default(), &mut a, &[1.0, 1.0], &mut x).expect_err("no solution");
+    assert!(matches!(error, KrylovError::NotConverged { iterations, .. } if iterations < 10), "{error:?}");
+    let report = fgmres(FgmresParams::default(), &mut a, &[1.0, 0.0], &mut x);
+    assert!(report.is_ok(), "in the range: {report:?}");
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_reported_and_kept_out_of_x() {
+    let nan = |_: &[f64], z: &mut [f64]| z.fill(f64::NAN);
+    let mut a = laplacian_2d(3);
+    let mut x = [0.5; 9];
+    let mut solver = Fgmres::new(FgmresParams::default());
+    let bad_m = solver.solve(&mut a, &mut FnOp::new(9, nan), &[1.0; 9], &mut x, Reference::RightHandSide);
+    assert_eq!((bad_m, x), (Err(KrylovError::NotFinite { iteration: 1 }), [0.5; 9]));
+    let bad_a =
+        solver.solve(&mut FnOp::new(9, nan), &mut Identity, &[1.0; 9], &mut x, Reference::RightHandSide);
+    assert_eq!(bad_a, Err(KrylovError::NotFinite { iteration: 0 }));
+    let bad_b = fgmres(FgmresParams::default(), &mut a, &[f64::INFINITY; 9], &mut x);
+    assert_eq!(bad_b, Err(KrylovError::NotFinite { iteration: 0 }));
+    let mut cg = Cg::new(9, CgParams::default());
+    let bad_m = cg.solve(&mut a, &mut FnOp::new(9, nan), &[1.0; 9], &mut x, Reference::RightHandSide);
+    assert_eq!(bad_m, Err(KrylovError::NotFinite { iteration: 1 }));
+}
+
+#[test]
+fn conjugate_gradients_refuse_what_is_not_positive_definite() {
+    let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (1, 1, -1.0)]).expect("in range");
+    let mut cg = Cg::new(2, CgParams::default());
+    let error = cg.solve(&mut a, &mut Identity, &[0.0, 1.0], &mut [0.0; 2], Reference::RightHandSide);
+    let expected = KrylovError::NotPositiveDefinite { what: "operator", iteration: 1, form: -1.0 };
+    assert_eq!(error, Err(expected));
+    let mut positive = FnOp::new(2, |x: &[f64], y: &mut [f64]| y.copy_from_slice(x));
+    let mut minus = FnOp::new(2, |r: &[f64], z: &mut [f64]| vector::scaled_copy(-1.0, r, z));
+    let error = cg.solve(&mut positive, &mut minus, &[0.0, 1.0], &mut [0.0; 2], Reference::RightHandSide);
+    assert!(matches!(error, Err(KrylovError::NotPositiveDefinite { what: "preconditioner", .. })));
+}
+
+#[test]
+fn wrong_lengths_are_refused() {
+    let mut a = laplacian_2d(3);
+    let error = fgmres(FgmresParams::default(), &mut a, &[1.0; 8], &mut [0.0; 9]);
+    assert_eq!(error, Err(KrylovError::DimensionMismatch { expected: 9, found: 8 }));
+    let mut cg = Cg::new(8, CgParams::default());
+    let error = cg.solve(&mut a, &mut Identity, &[1.0; 9], &mut [0.0; 9], Reference::RightHandSide);
+    assert!(matches!(error, Err(KrylovError::DimensionMismatch { .. })));
+}
