@@ -1,0 +1,76 @@
+//! What pairs remember from step to step.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{ContactParams, Memory, PairKey};
+
+/// One pair's memory.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairState {
+    /// The two particles.
+    pub pair: PairKey,
+    /// Minus the impulse by which they were pressed together, `<= 0`; unit: length^2.
+    pub gamma: f64,
+    /// Force of the last step over `6 pi eta`, positive apart; unit: length^2/time.
+    pub lambda: f64,
+}
+
+/// The memory of a contact model: pairs with `gamma < 0` or a force, sorted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactState {
+    /// The pairs.
+    pub pairs: Vec<PairState>,
+}
+
+impl ContactState {
+    /// Memory of a pair; none is `gamma = lambda = 0`.
+    pub fn get(&self, pair: PairKey) -> PairState {
+        match self.pairs.binary_search_by_key(&pair, |state| state.pair) {
+            Ok(place) => self.pairs[place],
+            Err(_) => PairState { pair, gamma: 0.0, lambda: 0.0 },
+        }
+    }
+
+    /// Gamma and the last force of no pair are positive and unknown: sorts, clips and drops what says nothing.
+    pub(crate) fn tidy(&mut self) {
+        self.pairs.retain(|state| state.gamma < 0.0 || state.lambda != 0.0);
+        self.pairs.sort_unstable_by_key(|state| state.pair);
+        self.pairs.dedup_by_key(|state| state.pair);
+    }
+}
+
+impl Memory {
+    /// Weights of this step's and the last step's force in the impulse of a step.
+    fn weights(self, rate: f64, dt: f64) -> (f64, f64) {
+        match self {
+            Self::Paper => (dt, 0.0),
+            Self::Consistent => (rate, dt - rate),
+        }
+    }
+
+    /// Smallest force a remembered gluey pair admits: `-inf` keeps it closed.
+    pub(crate) fn floor(self, state: &PairState, rate: f64, dt: f64) -> f64 {
+        match self {
+            Self::Paper if state.gamma < 0.0 => f64::NEG_INFINITY,
+            Self::Paper => 0.0,
+            Self::Consistent => {
+                let (now, last) = self.weights(rate, dt);
+                (state.gamma - last * state.lambda) / now
+            }
+        }
+    }
+
+    /// Gamma after a step with the force `lambda` (Verdon et al. 2010, eq. 30).
+    pub(crate) fn update(
+        self,
+        state: &PairState,
+        lambda: f64,
+        rate: f64,
+        dt: f64,
+        params: &ContactParams,
+    ) -> f64 {
+        let (now, last) = self.weights(rate, dt);
+        let gamma = state.gamma - now * lambda - last * state.lambda;
+        gamma.max(params.gamma_min.unwrap_or(f64::NEG_INFINITY)).min(0.0)
+    }
+}

@@ -1,0 +1,127 @@
+//! What a contact model sees of a step, does to it and tells about it.
+
+use gluey_geom::{Dim, Space, Twist, Vector};
+use serde::{Deserialize, Serialize};
+
+use crate::{ContactError, ContactState, PairKey, Quantity};
+
+/// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry a particle.
+#[derive(Clone, Copy, Debug)]
+pub struct StepGeometry<'a, const D: usize> {
+    /// Centres at the beginning of the step.
+    pub positions: &'a [Vector<D>],
+    /// Radii.
+    pub radii: &'a [f64],
+    /// Displacement known before the velocity (the history of a multi-step scheme).
+    pub drift: &'a [Vector<D>],
+    /// `c`: the displacement a unit velocity makes.
+    pub rate: f64,
+    /// Length of the step. `dt - c` is the weight of the last step's velocities in the drift.
+    pub dt: f64,
+}
+
+/// Corrects predicted velocities so that particles do not overlap.
+pub trait ContactModel<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Corrects `twists`; on an error they and the memory are as before.
+    fn correct(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<ContactReport, ContactError>;
+
+    /// The contacts of the last step, sorted by pair: those with a force or a memory.
+    fn contacts(&self) -> &[Contact];
+
+    /// Everything the next step depends on.
+    fn checkpoint(&self) -> ContactState;
+
+    /// Goes on from a checkpoint.
+    fn resume(&mut self, state: ContactState);
+
+    /// Tells that the flow was reversed, so that remembered forces change their sign.
+    fn reverse(&mut self);
+}
+
+/// A contact at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// The two particles.
+    pub pair: PairKey,
+    /// Force over `6 pi eta`, positive apart; unit: length^2/time.
+    pub lambda: f64,
+    /// Memory after the step, `<= 0`; unit: length^2.
+    pub gamma: f64,
+    /// Gap at the end of the step; unit: length.
+    pub gap: f64,
+}
+
+/// The pair with the smallest gap.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WorstPair {
+    /// The two particles.
+    pub pair: PairKey,
+    /// Their gap at the end of the step; unit: length.
+    pub gap: f64,
+}
+
+/// Effort and outcome of one correction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactReport {
+    /// Iterations of the projection over all linearisations (sweeps of the velocity correction).
+    pub iterations: usize,
+    /// Linearisations.
+    pub passes: usize,
+    /// Residual of the last projection, `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
+    pub residual: f64,
+    /// Pairs that took part.
+    pub pair_count: usize,
+    /// Pairs with a force.
+    pub active_count: usize,
+    /// The smallest gap among the pairs that took part.
+    pub worst: Option<WorstPair>,
+}
+
+/// Checks everything a step depends on.
+pub(crate) fn validate<const D: usize>(
+    step: &StepGeometry<'_, D>,
+    twists: &[Twist<D>],
+) -> Result<(), ContactError>
+where
+    Dim<D>: Space<D>,
+{
+    let count = step.positions.len();
+    if [step.radii.len(), step.drift.len(), twists.len()] != [count; 3] {
+        return Err(ContactError::LengthMismatch {
+            positions: count,
+            radii: step.radii.len(),
+            drifts: step.drift.len(),
+            twists: twists.len(),
+        });
+    }
+    if count >= u32::MAX as usize {
+        return Err(ContactError::TooManyParticles { count });
+    }
+    let positive = |x: f64| x > 0.0 && x.is_finite();
+    if !(positive(step.rate) && positive(step.dt)) {
+        return Err(ContactError::BadStep { rate: step.rate, dt: step.dt });
+    }
+    for particle in 0..count {
+        let radius = step.radii[particle];
+        if !positive(radius) {
+            return Err(ContactError::BadRadius { particle, radius });
+        }
+        for (vector, quantity) in [
+            (&step.positions[particle], Quantity::Position),
+            (&twists[particle].velocity, Quantity::Velocity),
+            (&step.drift[particle], Quantity::Drift),
+        ] {
+            if !vector.iter().all(|x| x.is_finite()) {
+                return Err(ContactError::NotFinite { particle, quantity });
+            }
+        }
+    }
+    Ok(())
+}

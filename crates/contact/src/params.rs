@@ -1,0 +1,122 @@
+//! Contact laws by name, and what tunes them.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+
+/// What happens when particles would overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Strategy {
+    /// Nothing: particles may overlap.
+    None,
+    /// After the move, each pair closer than a threshold gap is pushed apart along its normal, pair after pair; the
+    /// push enters as a correction of the velocities. Neither a projection nor reversible.
+    VelocityCorrection,
+    /// Projection on the velocities that do not overlap; `gamma = 0` always, contacts never pull.
+    Inelastic,
+    /// The gluey model (Maury 2007; Lefebvre 2009): projection, with contacts that stay closed until what pushed them
+    /// together has been pulled out again.
+    Gluey,
+}
+
+impl Strategy {
+    /// All strategies.
+    pub const ALL: [Self; 4] = [Self::None, Self::VelocityCorrection, Self::Inelastic, Self::Gluey];
+}
+
+impl fmt::Display for Strategy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::VelocityCorrection => "velocity-correction",
+            Self::Inelastic => "inelastic",
+            Self::Gluey => "gluey",
+        })
+    }
+}
+
+/// A name that is none of ours.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown contact strategy `{name}`: expected `none`, `velocity-correction`, `inelastic` or `gluey`")]
+pub struct UnknownStrategy {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl FromStr for Strategy {
+    type Err = UnknownStrategy;
+
+    fn from_str(name: &str) -> Result<Self, UnknownStrategy> {
+        Self::ALL
+            .into_iter()
+            .find(|strategy| strategy.to_string() == name)
+            .ok_or_else(|| UnknownStrategy { name: name.to_owned() })
+    }
+}
+
+/// How gamma follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and how a contact lets go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Memory {
+    /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays closed
+    /// for the whole step. First order: a contact ends at the end of a step.
+    #[default]
+    Paper,
+    /// By the scheme that moves the particles, `gamma <- gamma - c lambda^n - (dt - c) lambda^{n-1}`, with
+    /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step.
+    Consistent,
+}
+
+/// Which method solves the projection; all give the same velocities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverKind {
+    /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
+    #[default]
+    Uzawa,
+    /// Conjugate gradients on the active set (MPRGP; Dostal 2009). For many contacts.
+    ActiveSet,
+}
+
+/// Tuning of [`crate::PairContact`]. The defaults are the gluey law with the paper's first-order gap.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactParams {
+    /// The law.
+    pub strategy: Strategy,
+    /// Whether the constraint is re-linearised until the gap at the *end* of the step is exact to round-off. Without it
+    /// a closed pair that turns by `phi` in a step opens by `(a_i + a_j) phi^2 / 2`.
+    pub exact_gap: bool,
+    /// How gamma is integrated.
+    pub memory: Memory,
+    /// Floor of gamma (< 0; unit: length^2), for rough particles: however long they were pressed together, they
+    /// separate after this impulse. In lubrication theory `gamma = a^2 ln(gap)` up to a constant, `a = a_i a_j/(a_i+a_j)`.
+    pub gamma_min: Option<f64>,
+    /// Gap kept by [`Strategy::VelocityCorrection`], relative to the mean radius of the pair.
+    pub threshold: f64,
+    /// Solver of the projection.
+    pub solver: SolverKind,
+    /// Residual `max |min(gap, ||A|| (lambda - floor))|` at which the projection has converged, relative to the larger
+    /// of the smallest radius and the largest displacement of the step.
+    pub tolerance: f64,
+    /// Most iterations of one solve.
+    pub iteration_limit: usize,
+    /// Most linearisations of one step.
+    pub pass_limit: usize,
+}
+
+impl Default for ContactParams {
+    fn default() -> Self {
+        Self {
+            strategy: Strategy::Gluey,
+            exact_gap: false,
+            memory: Memory::Paper,
+            gamma_min: None,
+            threshold: 1e-4,
+            solver: SolverKind::Uzawa,
+            tolerance: 1e-13,
+            iteration_limit: 500_000,
+            pass_limit: 100,
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Conjugate gradients on the active set: MPRGP, "modified proportioning with reduced gradient projections"
+//! (Dostal 2009, Optimal Quadratic Programming Algorithms, DOI 10.1007/b138610, algorithm 5.8).
+//!
+//! Conjugate gradients move the contacts whose force is above its floor; when a force would pass its floor, a projected
+//! gradient step changes the active set; when the forces at the floor are worse than the others, a step frees them.
+//! The rate of convergence depends on the spectrum of `A` only, and the operator may be singular.
+
+use super::{
+    Projection, ProjectionSolver, ResidualHistory, SolveFailure, SolveReport, dot, gaps_under,
+    largest_eigenvalue, residual,
+};
+
+/// Iterations between two computations of the gaps from the forces, which bound the drift of the recurrence.
+const REFRESH: usize = 50;
+/// `p.A p / (||A|| p.p)` below which a direction is taken for a null vector of `A`.
+const NULL: f64 = 1e-13;
+
+/// The solver for many contacts.
+#[derive(Clone, Debug, Default)]
+pub struct ActiveSet {
+    /// `w`, the gradient of the dual function.
+    gaps: Vec<f64>,
+    /// Gradient of the forces above their floor.
+    free: Vec<f64>,
+    /// Gradient of the forces at their floor that want to leave it.
+    chopped: Vec<f64>,
+    direction: Vec<f64>,
+    /// `A direction`.
+    image: Vec<f64>,
+}
+
+impl ProjectionSolver for ActiveSet {
+    fn solve(
+        &mut self,
+        problem: &mut Projection<'_>,
+        forces: &mut [f64],
+    ) -> Result<SolveReport, SolveFailure> {
+        self.resize(forces.len());
+        let norm = largest_eigenvalue(problem.operator, forces.len());
+        let mut history = ResidualHistory::default();
+        self.begin(problem, forces);
+        let mut fresh = true;
+        let mut iteration = 0;
+        loop {
+            iteration += 1;
+            let (worst, residual) = residual(&self.gaps, forces, problem.floors, norm);
+            history.record(iteration, residual);
+            let report = SolveReport { iterations: iteration, residual };
+            if residual <= problem.tolerance && fresh {
+                return Ok(report);
+            }
+            if iteration >= problem.iteration_limit || !residual.is_finite() {
+                history.close(iteration, residual);
+                return Err(SolveFailure { report, history, worst });
+            }
+            fresh = residual <= problem.tolerance || iteration % REFRESH == 0;
+            if fresh {
+                self.begin(problem, forces);
+            } else {
+                self.iterate(problem, forces, norm);
+            }
+        }
+    }
+}
+
+impl ActiveSet {
+    fn resize(&mut self, count: usize) {
+        for buffer in
+            [&mut self.gaps, &mut self.free, &mut self.chopped, &mut self.direction, &mut self.image]
+        {
+            buffer.resize(count, 0.0);
+        }
+    }
+
+    /// Starts conjugate gradients anew from `forces`.
+    fn begin(&mut self, problem: &mut Projection<'_>, forces: &mut [f64]) {
+        for (force, floor) in forces.iter_mut().zip(problem.floors) {
+            *force = force.max(*floor);
+        }
+        gaps_under(problem, forces, &mut self.gaps);
+        self.split(forces, problem.floors);
+        self.direction.copy_from_slice(&self.free);
+    }
+
+    /// Parts the gradient into its free and chopped components.
+    fn split(&mut self, forces: &[f64], floors: &[f64]) {
+        for k in 0..forces.len() {
+            let above = forces[k] > floors[k];
+            self.free[k] = if above { self.gaps[k] } else { 0.0 };
+            self.chopped[k] = if above { 0.0 } else { self.gaps[k].min(0.0) };
+        }
+    }
+
+    fn iterate(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
+        if dot(&self.chopped, &self.chopped) <= self.reduced(forces, problem.floors, norm) {
+            self.conjugate_step(problem, forces, norm);
+        } else {
+            self.release_step(problem, forces, norm);
+        }
+    }
+
+    /// Product of the free gradient with its part that a step `1/norm` can still follow.
+    fn reduced(&self, forces: &[f64], floors: &[f64], norm: f64) -> f64 {
+        let room = forces.iter().zip(floors).map(|(force, floor)| norm * (force - floor));
+        room.zip(&self.free).map(|(room, free)| room.min(*free) * free).sum()
+    }
+
+    fn conjugate_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
+        problem.operator.apply(&self.direction, &mut self.image);
+        let curvature = dot(&self.direction, &self.image);
+        if curvature <= NULL * norm * dot(&self.direction, &self.direction) {
+            self.gradient_step(problem, forces, norm);
+            return;
+        }
+        let length = dot(&self.gaps, &self.direction) / curvature;
+        let feasible = self.feasible_length(forces, problem.floors);
+        self.advance(forces, length.min(feasible));
+        if length > feasible {
+            self.split(forces, problem.floors);
+            self.gradient_step(problem, forces, norm);
+            return;
+        }
+        self.split(forces, problem.floors);
+        let beta = dot(&self.free, &self.image) / curvature;
+        for (direction, free) in self.direction.iter_mut().zip(&self.free) {
+            *direction = free - beta * *direction;
+        }
+    }
+
+    /// Longest step against the direction before a force meets its floor.
+    fn feasible_length(&self, forces: &[f64], floors: &[f64]) -> f64 {
+        let mut length = f64::INFINITY;
+        for k in 0..forces.len() {
+            if self.direction[k] > 0.0 {
+                length = length.min((forces[k] - floors[k]) / self.direction[k]);
+            }
+        }
+        length
+    }
+
+    /// Moves by `-length * direction`, gaps by recurrence.
+    fn advance(&mut self, forces: &mut [f64], length: f64) {
+        for k in 0..forces.len() {
+            forces[k] -= length * self.direction[k];
+            self.gaps[k] -= length * self.image[k];
+        }
+    }
+
+    /// Projected step along the free gradient: forces may meet their floors.
+    fn gradient_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
+        for (force, free) in forces.iter_mut().zip(&self.free) {
+            *force -= free / norm;
+        }
+        self.begin(problem, forces);
+    }
+
+    /// Step along the chopped gradient: forces leave their floors.
+    fn release_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
+        self.direction.copy_from_slice(&self.chopped);
+        problem.operator.apply(&self.direction, &mut self.image);
+        let square = dot(&self.direction, &self.direction);
+        let curvature = dot(&self.direction, &self.image).max(NULL * norm * square);
+        self.advance(forces, dot(&self.gaps, &self.direction) / curvature);
+        self.split(forces, problem.floors);
+        self.direction.copy_from_slice(&self.free);
+    }
+}

@@ -1,0 +1,149 @@
+//! What a contact step refuses, and that it says which particles it means.
+
+use gluey_contact::{
+    ContactError, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState, Quantity,
+    StepGeometry, Strategy,
+};
+use gluey_geom::{Twist, Vector};
+
+struct Input {
+    positions: Vec<Vector<2>>,
+    radii: Vec<f64>,
+    drift: Vec<Vector<2>>,
+    twists: Vec<Twist<2>>,
+    rate: f64,
+    state: ContactState,
+    params: ContactParams,
+}
+
+/// Three discs in a row, the outer ones running at the middle one.
+fn input() -> Input {
+    let run = |x| Twist { velocity: Vector::<2>::new(x, 0.0), ..Twist::default() };
+    Input {
+        positions: [0.0, 2.1, 4.2].map(|x| Vector::<2>::new(x, 0.0)).to_vec(),
+        radii: vec![1.0; 3],
+        drift: vec![Vector::zeros(); 3],
+        twists: vec![run(2.0), run(0.0), run(-2.0)],
+        rate: 0.1,
+        state: ContactState::default(),
+        params: ContactParams::default(),
+    }
+}
+
+/// The error, having checked that velocities and memory are untouched.
+fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
+    let mut input = input();
+    change(&mut input);
+    let mut contact = PairContact::new(input.params);
+    contact.resume(input.state);
+    let before = contact.checkpoint();
+    let mut twists = input.twists.clone();
+    let step = StepGeometry {
+        positions: &input.positions,
+        radii: &input.radii,
+        drift: &input.drift,
+        rate: input.rate,
+        dt: 0.1,
+    };
+    let error = contact.correct(&step, &mut twists).expect_err("must be refused");
+    assert_eq!(format!("{twists:?}"), format!("{:?}", input.twists));
+    assert_eq!(contact.checkpoint(), before);
+    error
+}
+
+#[test]
+fn particles_are_named() {
+    let nan = Vector::<2>::new(0.0, f64::NAN);
+    for strategy in Strategy::ALL {
+        let refuse = |change: fn(&mut Input)| {
+            refuse(|input| {
+                input.params.strategy = strategy;
+                change(input);
+            })
+        };
+        assert_eq!(refuse(|i| i.radii[1] = 0.0), ContactError::BadRadius { particle: 1, radius: 0.0 });
+        assert_eq!(refuse(|i| i.radii[2] = -1.0), ContactError::BadRadius { particle: 2, radius: -1.0 });
+        assert!(matches!(refuse(|i| i.radii[0] = f64::NAN), ContactError::BadRadius { particle: 0, .. }));
+        assert!(matches!(refuse(|i| i.rate = 0.0), ContactError::BadStep { .. }));
+        let mismatch = ContactError::LengthMismatch { positions: 3, radii: 2, drifts: 3, twists: 3 };
+        assert_eq!(refuse(|i| i.radii.truncate(2)), mismatch);
+    }
+    let not_finite = |particle, quantity| ContactError::NotFinite { particle, quantity };
+    assert_eq!(refuse(|i| i.positions[2] = nan), not_finite(2, Quantity::Position));
+    assert_eq!(refuse(|i| i.twists[1].velocity = nan), not_finite(1, Quantity::Velocity));
+    assert_eq!(refuse(|i| i.drift[0].x = f64::INFINITY), not_finite(0, Quantity::Drift));
+}
+
+#[test]
+fn coincident_centres_are_named() {
+    for strategy in [Strategy::VelocityCorrection, Strategy::Inelastic, Strategy::Gluey] {
+        let error = refuse(|input| {
+            input.params.strategy = strategy;
+            input.positions[2] = input.positions[0];
+            input.twists[2] = input.twists[0];
+        });
+        assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{strategy}");
+        assert_eq!(error.to_string(), "the centres of particles 0 and 2 coincide");
+    }
+}
+
+#[test]
+fn a_memory_of_missing_particles_is_named() {
+    let pair = PairKey::new(1, 7);
+    let error = refuse(|input| input.state.pairs = vec![PairState { pair, gamma: -1.0, lambda: 0.0 }]);
+    assert_eq!(error, ContactError::UnknownParticle { pair, count: 3 });
+}
+
+#[test]
+fn too_few_iterations_are_told_with_the_way_there() {
+    let error = refuse(|input| input.params.iteration_limit = 3);
+    let ContactError::NotConverged { residual, tolerance, iterations, history, .. } = error else {
+        panic!("not what was expected: {error}");
+    };
+    assert_eq!(iterations, 3);
+    assert!(residual > tolerance && tolerance > 0.0);
+    assert_eq!(history.entries.iter().map(|entry| entry.0).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(history.entries[2].1, residual);
+}
+
+#[test]
+fn contradictory_contacts_end_with_an_error() {
+    // The outer discs cannot be 2 away from the middle one and 2 from each other, all on a line.
+    let pairs = [(0, 1), (1, 2), (0, 2)].map(|(i, j)| PairKey::new(i, j));
+    for exact_gap in [false, true] {
+        let error = refuse(|input| {
+            input.params.exact_gap = exact_gap;
+            input.params.iteration_limit = 2000;
+            input.state.pairs =
+                pairs.iter().map(|&pair| PairState { pair, gamma: -1.0, lambda: 0.0 }).collect();
+        });
+        assert!(matches!(error, ContactError::NotConverged { .. }), "{error}");
+    }
+}
+
+#[test]
+fn too_few_linearisations_are_told() {
+    let error = refuse(|input| {
+        input.params.exact_gap = true;
+        input.params.pass_limit = 1;
+        input.twists[1].velocity.y = 5.0;
+    });
+    assert!(matches!(error, ContactError::GapNotClosed { passes: 1, .. }), "{error}");
+}
+
+#[test]
+fn nothing_is_no_error() {
+    let mut contact = PairContact::<3>::new(ContactParams::default());
+    let step = StepGeometry { positions: &[], radii: &[], drift: &[], rate: 0.1, dt: 0.1 };
+    let report = contact.correct(&step, &mut []).expect("no particles, no contacts");
+    assert_eq!(report.pair_count, 0);
+    assert!(contact.contacts().is_empty());
+}
+
+#[test]
+fn strategies_have_names() {
+    for strategy in Strategy::ALL {
+        assert_eq!(strategy.to_string().parse(), Ok(strategy));
+    }
+    assert!("sticky".parse::<Strategy>().is_err());
+}

@@ -1,0 +1,68 @@
+//! What the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
+#![allow(dead_code)]
+
+use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
+use gluey_geom::{Particle, Twist, Vector};
+use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+
+pub const RADIUS: f64 = 0.05;
+
+/// The paper's pair of spheres (Fig. 7) with exact hydrodynamics at `gap + offset`.
+pub struct Encounter {
+    pub particles: [Particle<3>; 2],
+    pub contact: PairContact<3>,
+    pub integrator: Integrator<3>,
+    pub smallest_gap: f64,
+    flow: PairMobility,
+    dt: f64,
+}
+
+impl Encounter {
+    pub fn new(offset: f64, params: ContactParams, scheme: Scheme, dt: f64) -> Self {
+        let start = [[0.3, 0.525, 0.5], [0.7, 0.475, 0.5]];
+        Self {
+            particles: start.map(|x| Particle::new(Vector::<3>::from(x), RADIUS)),
+            contact: PairContact::new(params),
+            integrator: Integrator::new(scheme),
+            smallest_gap: f64::INFINITY,
+            flow: PairMobility::new(LinearFlow::shear(1.0, 0.5)).with_gap_offset(offset),
+            dt,
+        }
+    }
+
+    /// Gap in radii.
+    pub fn gap(&self) -> f64 {
+        self.particles[0].gap(&self.particles[1]) / RADIUS
+    }
+
+    pub fn step(&mut self) -> ContactReport {
+        let mut twists = [Twist::default(); 2];
+        self.flow.predict(0.0, &self.particles, &mut twists).expect("a good pair");
+        let mut drift = [Vector::zeros(); 2];
+        self.integrator.drift(self.dt, &mut drift);
+        let positions = self.particles.map(|particle| particle.pose.position);
+        let step = StepGeometry {
+            positions: &positions,
+            radii: &[RADIUS; 2],
+            drift: &drift,
+            rate: self.integrator.rate(self.dt),
+            dt: self.dt,
+        };
+        let report = self.contact.correct(&step, &mut twists).expect("a good step");
+        self.integrator.advance(self.dt, &mut self.particles, &twists);
+        self.smallest_gap = self.smallest_gap.min(self.gap());
+        report
+    }
+
+    pub fn run(&mut self, time: f64) {
+        for _ in 0..(time / self.dt).round() as usize {
+            self.step();
+        }
+    }
+
+    pub fn reverse(&mut self, factor: f64) {
+        self.flow.set_shear_factor(factor);
+        self.integrator.reverse();
+        self.contact.reverse();
+    }
+}
