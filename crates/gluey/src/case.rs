@@ -23,8 +23,11 @@ mod suggest;
 mod validate;
 
 pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
-pub use names::{Boundary, Formulation, Hydrodynamics, Scheme, Solver, Strategy, UnknownName};
+pub use gluey_contact::{Memory, Strategy};
+pub use gluey_motion::Scheme;
+pub use names::{Boundary, Formulation, Hydrodynamics, Solver, UnknownName};
 
+use gluey_contact::ContactParams;
 use serde::{Deserialize, Serialize};
 
 /// A complete, checked description of one run.
@@ -89,7 +92,7 @@ pub struct TimeSpec {
     /// End of the run; the last step ends at the first multiple of `step` that is not before it.
     pub end: f64,
     /// Scheme.
-    #[serde(default)]
+    #[serde(default = "second_order")]
     pub scheme: Scheme,
     /// The shear is reversed at the first step that starts at this time or later.
     #[serde(default)]
@@ -104,6 +107,26 @@ pub struct ContactSpec {
     pub strategy: Strategy,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     pub exact_gap: bool,
+    /// How gamma, the memory of a contact, is integrated.
+    pub memory: Memory,
+    /// Floor of gamma (< 0) for rough particles; none when absent.
+    pub gamma_min: Option<f64>,
+    /// Gap kept by the strategy `velocity-correction`, relative to the mean radius of the pair.
+    pub threshold: f64,
+}
+
+impl ContactSpec {
+    /// The same for the contact model.
+    pub fn params(&self) -> ContactParams {
+        ContactParams {
+            strategy: self.strategy,
+            exact_gap: self.exact_gap,
+            memory: self.memory,
+            gamma_min: self.gamma_min,
+            threshold: self.threshold,
+            ..ContactParams::default()
+        }
+    }
 }
 
 /// Flow.
@@ -125,6 +148,9 @@ pub struct FlowSpec {
     /// Parameters of the `rigid-dofs` formulation.
     #[serde(rename = "rigid-dofs")]
     pub rigid_dofs: RigidDofsSpec,
+    /// Parameters of the `pair-mobility` model.
+    #[serde(rename = "pair-mobility")]
+    pub pair_mobility: PairMobilitySpec,
 }
 
 /// The 2^D-tree mesh.
@@ -161,9 +187,18 @@ pub struct RigidDofsSpec {
     pub offset: f64,
 }
 
+/// Parameters of the `pair-mobility` model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PairMobilitySpec {
+    /// The mobility is evaluated at the gap plus this many radii, to imitate a solver that does not resolve the film.
+    pub gap_offset: f64,
+}
+
 impl Default for ContactSpec {
     fn default() -> Self {
-        Self { strategy: Strategy::default(), exact_gap: true }
+        let ContactParams { strategy, memory, gamma_min, threshold, .. } = ContactParams::default();
+        Self { strategy, exact_gap: true, memory, gamma_min, threshold }
     }
 }
 
@@ -177,6 +212,7 @@ impl Default for FlowSpec {
             mesh: MeshSpec::default(),
             paper: PaperSpec::default(),
             rigid_dofs: RigidDofsSpec::default(),
+            pair_mobility: PairMobilitySpec::default(),
         }
     }
 }
@@ -221,6 +257,15 @@ impl Case {
         self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
     }
 
+    /// Name of the output files of this case: case and strategy, and the formulation where it is not the paper's.
+    pub fn file_stem(&self) -> String {
+        let stem = format!("{}-{}", self.name, self.contact.strategy);
+        match (self.flow.hydrodynamics, self.flow.formulation) {
+            (Hydrodynamics::Stokes, Formulation::RigidDofs) => format!("{stem}-{}", Formulation::RigidDofs),
+            _ => stem,
+        }
+    }
+
     /// How the flow is modelled, as reports name it: the formulation, or the analytic model's name.
     pub fn flow_name(&self) -> &'static str {
         match self.flow.hydrodynamics {
@@ -232,4 +277,8 @@ impl Case {
 
 fn one() -> f64 {
     1.0
+}
+
+fn second_order() -> Scheme {
+    Scheme::AdamsBashforth2
 }

@@ -1,5 +1,171 @@
 //! Reference solutions compiled into the program, so that it compares from any folder.
+//!
+//! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came from.
+
+use gluey_geom::{Dim, Space};
+
+use crate::case::Case;
+use crate::interpolate::cubic;
+use crate::trajectory::{Row, Trajectory};
 
 /// Names a case may give as its `reference`.
 pub const NAMES: &[&str] =
     &["pair2d_trajectory", "trio2d_trajectory", "pair3d_trajectory_box", "pair3d_trajectory_unbounded"];
+
+/// Radius of the particles in every reference.
+const RADIUS: f64 = 0.05;
+/// How far from the reference's a particle may start, in radii.
+const START_TOLERANCE: f64 = 1e-6;
+
+/// Trajectories of particles, to compare a run with.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    dimension: usize,
+    times: Vec<f64>,
+    /// Columns of x and y of each particle.
+    centers: Vec<[Vec<f64>; 2]>,
+    /// Gap of particles 1 and 2 over the radius.
+    gap: Vec<f64>,
+}
+
+/// How far a run is from a [`Reference`], over the time they have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Relative error of the gap of particles 1 and 2 at the end.
+    pub end_gap_rel_error: Option<f64>,
+    /// Largest distance of a centre from its reference (in the plane of shear), in radii.
+    pub max_abs_error_over_a: f64,
+}
+
+impl Reference {
+    /// The reference of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        let (dimension, text) = match name {
+            "pair2d_trajectory" => (2, include_str!("../../../data/reference/pair2d_trajectory.csv")),
+            "trio2d_trajectory" => (2, include_str!("../../../data/reference/trio2d_trajectory.csv")),
+            "pair3d_trajectory_box" => (3, include_str!("../../../data/reference/pair3d_trajectory_box.csv")),
+            "pair3d_trajectory_unbounded" => {
+                (3, include_str!("../../../data/reference/pair3d_trajectory_unbounded.csv"))
+            }
+            _ => return None,
+        };
+        Self::parse(dimension, text)
+    }
+
+    /// Reads a table with `#` comments and a header; columns are found by name.
+    fn parse(dimension: usize, text: &str) -> Option<Self> {
+        let mut lines = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+        let header: Vec<&str> = lines.next()?.split(',').map(str::trim).collect();
+        let rows: Vec<Vec<f64>> = lines
+            .map(|line| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<_>>())
+            .collect::<Option<_>>()?;
+        let column = |name: &str| -> Option<Vec<f64>> {
+            let index = header.iter().position(|title| *title == name)?;
+            rows.iter().map(|row| row.get(index).copied()).collect()
+        };
+        let centers =
+            (1..).map_while(|n| Some([column(&format!("x{n}"))?, column(&format!("y{n}"))?])).collect();
+        let gap = column("D_over_a").or_else(|| column("gap12_over_a"))?;
+        Some(Self { dimension, times: column("t")?, centers, gap })
+    }
+
+    /// What in `case` keeps it from being compared, in words.
+    pub(crate) fn mismatch(&self, case: &Case) -> Option<String> {
+        if case.dimension != self.dimension {
+            return Some(format!("dimension {}", case.dimension));
+        }
+        if case.particles.len() != self.centers.len() {
+            return Some(format!("{} particles", case.particles.len()));
+        }
+        if case.shear_rate != 1.0 {
+            return Some(format!("shear rate {}", case.shear_rate));
+        }
+        if case.time.reverse_at.is_some() {
+            return Some("a reversal of the shear".into());
+        }
+        self.first_stranger(case)
+    }
+
+    /// The first particle that is not one of the reference's at its start.
+    fn first_stranger(&self, case: &Case) -> Option<String> {
+        let mut particles = case.particles.iter().zip(&self.centers).enumerate();
+        particles.find_map(|(index, (particle, [x, y]))| {
+            let (dx, dy) = (particle.position[0] - x[0], particle.position[1] - y[0]);
+            let moved = dx.hypot(dy) > START_TOLERANCE * RADIUS;
+            (moved || particle.radius != RADIUS).then(|| {
+                format!(
+                    "particle {} of radius {} starting at ({}, {}) instead of {RADIUS} at ({}, {})",
+                    index + 1,
+                    particle.radius,
+                    particle.position[0],
+                    particle.position[1],
+                    x[0],
+                    y[0]
+                )
+            })
+        })
+    }
+
+    /// The distance of `trajectory` from this reference; `None` if they have no time in common.
+    pub fn compare<const D: usize>(&self, trajectory: &Trajectory<D>) -> Option<Deviation>
+    where
+        Dim<D>: Space<D>,
+    {
+        let end = self.times.last()?.min(*trajectory.times().last()?);
+        let errors = trajectory.rows().filter(|row| row.time <= end).filter_map(|row| self.error(&row));
+        let max_abs_error_over_a = errors.reduce(f64::max)?;
+        let gap = cubic(&self.times, |index| self.gap[index], end)?;
+        let found = (trajectory.particle_count() > 1).then(|| trajectory.gap_at(0, 1, end)).flatten();
+        let end_gap_rel_error = found.map(|found| (found / RADIUS - gap).abs() / gap.abs());
+        Some(Deviation { end_gap_rel_error, max_abs_error_over_a })
+    }
+
+    /// Largest distance of a centre from its reference at the time of `row`, in radii.
+    fn error<const D: usize>(&self, row: &Row<'_, D>) -> Option<f64>
+    where
+        Dim<D>: Space<D>,
+    {
+        let at = |column: &[f64]| cubic(&self.times, |index| column[index], row.time);
+        let distances = row
+            .positions
+            .iter()
+            .zip(&self.centers)
+            .map(|(center, [x, y])| Some((center[0] - at(x)?).hypot(center[1] - at(y)?) / RADIUS));
+        distances.collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gluey_geom::{Particle, Twist, Vector};
+
+    use super::*;
+
+    #[test]
+    fn every_name_has_a_table_with_ascending_times() {
+        for name in NAMES {
+            let reference = Reference::named(name).expect(name);
+            assert!(reference.times.len() > 100 && reference.centers.len() >= 2, "{name}");
+            assert!(reference.times.is_sorted_by(|a, b| a < b), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_reference_does_not_deviate_from_itself() {
+        let reference = Reference::named("pair2d_trajectory").expect("known");
+        let shifted = |shift: f64| {
+            let mut trajectory = Trajectory::<2>::new(vec![RADIUS; 2]);
+            for row in 0..reference.times.len() {
+                let center = |n: usize| {
+                    Vector::<2>::new(reference.centers[n][0][row], reference.centers[n][1][row] + shift)
+                };
+                let particles = [Particle::new(center(0), RADIUS), Particle::new(center(1), RADIUS)];
+                trajectory.push(reference.times[row], &particles, &[Twist::default(); 2]);
+            }
+            reference.compare(&trajectory).expect("a common time")
+        };
+        assert!(shifted(0.0).max_abs_error_over_a < 1e-9);
+        assert!(shifted(0.0).end_gap_rel_error.expect("a pair") < 1e-4);
+        assert!((shifted(0.01).max_abs_error_over_a - 0.2).abs() < 1e-9);
+    }
+}

@@ -2,9 +2,18 @@
 
 use std::fmt;
 
+use gluey_geom::{Dim, Space};
+use gluey_motion::FlowStatistics;
 use serde::Serialize;
 
-use crate::case::Strategy;
+use crate::case::{Case, Strategy};
+use crate::interpolate::cubic;
+use crate::phases::PhaseTable;
+use crate::reference::Reference;
+use crate::trajectory::Trajectory;
+
+/// Gaps below this many radii are contact, and no measure of anything.
+const TOUCHING_OVER_A: f64 = 1e-8;
 
 /// The result of a run in numbers. Lengths named `_over_a` are in mean radii.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -25,10 +34,11 @@ pub struct RunReport {
     pub dofs: usize,
     /// Smallest gap of any pair at any time; `None` for a single particle.
     pub min_gap_over_a: Option<f64>,
-    /// Smallest gap of any pair at the end; `None` for a single particle.
+    /// Gap of particles 1 and 2 at the end; `None` for a single particle.
     pub end_gap_over_a: Option<f64>,
-    /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of the pair of particles 1 and 2, with `t*` the last
-    /// time when their line of centres is at 90 degrees to the flow and the mirror time is in the run.
+    /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of particles 1 and 2, with `t*` the last time when their
+    /// line of centres is at 90 degrees to the flow; `None` where that mirror time is not in the run, where they touch
+    /// at it, and with a reversal of the shear.
     pub reversibility_error: Option<f64>,
     /// Name of the reference solution.
     pub reference: Option<String>,
@@ -38,6 +48,101 @@ pub struct RunReport {
     pub max_abs_error_over_a: Option<f64>,
     /// Seconds spent in each phase, in the order of a step.
     pub phases: Vec<(String, f64)>,
+}
+
+impl RunReport {
+    /// Measures a trajectory of `case`.
+    pub(crate) fn of<const D: usize>(
+        case: &Case,
+        trajectory: &Trajectory<D>,
+        flow: &FlowStatistics,
+        wall_s: f64,
+        phases: &PhaseTable,
+    ) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let a = trajectory.mean_radius();
+        let deviation = case
+            .reference
+            .as_deref()
+            .and_then(Reference::named)
+            .and_then(|reference| reference.compare(trajectory));
+        let reversibility_error = match case.time.reverse_at {
+            None => reversibility_error(trajectory),
+            Some(_) => None,
+        };
+        Self {
+            case: case.name.clone(),
+            strategy: case.contact.strategy,
+            formulation: case.flow_name().to_owned(),
+            steps: trajectory.len().saturating_sub(1),
+            wall_s,
+            cells: flow.cell_count,
+            dofs: flow.dof_count,
+            min_gap_over_a: trajectory
+                .rows()
+                .filter_map(|row| row.smallest_gap())
+                .reduce(f64::min)
+                .map(|gap| gap / a),
+            end_gap_over_a: end_gap(trajectory).map(|gap| gap / a),
+            reversibility_error,
+            reference: case.reference.clone(),
+            end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
+            max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),
+            phases: phases.rows().to_vec(),
+        }
+    }
+}
+
+/// Gap of particles 1 and 2 at the end.
+fn end_gap<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let last = trajectory.len().checked_sub(1)?;
+    (trajectory.particle_count() > 1).then(|| trajectory.row(last).gap(0, 1))
+}
+
+/// `|D(t_end) - D(t')| / D(t')` of particles 1 and 2 with `t' = 2 t* - t_end` and `t*` the last time when their line
+/// of centres is at 90 degrees to the flow while `t'` is in the run. An exact encounter has none: it is its own
+/// mirror image in time.
+///
+/// `None` for fewer than two particles, without such a time, and where the surfaces touch at `t'`.
+fn reversibility_error<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let end = *trajectory.times().last()?;
+    let crossing = last_crossing(trajectory).filter(|crossing| 2.0 * crossing >= end)?;
+    let mirrored = trajectory.gap_at(0, 1, 2.0 * crossing - end)?;
+    let error = (end_gap(trajectory)? - mirrored).abs() / mirrored;
+    (mirrored > TOUCHING_OVER_A * trajectory.mean_radius()).then_some(error)
+}
+
+/// The last time when particles 1 and 2 are abreast in x.
+fn last_crossing<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    if trajectory.particle_count() < 2 {
+        return None;
+    }
+    let times = trajectory.times();
+    let along = |index: usize| {
+        let positions = trajectory.row(index).positions;
+        positions[1][0] - positions[0][0]
+    };
+    let crosses = |index: usize| (along(index) > 0.0) != (along(index + 1) > 0.0);
+    let index = (0..times.len().saturating_sub(1)).rev().find(|&index| crosses(index))?;
+    let (mut before, mut after) = (times[index], times[index + 1]);
+    // Bisection to the last bit or so.
+    for _ in 0..60 {
+        let middle = 0.5 * (before + after);
+        let same_side = (cubic(times, along, middle)? > 0.0) == (along(index) > 0.0);
+        *(if same_side { &mut before } else { &mut after }) = middle;
+    }
+    Some(0.5 * (before + after))
 }
 
 impl fmt::Display for RunReport {

@@ -278,7 +278,7 @@ pub enum Problem {
     #[error("\"{choice}\" needs {needs}, but the case has {found}")]
     Unfit {
         /// The choice.
-        choice: &'static str,
+        choice: String,
         /// What it needs.
         needs: &'static str,
         /// What the case has.

@@ -9,7 +9,12 @@ use toml::de::{DeTable, DeValue};
 use super::error::{CaseError, CaseIssue, Key, Problem};
 use super::suggest::closest;
 use super::validate::{Violation, check};
-use super::{Boundary, Case, Formulation, Hydrodynamics, Scheme, Solver, Strategy, UnknownName};
+use super::{Boundary, Case, Formulation, Hydrodynamics, Solver, UnknownName};
+
+/// Names of choices that other crates own, in their order.
+const STRATEGIES: &[&str] = &["none", "velocity-correction", "inelastic", "gluey"];
+const MEMORIES: &[&str] = &["paper", "consistent"];
+const SCHEMES: &[&str] = &["euler", "adams-bashforth-2"];
 
 impl Case {
     /// Reads and checks a case file.
@@ -147,12 +152,13 @@ fn in_words(expected: &str) -> String {
 
 /// The list of names that serde offers, matched with the choice it belongs to.
 fn unknown_name(found: String, known: &[String]) -> Option<Problem> {
-    let lists: [(&'static str, &'static [&'static str]); 6] = [
-        ("strategy", Strategy::NAMES),
+    let lists: [(&'static str, &'static [&'static str]); 7] = [
+        ("strategy", STRATEGIES),
+        ("memory", MEMORIES),
         ("formulation", Formulation::NAMES),
         ("hydrodynamics", Hydrodynamics::NAMES),
         ("solver", Solver::NAMES),
-        ("time scheme", Scheme::NAMES),
+        ("time scheme", SCHEMES),
         ("boundary", Boundary::NAMES),
     ];
     let (what, known) = lists.into_iter().find(|(_, names)| names.iter().eq(known.iter()))?;

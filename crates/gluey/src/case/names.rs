@@ -75,21 +75,6 @@ macro_rules! named {
 }
 
 named! {
-    /// What keeps particles from overlapping.
-    Strategy, "strategy" {
-        /// Nothing: the flow alone decides.
-        None = "none",
-        /// Push overlapping pairs apart along the line of centres after the move.
-        VelocityCorrection = "velocity-correction",
-        /// Project the velocities on those that do not overlap, without memory (gamma = 0).
-        Inelastic = "inelastic",
-        /// Project with memory: a pair sticks until it was pulled as hard as it was pushed (Verdon et al. 2010).
-        #[default]
-        Gluey = "gluey",
-    }
-}
-
-named! {
     /// How rigidity of the particles enters the flow equations.
     Formulation, "formulation" {
         /// Viscosity ratio and Uzawa multiplier, as in the paper: soft near contact.
@@ -121,17 +106,6 @@ named! {
         Direct = "direct",
         /// Krylov iteration with a multigrid preconditioner.
         Multigrid = "multigrid",
-    }
-}
-
-named! {
-    /// Time stepping of the particles.
-    Scheme, "time scheme" {
-        /// Explicit Euler (Verdon et al. 2010, eq. 11).
-        Euler = "euler",
-        /// Adams-Bashforth of order two, the first step Euler (eq. 12).
-        #[default]
-        AdamsBashforth2 = "adams-bashforth-2",
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Case;
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
-use crate::reference;
+use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,11 +28,12 @@ pub(super) fn check(case: &Case) -> Check {
         return fail(root.name("dimension"), Problem::Dimension { found: case.dimension });
     }
     finite(case.shear_rate, root.name("shear_rate"))?;
-    check_reference(case, root.name("reference"))?;
     check_domain(case, &root.name("domain"))?;
     check_particles(case, &root.name("particles"))?;
     check_time(case, &root.name("time"))?;
-    check_flow(case, &root.name("flow"))
+    check_contact(case, &root.name("contact"))?;
+    check_flow(case, &root.name("flow"))?;
+    check_reference(case, root.name("reference"))
 }
 
 fn check_name(name: &str, key: Key) -> Check {
@@ -43,13 +44,19 @@ fn check_name(name: &str, key: Key) -> Check {
     }
 }
 
+/// A comparison with a reference of something else would look like an error of the run.
 fn check_reference(case: &Case, key: Key) -> Check {
-    match &case.reference {
-        Some(name) if !reference::NAMES.contains(&name.as_str()) => {
-            let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
-            fail(key, Problem::UnknownName(problem))
+    let Some(name) = &case.reference else { return Ok(()) };
+    let Some(table) = Reference::named(name) else {
+        let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
+        return fail(key, Problem::UnknownName(problem));
+    };
+    match table.mismatch(case) {
+        Some(found) => {
+            let needs = "the particles, dimension and shear rate it was computed for";
+            fail(key, Problem::Unfit { choice: name.clone(), needs, found })
         }
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
@@ -144,12 +151,29 @@ fn check_time(case: &Case, key: &Key) -> Check {
     }
 }
 
+fn check_contact(case: &Case, key: &Key) -> Check {
+    let contact = &case.contact;
+    if !(contact.threshold >= 0.0 && contact.threshold < 1.0) {
+        return out_of_range(contact.threshold, "from 0 to less than 1", key.name("threshold"));
+    }
+    match contact.gamma_min {
+        Some(floor) if !(floor < 0.0 && floor.is_finite()) => {
+            out_of_range(floor, "less than 0", key.name("gamma_min"))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn check_flow(case: &Case, key: &Key) -> Check {
     let flow = &case.flow;
     between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
     check_mesh(case, &key.name("mesh"))?;
     check_paper(case, &key.name("paper"))?;
     between(flow.rigid_dofs.offset, -1.0, 1.0, key.name("rigid-dofs").name("offset"))?;
+    let offset = flow.pair_mobility.gap_offset;
+    if !(offset >= 0.0 && offset.is_finite()) {
+        return out_of_range(offset, "of 0 or more", key.name("pair-mobility").name("gap_offset"));
+    }
     match flow.hydrodynamics {
         Hydrodynamics::PairMobility => check_pair_mobility(case, key.name("hydrodynamics")),
         Hydrodynamics::Stokes => Ok(()),
@@ -195,7 +219,7 @@ fn check_paper(case: &Case, key: &Key) -> Check {
 
 /// The analytic model knows two equal spheres in unbounded shear.
 fn check_pair_mobility(case: &Case, key: Key) -> Check {
-    let choice = Hydrodynamics::PairMobility.name();
+    let choice = Hydrodynamics::PairMobility.name().to_owned();
     let needs = "dimension 3 and two particles of equal radius";
     let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
     let found = match (case.dimension, radii.as_slice()) {

@@ -1,0 +1,177 @@
+//! Checkpoints: everything a run needs to go on, bit for bit, as if it had never stopped.
+//!
+//! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and the rest:
+//! a [`Checkpoint`] in postcard encoding, compressed by zstd. It carries the case, so that it cannot be taken for one
+//! of another case.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use gluey_geom::{Dim, Space};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::case::Case;
+use crate::output::{OutputError, write_atomically};
+use crate::phases::PhaseTable;
+use crate::simulation::SimulationState;
+use crate::trajectory::Trajectory;
+
+const MAGIC: &[u8; 8] = b"gluey-ck";
+/// Counts changes of the layout of [`Checkpoint`].
+const VERSION: u32 = 1;
+const DIGEST_LENGTH: usize = 32;
+const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
+/// Fast; the payload is small.
+const COMPRESSION_LEVEL: i32 = 3;
+
+/// A run between two steps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Checkpoint<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Particles, history, contact memory, warm start of the flow.
+    pub state: SimulationState<D>,
+    /// All rows of output so far.
+    pub trajectory: Trajectory<D>,
+    /// Wall time so far, phase by phase.
+    pub phases: PhaseTable,
+    /// Wall time so far, in seconds.
+    pub wall_s: f64,
+}
+
+/// A checkpoint could not be used.
+#[derive(Debug, Error)]
+pub enum CheckpointError {
+    /// It could not be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is another kind of file.
+    #[error("{}: not a gluey checkpoint", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It was written by another version of the program.
+    #[error("{}: layout {found} of a checkpoint; this program reads layout {VERSION}", path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its layout.
+        found: u32,
+    },
+    /// Its bytes are not those that were written.
+    #[error("{}: damaged: its digest does not match its contents", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It belongs to another case.
+    #[error("{}: a checkpoint of another case; {difference}", path.display())]
+    OtherCase {
+        /// The file.
+        path: PathBuf,
+        /// The first line in which the cases differ.
+        difference: CaseDifference,
+    },
+}
+
+/// The first line in which two cases differ.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("there it reads `{saved}`, here `{given}`")]
+pub struct CaseDifference {
+    /// The line of the checkpoint.
+    pub saved: String,
+    /// The line of the case that was to be resumed.
+    pub given: String,
+}
+
+/// What stands in the file: the case as text, then the run, decoded only if the case is the right one.
+#[derive(Serialize, Deserialize)]
+struct Payload {
+    case: String,
+    run: Vec<u8>,
+}
+
+impl<const D: usize> Checkpoint<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Writes the checkpoint of a run of `case`, all or nothing.
+    pub fn write(&self, case: &Case, path: &Path) -> Result<(), OutputError> {
+        let encode = || -> io::Result<Vec<u8>> {
+            let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
+            let payload = Payload { case: canonical(case), run };
+            let bytes = postcard::to_stdvec(&payload).map_err(io::Error::other)?;
+            zstd::encode_all(bytes.as_slice(), COMPRESSION_LEVEL)
+        };
+        let body = encode().map_err(|error| OutputError::new(path, "encode the checkpoint", error))?;
+        let mut file = MAGIC.to_vec();
+        file.extend(VERSION.to_le_bytes());
+        file.extend(blake3::hash(&body).as_bytes());
+        file.extend(body);
+        write_atomically(path, &file)
+    }
+
+    /// Reads a checkpoint of a run of `case`. The end of the run may differ: a run can be prolonged.
+    pub fn read(case: &Case, path: &Path) -> Result<Self, CheckpointError> {
+        let path = path.to_owned();
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(source) => return Err(CheckpointError::Read { path, source }),
+        };
+        let Some((header, body)) = bytes.split_at_checked(HEADER_LENGTH) else {
+            return Err(CheckpointError::Foreign { path });
+        };
+        let (magic, rest) = header.split_at(MAGIC.len());
+        let (version, digest) = rest.split_at(4);
+        if magic != MAGIC {
+            return Err(CheckpointError::Foreign { path });
+        }
+        let found = version.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte));
+        if found != VERSION {
+            return Err(CheckpointError::Version { path, found });
+        }
+        if blake3::hash(body).as_bytes() != digest {
+            return Err(CheckpointError::Damaged { path });
+        }
+        let payload: Option<Payload> =
+            zstd::decode_all(body).ok().and_then(|bytes| postcard::from_bytes(&bytes).ok());
+        let Some(payload) = payload else { return Err(CheckpointError::Damaged { path }) };
+        if let Some(difference) = difference(&payload.case, &canonical(case)) {
+            return Err(CheckpointError::OtherCase { path, difference });
+        }
+        match postcard::from_bytes::<Self>(&payload.run) {
+            Ok(checkpoint) if checkpoint.trajectory.is_consistent() => Ok(checkpoint),
+            _ => Err(CheckpointError::Damaged { path }),
+        }
+    }
+}
+
+/// The case as text, without its end.
+fn canonical(case: &Case) -> String {
+    let mut case = case.clone();
+    case.time.end = 0.0;
+    // Tables of numbers and names always serialise.
+    toml::to_string(&case).unwrap_or_default()
+}
+
+fn difference(saved: &str, given: &str) -> Option<CaseDifference> {
+    let line = |line: Option<&str>| line.unwrap_or("(nothing)").to_owned();
+    let (mut a, mut b) = (saved.lines(), given.lines());
+    loop {
+        match (a.next(), b.next()) {
+            (None, None) => return None,
+            (x, y) if x == y => {}
+            (x, y) => return Some(CaseDifference { saved: line(x), given: line(y) }),
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Arguments of the command, and what they ask of the library.
+
+use std::path::PathBuf;
+use std::process;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Args, Parser, Subcommand};
+use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions};
+
+use crate::diagnostic::Diagnosed;
+use crate::terminal::Reporter;
+
+/// What a shell reports for a program ended by Ctrl-C.
+const INTERRUPTED: u8 = 130;
+
+/// Rigid particles in a Stokes flow with the gluey contact model.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a case and write its trajectory.
+    Run(RunArguments),
+}
+
+/// Arguments of `gluey run`.
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The case file.
+    case: PathBuf,
+    /// What keeps particles from overlapping, instead of the case's choice: none, velocity-correction, inelastic, gluey.
+    #[arg(long)]
+    strategy: Option<Strategy>,
+    /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs.
+    #[arg(long)]
+    formulation: Option<Formulation>,
+    /// Folder for all output.
+    #[arg(long, default_value = "out", value_name = "DIR")]
+    out: PathBuf,
+    /// Write fields, particles and contacts for ParaView every N steps.
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    vtk: Option<usize>,
+    /// Write a checkpoint every N steps (one is written at Ctrl-C in any case).
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    checkpoint_every: Option<usize>,
+    /// Go on from a checkpoint of the same case.
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+}
+
+/// Why a command failed, and what the program's exit says about it.
+#[derive(Debug)]
+pub struct Failure {
+    /// What to show.
+    pub diagnostic: Box<Diagnosed>,
+    /// Not 0.
+    pub exit_code: u8,
+}
+
+/// Runs the case that `arguments` name.
+pub fn run(arguments: &RunArguments) -> Result<RunReport, Failure> {
+    let case =
+        arguments.case().map_err(|error| Failure { diagnostic: Box::new(error.into()), exit_code: 1 })?;
+    let options = arguments.options(&case);
+    let reporter = Reporter::new(&case.name);
+    let outcome = gluey::run(&case, &options, &reporter);
+    reporter.finish();
+    outcome.map_err(|error| Failure {
+        exit_code: if matches!(error, RunError::Interrupted { .. }) { INTERRUPTED } else { 1 },
+        diagnostic: Box::new(Diagnosed::new(error, &arguments.case)),
+    })
+}
+
+impl RunArguments {
+    fn case(&self) -> Result<Case, gluey::CaseError> {
+        let mut case = Case::load(&self.case)?;
+        case.contact.strategy = self.strategy.unwrap_or(case.contact.strategy);
+        case.flow.formulation = self.formulation.unwrap_or(case.flow.formulation);
+        Ok(case)
+    }
+
+    fn options(&self, case: &Case) -> RunOptions {
+        let stem = case.file_stem();
+        RunOptions {
+            csv: self.out.join(format!("{stem}.csv")),
+            vtk: self.vtk.map(|every| VtkOptions { folder: self.out.join(format!("{stem}-vtk")), every }),
+            checkpoint: Some(self.out.join(format!("{stem}.checkpoint"))),
+            checkpoint_every: self.checkpoint_every,
+            resume: self.resume.clone(),
+            interrupt: Some(interrupt_flag()),
+        }
+    }
+}
+
+/// A flag that the first Ctrl-C sets; the second ends the program at once.
+fn interrupt_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let shared = flag.clone();
+    let installed = ctrlc::set_handler(move || {
+        if shared.swap(true, Ordering::Relaxed) {
+            process::exit(i32::from(INTERRUPTED));
+        }
+        eprintln!("stopping after this step; once more to stop at once");
+    });
+    if let Err(error) = installed {
+        eprintln!("Ctrl-C will end the program without a checkpoint: {error}");
+    }
+    flag
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("must be at least 1".into()),
+        Ok(number) => Ok(number),
+        Err(_) => Err("must be a whole number, at least 1".into()),
+    }
+}

@@ -1,0 +1,240 @@
+//! Fields, particles and contacts for ParaView, VTK and meshio: compressed `.vtu` files and `.pvd` collections.
+//!
+//! Three series a run: `fields` (velocity, pressure, viscosity, level set and rigidity multiplier at the nodes of
+//! quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for each pair in
+//! contact, from centre to centre: gamma, lambda, gap; and a vertex for every particle, so that the file is
+//! readable when nothing touches).
+
+use std::path::{Path, PathBuf};
+
+use gluey_contact::Contact;
+use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
+use gluey_motion::Fields;
+use vtkio::model::{
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version,
+    VertexNumbers, Vtk,
+};
+use vtkio::xml::Compressor;
+
+use super::{OutputError, prepare_folder_of, pvd, write_atomically};
+
+/// Fast; higher levels gain a few percent.
+const COMPRESSION_LEVEL: u32 = 1;
+/// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's order:
+/// corners, edges, centre.
+const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
+/// The same for a triquadratic hexahedron (type 29): corners, edges, faces -x +x -y +y -z +z, centre.
+const HEXAHEDRON_ORDER: [usize; 27] =
+    [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
+
+/// What there is to write about one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Step that starts here.
+    pub step: usize,
+    /// Time.
+    pub time: f64,
+    /// Particles.
+    pub particles: &'a [Particle<D>],
+    /// Their velocities.
+    pub twists: &'a [Twist<D>],
+    /// Pairs in contact.
+    pub contacts: &'a [Contact],
+    /// Flow fields, where the model has any.
+    pub fields: Option<&'a Fields<D>>,
+}
+
+/// Writes frames into a folder and keeps the collections up to date.
+#[derive(Debug)]
+pub struct VtkWriter {
+    folder: PathBuf,
+    series: [Series; 3],
+}
+
+/// Files of one kind and their times.
+#[derive(Debug)]
+struct Series {
+    name: &'static str,
+    entries: Vec<(f64, String)>,
+}
+
+impl VtkWriter {
+    /// Prepares `folder`. Of the steps already done when a run goes on from a checkpoint, given as `(step, time)`,
+    /// those with a file in the folder stay in the collections.
+    pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, OutputError> {
+        prepare_folder_of(&folder.join("fields.pvd"))?;
+        let series = ["fields", "particles", "contacts"].map(|name| {
+            let entries = done.iter().map(|&(step, time)| (time, file_name(name, step)));
+            Series { name, entries: entries.filter(|(_, file)| folder.join(file).is_file()).collect() }
+        });
+        Ok(Self { folder: folder.to_owned(), series })
+    }
+
+    /// Writes one instant.
+    pub fn write<const D: usize>(&mut self, frame: &Frame<'_, D>) -> Result<(), OutputError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let pieces = [
+            frame.fields.map(fields_piece),
+            Some(particles_piece(frame.particles, frame.twists)),
+            Some(contacts_piece(frame.particles, frame.contacts)),
+        ];
+        for (series, piece) in self.series.iter_mut().zip(pieces) {
+            if let Some(piece) = piece {
+                series.add(&self.folder, frame.step, frame.time, piece)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Series {
+    fn add(
+        &mut self,
+        folder: &Path,
+        step: usize,
+        time: f64,
+        piece: UnstructuredGridPiece,
+    ) -> Result<(), OutputError> {
+        let file = file_name(self.name, step);
+        write_piece(&folder.join(&file), piece)?;
+        self.entries.push((time, file));
+        pvd::write(&folder.join(format!("{}.pvd", self.name)), &self.entries)
+    }
+}
+
+fn file_name(series: &str, step: usize) -> String {
+    format!("{series}-{step:06}.vtu")
+}
+
+fn fields_piece<const D: usize>(fields: &Fields<D>) -> UnstructuredGridPiece {
+    let (order, cell_type): (&[usize], _) = match D {
+        2 => (&QUAD_ORDER, CellType::BiquadraticQuad),
+        _ => (&HEXAHEDRON_ORDER, CellType::TriquadraticHexahedron),
+    };
+    let cells = fields.cells.chunks_exact(order.len());
+    let count = cells.len();
+    let connectivity = cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect();
+    let offsets = (1..=count).map(|cell| (cell * order.len()) as u64).collect();
+    let point = vec![
+        vectors("velocity", &fields.velocity),
+        scalars("pressure", fields.pressure.clone()),
+        scalars("viscosity", fields.viscosity.clone()),
+        scalars("level_set", fields.level_set.clone()),
+        vectors("lambda", &fields.multiplier),
+    ];
+    UnstructuredGridPiece {
+        points: in_space(&fields.points).into(),
+        cells: cell_list(connectivity, offsets, vec![cell_type; count]),
+        data: Attributes { point, cell: Vec::new() },
+    }
+}
+
+fn particles_piece<const D: usize>(particles: &[Particle<D>], twists: &[Twist<D>]) -> UnstructuredGridPiece
+where
+    Dim<D>: Space<D>,
+{
+    let count = particles.len();
+    let velocities: Vec<Vector<D>> = twists.iter().map(|twist| twist.velocity).collect();
+    let spins: Vec<f64> = twists.iter().flat_map(|twist| spin_in_space::<D>(&twist.spin)).collect();
+    let point = vec![
+        scalars("radius", particles.iter().map(|particle| particle.radius).collect()),
+        vectors("velocity", &velocities),
+        Attribute::generic("spin", 3).with_data(spins),
+    ];
+    UnstructuredGridPiece {
+        points: in_space(&centers(particles)).into(),
+        cells: cell_list(
+            (0..count as u64).collect(),
+            (1..=count as u64).collect(),
+            vec![CellType::Vertex; count],
+        ),
+        data: Attributes { point, cell: Vec::new() },
+    }
+}
+
+fn contacts_piece<const D: usize>(particles: &[Particle<D>], contacts: &[Contact]) -> UnstructuredGridPiece
+where
+    Dim<D>: Space<D>,
+{
+    let count = particles.len();
+    let mut connectivity: Vec<u64> = (0..count as u64).collect();
+    connectivity.extend(contacts.iter().flat_map(|contact| {
+        let pair = contact.pair;
+        [u64::from(pair.first), u64::from(pair.second)]
+    }));
+    let mut offsets: Vec<u64> = (1..=count as u64).collect();
+    offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as u64));
+    let mut types = vec![CellType::Vertex; count];
+    types.resize(count + contacts.len(), CellType::Line);
+    // Vertices carry zeros.
+    let of_lines = |value: fn(&Contact) -> f64| -> Vec<f64> {
+        std::iter::repeat_n(0.0, count).chain(contacts.iter().map(value)).collect()
+    };
+    let cell = vec![
+        scalars("gamma", of_lines(|contact| contact.gamma)),
+        scalars("lambda", of_lines(|contact| contact.lambda)),
+        scalars("gap", of_lines(|contact| contact.gap)),
+    ];
+    UnstructuredGridPiece {
+        points: in_space(&centers(particles)).into(),
+        cells: cell_list(connectivity, offsets, types),
+        data: Attributes { point: Vec::new(), cell },
+    }
+}
+
+fn cell_list(connectivity: Vec<u64>, offsets: Vec<u64>, types: Vec<CellType>) -> Cells {
+    Cells { cell_verts: VertexNumbers::XML { connectivity, offsets }, types }
+}
+
+fn scalars(name: &str, values: Vec<f64>) -> Attribute {
+    Attribute::generic(name, 1).with_data(values)
+}
+
+fn vectors<const D: usize>(name: &str, values: &[Vector<D>]) -> Attribute {
+    Attribute::generic(name, 3).with_data(in_space(values))
+}
+
+/// VTK's vectors have three components.
+fn in_space<const D: usize>(vectors: &[Vector<D>]) -> Vec<f64> {
+    vectors.iter().flat_map(|v| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)]).collect()
+}
+
+/// A plane spin turns about z.
+fn spin_in_space<const D: usize>(spin: &Spin<D>) -> [f64; 3]
+where
+    Dim<D>: Space<D>,
+{
+    match Dim::<D>::spin_slice(spin) {
+        [x, y, z] => [*x, *y, *z],
+        other => [0.0, 0.0, other.first().copied().unwrap_or(0.0)],
+    }
+}
+
+fn centers<const D: usize>(particles: &[Particle<D>]) -> Vec<Vector<D>>
+where
+    Dim<D>: Space<D>,
+{
+    particles.iter().map(|particle| particle.pose.position).collect()
+}
+
+fn write_piece(path: &Path, piece: UnstructuredGridPiece) -> Result<(), OutputError> {
+    let vtk = Vtk {
+        version: Version::new_xml(1, 0),
+        title: String::new(),
+        byte_order: ByteOrder::LittleEndian,
+        data: DataSet::inline(piece),
+        file_path: None,
+    };
+    let mut bytes = Vec::new();
+    vtk.try_into_xml_format(Compressor::ZLib, COMPRESSION_LEVEL)
+        .and_then(|file| file.write(&mut bytes))
+        .map_err(|error| {
+            OutputError::new(path, "encode the file", std::io::Error::other(error.to_string()))
+        })?;
+    write_atomically(path, &bytes)
+}

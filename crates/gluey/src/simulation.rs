@@ -1,0 +1,295 @@
+//! The time loop, one step at a time: predict, correct for contact, integrate.
+
+use gluey_contact::{Contact, ContactError, ContactModel, ContactState, StepGeometry};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, Integrator, Scheme};
+use thiserror::Error;
+
+use crate::phases::PhaseTable;
+
+/// Particles in a flow that `H` predicts, kept apart by `C`.
+///
+/// ```
+/// use gluey::Simulation;
+/// use gluey_contact::{ContactParams, PairContact};
+/// use gluey_geom::{Particle, Vector};
+/// use gluey_motion::{LinearFlow, PairMobility, Scheme};
+///
+/// let particles = vec![
+///     Particle::new(Vector::<3>::new(0.3, 0.525, 0.5), 0.05),
+///     Particle::new(Vector::<3>::new(0.7, 0.475, 0.5), 0.05),
+/// ];
+/// let flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
+/// let contact = PairContact::new(ContactParams::default());
+/// let mut simulation = Simulation::new(particles, Scheme::AdamsBashforth2, 0.05, flow, contact);
+/// for _ in 0..20 {
+///     simulation.step()?;
+/// }
+/// assert!((simulation.time() - 1.0).abs() < 1e-15);
+/// # Ok::<(), gluey::StepError<gluey_motion::PairMobilityError>>(())
+/// ```
+#[derive(Debug)]
+pub struct Simulation<const D: usize, H, C>
+where
+    Dim<D>: Space<D>,
+{
+    dt: f64,
+    step: usize,
+    reversed: bool,
+    particles: Vec<Particle<D>>,
+    radii: Vec<f64>,
+    integrator: Integrator<D>,
+    hydrodynamics: H,
+    contact: C,
+    positions: Vec<Vector<D>>,
+    drift: Vec<Vector<D>>,
+    twists: Vec<Twist<D>>,
+    phases: PhaseTable,
+}
+
+/// A step could not be done.
+#[derive(Debug, Error)]
+pub enum StepError<E: std::error::Error + 'static> {
+    /// The flow could not be computed.
+    #[error("the flow failed in step {step} (t = {time})")]
+    Flow {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: E,
+    },
+    /// Contact could not be resolved.
+    #[error("contact failed in step {step} (t = {time})")]
+    Contact {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: ContactError,
+    },
+    /// A velocity is infinite or not a number.
+    #[error("the velocity of particle {particle} is not finite in step {step} (t = {time})")]
+    NotFinite {
+        /// Its number, from 1.
+        particle: usize,
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+    },
+}
+
+impl<E: std::error::Error + 'static> StepError<E> {
+    /// The same for a wider type of flow errors.
+    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> StepError<W> {
+        match self {
+            Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
+            Self::Contact { step, time, source } => StepError::Contact { step, time, source },
+            Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
+        }
+    }
+}
+
+/// Everything a simulation needs to go on as if it had never stopped.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(bound = "")]
+pub struct SimulationState<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Steps done.
+    pub step: usize,
+    /// Whether the shear is reversed.
+    pub reversed: bool,
+    /// Particles.
+    pub particles: Vec<Particle<D>>,
+    /// Velocity history.
+    pub integrator: Integrator<D>,
+    /// Memory of the contact model.
+    pub contact: ContactState,
+    /// Warm start of the flow, as [`Hydrodynamics::checkpoint`] gave it.
+    pub hydrodynamics: Vec<u8>,
+}
+
+impl<const D: usize, H, C> Simulation<D, H, C>
+where
+    Dim<D>: Space<D>,
+    H: Hydrodynamics<D>,
+    C: ContactModel<D>,
+{
+    /// A simulation at time 0 with steps of length `dt > 0`.
+    pub fn new(particles: Vec<Particle<D>>, scheme: Scheme, dt: f64, hydrodynamics: H, contact: C) -> Self {
+        let count = particles.len();
+        Self {
+            dt,
+            step: 0,
+            reversed: false,
+            radii: particles.iter().map(|particle| particle.radius).collect(),
+            particles,
+            integrator: Integrator::new(scheme),
+            hydrodynamics,
+            contact,
+            positions: vec![Vector::zeros(); count],
+            drift: vec![Vector::zeros(); count],
+            twists: vec![Twist::default(); count],
+            phases: PhaseTable::default(),
+        }
+    }
+
+    /// Does one step.
+    pub fn step(&mut self) -> Result<(), StepError<H::Error>> {
+        self.predict()?;
+        self.correct()?;
+        self.advance();
+        Ok(())
+    }
+
+    /// Computes the velocities of all particles where they are, without contact.
+    pub fn predict(&mut self) -> Result<(), StepError<H::Error>> {
+        let (step, time) = (self.step, self.time());
+        let start = std::time::Instant::now();
+        let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
+        self.book_flow(start.elapsed().as_secs_f64());
+        predicted.map_err(|source| StepError::Flow { step, time, source })?;
+        match self.twists.iter().position(|twist| !is_finite(twist)) {
+            Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
+            None => Ok(()),
+        }
+    }
+
+    /// Corrects the predicted velocities for contact.
+    pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
+        let (step, time) = (self.step, self.time());
+        for (position, particle) in self.positions.iter_mut().zip(&self.particles) {
+            *position = particle.pose.position;
+        }
+        self.integrator.drift(self.dt, &mut self.drift);
+        let geometry = StepGeometry {
+            positions: &self.positions,
+            radii: &self.radii,
+            drift: &self.drift,
+            rate: self.integrator.rate(self.dt),
+            dt: self.dt,
+        };
+        let (contact, twists) = (&mut self.contact, &mut self.twists);
+        self.phases
+            .time("contact", || contact.correct(&geometry, twists))
+            .map_err(|source| StepError::Contact { step, time, source })?;
+        Ok(())
+    }
+
+    /// Moves the particles with the corrected velocities.
+    pub fn advance(&mut self) {
+        let (integrator, particles) = (&mut self.integrator, &mut self.particles);
+        self.phases.time("motion", || integrator.advance(self.dt, particles, &self.twists));
+        self.step += 1;
+    }
+
+    /// Reverses the shear from the next step on.
+    ///
+    /// In Stokes flow all velocities change sign at once, and so does the history of the integrator; what
+    /// contacts remember of the impulse between particles stays.
+    pub fn reverse_shear(&mut self) {
+        self.reversed = !self.reversed;
+        self.hydrodynamics.set_shear_factor(if self.reversed { -1.0 } else { 1.0 });
+        self.integrator.reverse();
+        self.contact.reverse();
+    }
+
+    /// Whether the shear is reversed now.
+    pub fn is_reversed(&self) -> bool {
+        self.reversed
+    }
+
+    /// Steps done.
+    pub fn step_index(&self) -> usize {
+        self.step
+    }
+
+    /// Time reached.
+    pub fn time(&self) -> f64 {
+        self.step as f64 * self.dt
+    }
+
+    /// The particles where they are now.
+    pub fn particles(&self) -> &[Particle<D>] {
+        &self.particles
+    }
+
+    /// The velocities computed last.
+    pub fn twists(&self) -> &[Twist<D>] {
+        &self.twists
+    }
+
+    /// Pairs in contact at the last correction.
+    pub fn contacts(&self) -> &[Contact] {
+        self.contact.contacts()
+    }
+
+    /// Flow fields of the last prediction.
+    pub fn fields(&self) -> Option<Fields<D>> {
+        self.hydrodynamics.fields()
+    }
+
+    /// Size and effort of the last prediction.
+    pub fn statistics(&self) -> FlowStatistics {
+        self.hydrodynamics.statistics()
+    }
+
+    /// Wall time spent so far, phase by phase.
+    pub fn phases(&self) -> &PhaseTable {
+        &self.phases
+    }
+
+    /// The same, to book more on it.
+    pub fn phases_mut(&mut self) -> &mut PhaseTable {
+        &mut self.phases
+    }
+
+    /// What [`Simulation::restore`] needs; taken between steps.
+    pub fn state(&self) -> SimulationState<D> {
+        SimulationState {
+            step: self.step,
+            reversed: self.reversed,
+            particles: self.particles.clone(),
+            integrator: self.integrator.clone(),
+            contact: self.contact.checkpoint(),
+            hydrodynamics: self.hydrodynamics.checkpoint(),
+        }
+    }
+
+    /// Goes on from `state`; `false`, and unchanged but for the flow, if it is not of a simulation like this one.
+    pub fn restore(&mut self, state: SimulationState<D>) -> bool {
+        let same_radii =
+            state.particles.iter().map(|particle| particle.radius).eq(self.radii.iter().copied());
+        if !same_radii || !self.hydrodynamics.resume(&state.hydrodynamics) {
+            return false;
+        }
+        self.hydrodynamics.set_shear_factor(if state.reversed { -1.0 } else { 1.0 });
+        self.step = state.step;
+        self.reversed = state.reversed;
+        self.particles = state.particles;
+        self.integrator = state.integrator;
+        self.contact.resume(state.contact);
+        true
+    }
+
+    /// Books the time of a prediction on the phases that the flow names, and the rest on "flow".
+    fn book_flow(&mut self, seconds: f64) {
+        let named = self.hydrodynamics.statistics().phases;
+        let rest = seconds - named.iter().map(|(_, seconds)| seconds).sum::<f64>();
+        named.iter().for_each(|(name, seconds)| self.phases.add(name, *seconds));
+        self.phases.add("flow", rest.max(0.0));
+    }
+}
+
+fn is_finite<const D: usize>(twist: &Twist<D>) -> bool
+where
+    Dim<D>: Space<D>,
+{
+    let numbers = twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin));
+    numbers.into_iter().all(|number| number.is_finite())
+}

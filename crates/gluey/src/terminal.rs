@@ -1,0 +1,106 @@
+//! Progress and results in words: a bar on a terminal, plain lines in a log.
+
+use std::io::{IsTerminal, stderr};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use gluey::{Progress, ProgressState, RunReport};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Time between lines of a log.
+const LOG_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Shows where a run is.
+pub enum Reporter {
+    /// On a terminal.
+    Bar(ProgressBar),
+    /// Into a file or pipe.
+    Log {
+        /// Name of the run.
+        name: String,
+        /// Time of the last line.
+        last: Mutex<Instant>,
+    },
+}
+
+impl Reporter {
+    /// A bar if there is a terminal to draw it on.
+    pub fn new(name: &str) -> Self {
+        if !stderr().is_terminal() {
+            return Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()) };
+        }
+        let bar = ProgressBar::no_length().with_prefix(name.to_owned());
+        let template = "{prefix} [{bar:30}] step {pos}/{len} {msg}";
+        // The template is valid; a plain bar would do as well.
+        bar.set_style(
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        Self::Bar(bar)
+    }
+
+    /// Takes the bar off the screen.
+    pub fn finish(&self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Progress for Reporter {
+    fn report(&self, state: &ProgressState<'_>) {
+        match self {
+            Self::Bar(bar) => {
+                bar.set_length(state.steps as u64);
+                bar.set_position(state.step as u64);
+                bar.set_message(summary(state));
+            }
+            Self::Log { name, last } => {
+                let Ok(mut last) = last.lock() else { return };
+                if last.elapsed() >= LOG_INTERVAL {
+                    *last = Instant::now();
+                    eprintln!("{name}: step {}/{} {}", state.step, state.steps, summary(state));
+                }
+            }
+        }
+    }
+}
+
+fn summary(state: &ProgressState<'_>) -> String {
+    let left = state.left_s.map_or("?".into(), duration);
+    let rate = match state.left_s {
+        Some(left) if left > 0.0 => format!("{:.3}", (state.steps - state.step) as f64 / left),
+        _ => "?".into(),
+    };
+    format!("t = {:.3}, {rate} steps/s, {left} left, {}", state.time, state.phase)
+}
+
+fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+/// Prints what came out, and where the time went.
+pub fn print_report(report: &RunReport) {
+    print!("{report}");
+    let total: f64 = report.phases.iter().map(|(_, seconds)| seconds).sum();
+    println!("  phase            seconds   share");
+    for (name, seconds) in &report.phases {
+        println!("  {name:<14} {seconds:>9.3} {:>6.1} %", 100.0 * seconds / total.max(f64::MIN_POSITIVE));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_given_in_units_one_can_wait_in() {
+        assert_eq!(duration(3.4), "3 s");
+        assert_eq!(duration(125.0), "2 min 05 s");
+        assert_eq!(duration(3720.0), "1 h 02 min");
+    }
+}
