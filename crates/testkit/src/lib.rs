@@ -1,1 +1,19 @@
-//! Placeholder.
+//! What tests measure against: exact Stokes flows, orders of convergence, reference data and an allocation counter.
+//!
+//! ```
+//! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
+//! use gluey_geom::Vector;
+//!
+//! let flow = PolynomialFlow { viscosity: 1.0 };
+//! assert_eq!(flow.velocity(&Vector::<2>::new(0.0, 0.3)), Vector::<2>::zeros());
+//! assert!((convergence_order(&[0.1, 0.05], &[8e-3, 1e-3]) - 3.0).abs() < 1e-12);
+//! ```
+//!
+//! A dev-dependency only: nothing here belongs in a program that users run.
+
+pub mod allocation;
+mod convergence;
+pub mod exact;
+pub mod reference;
+
+pub use convergence::{convergence_order, convergence_orders};

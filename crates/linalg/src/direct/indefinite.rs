@@ -54,7 +54,7 @@ pub struct DirectIndefinite {
     factor: Factor,
     factorised: bool,
     refinement: Refinement,
-    /// Right-hand side, solution and residual of the test solve.
+    /// Right-hand side, then residual, and solution of the test solve; the first also holds the diagonal.
     probe: [Vec<f64>; 2],
 }
 
@@ -142,8 +142,11 @@ impl DirectIndefinite {
 
     /// Replaces the zero diagonal entries of the matrix.
     fn regularise(&mut self) {
-        let diagonal = self.matrix.diagonal();
         let pattern = self.symbolic.pattern();
+        let diagonal = &mut self.probe[0];
+        for (row, entry) in diagonal.iter_mut().enumerate() {
+            *entry = self.matrix.get(row, row);
+        }
         for row in (0..diagonal.len()).filter(|&row| diagonal[row] == 0.0) {
             let range = pattern.range(row);
             let lumped: f64 = pattern
