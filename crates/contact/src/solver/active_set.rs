@@ -10,7 +10,8 @@ use super::{
     largest_eigenvalue, residual,
 };
 
-/// Iterations between two computations of the gaps from the forces, which bound the drift of the recurrence.
+/// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they bound the
+/// drift of the recurrence, but each is a restart that costs conjugate gradients what they have learnt.
 const REFRESH: usize = 50;
 /// `p.A p / (||A|| p.p)` below which a direction is taken for a null vector of `A`.
 const NULL: f64 = 1e-13;
@@ -53,7 +54,7 @@ impl ProjectionSolver for ActiveSet {
                 history.close(iteration, residual);
                 return Err(SolveFailure { report, history, worst });
             }
-            fresh = residual <= problem.tolerance || iteration % REFRESH == 0;
+            fresh = residual <= problem.tolerance || iteration % (REFRESH + 2 * forces.len()) == 0;
             if fresh {
                 self.begin(problem, forces);
             } else {

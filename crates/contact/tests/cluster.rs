@@ -1,0 +1,90 @@
+//! A cloud of particles squeezed into a jammed cluster by `u = -x`, then pulled apart by `u = x`.
+
+use gluey_contact::{ContactModel, ContactParams, Memory, PairContact, SolverKind, StepGeometry, Strategy};
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
+use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const DT: f64 = 0.01;
+
+struct Outcome {
+    /// Smallest gap, in radii.
+    smallest_gap: f64,
+    /// Most contacts at a time.
+    contact_count: usize,
+    /// Farthest distance from the start at the end, in radii.
+    miss: f64,
+}
+
+fn squeeze_and_release<const D: usize>(side: usize, params: ContactParams) -> Outcome
+where
+    Dim<D>: Space<D>,
+{
+    let mut random = ChaCha8Rng::seed_from_u64(42);
+    let mut jitter = || Vector::<D>::from_fn(|_, _| random.random_range(-0.25..0.25));
+    let site = |i: usize| Vector::<D>::from_fn(|d, _| (i / side.pow(d as u32) % side) as f64);
+    let centre = Vector::<D>::repeat(0.5 * (side - 1) as f64);
+    let count = side.pow(D as u32);
+    let mut particles: Vec<Particle<D>> =
+        (0..count).map(|i| Particle::new((site(i) - centre) * 2.6 + jitter(), 1.0)).collect();
+    let start = particles.clone();
+
+    let sink = LinearFlow { gradient: -Matrix::<D>::identity(), origin: Vector::zeros() };
+    let (mut flow, mut integrator) = (BackgroundFlow::new(sink), Integrator::new(Scheme::AdamsBashforth2));
+    let mut contact = PairContact::<D>::new(params);
+    let mut twists = vec![Twist::default(); count];
+    let (radii, mut drift) = (vec![1.0; count], vec![Vector::zeros(); count]);
+    let mut outcome = Outcome { smallest_gap: f64::INFINITY, contact_count: 0, miss: 0.0 };
+    for factor in [1.0, -1.0] {
+        flow.set_shear_factor(factor);
+        for _ in 0..100 {
+            flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
+            integrator.drift(DT, &mut drift);
+            let positions: Vec<_> = particles.iter().map(|particle| particle.pose.position).collect();
+            let rate = integrator.rate(DT);
+            let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate, dt: DT };
+            contact.correct(&step, &mut twists).expect("feasible");
+            integrator.advance(DT, &mut particles, &twists);
+            outcome.contact_count = outcome.contact_count.max(contact.contacts().len());
+            assert!(contact.contacts().iter().all(|contact| contact.gamma <= 0.0));
+            for (i, particle) in particles.iter().enumerate() {
+                let gaps = particles[..i].iter().map(|other| particle.gap(other));
+                outcome.smallest_gap = gaps.fold(outcome.smallest_gap, f64::min);
+            }
+        }
+        integrator.reverse();
+        contact.reverse();
+    }
+    let misses = particles.iter().zip(&start);
+    outcome.miss =
+        misses.map(|(now, then)| (now.pose.position - then.pose.position).norm()).fold(0.0, f64::max);
+    outcome
+}
+
+fn check<const D: usize>(side: usize)
+where
+    Dim<D>: Space<D>,
+{
+    let law = |strategy| ContactParams {
+        strategy,
+        exact_gap: true,
+        memory: Memory::Consistent,
+        solver: SolverKind::ActiveSet,
+        ..Default::default()
+    };
+    let gluey = squeeze_and_release::<D>(side, law(Strategy::Gluey));
+    assert!(gluey.contact_count > side.pow(D as u32), "{} contacts", gluey.contact_count);
+    assert!(gluey.smallest_gap >= -1e-12, "{:e}", gluey.smallest_gap);
+    println!("{D}D: gluey misses by {:.2e}", gluey.miss);
+    assert!(gluey.miss < 5e-3, "{}", gluey.miss);
+    let inelastic = squeeze_and_release::<D>(side, law(Strategy::Inelastic));
+    assert!(inelastic.smallest_gap >= -1e-12, "{:e}", inelastic.smallest_gap);
+    assert!(inelastic.miss > 1.0, "{}", inelastic.miss);
+}
+
+#[test]
+fn a_gluey_cluster_comes_apart_as_it_came_together() {
+    check::<2>(6);
+    check::<3>(3);
+}
