@@ -1,0 +1,124 @@
+//! Tensor-product Lagrange elements and Gauss quadrature on the unit cube.
+//!
+//! Local nodes and quadrature points are numbered with x fastest. Node `i` of degree `k` has the 1D indices
+//! `i_d` in `0..=k` and lies at `i_d / k`.
+
+/// Nodes of the Lagrange element of `degree` in `D` dimensions, `(degree+1)^D`.
+pub const fn node_count<const D: usize>(degree: usize) -> usize {
+    (degree + 1).pow(D as u32)
+}
+
+/// The 1D indices of point `i` in a grid with `n` points a direction.
+pub fn split<const D: usize>(i: usize, n: usize) -> [usize; D] {
+    std::array::from_fn(|d| i / n.pow(d as u32) % n)
+}
+
+/// Values of the 1D Lagrange functions of `degree` 1 or 2 at `x` in `[0, 1]`; unused entries are zero.
+pub fn values_1d(degree: usize, x: f64) -> [f64; 3] {
+    match degree {
+        1 => [1.0 - x, x, 0.0],
+        _ => [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)],
+    }
+}
+
+/// Derivatives of the 1D Lagrange functions of `degree` 1 or 2 at `x`.
+pub fn derivatives_1d(degree: usize, x: f64) -> [f64; 3] {
+    match degree {
+        1 => [-1.0, 1.0, 0.0],
+        _ => [4.0 * x - 3.0, 4.0 - 8.0 * x, 4.0 * x - 1.0],
+    }
+}
+
+/// Value of shape function `i` of `degree` at the point `x` of the unit cube.
+pub fn value<const D: usize>(degree: usize, i: usize, x: &[f64; D]) -> f64 {
+    let index = split::<D>(i, degree + 1);
+    (0..D).map(|d| values_1d(degree, x[d])[index[d]]).product()
+}
+
+/// Gradient of shape function `i` of `degree` at `x`, with respect to the unit-cube coordinates.
+pub fn gradient<const D: usize>(degree: usize, i: usize, x: &[f64; D]) -> [f64; D] {
+    let index = split::<D>(i, degree + 1);
+    std::array::from_fn(|g| {
+        let factor = |d: usize| match d == g {
+            true => derivatives_1d(degree, x[d])[index[d]],
+            false => values_1d(degree, x[d])[index[d]],
+        };
+        (0..D).map(factor).product()
+    })
+}
+
+/// Gauss-Legendre points and weights on `[0, 1]` with `n` points (exact to degree `2n-1`).
+pub fn gauss(n: usize) -> Vec<(f64, f64)> {
+    (0..n).map(|i| gauss_point(n, i)).collect()
+}
+
+fn gauss_point(n: usize, i: usize) -> (f64, f64) {
+    let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
+    let mut slope = 1.0;
+    for _ in 0..100 {
+        let (p, dp) = legendre(n, x);
+        slope = dp;
+        let dx = p / dp;
+        x -= dx;
+        if dx.abs() < 1e-16 {
+            break;
+        }
+    }
+    (0.5 * (1.0 - x), 1.0 / ((1.0 - x * x) * slope * slope))
+}
+
+/// Legendre polynomial of degree `n` and its derivative at `x`.
+fn legendre(n: usize, x: f64) -> (f64, f64) {
+    let (mut p0, mut p1) = (1.0, x);
+    for k in 2..=n {
+        let k = k as f64;
+        (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
+    }
+    (p1, n as f64 * (x * p1 - p0) / (x * x - 1.0))
+}
+
+/// Points and weights of the tensor-product Gauss rule with `n` points a direction on the unit cube.
+pub fn gauss_cube<const D: usize>(n: usize) -> Vec<([f64; D], f64)> {
+    let line = gauss(n);
+    (0..n.pow(D as u32))
+        .map(|q| {
+            let index = split::<D>(q, n);
+            let weight = (0..D).map(|d| line[index[d]].1).product();
+            (std::array::from_fn(|d| line[index[d]].0), weight)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gauss_integrates_polynomials_exactly() {
+        for n in 1..=10 {
+            for degree in 0..2 * n {
+                let sum: f64 = gauss(n).iter().map(|(x, w)| w * x.powi(degree as i32)).sum();
+                assert!((sum - 1.0 / (degree as f64 + 1.0)).abs() < 1e-14, "{n} {degree}");
+            }
+        }
+    }
+
+    fn shapes_form_a_partition_of_unity<const D: usize>() {
+        let x = std::array::from_fn(|d| 0.2 + 0.3 * d as f64);
+        for degree in [1, 2] {
+            let count = node_count::<D>(degree);
+            let sum: f64 = (0..count).map(|i| value::<D>(degree, i, &x)).sum();
+            assert!((sum - 1.0).abs() < 1e-14);
+            for d in 0..D {
+                let sum: f64 = (0..count).map(|i| gradient::<D>(degree, i, &x)[d]).sum();
+                assert!(sum.abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn partition_of_unity() {
+        shapes_form_a_partition_of_unity::<2>();
+        shapes_form_a_partition_of_unity::<3>();
+    }
+}

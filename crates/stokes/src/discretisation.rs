@@ -1,0 +1,73 @@
+//! A mesh with its velocity and pressure nodes, and how its cells meet the bodies.
+
+use gluey_fem::{NodeMap, TreeMesh};
+use gluey_geom::Vector;
+use gluey_levelset::{LevelSet, nearest};
+
+use crate::space::SolidNodes;
+
+/// A mesh with the nodes of the Q2-Q1 pair.
+#[derive(Clone, Debug)]
+pub struct Discretisation<const D: usize> {
+    /// The mesh.
+    pub mesh: TreeMesh<D>,
+    /// Nodes of the velocity, degree 2.
+    pub velocity: NodeMap<D>,
+    /// Nodes of the pressure, degree 1.
+    pub pressure: NodeMap<D>,
+}
+
+impl<const D: usize> Discretisation<D> {
+    /// Numbers the nodes of `mesh`.
+    pub fn new(mesh: TreeMesh<D>) -> Self {
+        let (velocity, pressure) = (NodeMap::new(&mesh, 2), NodeMap::new(&mesh, 1));
+        Self { mesh, velocity, pressure }
+    }
+
+    /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.
+    pub fn dof_count(&self) -> usize {
+        self.velocity.node_count() * D + self.pressure.node_count()
+    }
+
+    /// Edge length of a cell.
+    pub fn cell_size(&self, cell: usize) -> f64 {
+        self.mesh.size(self.mesh.cells()[cell].level)
+    }
+}
+
+/// The nodes with `alpha >= offset`, each with the body whose level set is largest there. A negative offset takes
+/// nodes slightly outside the surface; it is a length.
+pub fn solid_nodes<const D: usize, B: LevelSet<D>>(
+    nodes: &NodeMap<D>,
+    bodies: &[B],
+    offset: f64,
+) -> SolidNodes {
+    let at = |x: Vector<D>| nearest(bodies, &x).filter(|b| b.1 >= offset).map(|b| b.0 as u32);
+    (0..nodes.node_count()).map(|n| at(nodes.point(n))).collect()
+}
+
+/// How the cells of a mesh are made of free and rigid nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellKind {
+    /// Every node belongs to one body: no strain, no flow.
+    Rigid,
+    /// Every node belongs to a body, but not to the same one: it is strained, but nothing flows.
+    Bridge,
+    /// Some nodes are free.
+    Fluid,
+}
+
+/// Kind of a cell from the bodies its nodes belong to.
+pub fn cell_kind(bodies: impl Iterator<Item = Option<u32>>) -> CellKind {
+    let mut first = None;
+    let mut kind = CellKind::Rigid;
+    for body in bodies {
+        match (body, first) {
+            (None, _) => return CellKind::Fluid,
+            (Some(b), None) => first = Some(b),
+            (Some(b), Some(f)) if b != f => kind = CellKind::Bridge,
+            _ => {}
+        }
+    }
+    kind
+}

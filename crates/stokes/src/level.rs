@@ -1,0 +1,278 @@
+//! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
+
+use gluey_fem::kernel::{CellBatches, CubeKernel};
+use gluey_fem::{Interpolation, Reference};
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{
+    Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, invert_spd,
+};
+
+use crate::discretisation::Discretisation;
+use crate::error::StokesError;
+use crate::space::VelocitySpace;
+use crate::system::{ActiveCell, Penalty, active_cells, batches};
+
+/// Applications of the diagonal in one smoothing sweep.
+const SMOOTHER_DEGREE: usize = 3;
+/// Largest over smallest eigenvalue that the smoother damps.
+const SMOOTHER_RATIO: f64 = 10.0;
+/// Factor by which the estimate of the largest eigenvalue is raised.
+const SMOOTHER_SAFETY: f64 = 1.15;
+/// Lanczos steps for that estimate.
+const LANCZOS_STEPS: usize = 10;
+
+/// The viscous operator `T^T A T` of one level.
+#[derive(Clone, Debug)]
+pub struct LevelOperator<const D: usize> {
+    /// Reduced velocities.
+    pub space: VelocitySpace<D>,
+    kernel: CubeKernel<f32, D>,
+    batches: CellBatches<f32>,
+    penalty: Option<Penalty<f32, D>>,
+    work: Vec<f32>,
+    penalty_work: Vec<f32>,
+}
+
+impl<const D: usize> LinOp<f32> for LevelOperator<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.space.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.work.copy_from_slice(x);
+        self.space.expand(&mut self.work);
+        y.fill(0.0);
+        self.kernel.viscous(&self.batches, &self.work, y);
+        if let Some(penalty) = &self.penalty {
+            self.penalty_work.fill(0.0);
+            penalty.stress.apply(self.space.nodes(), &self.work, &mut self.penalty_work);
+            gluey_linalg::vector::axpy(penalty.factor, &self.penalty_work, y);
+        }
+        self.space.reduce(y);
+    }
+}
+
+/// Inverse diagonal on free nodes, inverse blocks on twists, zero elsewhere.
+#[derive(Clone, Debug)]
+struct BlockDiagonal {
+    nodal: Vec<f32>,
+    twists: Vec<f32>,
+    rigid: usize,
+}
+
+impl Preconditioner<f32> for BlockDiagonal {
+    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+        let split = self.nodal.len();
+        for (z, (r, d)) in z.iter_mut().zip(r.iter().zip(&self.nodal)) {
+            *z = r * d;
+        }
+        let n = self.rigid;
+        let (r, z) = (&r[split..], &mut z[split..]);
+        for (body, block) in self.twists.chunks_exact(n * n).enumerate() {
+            for (i, row) in block.chunks_exact(n).enumerate() {
+                z[body * n + i] = row.iter().zip(&r[body * n..]).map(|(m, r)| m * r).sum();
+            }
+        }
+    }
+}
+
+/// How a level hangs on the next coarser one.
+#[derive(Clone, Debug)]
+pub enum Transfer {
+    /// The coarser level has the same mesh, with rigid bodies.
+    SameMesh,
+    /// The coarser level has a coarser mesh.
+    Mesh(Interpolation),
+}
+
+/// One level of the multigrid.
+#[derive(Clone, Debug)]
+pub struct Level<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Operator of this level.
+    pub operator: LevelOperator<D>,
+    diagonal: BlockDiagonal,
+    chebyshev: Chebyshev<f32>,
+    /// Right-hand side, and the workspace of the transfers.
+    pub b: Vec<f32>,
+    /// Solution.
+    pub x: Vec<f32>,
+    r: Vec<f32>,
+}
+
+impl<const D: usize> Level<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Sets up operator and smoother; `index` names the level in errors.
+    pub fn new(
+        discretisation: &Discretisation<D>,
+        space: VelocitySpace<D>,
+        viscosity: f64,
+        penalty: Option<Penalty<f32, D>>,
+        index: usize,
+    ) -> Result<Self, StokesError> {
+        let cells = active_cells(discretisation, &space, viscosity);
+        let mut diagonal = block_diagonal(discretisation, &space, &cells, penalty.as_ref())
+            .map_err(|reason| StokesError::Smoother { level: index, reason })?;
+        let dim = space.dim();
+        let penalty_work = if penalty.is_some() { dim } else { 0 };
+        let mut operator = LevelOperator {
+            kernel: CubeKernel::default(),
+            batches: batches(discretisation, &cells),
+            penalty,
+            work: vec![0.0; dim],
+            penalty_work: vec![0.0; penalty_work],
+            space,
+        };
+        let lambda_max = estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
+        let interval = SpectralInterval::upper_part(lambda_max, SMOOTHER_RATIO, SMOOTHER_SAFETY);
+        let zeros = || vec![0.0; dim];
+        Ok(Self {
+            operator,
+            diagonal,
+            chebyshev: Chebyshev::new(dim, SMOOTHER_DEGREE, interval),
+            b: zeros(),
+            x: zeros(),
+            r: zeros(),
+        })
+    }
+
+    /// Smooths `A x = b` from zero.
+    pub fn smooth_from_zero(&mut self) {
+        let Self { operator, diagonal, chebyshev, b, x, .. } = self;
+        chebyshev.smooth(operator, diagonal, b, x, Guess::Zero);
+    }
+
+    /// Smooths `A x = b` from the present `x`.
+    pub fn smooth(&mut self) {
+        let Self { operator, diagonal, chebyshev, b, x, .. } = self;
+        chebyshev.smooth(operator, diagonal, b, x, Guess::Given);
+    }
+
+    /// Restricts the residual of this level to the right-hand side of the coarser one.
+    pub fn restrict(&mut self, transfer: &Transfer, coarse: &VelocitySpace<D>, coarse_b: &mut [f32]) {
+        self.operator.apply(&self.x, &mut self.r);
+        for (r, b) in self.r.iter_mut().zip(&self.b) {
+            *r = b - *r;
+        }
+        self.operator.space.spread(&mut self.r);
+        match transfer {
+            Transfer::SameMesh => {
+                let nodal = coarse.full_dim();
+                coarse_b[..nodal].copy_from_slice(&self.r[..nodal]);
+            }
+            Transfer::Mesh(interpolation) => {
+                coarse_b.fill(0.0);
+                interpolation.restrict(D, &self.r, coarse_b);
+            }
+        }
+        coarse.reduce(coarse_b);
+    }
+
+    /// Adds the correction `coarse_x` of the coarser level, whose entries it expands in place.
+    pub fn correct(&mut self, transfer: &Transfer, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
+        coarse.expand(coarse_x);
+        let nodal = self.operator.space.full_dim();
+        match transfer {
+            Transfer::SameMesh => self.r[..nodal].copy_from_slice(&coarse_x[..nodal]),
+            Transfer::Mesh(interpolation) => interpolation.prolong(D, coarse_x, &mut self.r[..nodal]),
+        }
+        self.operator.space.project(&mut self.r);
+        for (x, r) in self.x.iter_mut().zip(&self.r) {
+            *x += r;
+        }
+    }
+}
+
+fn block_diagonal<const D: usize>(
+    discretisation: &Discretisation<D>,
+    space: &VelocitySpace<D>,
+    cells: &[ActiveCell],
+    penalty: Option<&Penalty<f32, D>>,
+) -> Result<BlockDiagonal, String>
+where
+    Dim<D>: Space<D>,
+{
+    let reference = Reference::<D>::new();
+    let n = Reference::<D>::VELOCITY;
+    let nodes = space.nodes();
+    let mut nodal = vec![0f32; space.full_dim()];
+    for cell in cells {
+        for (i, &node) in discretisation.velocity.cell(cell.cell as usize).iter().enumerate() {
+            for c in 0..D {
+                nodal[node as usize * D + c] +=
+                    (cell.viscous * reference.viscous[(i * D + c) * (n + 1)]) as f32;
+            }
+        }
+    }
+    if let Some(penalty) = penalty {
+        let mut added = vec![0f32; space.full_dim()];
+        penalty.stress.add_diagonal(nodes, &reference, &mut added);
+        gluey_linalg::vector::axpy(penalty.factor, &added, &mut nodal);
+    }
+    nodes.collect(D, |w| w as f32, &mut nodal);
+    for (k, value) in nodal.iter_mut().enumerate() {
+        *value = match space.is_free(k / D) {
+            true if *value > 0.0 => 1.0 / *value,
+            true => return Err(format!("diagonal entry {value:e} at node {}", k / D)),
+            false => 0.0,
+        };
+    }
+    let twists = twist_blocks(discretisation, space, cells, &reference)?;
+    Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
+}
+
+/// Inverses of `R^T A R` for every body, zero for those that are not active.
+fn twist_blocks<const D: usize>(
+    discretisation: &Discretisation<D>,
+    space: &VelocitySpace<D>,
+    cells: &[ActiveCell],
+    reference: &Reference<D>,
+) -> Result<Vec<f32>, String>
+where
+    Dim<D>: Space<D>,
+{
+    let (n, rigid) = (Reference::<D>::VELOCITY, Dim::<D>::RIGID);
+    let mut rows = vec![None; space.nodes().node_count()];
+    for (node, body, matrix) in space.rigid_rows() {
+        rows[node as usize] = Some((body as usize, matrix));
+    }
+    let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
+    for cell in cells {
+        let nodes = discretisation.velocity.cell(cell.cell as usize);
+        let mut bodies: Vec<usize> =
+            nodes.iter().filter_map(|&v| rows[v as usize].as_ref().map(|r| r.0)).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        for body in bodies {
+            let mut motion = vec![0.0; n * rigid];
+            for (i, &node) in nodes.iter().enumerate() {
+                if let Some((owner, matrix)) = &rows[node as usize]
+                    && *owner == body
+                {
+                    motion[i * D * rigid..(i + 1) * D * rigid].copy_from_slice(matrix);
+                }
+            }
+            let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
+            let viscous = nalgebra::DMatrix::from_row_slice(n, n, &reference.viscous);
+            let product = motion.transpose() * (viscous * &motion) * cell.viscous;
+            blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
+        }
+    }
+    let mut inverses = Vec::with_capacity(blocks.len() * rigid * rigid);
+    for (body, mut block) in blocks.into_iter().enumerate() {
+        if !space.is_active(body) {
+            inverses.extend(std::iter::repeat_n(0f32, rigid * rigid));
+            continue;
+        }
+        invert_spd(rigid, &mut block).map_err(|e| format!("body {body}: {e}"))?;
+        inverses.extend(block.iter().map(|&m| m as f32));
+    }
+    Ok(inverses)
+}

@@ -1,0 +1,330 @@
+//! Krylov solution of the Stokes system with a multigrid preconditioner.
+//!
+//! FGMRES (Saad 1993) on `[A, -B^T; -B, 0]` with the block triangular preconditioner `z_p = -S^-1 r_p`,
+//! `z_u = V (r_u + B^T z_p)`: `S` is the pressure mass matrix over the viscosity, `V` one `f32` V-cycle on the velocity.
+//! The levels are the tree's own: level `l` is the mesh cut at depth `l`. On every level the solid nodes of that level
+//! are eliminated; a coarse correction enters as the rigid motion that fits it best. In the `paper` formulation the
+//! finest level is the penalised operator, and below it, on the same mesh, lies a level that moves every node the solid
+//! touches rigidly: what the penalty makes stiff is invisible to all coarser levels.
+
+use std::sync::Arc;
+
+use gluey_fem::Interpolation;
+use gluey_geom::{Dim, Space};
+use gluey_levelset::Ball;
+use gluey_linalg::{
+    Chebyshev, DirectSpd, Fgmres, FgmresParams, Guess, Jacobi, LinOp, Ordering, Preconditioner, Reference,
+    RefinementParams, SparseMatrix, SpectralInterval, Symbolic, vector,
+};
+
+use crate::assembly::{Unknowns, assemble_viscous};
+use crate::discretisation::{Discretisation, solid_nodes};
+use crate::error::StokesError;
+use crate::level::{Level, Transfer};
+use crate::pressure::WeakPressures;
+use crate::solid::SolidStress;
+use crate::solver::{Preparation, SaddleSolver};
+use crate::space::VelocitySpace;
+use crate::system::{Penalty, StokesSystem, SystemOperator, pressure_mass};
+
+/// Depth of the coarsest mesh.
+const COARSEST_LEVEL: u8 = 2;
+/// Chebyshev steps for a pressure mass matrix.
+const MASS_STEPS: usize = 8;
+
+/// FGMRES with a multigrid preconditioner.
+pub struct MultigridSolver<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    krylov: Fgmres<f64>,
+    cycle: Option<VCycle<D>>,
+    schur: Option<MassInverse>,
+}
+
+impl<const D: usize> Default for MultigridSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn default() -> Self {
+        let params = FgmresParams { max_iterations: 200, restart: 60, ..FgmresParams::default() };
+        Self { krylov: Fgmres::new(params), cycle: None, schur: None }
+    }
+}
+
+impl<const D: usize> SaddleSolver<D> for MultigridSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn prepare(
+        &mut self,
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        preparation: &Preparation<'_, D>,
+    ) -> Result<(), StokesError> {
+        self.cycle = Some(VCycle::new(discretisation, system, preparation)?);
+        let mass = pressure_mass(discretisation, system, preparation.viscosity)?;
+        self.schur = Some(MassInverse::new::<D>(mass)?);
+        Ok(())
+    }
+
+    fn solve(
+        &mut self,
+        system: &StokesSystem<D>,
+        b: &[f64],
+        x: &mut [f64],
+        tolerance: f64,
+    ) -> Result<usize, StokesError> {
+        let (Some(cycle), Some(schur)) = (&mut self.cycle, &mut self.schur) else {
+            return Err(StokesError::NotPrepared);
+        };
+        let mut b = b.to_vec();
+        system.pressure.remove_mean(&mut b[system.velocity_dim()..]);
+        let mut preconditioner = BlockTriangular {
+            system,
+            cycle,
+            schur,
+            load: vec![0.0; system.velocity_dim()],
+            pressure: vec![0.0; system.pressure.dim()],
+        };
+        self.krylov.set_relative_tolerance(tolerance);
+        let mut operator = MeanFree { operator: SystemOperator::new(system), system };
+        let report =
+            self.krylov.solve(&mut operator, &mut preconditioner, &b, x, Reference::RightHandSide)?;
+        Ok(report.iterations)
+    }
+}
+
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`.
+struct BlockTriangular<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    system: &'a StokesSystem<D>,
+    cycle: &'a mut VCycle<D>,
+    schur: &'a mut MassInverse,
+    load: Vec<f64>,
+    pressure: Vec<f64>,
+}
+
+impl<const D: usize> Preconditioner<f64> for BlockTriangular<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let (ru, rp) = r.split_at(self.system.velocity_dim());
+        let (zu, zp) = z.split_at_mut(self.system.velocity_dim());
+        self.pressure.copy_from_slice(rp);
+        self.system.pressure.remove_mean(&mut self.pressure);
+        self.schur.apply(&self.pressure, zp);
+        self.system.pressure.remove_mean(zp);
+        vector::scale(-1.0, zp);
+        self.pressure.copy_from_slice(zp);
+        self.system.pressure.expand(&mut self.pressure);
+        self.load.fill(0.0);
+        self.system.subtract_gradient(&self.pressure, &mut self.load);
+        self.system.space.reduce(&mut self.load);
+        for (load, r) in self.load.iter_mut().zip(ru) {
+            *load = r - *load;
+        }
+        self.cycle.apply(&self.load, zu);
+    }
+}
+
+/// The Stokes operator with its divergences made to sum to zero, as the right-hand side is: where two bodies share cells
+/// without a free node the flow between them is not constrained, and constants are not quite in the kernel.
+struct MeanFree<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    operator: SystemOperator<'a, D>,
+    system: &'a StokesSystem<D>,
+}
+
+impl<const D: usize> LinOp<f64> for MeanFree<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.operator.dim()
+    }
+
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.operator.apply(x, y);
+        self.system.pressure.remove_mean(&mut y[self.system.velocity_dim()..]);
+    }
+}
+
+/// Approximate inverse of the weighted pressure mass matrix.
+struct MassInverse {
+    mass: SparseMatrix,
+    jacobi: Jacobi<f64>,
+    chebyshev: Chebyshev<f64>,
+}
+
+impl MassInverse {
+    fn new<const D: usize>(mass: SparseMatrix) -> Result<Self, StokesError> {
+        let jacobi = Jacobi::new(&mass.diagonal())
+            .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
+        // Bounds of every cell's mass matrix relative to its diagonal, hence of their sum.
+        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: 1.5f64.powi(D as i32) };
+        let chebyshev = Chebyshev::new(mass.pattern().row_count(), MASS_STEPS, interval);
+        Ok(Self { mass, jacobi, chebyshev })
+    }
+
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
+    }
+}
+
+/// One V-cycle on the velocity block.
+struct VCycle<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Coarsest first.
+    levels: Vec<Level<D>>,
+    /// `transfers[l]` joins level `l` to level `l + 1`.
+    transfers: Vec<Transfer>,
+    coarse: CoarseSolver,
+}
+
+impl<const D: usize> VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        preparation: &Preparation<'_, D>,
+    ) -> Result<Self, StokesError> {
+        let finest = discretisation.mesh.max_level();
+        let coarsest = COARSEST_LEVEL.min(finest);
+        let mut meshes: Vec<Discretisation<D>> = (coarsest..finest)
+            .map(|level| Discretisation::new(discretisation.mesh.coarsened(level)))
+            .collect();
+        meshes.push(discretisation.clone());
+        let mut levels = Vec::with_capacity(meshes.len() + 1);
+        for (index, mesh) in meshes.iter().enumerate() {
+            let is_finest = index + 1 == meshes.len();
+            let space = rigid_space(mesh, preparation, is_finest);
+            levels.push(Level::new(mesh, space, preparation.viscosity, None, index)?);
+        }
+        let mut transfers: Vec<Transfer> = meshes
+            .windows(2)
+            .map(|pair| {
+                let (coarse, fine) = (&pair[0], &pair[1]);
+                Transfer::Mesh(Interpolation::new(&coarse.mesh, &coarse.velocity, &fine.mesh, &fine.velocity))
+            })
+            .collect();
+        if let Some(penalty) = &system.penalty {
+            let stress: SolidStress<f32, D> = penalty.stress.convert();
+            let penalty = Penalty { factor: penalty.factor, stress };
+            let index = levels.len();
+            let space = system.space.clone();
+            levels.push(Level::new(discretisation, space, preparation.viscosity, Some(penalty), index)?);
+            transfers.push(Transfer::SameMesh);
+        }
+        let coarse_space = levels[0].operator.space.clone();
+        let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
+        Ok(Self { levels, transfers, coarse })
+    }
+
+    fn run(&mut self, top: usize) {
+        if top == 0 {
+            let level = &mut self.levels[0];
+            self.coarse.solve(&level.b, &mut level.x);
+            return;
+        }
+        let (below, above) = self.levels.split_at_mut(top);
+        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
+        fine.smooth_from_zero();
+        fine.restrict(&self.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
+        self.run(top - 1);
+        let (below, above) = self.levels.split_at_mut(top);
+        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
+        let mut x = std::mem::take(&mut coarse.x);
+        fine.correct(&self.transfers[top - 1], &coarse.operator.space, &mut x);
+        coarse.x = x;
+        fine.smooth();
+    }
+}
+
+impl<const D: usize> Preconditioner<f64> for VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let norm = vector::norm(r);
+        if norm == 0.0 {
+            z.fill(0.0);
+            return;
+        }
+        let top = self.levels.len() - 1;
+        for (single, &double) in self.levels[top].b.iter_mut().zip(r) {
+            *single = (double / norm) as f32;
+        }
+        self.run(top);
+        for (double, &single) in z.iter_mut().zip(&self.levels[top].x) {
+            *double = f64::from(single) * norm;
+        }
+    }
+}
+
+/// Velocities of one level with the bodies' nodes on it eliminated.
+fn rigid_space<const D: usize>(
+    mesh: &Discretisation<D>,
+    preparation: &Preparation<'_, D>,
+    is_finest: bool,
+) -> VelocitySpace<D>
+where
+    Dim<D>: Space<D>,
+{
+    let bodies: &[Ball<D>] = preparation.bodies;
+    let h = mesh.mesh.size(mesh.mesh.max_level());
+    match preparation.touched {
+        Some(touched) if is_finest => VelocitySpace::new(mesh.velocity.clone(), bodies, &touched.to_vec()),
+        _ => {
+            let solid = solid_nodes(&mesh.velocity, bodies, preparation.offset * h);
+            VelocitySpace::new(mesh.velocity.clone(), bodies, &solid)
+        }
+    }
+}
+
+/// Direct solver of the coarsest level.
+struct CoarseSolver {
+    factor: DirectSpd,
+    unknowns: Unknowns,
+    b: Vec<f64>,
+    x: Vec<f64>,
+}
+
+impl CoarseSolver {
+    fn new<const D: usize>(
+        discretisation: &Discretisation<D>,
+        space: VelocitySpace<D>,
+        viscosity: f64,
+    ) -> Result<Self, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let system = StokesSystem::new(discretisation, space, viscosity, WeakPressures::Keep, None);
+        let assembled = assemble_viscous(discretisation, &system)?;
+        let symbolic = Symbolic::new(assembled.matrix.pattern().clone(), Ordering::Amd)?;
+        let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
+        factor.factorise(assembled.matrix.values())?;
+        let count = assembled.unknowns.positions.len();
+        Ok(Self { factor, unknowns: assembled.unknowns, b: vec![0.0; count], x: vec![0.0; count] })
+    }
+
+    fn solve(&mut self, b: &[f32], x: &mut [f32]) {
+        for (value, &k) in self.b.iter_mut().zip(&self.unknowns.positions) {
+            *value = f64::from(b[k as usize]);
+        }
+        self.factor.apply(&self.b, &mut self.x);
+        x.fill(0.0);
+        for (value, &k) in self.x.iter().zip(&self.unknowns.positions) {
+            x[k as usize] = *value as f32;
+        }
+    }
+}
