@@ -8,7 +8,7 @@ mod indefinite;
 mod refinement;
 mod spd;
 
-pub use indefinite::{DirectIndefinite, FactorReport, IndefiniteParams};
+pub use indefinite::{DirectIndefinite, FactorReport, IndefiniteParams, Regularise};
 pub use refinement::{RefinementParams, SolveReport};
 pub use spd::DirectSpd;
 

@@ -31,7 +31,7 @@ pub use block::{BlockError, BlockJacobi, BlockJacobiError, DenseCholesky, invert
 pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
-    SolveReport, Symbolic,
+    Regularise, SolveReport, Symbolic,
 };
 pub use krylov::{Cg, CgParams, Fgmres, FgmresParams, KrylovError, KrylovReport, Reference};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, SinglePrecision};

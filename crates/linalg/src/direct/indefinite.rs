@@ -2,7 +2,8 @@
 //!
 //! faer pivots (Bunch and Kaufman 1977, 10.1090/S0025-5718-1977-0428694-0) inside a supernode only. A pressure whose
 //! diagonal is zero and which the ordering eliminates before any of its velocities is a pivot of exactly zero, and the
-//! factor fills with NaN in silence. Therefore each factor is tested by a solve with a known answer. If the test fails
+//! factor fills with NaN in silence. That is the rule, not the exception, beside rigid bodies, where pressures see few
+//! free velocities. Therefore each factor is tested by a solve with a known answer. If the test fails
 //! the zero diagonal entries are replaced by `-s d_i`, where `d_i = sum_j a_ij^2 / |a_jj|` is the diagonal of the Schur
 //! complement with the other unknowns lumped: for Stokes a slight compressibility. The matrix is then quasi-definite and
 //! has a factor for *every* ordering (Vanderbei 1995, 10.1137/0805005); refinement with the true matrix removes the
@@ -18,18 +19,36 @@ use super::refinement::Refinement;
 use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
 use crate::{Preconditioner, SparseMatrix, vector};
 
+/// When [`DirectIndefinite`] regularises zero diagonal entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regularise {
+    /// A factor that fails its test is an error.
+    Never,
+    /// If the plain factor fails its test, which then has cost a factorisation.
+    WhenNeeded,
+    /// Always. Best where the plain factor is known to fail, as it is with pressures that see few free velocities:
+    /// approximate minimum degree eliminates these first. Costs one refinement in each solve.
+    Always,
+}
+
 /// Tuning of [`DirectIndefinite`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IndefiniteParams {
     /// Accuracy of the solves.
     pub refinement: RefinementParams,
-    /// The number `s` by which zero diagonal entries are regularised where the plain factor fails; zero forbids it.
+    /// When zero diagonal entries are regularised.
+    pub regularise: Regularise,
+    /// The number `s` they are regularised by.
     pub regularisation: f64,
 }
 
 impl Default for IndefiniteParams {
     fn default() -> Self {
-        Self { refinement: RefinementParams::default(), regularisation: 1e-8 }
+        Self {
+            refinement: RefinementParams::default(),
+            regularise: Regularise::WhenNeeded,
+            regularisation: 1e-8,
+        }
     }
 }
 
@@ -94,20 +113,32 @@ impl DirectIndefinite {
         self.factorised = false;
         self.matrix.copy_values(values)?;
         check_finite("matrix", values)?;
-        self.factor.compute(&self.symbolic, self.matrix.values());
-        let mut probe_residual = self.probe();
-        let regularised = self.params.regularisation > 0.0 && !passes(probe_residual);
-        if regularised {
-            self.regularise();
-            self.factor.compute(&self.symbolic, self.matrix.values());
-            self.matrix.copy_values(values)?;
-            probe_residual = self.probe();
+        let (mut regularised, mut probe_residual) = match self.params.regularise {
+            Regularise::Always => (true, self.factorise_regularised(values)?),
+            Regularise::Never | Regularise::WhenNeeded => (false, self.factorise_plain()),
+        };
+        if !passes(probe_residual) && self.params.regularise == Regularise::WhenNeeded {
+            (regularised, probe_residual) = (true, self.factorise_regularised(values)?);
         }
         if !passes(probe_residual) {
             return Err(DirectError::Singular { probe_residual });
         }
         self.factorised = true;
         Ok(FactorReport { regularised, probe_residual })
+    }
+
+    /// Factorises and returns the residual of the test solve.
+    fn factorise_plain(&mut self) -> f64 {
+        self.factor.compute(&self.symbolic, self.matrix.values());
+        self.probe()
+    }
+
+    /// The same with zero diagonal entries regularised in the factor, not in the matrix that residuals are taken of.
+    fn factorise_regularised(&mut self, values: &[f64]) -> Result<f64, DirectError> {
+        self.regularise();
+        self.factor.compute(&self.symbolic, self.matrix.values());
+        self.matrix.copy_values(values)?;
+        Ok(self.probe())
     }
 
     /// Solves `A x = rhs` to the tolerance of the parameters. The old content of `x` does not matter.
@@ -140,27 +171,39 @@ impl DirectIndefinite {
         if residual.is_finite() { residual } else { f64::INFINITY }
     }
 
-    /// Replaces the zero diagonal entries of the matrix.
+    /// Replaces the zero diagonal entries `a_ii` by `-s max(d_i, floor)`.
     fn regularise(&mut self) {
-        let pattern = self.symbolic.pattern();
-        let diagonal = &mut self.probe[0];
+        let [diagonal, lumped] = &mut self.probe;
         for (row, entry) in diagonal.iter_mut().enumerate() {
             *entry = self.matrix.get(row, row);
         }
+        let mut largest: f64 = 0.0;
+        for (row, lumped) in lumped.iter_mut().enumerate().filter(|&(row, _)| diagonal[row] == 0.0) {
+            *lumped = lumped_schur_diagonal(&self.matrix, diagonal, row);
+            largest = largest.max(*lumped);
+        }
+        let floor = LUMPED_FLOOR * largest;
         for row in (0..diagonal.len()).filter(|&row| diagonal[row] == 0.0) {
-            let range = pattern.range(row);
-            let lumped: f64 = pattern
-                .columns_of(row)
-                .iter()
-                .zip(&self.matrix.values()[range])
-                .filter(|&(&column, _)| diagonal[column as usize] != 0.0)
-                .map(|(&column, value)| value * value / diagonal[column as usize].abs())
-                .sum();
-            if let Some(position) = pattern.position(row, row) {
-                self.matrix.values_mut()[position] = -self.params.regularisation * lumped;
+            if let Some(position) = self.symbolic.pattern().position(row, row) {
+                self.matrix.values_mut()[position] = -self.params.regularisation * lumped[row].max(floor);
             }
         }
     }
+}
+
+/// `d_i` counts for at least this fraction of the largest. A pressure whose couplings are rounding errors would else
+/// keep a pivot that is one; and where the system is truly singular, the null vector would be filled with noise.
+const LUMPED_FLOOR: f64 = 1e-2;
+
+/// `d_i = sum_j a_ij^2 / |a_jj|` over the `j` with a diagonal.
+fn lumped_schur_diagonal(matrix: &SparseMatrix, diagonal: &[f64], row: usize) -> f64 {
+    let pattern = matrix.pattern();
+    let entries = pattern.columns_of(row).iter().zip(&matrix.values()[pattern.range(row)]);
+    entries
+        .map(|(&column, value)| (value, diagonal[column as usize].abs()))
+        .filter(|&(_, size)| size > 0.0)
+        .map(|(value, size)| value * value / size)
+        .sum()
 }
 
 fn passes(probe_residual: f64) -> bool {

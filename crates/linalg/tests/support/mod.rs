@@ -15,9 +15,18 @@ pub struct Saddle {
 /// Q2-Q1 elements on `n x n` cells of the unit square, velocity zero on the boundary, one pressure pinned, and
 /// viscosity `viscosity(x, y)` at the quadrature points.
 pub fn stokes_2d(n: usize, viscosity: impl Fn(f64, f64) -> f64) -> Saddle {
-    let grid = Grid::new(n);
+    stokes_2d_around(n, viscosity, |_, _| false)
+}
+
+/// The same with velocity zero also where `solid(x, y)`; pressures that see no free velocity are left out.
+pub fn stokes_2d_around(
+    n: usize,
+    viscosity: impl Fn(f64, f64) -> f64,
+    solid: impl Fn(f64, f64) -> bool,
+) -> Saddle {
+    let grid = Grid::new(n, solid);
     let cells: Vec<Vec<usize>> = grid.cells().map(|(i, j)| grid.unknowns(i, j).flatten().collect()).collect();
-    let pattern = Pattern::from_groups(grid.dim(), &cells).expect("unknowns in range");
+    let pattern = Pattern::from_groups(grid.dim, &cells).expect("unknowns in range");
     let mut matrix = SparseMatrix::zeros(Arc::new(pattern));
     for (i, j) in grid.cells() {
         let block = cell_matrix(1.0 / n as f64, |x, y| {
@@ -32,25 +41,46 @@ pub fn stokes_2d(n: usize, viscosity: impl Fn(f64, f64) -> f64) -> Saddle {
             }
         }
     }
-    let is_pressure = (0..grid.dim()).map(|unknown| unknown >= grid.velocity_count()).collect();
+    let is_pressure = (0..grid.dim).map(|unknown| unknown >= grid.velocity_count).collect();
     Saddle { matrix, is_pressure }
 }
 
 struct Grid {
     n: usize,
+    dim: usize,
+    velocity_count: usize,
+    /// First of the two unknowns of a velocity node, where it is free.
+    velocity: Vec<Option<usize>>,
+    pressure: Vec<Option<usize>>,
 }
 
 impl Grid {
-    fn new(n: usize) -> Self {
-        Self { n }
-    }
-
-    fn velocity_count(&self) -> usize {
-        2 * (2 * self.n - 1).pow(2)
-    }
-
-    fn dim(&self) -> usize {
-        self.velocity_count() + (self.n + 1).pow(2) - 1
+    fn new(n: usize, solid: impl Fn(f64, f64) -> bool) -> Self {
+        let side = 2 * n + 1;
+        let mut dim = 0;
+        let mut number = |free: bool, size: usize| {
+            free.then(|| {
+                dim += size;
+                dim - size
+            })
+        };
+        let inner = |k: usize| 0 < k && k < 2 * n;
+        let place = |k: usize| k as f64 / (2 * n) as f64;
+        let velocity: Vec<_> = (0..side * side)
+            .map(|node| (node % side, node / side))
+            .map(|(x, y)| number(inner(x) && inner(y) && !solid(place(x), place(y)), 2))
+            .collect();
+        let velocity_count = velocity.iter().flatten().count() * 2;
+        // The coupling to the far corners of the cells is zero: the integral of (1-t) t (2t-1) over [0, 1] vanishes.
+        let sees_velocity = |px: usize, py: usize| {
+            let near = |k: usize| k.saturating_sub(2)..=(k + 2).min(2 * n);
+            let couples = |x: usize, y: usize| px.abs_diff(x) < 2 || py.abs_diff(y) < 2;
+            near(py).any(|y| near(px).any(|x| couples(x, y) && velocity[y * side + x].is_some()))
+        };
+        let pressure = (0..(n + 1) * (n + 1))
+            .map(|node| number(node > 0 && sees_velocity(2 * (node % (n + 1)), 2 * (node / (n + 1))), 1))
+            .collect();
+        Self { n, dim, velocity_count, velocity, pressure }
     }
 
     fn cells(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
@@ -60,16 +90,11 @@ impl Grid {
 
     /// The 18 velocities (two for each of the 9 nodes) and 4 pressures of a cell; none where they are given.
     fn unknowns(&self, i: usize, j: usize) -> impl Iterator<Item = Option<usize>> + use<'_> {
-        let inner = 2 * self.n - 1;
         let velocities = (0..18).map(move |k| {
             let (x, y) = (2 * i + (k / 2) % 3, 2 * j + k / 6);
-            let free = (1..=inner).contains(&x) && (1..=inner).contains(&y);
-            free.then(|| 2 * ((y - 1) * inner + x - 1) + k % 2)
+            self.velocity[y * (2 * self.n + 1) + x].map(|first| first + k % 2)
         });
-        let pressures = (0..4).map(move |k| {
-            let node = (j + k / 2) * (self.n + 1) + i + k % 2;
-            (node > 0).then(|| self.velocity_count() + node - 1)
-        });
+        let pressures = (0..4).map(move |k| self.pressure[(j + k / 2) * (self.n + 1) + i + k % 2]);
         velocities.chain(pressures)
     }
 }
