@@ -107,7 +107,9 @@ pub struct ContactSpec {
     pub strategy: Strategy,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     pub exact_gap: bool,
-    /// How gamma, the memory of a contact, is integrated.
+    /// How gamma, the memory of a contact, is integrated: by the scheme that moves the particles (`consistent`, the
+    /// default: a contact ends within a step, and encounters are reversible to second order) or as in the paper, whole
+    /// steps at a time (`paper`).
     pub memory: Memory,
     /// Floor of gamma (< 0) for rough particles; none when absent.
     pub gamma_min: Option<f64>,
@@ -197,8 +199,8 @@ pub struct PairMobilitySpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        let ContactParams { strategy, memory, gamma_min, threshold, .. } = ContactParams::default();
-        Self { strategy, exact_gap: true, memory, gamma_min, threshold }
+        let ContactParams { strategy, gamma_min, threshold, .. } = ContactParams::default();
+        Self { strategy, exact_gap: true, memory: Memory::Consistent, gamma_min, threshold }
     }
 }
 

@@ -122,6 +122,8 @@ fn classify(message: &str) -> Problem {
     } else if message.starts_with("unknown variant") {
         unknown_name(first, &quoted[1..])
             .unwrap_or_else(|| Problem::Malformed { message: message.to_owned() })
+    } else if message.starts_with("wanted string") {
+        Problem::WrongType { found: "something without quotes".into(), expected: "a name in quotes".into() }
     } else if let Some((found, expected)) = wrong_type(message) {
         Problem::WrongType { found, expected }
     } else {

@@ -182,7 +182,9 @@ fn check_flow(case: &Case, key: &Key) -> Check {
 
 fn check_mesh(case: &Case, key: &Key) -> Check {
     let mesh = &case.flow.mesh;
-    positive(mesh.cells_per_radius, key.name("cells_per_radius"))?;
+    if !(mesh.cells_per_radius >= 1.0 && mesh.cells_per_radius.is_finite()) {
+        return out_of_range(mesh.cells_per_radius, "of 1 or more", key.name("cells_per_radius"));
+    }
     if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
         return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
     }
@@ -204,15 +206,19 @@ fn check_mesh(case: &Case, key: &Key) -> Check {
 
 fn check_paper(case: &Case, key: &Key) -> Check {
     let paper = &case.flow.paper;
-    if !(paper.viscosity_ratio >= 1.0 && paper.viscosity_ratio <= 1e12) {
-        return out_of_range(paper.viscosity_ratio, "from 1 to 1e12", key.name("viscosity_ratio"));
+    if !(paper.viscosity_ratio > 1.0 && paper.viscosity_ratio <= 1e12) {
+        return out_of_range(
+            paper.viscosity_ratio,
+            "greater than 1, up to 1e12",
+            key.name("viscosity_ratio"),
+        );
     }
     if !(1..=10_000).contains(&paper.uzawa_steps) {
         return out_of_range(paper.uzawa_steps as f64, "from 1 to 10000", key.name("uzawa_steps"));
     }
     between(paper.rho, 0.0, 4.0, key.name("rho"))?;
-    if !(paper.ramp >= 0.0 && paper.ramp <= 100.0) {
-        return out_of_range(paper.ramp, "from 0 to 100", key.name("ramp"));
+    if !(paper.ramp > 0.0 && paper.ramp <= 100.0) {
+        return out_of_range(paper.ramp, "greater than 0, up to 100", key.name("ramp"));
     }
     Ok(())
 }

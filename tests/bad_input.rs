@@ -1,0 +1,296 @@
+//! The command refuses every kind of bad input, and says where it is and what would be right.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+/// A good case, one key a line: the tests break one line each.
+const GOOD: &str = r#"name = "pair"
+dimension = 3
+shear_rate = 1.0
+[domain]
+upper = [1.0, 1.0, 1.0]
+boundary = "couette"
+[[particles]]
+position = [0.3, 0.525, 0.5]
+radius = 0.05
+[[particles]]
+position = [0.7, 0.475, 0.5]
+radius = 0.05
+[time]
+step = 0.05
+end = 0.2
+scheme = "euler"
+[contact]
+strategy = "gluey"
+exact_gap = true
+[flow]
+hydrodynamics = "pair-mobility"
+formulation = "paper"
+tolerance = 1e-8
+[flow.mesh]
+cells_per_radius = 6.4
+coarsest_level = 3
+[flow.paper]
+rho = 1.0
+uzawa_steps = 1
+"#;
+
+/// Exit code and error output of the command.
+fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
+    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
+}
+
+/// Runs `text` and demands that it is refused with all of `expected` in the message, and nothing written.
+fn refused(text: &str, expected: &[&str]) {
+    let folder = TempDir::new().expect("a folder");
+    fs::write(folder.path().join("case.toml"), text).expect("a file");
+    let (code, stderr) = gluey(folder.path(), &["run", "case.toml"]);
+    assert_eq!(code, Some(1), "{stderr}");
+    for part in expected {
+        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
+    }
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    assert!(!folder.path().join("out").exists(), "output was written");
+}
+
+/// Replaces the `nth` line (from 1) of the good case.
+fn with_line(nth: usize, line: &str) -> String {
+    let mut lines: Vec<&str> = GOOD.lines().collect();
+    lines[nth - 1] = line;
+    lines.join("\n") + "\n"
+}
+
+/// The good case with its `nth` line replaced is refused, and that line named.
+fn refused_line(nth: usize, line: &str, expected: &[&str]) {
+    let place = format!("case.toml:{nth}:");
+    refused(&with_line(nth, line), &[&[place.as_str()], expected].concat());
+}
+
+#[test]
+fn the_good_case_runs() {
+    let folder = TempDir::new().expect("a folder");
+    fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
+    let (code, stderr) = gluey(folder.path(), &["run", "case.toml"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    let csv = fs::read_to_string(folder.path().join("out/pair-gluey.csv")).expect("a trajectory");
+    assert_eq!(csv.lines().count(), 1 + 5);
+}
+
+#[test]
+fn missing_keys() {
+    // The line named is that of the table in which the key should stand.
+    let without = |nth: usize| with_line(nth, "");
+    refused(&without(14), &["case.toml:13:", "time.step", "missing key `step`", "step = 0.025"]);
+    refused(&without(12), &["case.toml:10:", "particles[1].radius", "missing key `radius`", "radius = 0.05"]);
+    refused(&without(1), &["case.toml:1:", "name: missing key `name`", "name = \"my-case\""]);
+    refused("name = \"x\"\ndimension = 2\n", &["case.toml:1:", "missing key `particles`", "[[particles]]"]);
+}
+
+#[test]
+fn unknown_keys() {
+    refused_line(
+        9,
+        "raduis = 0.05",
+        &["particles[0].raduis", "unknown key `raduis`", "did you mean `radius`?"],
+    );
+    refused_line(16, "wombat = 1", &["time.wombat", "unknown key `wombat`", "`step`, `end`, `scheme`"]);
+    refused_line(26, "coarse_level = 3", &["flow.mesh.coarse_level", "did you mean `coarsest_level`?"]);
+    refused_line(24, "[flow.mash]", &["flow.mash", "unknown key `mash`", "did you mean `mesh`?"]);
+}
+
+#[test]
+fn wrong_types() {
+    refused_line(
+        14,
+        "step = \"fast\"",
+        &["time.step = \"fast\"", "wrong type: found string", "expected a number"],
+    );
+    refused_line(9, "radius = [0.05]", &["particles[0].radius", "wrong type", "expected a number"]);
+    refused_line(8, "position = 0.3", &["particles[0].position = 0.3", "expected a list like [1.0, 2.0]"]);
+    refused_line(8, "position = [0.3, \"a\", 0.5]", &["particles[0].position[1]", "expected a number"]);
+    refused_line(19, "exact_gap = 1", &["contact.exact_gap = 1", "expected true or false"]);
+    refused_line(2, "dimension = 3.0", &["dimension = 3.0", "wrong type", "expected a whole number"]);
+    refused_line(2, "dimension = -3", &["dimension = -3", "expected a whole number"]);
+    refused_line(29, "uzawa_steps = 1.5", &["flow.paper.uzawa_steps = 1.5", "expected a whole number"]);
+    refused_line(18, "strategy = 3", &["contact.strategy = 3", "wrong type", "expected a name in quotes"]);
+}
+
+#[test]
+fn text_that_is_not_toml() {
+    refused_line(14, "step = = 0.05", &["not valid TOML"]);
+    refused(&with_line(14, "step = 0.05\nstep = 0.05"), &["case.toml:15:", "duplicate key"]);
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = TempDir::new().expect("a folder");
+    let (code, stderr) = gluey(folder.path(), &["run", "nowhere.toml"]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("nowhere.toml: cannot be read"), "{stderr}");
+    fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).expect("a file");
+    let (code, stderr) = gluey(folder.path(), &["run", "binary.toml"]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("binary.toml: cannot be read") && stderr.contains("UTF-8"), "{stderr}");
+}
+
+#[test]
+fn dimensions_other_than_2_and_3() {
+    refused_line(
+        2,
+        "dimension = 4",
+        &["dimension = 4", "dimension 4 is not implemented", "dimension is 2 or 3"],
+    );
+    refused_line(2, "dimension = 0", &["dimension is 2 or 3"]);
+}
+
+#[test]
+fn wrong_numbers_of_coordinates() {
+    refused_line(
+        8,
+        "position = [0.3, 0.525]",
+        &["particles[0].position", "2 coordinates in 3D", "expected 3"],
+    );
+    refused_line(
+        5,
+        "upper = [1.0]",
+        &["domain.upper = [1.0]", "1 coordinates in 3D", "expected 3 coordinates"],
+    );
+    // The dimension is believed, the coordinates are not.
+    refused(&with_line(2, "dimension = 2"), &["case.toml:5:", "domain.upper", "3 coordinates in 2D"]);
+}
+
+#[test]
+fn overlapping_starts() {
+    let message = "particles 1 and 2 overlap at the start: gap -4.000000e-2";
+    let key = "particles[1].position = [0.36, 0.525, 0.5]";
+    refused_line(11, "position = [0.36, 0.525, 0.5]", &[key, message, "at least 0.1 is needed"]);
+    refused_line(11, "position = [0.3, 0.525, 0.5]", &["gap -1.000000e-1"]);
+}
+
+#[test]
+fn particles_outside_the_box() {
+    let message = "particle 2 sticks out of the box by 2.000000e-2 along x";
+    let hint = "x of the centre must lie between 0.05 and 0.95";
+    refused_line(11, "position = [0.97, 0.475, 0.5]", &["particles[1].position", message, hint]);
+    refused_line(8, "position = [0.3, 0.525, -7.0]", &["particles[0].position", "along z"]);
+    let message = "particle 1 of diameter 1.2 does not fit in a box of edge 1 along x";
+    refused_line(9, "radius = 0.6", &["particles[0].radius = 0.6", message, "less than 0.5"]);
+}
+
+#[test]
+fn boxes_that_are_none() {
+    let empty = "the box is empty along y: lower 0, upper -1";
+    refused_line(5, "upper = [1.0, -1.0, 1.0]", &["domain.upper", empty, "must exceed"]);
+    let stokes = with_line(21, "hydrodynamics = \"stokes\"");
+    let uneven = stokes.replace("upper = [1.0, 1.0, 1.0]", "upper = [1.5, 1.0, 1.0]");
+    refused(
+        &uneven,
+        &["case.toml:5:", "edge 1.5 along x is not a whole multiple of the shortest edge 1", "take 2"],
+    );
+}
+
+#[test]
+fn numbers_that_are_not_positive() {
+    refused_line(
+        14,
+        "step = 0.0",
+        &["time.step = 0.0", "0 is out of range", "expected a number greater than 0"],
+    );
+    refused_line(14, "step = -0.05", &["time.step = -0.05", "greater than 0"]);
+    refused_line(15, "end = -1", &["time.end = -1", "greater than 0"]);
+    refused_line(14, "step = 1e-300", &["time.step", "at most 1e9 steps"]);
+    refused_line(9, "radius = 0", &["particles[0].radius = 0", "greater than 0"]);
+    refused_line(12, "radius = -0.05", &["particles[1].radius = -0.05", "greater than 0"]);
+    refused_line(23, "tolerance = 0", &["flow.tolerance = 0", "between 0 and 0.1"]);
+    refused_line(25, "cells_per_radius = 0", &["flow.mesh.cells_per_radius", "a number of 1 or more"]);
+}
+
+#[test]
+fn numbers_that_are_not_finite() {
+    refused_line(14, "step = nan", &["time.step = nan", "NaN is not a finite number"]);
+    refused_line(15, "end = inf", &["time.end = inf", "inf is not a finite number"]);
+    refused_line(8, "position = [0.3, nan, 0.5]", &["particles[0].position[1] = nan", "not a finite number"]);
+    refused_line(9, "radius = nan", &["particles[0].radius = nan", "not a finite number"]);
+    refused_line(3, "shear_rate = -inf", &["shear_rate = -inf", "not a finite number"]);
+    refused_line(5, "upper = [1.0, nan, 1.0]", &["domain.upper[1] = nan", "not a finite number"]);
+    refused_line(23, "tolerance = nan", &["flow.tolerance = nan", "not a finite number"]);
+    refused_line(28, "rho = nan", &["flow.paper.rho = nan", "not a finite number"]);
+}
+
+#[test]
+fn names_that_are_not_known() {
+    let all = "\"none\", \"velocity-correction\", \"inelastic\", \"gluey\"";
+    let near = "did you mean \"gluey\"?";
+    refused_line(
+        18,
+        "strategy = \"glue\"",
+        &["contact.strategy", "`glue` is not a known strategy", near, all],
+    );
+    refused_line(22, "formulation = \"rigid\"", &["flow.formulation", "\"paper\", \"rigid-dofs\""]);
+    refused_line(16, "scheme = \"rk4\"", &["time.scheme", "\"euler\", \"adams-bashforth-2\""]);
+    refused_line(6, "boundary = \"periodc\"", &["domain.boundary", "did you mean \"periodic\"?"]);
+    refused_line(21, "hydrodynamics = \"navier\"", &["flow.hydrodynamics", "\"stokes\", \"pair-mobility\""]);
+    let solver = with_line(20, "[flow]\nsolver = \"cg\"");
+    refused(&solver, &["case.toml:21:", "flow.solver", "one of \"auto\", \"direct\", \"multigrid\""]);
+    let memory = with_line(17, "[contact]\nmemory = \"none\"");
+    refused(&memory, &["case.toml:18:", "contact.memory", "one of \"paper\", \"consistent\""]);
+}
+
+#[test]
+fn choices_that_do_not_fit_together() {
+    let third = GOOD.to_owned() + "[[particles]]\nposition = [0.5, 0.2, 0.5]\nradius = 0.05\n";
+    refused(
+        &third,
+        &["case.toml:21:", "flow.hydrodynamics = \"pair-mobility\"", "two particles", "3 particles"],
+    );
+    refused_line(1, "name = \"a pair\"", &["name = \"a pair\"", "not a name", "letters, digits"]);
+    let reference = |name: &str| with_line(1, &format!("name = \"pair\"\nreference = \"{name}\""));
+    refused(
+        &reference("pair4d"),
+        &["case.toml:2:", "`pair4d` is not a known reference", "pair3d_trajectory_box"],
+    );
+    refused(&reference("pair2d_trajectory"), &["case.toml:2:", "but the case has dimension 3"]);
+    let moved = reference("pair3d_trajectory_box").replace("0.525", "0.53");
+    refused(&moved, &["case.toml:2:", "particle 1", "(0.3, 0.53)", "(0.3, 0.525)"]);
+}
+
+#[test]
+fn meshes_that_cannot_be_numbered() {
+    refused_line(25, "cells_per_radius = 1e9", &["flow.mesh.cells_per_radius = 1e9", "level", "at most"]);
+    refused_line(26, "coarsest_level = 12", &["flow.mesh.coarsest_level = 12", "between 0 and 7"]);
+}
+
+#[test]
+fn output_folders_that_cannot_be_written() {
+    let folder = TempDir::new().expect("a folder");
+    fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
+    fs::write(folder.path().join("taken"), "a file, not a folder").expect("a file");
+    let (code, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "taken/deeper"]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("taken/deeper: cannot create the folder"), "{stderr}");
+    assert!(stderr.contains("--out DIR"), "{stderr}");
+    let (code, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "/proc/gluey"]);
+    assert_eq!(code, Some(1), "{stderr}");
+    assert!(stderr.contains("/proc/gluey: cannot create the folder"), "{stderr}");
+}
+
+#[test]
+fn arguments_that_make_no_sense() {
+    let folder = TempDir::new().expect("a folder");
+    fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
+    for (arguments, expected) in [
+        (["--strategy", "glue"], "expected `none`, `velocity-correction`, `inelastic` or `gluey`"),
+        (["--formulation", "soft"], "`soft` is not a known formulation"),
+        (["--vtk", "0"], "must be at least 1"),
+        (["--checkpoint-every", "often"], "must be a whole number"),
+    ] {
+        let (code, stderr) = gluey(folder.path(), &[["run", "case.toml"], arguments].concat());
+        assert_eq!(code, Some(2), "{stderr}");
+        assert!(stderr.contains(expected), "{stderr}");
+    }
+}

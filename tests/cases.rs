@@ -1,0 +1,70 @@
+//! Every case in `data/cases` loads, and runs its first steps.
+
+use std::fs;
+use std::path::PathBuf;
+
+use gluey::case::Hydrodynamics;
+use gluey::{Case, RunOptions, Silent, run};
+use tempfile::TempDir;
+
+fn case_files() -> Vec<PathBuf> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases");
+    let entries = fs::read_dir(folder).expect("the folder of cases");
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn the_papers_cases_are_there() {
+    let names: Vec<String> =
+        case_files().iter().map(|path| path.file_stem().expect("a name").to_string_lossy().into()).collect();
+    for name in ["pair-2d", "pair-3d", "pair-3d-mobility", "trio-2d"] {
+        assert!(names.iter().any(|found| found == name), "{name} is not among {names:?}");
+    }
+}
+
+#[test]
+fn the_papers_data_are_in_them() {
+    let case = |name: &str| {
+        let file = case_files().into_iter().find(|path| path.ends_with(format!("{name}.toml")));
+        Case::load(file.expect(name)).expect(name)
+    };
+    let starts =
+        |case: &Case| -> Vec<Vec<f64>> { case.particles.iter().map(|p| p.position.clone()).collect() };
+    let (pair, trio, spheres) = (case("pair-2d"), case("trio-2d"), case("pair-3d"));
+    assert_eq!(starts(&pair), [[0.451, 0.51], [0.549, 0.49]]);
+    assert_eq!(starts(&trio), [[0.451, 0.51], [0.549, 0.49], [0.7, 0.49]]);
+    assert_eq!(starts(&spheres), [[0.3, 0.525, 0.5], [0.7, 0.475, 0.5]]);
+    assert_eq!([pair.step_count(), trio.step_count(), spheres.step_count()], [1200, 1200, 337]);
+    for case in [pair, trio, spheres] {
+        assert!(case.particles.iter().all(|particle| particle.radius == 0.05));
+        assert_eq!((case.shear_rate, case.lower()[0], case.upper()[0]), (1.0, 0.0, 1.0));
+    }
+}
+
+#[test]
+fn every_case_runs_its_first_steps() {
+    for file in case_files() {
+        let mut case = Case::load(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(Some(case.name.as_str()), file.file_stem().and_then(|stem| stem.to_str()));
+        case.time.end = 2.0 * case.time.step;
+        // Coarse: this asks whether it runs, not how well.
+        case.flow.mesh.cells_per_radius = 1.0;
+        let folder = TempDir::new().expect("a folder");
+        let csv = folder.path().join("runs").join("trajectory.csv");
+        let report = run(&case, &RunOptions::csv(&csv), &Silent).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((report.steps, report.case.as_str()), (2, case.name.as_str()));
+        assert_eq!(report.cells > 0, case.flow.hydrodynamics == Hydrodynamics::Stokes);
+        assert!(report.min_gap_over_a.is_some_and(f64::is_finite));
+        assert!(report.max_abs_error_over_a.is_some_and(|error| error < 0.1), "{report}");
+        let rows = fs::read_to_string(&csv).expect("a trajectory");
+        assert_eq!(rows.lines().count(), 1 + 3);
+        assert!(rows.lines().skip(1).all(|row| row.split(',').all(|cell| cell.parse::<f64>().is_ok())));
+        assert_eq!(
+            fs::read_dir(csv.parent().expect("a folder")).expect("it").count(),
+            1,
+            "something is left over"
+        );
+    }
+}

@@ -1,0 +1,174 @@
+//! A run that was interrupted and resumed ends with the same bits as one that was not.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use gluey::{Case, CheckpointError, Progress, ProgressState, RunError, RunOptions, Silent, Strategy, run};
+use tempfile::TempDir;
+
+fn case() -> Case {
+    Case::load(case_file()).expect("a case")
+}
+
+fn case_file() -> &'static str {
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml")
+}
+
+/// Interrupts a run when it has reached a step.
+struct StopAt {
+    step: usize,
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Progress for StopAt {
+    fn report(&self, state: &ProgressState<'_>) {
+        if state.step >= self.step {
+            self.interrupt.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Options with a checkpoint beside the trajectory.
+fn options(folder: &Path) -> RunOptions {
+    RunOptions { checkpoint: Some(folder.join("c.checkpoint")), ..RunOptions::csv(folder.join("t.csv")) }
+}
+
+/// Runs to `step`, where the run is interrupted.
+fn interrupted(case: &Case, folder: &Path, step: usize) {
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let options = RunOptions { interrupt: Some(interrupt.clone()), ..options(folder) };
+    match run(case, &options, &StopAt { step, interrupt }) {
+        Err(RunError::Interrupted { step: done, checkpoint: Some(_), .. }) => assert_eq!(done, step + 1),
+        other => panic!("{other:?}"),
+    }
+    assert!(!options.csv.exists(), "a trajectory that is not complete has its final name");
+}
+
+fn resumed(case: &Case, folder: &Path) -> Result<gluey::RunReport, RunError> {
+    let options = RunOptions { resume: Some(folder.join("c.checkpoint")), ..options(folder) };
+    run(case, &options, &Silent)
+}
+
+fn resumes_bit_by_bit(case: &Case, step: usize) {
+    let folder = TempDir::new().expect("a folder");
+    let whole = folder.path().join("whole.csv");
+    let one = run(case, &RunOptions::csv(&whole), &Silent).unwrap_or_else(|error| panic!("{error}"));
+    interrupted(case, folder.path(), step);
+    let two = resumed(case, folder.path()).unwrap_or_else(|error| panic!("{error}"));
+    let read = |path: &Path| fs::read_to_string(path).expect("a trajectory");
+    assert_eq!(read(&whole), read(&folder.path().join("t.csv")));
+    assert_eq!(
+        (one.steps, one.min_gap_over_a, one.end_gap_over_a),
+        (two.steps, two.min_gap_over_a, two.end_gap_over_a)
+    );
+    assert_eq!(one.reversibility_error, two.reversibility_error);
+}
+
+#[test]
+fn before_during_and_after_contact() {
+    // The pair touches from about step 140 to 190.
+    for step in [0, 50, 160, 250] {
+        resumes_bit_by_bit(&case(), step);
+    }
+}
+
+#[test]
+fn on_the_way_back() {
+    let mut case = case();
+    case.reference = None;
+    case.time.reverse_at = Some(8.0);
+    resumes_bit_by_bit(&case, 159);
+    resumes_bit_by_bit(&case, 200);
+}
+
+#[test]
+fn a_run_can_be_prolonged() {
+    let folder = TempDir::new().expect("a folder");
+    let long = case();
+    let mut short = case();
+    short.time.end = 5.0;
+    let options = RunOptions { checkpoint_every: Some(50), ..options(folder.path()) };
+    run(&short, &options, &Silent).unwrap_or_else(|error| panic!("{error}"));
+    let report = resumed(&long, folder.path()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(report.steps, long.step_count());
+}
+
+#[test]
+fn a_checkpoint_of_another_case_is_refused() {
+    let folder = TempDir::new().expect("a folder");
+    interrupted(&case(), folder.path(), 3);
+    let mut other = case();
+    other.contact.strategy = Strategy::Inelastic;
+    match resumed(&other, folder.path()) {
+        Err(RunError::Checkpoint(CheckpointError::OtherCase { difference, .. })) => {
+            assert_eq!(difference.saved, "strategy = \"gluey\"");
+            assert_eq!(difference.given, "strategy = \"inelastic\"");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_damaged_checkpoint_is_refused() {
+    let folder = TempDir::new().expect("a folder");
+    interrupted(&case(), folder.path(), 3);
+    let path = folder.path().join("c.checkpoint");
+    let whole = fs::read(&path).expect("a checkpoint");
+    let refusal = |bytes: &[u8]| {
+        fs::write(&path, bytes).expect("a file");
+        match resumed(&case(), folder.path()) {
+            Err(RunError::Checkpoint(error)) => error,
+            other => panic!("{other:?}"),
+        }
+    };
+    let mut flipped = whole.clone();
+    *flipped.last_mut().expect("bytes") ^= 1;
+    assert!(matches!(refusal(&flipped), CheckpointError::Damaged { .. }));
+    assert!(matches!(refusal(&whole[..whole.len() - 1]), CheckpointError::Damaged { .. }));
+    assert!(matches!(refusal(b"t,x1,y1"), CheckpointError::Foreign { .. }));
+    assert!(matches!(refusal(&[b'x'; 100]), CheckpointError::Foreign { .. }));
+    let mut newer = whole.clone();
+    newer[8] = 200;
+    assert!(matches!(refusal(&newer), CheckpointError::Version { found: 200, .. }));
+    fs::remove_file(&path).expect("a file");
+    assert!(matches!(
+        resumed(&case(), folder.path()),
+        Err(RunError::Checkpoint(CheckpointError::Read { .. }))
+    ));
+}
+
+/// Ctrl-C in a terminal: the step is finished, a checkpoint written, the way to go on told.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_a_checkpoint_to_go_on_from() {
+    let folder = TempDir::new().expect("a folder");
+    let text = fs::read_to_string(case_file()).expect("a case");
+    let long = text.replace("end = 15.75", "end = 1575.0").replace("step = 0.05", "step = 0.0001");
+    let long = long.replace("reference = ", "# reference = ");
+    fs::write(folder.path().join("long.toml"), long).expect("a file");
+    let gluey = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+        command.current_dir(folder.path()).args(["run", "long.toml"]);
+        command
+    };
+    let started = gluey().stderr(std::process::Stdio::piped()).spawn().expect("it runs");
+    let partial = folder.path().join("out/pair-3d-mobility-gluey.csv.partial");
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while fs::metadata(&partial).map_or(0, |file| file.len()) < 10_000 {
+        assert!(Instant::now() < deadline, "the run does not get going");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let sent = Command::new("kill").args(["-INT", &started.id().to_string()]).status().expect("a signal");
+    assert!(sent.success());
+    let output = started.wait_with_output().expect("it ends");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(stderr.contains("interrupted after step"), "{stderr}");
+    let checkpoint = "out/pair-3d-mobility-gluey.checkpoint";
+    assert!(stderr.contains(&format!("gluey run long.toml --resume {checkpoint}")), "{stderr}");
+    assert!(folder.path().join(checkpoint).is_file());
+}

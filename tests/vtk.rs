@@ -1,0 +1,177 @@
+//! The files for ParaView hold what was written, in the order of nodes that VTK defines.
+
+use std::fs;
+use std::path::Path;
+
+use gluey::output::vtk::{Frame, VtkWriter};
+use gluey::{Case, RunOptions, Silent, VtkOptions, run};
+use gluey_contact::{Contact, PairKey};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_motion::Fields;
+use tempfile::TempDir;
+use vtkio::Vtk;
+use vtkio::model::{Attribute, CellType, DataSet, UnstructuredGridPiece};
+
+/// Edges of a quadrilateral in VTK's order: node 4 + i lies between the corners `EDGES[i]`.
+const QUAD_EDGES: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 3], [3, 0]];
+/// The same for a hexahedron: node 8 + i.
+const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
+/// Corners of the faces of a triquadratic hexahedron: node 20 + i is the centre of `FACES[i]`
+/// (vtkTriQuadraticHexahedron.h: left, right, front, back, bottom, top).
+const HEXAHEDRON_FACES: [[usize; 4]; 6] =
+    [[0, 3, 7, 4], [1, 2, 6, 5], [0, 1, 5, 4], [3, 2, 6, 7], [0, 1, 2, 3], [4, 5, 6, 7]];
+/// Corners of the unit cube in VTK's order.
+const CORNERS: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [0.0, 1.0, 1.0],
+];
+
+fn read(path: &Path) -> UnstructuredGridPiece {
+    let vtk = Vtk::import(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("not an unstructured grid") };
+    assert_eq!(pieces.len(), 1);
+    pieces[0].load_piece_data(None).expect("data")
+}
+
+fn numbers(attributes: &[Attribute], name: &str) -> Vec<f64> {
+    let found = attributes.iter().find_map(|attribute| match attribute {
+        Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("no array {name}"))
+}
+
+/// One cell, the unit square or cube, with a field that tells its nodes apart.
+fn one_cell<const D: usize>() -> Fields<D> {
+    let node_count = 3usize.pow(D as u32);
+    let point =
+        |node: usize| Vector::<D>::from_fn(|axis, _| 0.5 * (node / 3usize.pow(axis as u32) % 3) as f64);
+    let points: Vec<Vector<D>> = (0..node_count).map(point).collect();
+    Fields {
+        cells: (0..node_count as u32).collect(),
+        velocity: points.iter().map(|x| x * 2.0).collect(),
+        pressure: (0..node_count).map(|node| 1.0 / (node as f64 + 3.0)).collect(),
+        viscosity: vec![1e3; node_count],
+        level_set: points.iter().map(|x| x.norm() - 0.3).collect(),
+        multiplier: points.iter().map(|x| -x).collect(),
+        points,
+    }
+}
+
+fn cells_have_vtks_order_of_nodes<const D: usize>(
+    cell_type: CellType,
+    edges: &[[usize; 2]],
+    faces: &[[usize; 4]],
+) where
+    Dim<D>: Space<D>,
+{
+    let folder = TempDir::new().expect("a folder");
+    let fields = one_cell::<D>();
+    let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
+    let frame =
+        Frame { step: 40, time: 1.0, particles: &[], twists: &[], contacts: &[], fields: Some(&fields) };
+    writer.write(&frame).expect("files");
+    let piece = read(&folder.path().join("fields-000040.vtu"));
+
+    assert_eq!(piece.cells.types, [cell_type]);
+    let points: Vec<f64> = piece.points.cast_into().expect("numbers");
+    let nodes = piece.cells.cell_verts.into_xml().0;
+    let at = |n: usize| -> [f64; 3] { std::array::from_fn(|axis| points[3 * nodes[n] as usize + axis]) };
+    let mean = |corners: &[usize]| -> [f64; 3] {
+        std::array::from_fn(|axis| corners.iter().map(|&n| at(n)[axis]).sum::<f64>() / corners.len() as f64)
+    };
+    let corner_count = 1 << D;
+    assert_eq!(nodes.len(), fields.points.len());
+    (0..corner_count).for_each(|n| assert_eq!(at(n), CORNERS[n], "corner {n}"));
+    for (i, edge) in edges.iter().enumerate() {
+        assert_eq!(at(corner_count + i), mean(edge), "edge {i}");
+    }
+    for (i, face) in faces.iter().enumerate() {
+        assert_eq!(at(corner_count + edges.len() + i), mean(face), "face {i}");
+    }
+    let all: Vec<usize> = (0..corner_count).collect();
+    assert_eq!(at(nodes.len() - 1), mean(&all), "centre");
+
+    let data = &piece.data.point;
+    assert_eq!(numbers(data, "pressure"), fields.pressure);
+    assert_eq!(numbers(data, "viscosity"), fields.viscosity);
+    assert_eq!(numbers(data, "level_set"), fields.level_set);
+    let three = |v: &Vector<D>| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)];
+    assert_eq!(numbers(data, "velocity"), fields.velocity.iter().flat_map(three).collect::<Vec<_>>());
+    assert_eq!(numbers(data, "lambda"), fields.multiplier.iter().flat_map(three).collect::<Vec<_>>());
+}
+
+#[test]
+fn quadratic_cells() {
+    cells_have_vtks_order_of_nodes::<2>(CellType::BiquadraticQuad, &QUAD_EDGES, &[]);
+    cells_have_vtks_order_of_nodes::<3>(
+        CellType::TriquadraticHexahedron,
+        &HEXAHEDRON_EDGES,
+        &HEXAHEDRON_FACES,
+    );
+}
+
+#[test]
+fn particles_and_contacts() {
+    let folder = TempDir::new().expect("a folder");
+    let particles: Vec<Particle<2>> = (0..3)
+        .map(|n| Particle::new(Vector::<2>::new(0.1 * n as f64, 0.5), 0.05 + 0.01 * n as f64))
+        .collect();
+    let mut twists = [Twist::<2>::default(); 3];
+    twists[1].velocity = Vector::<2>::new(0.1, -0.2);
+    twists[2].spin[0] = -0.5;
+    let contacts = [Contact { pair: PairKey::new(0, 2), lambda: 0.3, gamma: -0.01, gap: 1e-9 }];
+    let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
+    let frame = Frame {
+        step: 0,
+        time: 0.0,
+        particles: &particles,
+        twists: &twists,
+        contacts: &contacts,
+        fields: None,
+    };
+    writer.write(&frame).expect("files");
+
+    let piece = read(&folder.path().join("particles-000000.vtu"));
+    assert_eq!(piece.cells.types, [CellType::Vertex; 3]);
+    assert_eq!(numbers(&piece.data.point, "radius"), [0.05, 0.060000000000000005, 0.07]);
+    assert_eq!(numbers(&piece.data.point, "velocity")[3..6], [0.1, -0.2, 0.0]);
+    assert_eq!(numbers(&piece.data.point, "spin")[6..9], [0.0, 0.0, -0.5]);
+
+    let piece = read(&folder.path().join("contacts-000000.vtu"));
+    assert_eq!(piece.cells.types, [CellType::Vertex, CellType::Vertex, CellType::Vertex, CellType::Line]);
+    assert_eq!(numbers(&piece.data.cell, "gamma"), [0.0, 0.0, 0.0, -0.01]);
+    assert_eq!(numbers(&piece.data.cell, "lambda"), [0.0, 0.0, 0.0, 0.3]);
+    let (nodes, offsets) = piece.cells.cell_verts.into_xml();
+    assert_eq!((nodes.as_slice(), offsets.as_slice()), ([0, 1, 2, 0, 2].as_slice(), [1, 2, 3, 5].as_slice()));
+    assert!(!folder.path().join("fields.pvd").exists(), "a collection without files");
+}
+
+#[test]
+fn runs_leave_a_collection_of_all_times() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
+    let mut case = Case::load(file).expect("a case");
+    case.time.end = 1.0;
+    let folder = TempDir::new().expect("a folder");
+    let vtk = VtkOptions { folder: folder.path().join("vtk"), every: 8 };
+    let options = RunOptions { vtk: Some(vtk), ..RunOptions::csv(folder.path().join("t.csv")) };
+    run(&case, &options, &Silent).unwrap_or_else(|error| panic!("{error}"));
+    let collection = fs::read_to_string(folder.path().join("vtk/particles.pvd")).expect("a collection");
+    for (time, file) in
+        [("0", "particles-000000.vtu"), ("0.4", "particles-000008.vtu"), ("0.8", "particles-000016.vtu")]
+    {
+        assert!(
+            collection.contains(&format!("timestep=\"{time}\" part=\"0\" file=\"{file}\"")),
+            "{collection}"
+        );
+        assert_eq!(read(&folder.path().join("vtk").join(file)).cells.types.len(), 2);
+    }
+    assert_eq!(collection.matches("<DataSet").count(), 3);
+}
