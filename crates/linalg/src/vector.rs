@@ -1,6 +1,6 @@
 //! Vector kernels with a fixed order of summation.
 //!
-//! A sum is taken in blocks of [`BLOCK`] entries, each with [`LANES`] partial sums that the compiler keeps in
+//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in
 //! vector registers; the sums of the blocks are added in `f64` from first to last. The order depends on the
 //! length alone, so equal inputs give equal bits.
 
