@@ -1,1 +1,124 @@
-fn main() {}
+//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask tidy`, `cargo xtask ci`.
+
+mod ci;
+mod figures;
+mod reproduce;
+mod tidy;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use reproduce::plan::FigureName;
+use reproduce::summary::Summary;
+
+#[derive(Parser)]
+#[command(bin_name = "cargo xtask", about = "Project tasks of gluey", max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Compute and draw the figures of Verdon et al. (2010).
+    ReproduceFigures(ReproduceArguments),
+    /// Check the code against ARCHITECTURE.md and the house rules.
+    Tidy,
+    /// Formatting, lints and all tests.
+    Ci,
+}
+
+#[derive(clap::Args)]
+struct ReproduceArguments {
+    /// A coarse mesh, large time steps and shorter runs: minutes instead of an hour.
+    #[arg(long)]
+    quick: bool,
+    /// Only these figures, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "FIGURES")]
+    only: Vec<FigureName>,
+    /// Output folder.
+    #[arg(long, default_value = "target/figures", value_name = "DIR")]
+    out: PathBuf,
+    /// Runs at a time [default: number of cores].
+    #[arg(long, value_name = "N")]
+    jobs: Option<std::num::NonZeroUsize>,
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().task {
+        Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
+        Task::Tidy => tidy(),
+        Task::Ci => outcome(ci::run(&workspace_root())),
+    }
+}
+
+fn tidy() -> ExitCode {
+    match tidy::offences(&workspace_root()) {
+        Ok(offences) => {
+            offences.iter().for_each(|offence| eprintln!("{offence}"));
+            if offences.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        }
+        Err(error) => outcome(Err(error)),
+    }
+}
+
+fn outcome<E: std::error::Error>(result: Result<(), E>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Folder of the workspace.
+fn workspace_root() -> PathBuf {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.parent().expect("xtask lies in the workspace").to_owned()
+}
+
+fn reproduce_figures(arguments: ReproduceArguments) -> ExitCode {
+    let cores = std::thread::available_parallelism();
+    let options = reproduce::Options {
+        quick: arguments.quick,
+        figures: chosen(arguments.only),
+        root: workspace_root(),
+        out: arguments.out,
+        jobs: arguments.jobs.or(cores.ok()).map_or(1, usize::from),
+    };
+    match reproduce::reproduce(&options) {
+        Ok(summary) => {
+            print_checks(&summary);
+            println!("\nfigures, runs, summary.json and index.html are in {}", options.out.display());
+            print_failures(&summary)
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The figures asked for, each once, in the paper's order; all if none was named.
+fn chosen(only: Vec<FigureName>) -> Vec<FigureName> {
+    FigureName::ALL.into_iter().filter(|figure| only.is_empty() || only.contains(figure)).collect()
+}
+
+fn print_checks(summary: &Summary) {
+    for check in &summary.checks {
+        let mark = if check.ok { "ok  " } else { "FAIL" };
+        let value = check.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
+        println!("{mark} {:5} {}: {} = {value} ({})", check.figure, check.run, check.name, check.wanted);
+    }
+}
+
+/// Lists what did not work.
+fn print_failures(summary: &Summary) -> ExitCode {
+    for failure in &summary.failures {
+        eprintln!("error: {}: {}", failure.what, failure.error);
+    }
+    if summary.failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}

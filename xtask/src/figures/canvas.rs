@@ -1,0 +1,148 @@
+//! A drawing surface for what kuva does not draw: legends, set-ups, stacked panels. Plain SVG, one element a call.
+
+use std::fmt::Write;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg;
+
+use super::chart::Stroke;
+use super::text;
+
+/// The bundled font first, then fonts of similar width.
+pub const FONT_FAMILY: &str = "Libertinus Serif, Linux Libertine, Times New Roman, serif";
+const REGULAR: &[u8] = include_bytes!("../../assets/LibertinusSerif-Regular.otf");
+const ITALIC: &[u8] = include_bytes!("../../assets/LibertinusSerif-Italic.otf");
+/// PNG pixels per SVG pixel: 600 SVG pixels are 1800 PNG pixels, 300 dpi at 152 mm.
+const PNG_ZOOM: f32 = 3.0;
+
+/// An SVG drawing under construction; lengths in SVG pixels, y downwards.
+pub struct Canvas {
+    width: f64,
+    height: f64,
+    body: String,
+}
+
+/// Why a drawing could not become a PNG.
+#[derive(Debug, thiserror::Error)]
+pub enum PngError {
+    /// The SVG is not readable.
+    #[error("the SVG cannot be read back: {0}")]
+    Svg(#[from] usvg::Error),
+    /// The picture has no area or is too large.
+    #[error("no picture of {0} x {1} pixels can be made")]
+    Size(u32, u32),
+    /// The encoder failed.
+    #[error("PNG encoding failed: {0}")]
+    Encoding(String),
+}
+
+impl Canvas {
+    /// An empty white canvas.
+    pub fn new(width: f64, height: f64) -> Self {
+        Self { width, height, body: String::new() }
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64), stroke: Stroke) {
+        let dashes = stroke.dashes.map(|d| format!(r#" stroke-dasharray="{d}""#)).unwrap_or_default();
+        self.element(format_args!(
+            r#"<line x1="{:.2}" y1="{:.2}" x2="{:.2}" y2="{:.2}" stroke="{}" stroke-width="{}"{dashes}/>"#,
+            from.0, from.1, to.0, to.1, stroke.color, stroke.width
+        ));
+    }
+
+    /// A straight arrow, its head at `to`.
+    pub fn arrow(&mut self, from: (f64, f64), to: (f64, f64), stroke: Stroke) {
+        self.line(from, to, stroke);
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+        let (ex, ey) = (dx / length, dy / length);
+        let head = |side: f64| (to.0 - 8.0 * ex - side * 3.5 * ey, to.1 - 8.0 * ey + side * 3.5 * ex);
+        let ((ax, ay), (bx, by)) = (head(1.0), head(-1.0));
+        self.element(format_args!(
+            r#"<path d="M{:.2} {:.2}L{ax:.2} {ay:.2}L{bx:.2} {by:.2}Z" fill="{}"/>"#,
+            to.0, to.1, stroke.color
+        ));
+    }
+
+    /// A circle, filled or only outlined.
+    pub fn circle(&mut self, center: (f64, f64), radius: f64, fill: &str, stroke: Stroke) {
+        self.element(format_args!(
+            r#"<circle cx="{:.2}" cy="{:.2}" r="{radius:.2}" fill="{fill}" stroke="{}" stroke-width="{}"/>"#,
+            center.0, center.1, stroke.color, stroke.width
+        ));
+    }
+
+    /// An axis-parallel rectangle without filling.
+    pub fn rectangle(&mut self, corner: (f64, f64), size: (f64, f64), stroke: Stroke) {
+        self.element(format_args!(
+            r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{:.2}" fill="none" stroke="{}" stroke-width="{}"/>"#,
+            corner.0, corner.1, size.0, size.1, stroke.color, stroke.width
+        ));
+    }
+
+    /// A label with the markup of [`text`]; `anchor` is `start`, `middle` or `end`.
+    pub fn text(&mut self, x: f64, y: f64, size: f64, anchor: &str, label: &str) {
+        let escaped = label.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        self.element(format_args!(
+            r#"<text x="{x:.2}" y="{y:.2}" font-size="{size}" text-anchor="{anchor}" fill="black">{escaped}</text>"#
+        ));
+    }
+
+    /// Another SVG document, its upper left corner at `(x, y)`.
+    pub fn embed(&mut self, svg: &str, x: f64, y: f64) {
+        let body = svg.find("<svg").map_or(svg, |start| &svg[start..]);
+        let body = body.replacen("<svg", &format!(r#"<svg x="{x:.2}" y="{y:.2}""#), 1);
+        self.element(format_args!("{body}"));
+    }
+
+    /// The drawing as an SVG document without its fonts (for a page that brings them).
+    pub fn inline_svg(&self) -> String {
+        self.document("")
+    }
+
+    /// The drawing as an SVG document that carries its fonts.
+    pub fn svg(&self) -> String {
+        self.document(&format!("<style>{}</style>", font_faces()))
+    }
+
+    /// The drawing as a PNG picture, drawn with the bundled fonts only.
+    pub fn png(&self) -> Result<Vec<u8>, PngError> {
+        let mut options = usvg::Options { font_family: "Libertinus Serif".to_owned(), ..Default::default() };
+        options.fontdb_mut().load_font_data(REGULAR.to_vec());
+        options.fontdb_mut().load_font_data(ITALIC.to_vec());
+        let tree = usvg::Tree::from_str(&self.inline_svg(), &options)?;
+        let size = tree.size().to_int_size().scale_by(PNG_ZOOM).ok_or(PngError::Size(0, 0))?;
+        let mut pixels =
+            Pixmap::new(size.width(), size.height()).ok_or(PngError::Size(size.width(), size.height()))?;
+        resvg::render(&tree, Transform::from_scale(PNG_ZOOM, PNG_ZOOM), &mut pixels.as_mut());
+        pixels.encode_png().map_err(|error| PngError::Encoding(error.to_string()))
+    }
+
+    fn document(&self, style: &str) -> String {
+        let (w, h) = (self.width, self.height);
+        text::typeset(&format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w:.0}\" height=\"{h:.0}\" viewBox=\"0 0 {w:.0} {h:.0}\" \
+             font-family=\"{FONT_FAMILY}\">{style}\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{}</svg>\n",
+            self.body
+        ))
+    }
+
+    fn element(&mut self, element: std::fmt::Arguments<'_>) {
+        writeln!(self.body, "{element}").expect("writing to a String cannot fail");
+    }
+}
+
+/// CSS that brings the two bundled fonts.
+pub fn font_faces() -> String {
+    let face = |style: &str, data: &[u8]| {
+        format!(
+            "@font-face{{font-family:'Libertinus Serif';font-style:{style};\
+             src:url(data:font/otf;base64,{}) format('opentype');}}",
+            STANDARD.encode(data)
+        )
+    };
+    face("normal", REGULAR) + &face("italic", ITALIC)
+}

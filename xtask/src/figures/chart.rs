@@ -1,0 +1,216 @@
+//! One chart: styled curves over linear or logarithmic axes, drawn by kuva, with a legend above the frame.
+
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::LinePlot;
+use kuva::plot::line::LineStyle;
+use kuva::render::layout::{Layout, TickFormat};
+use kuva::render::plots::Plot;
+use kuva::render::render::render_multiple;
+use std::sync::Arc;
+
+use super::canvas::{Canvas, FONT_FAMILY};
+
+/// Width of a figure, in SVG pixels.
+pub const WIDTH: f64 = 600.0;
+const MARGIN_LEFT: f64 = 66.0;
+const MARGIN_RIGHT: f64 = 18.0;
+const MARGIN_BOTTOM: f64 = 48.0;
+const MARGIN_TOP: f64 = 8.0;
+const LEGEND_ROW: f64 = 19.0;
+const LEGEND_SAMPLE: f64 = 40.0;
+
+/// How a curve is drawn; one style means the same thing in every figure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stroke {
+    /// CSS colour.
+    pub color: &'static str,
+    /// Width in SVG pixels.
+    pub width: f64,
+    /// SVG dash pattern; `None` is a solid line.
+    pub dashes: Option<&'static str>,
+}
+
+/// A curve as pieces of consecutive points (it may be interrupted).
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Legend text with the markup of [`super::text`]; `None` keeps it out of the legend.
+    pub label: Option<String>,
+    /// How it is drawn.
+    pub stroke: Stroke,
+    /// Pieces of points `(x, y)`.
+    pub pieces: Vec<Vec<(f64, f64)>>,
+}
+
+/// One axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Label with the markup of [`super::text`].
+    pub label: String,
+    /// Smallest value shown.
+    pub min: f64,
+    /// Largest value shown.
+    pub max: f64,
+    /// Distance of ticks (ignored on a logarithmic axis).
+    pub tick: f64,
+    /// Logarithmic (base 10).
+    pub log: bool,
+}
+
+/// A chart: curves over a pair of axes.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Curves, the first at the bottom.
+    pub curves: Vec<Curve>,
+    /// Remarks in small print, one line each, above the frame.
+    pub notes: Vec<String>,
+    /// Dots with labels.
+    pub marks: Vec<Mark>,
+}
+
+/// A dot with a label.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Where, in data coordinates (linear axes).
+    pub at: (f64, f64),
+    /// Text with the markup of [`super::text`].
+    pub label: String,
+}
+
+/// Stacks charts of equal width, the legend of all of them on top, into one SVG canvas.
+pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
+    let entries = legend_entries(charts);
+    let notes: Vec<&String> = charts.iter().flat_map(|chart| &chart.notes).collect();
+    let rows = entries.len().div_ceil(LEGEND_COLUMNS) + notes.len();
+    let mut y = 6.0 + LEGEND_ROW * rows as f64;
+    let heights: Vec<f64> = charts.iter().map(|c| frame_height(c) + MARGIN_TOP + c.margin_bottom()).collect();
+    let mut canvas = Canvas::new(WIDTH, y + heights.iter().sum::<f64>());
+    draw_legend(&mut canvas, &entries, &notes);
+    for (chart, height) in charts.iter().zip(heights) {
+        canvas.embed(&chart.svg(height), 0.0, y);
+        chart.draw_marks(&mut canvas, y + MARGIN_TOP, frame_height(chart));
+        y += height;
+    }
+    canvas
+}
+
+/// Height of the frame that gives both axes of `chart` the same scale.
+pub fn equal_aspect_height(chart: &Chart) -> f64 {
+    let width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
+    width * (chart.y.max - chart.y.min) / (chart.x.max - chart.x.min)
+}
+
+impl Chart {
+    /// The chart alone, `height` high with its margins.
+    fn svg(&self, height: f64) -> String {
+        let plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve)).collect();
+        let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
+            .with_width(WIDTH)
+            .with_height(height)
+            .with_force_margins(MARGIN_LEFT, MARGIN_RIGHT)
+            .with_force_margins_y(MARGIN_TOP, self.margin_bottom())
+            .with_x_axis_min(self.x.min)
+            .with_x_axis_max(self.x.max)
+            .with_y_axis_min(self.y.min)
+            .with_y_axis_max(self.y.max)
+            .with_x_tick_step(self.x.tick)
+            .with_x_label(&*self.x.label)
+            .with_y_label(&*self.y.label)
+            .with_font_family(FONT_FAMILY)
+            .with_label_size(17)
+            .with_tick_size(14)
+            .with_show_grid(false)
+            .with_box_axes()
+            .with_tick_align("inside")
+            .with_tick_pos("both")
+            .with_x_tick_format(tick_format(&self.x))
+            .with_y_tick_format(tick_format(&self.y));
+        layout = if self.y.log { layout.with_log_y() } else { layout.with_y_tick_step(self.y.tick) };
+        SvgBackend::new().render_scene(&render_multiple(plots, layout))
+    }
+
+    /// Room for tick labels and, if there is one, the axis label.
+    fn margin_bottom(&self) -> f64 {
+        if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
+    }
+
+    /// Draws the marks over a frame whose upper edge is at `top`.
+    fn draw_marks(&self, canvas: &mut Canvas, top: f64, frame_height: f64) {
+        let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
+        for Mark { at, label } in &self.marks {
+            let x = MARGIN_LEFT + frame_width * (at.0 - self.x.min) / (self.x.max - self.x.min);
+            let y = top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min);
+            canvas.circle((x, y), 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
+            canvas.text(x + 6.0, y + 15.0, 15.0, "start", label);
+        }
+    }
+
+    fn plots(&self, curve: &Curve) -> Vec<Plot> {
+        let style = curve.stroke.dashes.map_or(LineStyle::Solid, |d| LineStyle::Custom(d.to_owned()));
+        let line = LinePlot::new()
+            .with_color(curve.stroke.color)
+            .with_stroke_width(curve.stroke.width)
+            .with_line_style(style);
+        self.inside(&curve.pieces).into_iter().map(|piece| line.clone().with_data(piece).into()).collect()
+    }
+
+    /// The parts of the pieces that lie within the axes.
+    fn inside(&self, pieces: &[Vec<(f64, f64)>]) -> Vec<Vec<(f64, f64)>> {
+        let visible = |&(x, y): &(f64, f64)| {
+            (self.x.min..=self.x.max).contains(&x) && (self.y.min..=self.y.max).contains(&y)
+        };
+        let runs = pieces.iter().flat_map(|piece| piece.chunk_by(move |a, b| visible(a) && visible(b)));
+        runs.filter(|run| run.len() > 1).map(<[_]>::to_vec).collect()
+    }
+}
+
+const LEGEND_COLUMNS: usize = 2;
+
+/// Label and stroke of every curve to be named, once each.
+fn legend_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
+    let mut entries: Vec<(&str, Stroke)> = Vec::new();
+    for curve in charts.iter().flat_map(|chart| &chart.curves) {
+        if let Some(label) = &curve.label
+            && !entries.iter().any(|(name, _)| *name == label)
+        {
+            entries.push((label, curve.stroke));
+        }
+    }
+    entries
+}
+
+fn draw_legend(canvas: &mut Canvas, entries: &[(&str, Stroke)], notes: &[&String]) {
+    let column_width = (WIDTH - MARGIN_LEFT - MARGIN_RIGHT) / LEGEND_COLUMNS as f64;
+    for (i, (label, stroke)) in entries.iter().enumerate() {
+        let x = MARGIN_LEFT + column_width * (i % LEGEND_COLUMNS) as f64;
+        let y = 6.0 + LEGEND_ROW * ((i / LEGEND_COLUMNS) as f64 + 0.5);
+        canvas.line((x, y), (x + LEGEND_SAMPLE, y), *stroke);
+        canvas.text(x + LEGEND_SAMPLE + 8.0, y + 5.0, 15.0, "start", label);
+    }
+    let rows = entries.len().div_ceil(LEGEND_COLUMNS);
+    for (i, note) in notes.iter().enumerate() {
+        let y = 6.0 + LEGEND_ROW * ((rows + i) as f64 + 0.5);
+        canvas.text(MARGIN_LEFT, y + 5.0, 13.0, "start", note);
+    }
+}
+
+/// `10^{n}` for whole powers, nothing for ticks between them.
+fn power_of_ten(value: f64) -> String {
+    let exponent = value.log10();
+    if (exponent - exponent.round()).abs() > 1e-6 {
+        return String::new();
+    }
+    format!("10^{{{}}}", format!("{exponent:.0}").replace("-0", "0").replace('-', "\u{2212}"))
+}
+
+/// Ticks: decimals as the step needs on a linear axis, powers of ten on a logarithmic one.
+fn tick_format(axis: &Axis) -> TickFormat {
+    if axis.log {
+        return TickFormat::Custom(Arc::new(power_of_ten));
+    }
+    let decimals = (0..6).find(|d| (axis.tick * 10f64.powi(*d)).fract().abs() < 1e-9).unwrap_or(6);
+    TickFormat::Fixed(usize::try_from(decimals).unwrap_or(0))
+}

@@ -1,0 +1,135 @@
+//! Gaps over time on a logarithmic scale: figures 5, 7a and 9.
+
+use super::canvas::Canvas;
+use super::chart::{Axis, Chart, Curve, Stroke, stack};
+use super::{Data, exact_curve, legend, stroke};
+use crate::reproduce::plan::{Approach, CaseName, FigureName};
+use crate::reproduce::trajectory::Trajectory;
+
+const FRAME_HEIGHT: f64 = 300.0;
+const PANEL_HEIGHT: f64 = 170.0;
+
+/// Colour of the parts of a curve where particles overlap and |D| is drawn.
+const OVERLAP_COLOR: &str = "#7fc49f";
+
+/// Figure 5 or 7a: |D/a| of a pair.
+pub fn pair(figure: FigureName, data: &Data) -> Canvas {
+    let floor = if figure == FigureName::Fig5 { 1e-6 } else { 1e-5 };
+    let mut curves: Vec<Curve> = Vec::new();
+    for (approach, run) in data.runs_of(figure) {
+        curves.extend(gap_curves(approach, run, (1, 2), floor, true));
+    }
+    curves.extend(exact(data, figure.case(), (1, 2), floor));
+    let mut notes = data.notes(figure);
+    notes.extend(floor_note(&curves, floor));
+    let chart = Chart {
+        x: time_axis(&curves),
+        y: gap_axis("|*D*/*a*|", &curves, floor),
+        curves,
+        notes,
+        marks: Vec::new(),
+    };
+    stack(&[chart], |_| FRAME_HEIGHT)
+}
+
+/// Figure 9: D/a of the three pairs, positive values only, one panel each.
+pub fn trio(data: &Data) -> Canvas {
+    let floor = 1e-6;
+    let panel = |(i, j): (usize, usize)| {
+        let mut curves: Vec<Curve> = Vec::new();
+        for (approach, run) in data.runs_of(FigureName::Fig9) {
+            curves.extend(gap_curves(approach, run, (i, j), floor, false));
+        }
+        curves.extend(exact(data, CaseName::Trio2d, (i, j), floor));
+        Chart {
+            x: time_axis(&curves),
+            y: gap_axis(&format!("*D*_{{{i}{j}}}/*a*"), &curves, floor),
+            curves,
+            notes: Vec::new(),
+            marks: Vec::new(),
+        }
+    };
+    let mut charts = [(1, 2), (1, 3), (2, 3)].map(panel);
+    for upper in &mut charts[..2] {
+        upper.x.label.clear();
+    }
+    charts[0].notes = data.notes(FigureName::Fig9);
+    if let Some(note) = charts.iter().find_map(|chart| floor_note(&chart.curves, floor)) {
+        charts[0].notes.push(note);
+    }
+    stack(&charts, |_| PANEL_HEIGHT)
+}
+
+fn exact(data: &Data, case: CaseName, pair: (usize, usize), floor: f64) -> Vec<Curve> {
+    let gap = data.exact.get(&case).and_then(|exact| Some((exact, exact.gap(pair)?)));
+    gap.map(|(exact, gap)| exact_curve("exact", vec![clipped(&exact.times, gap, floor)]))
+        .into_iter()
+        .collect()
+}
+
+/// The curve of a run; where the gap is negative, a second curve shows |D| if `with_overlap`.
+fn gap_curves(
+    approach: Approach,
+    run: &Trajectory,
+    pair: (usize, usize),
+    floor: f64,
+    with_overlap: bool,
+) -> Vec<Curve> {
+    let Some(gap) = run.gap(pair) else { return Vec::new() };
+    let overlaps = |value: f64| value < -floor;
+    let pieces = |overlap: bool| -> Vec<Vec<(f64, f64)>> {
+        let points: Vec<(f64, f64)> = run.times.iter().copied().zip(gap.iter().copied()).collect();
+        let parts = points.chunk_by(|a, b| overlaps(a.1) == overlaps(b.1));
+        let wanted = parts.filter(|part| overlaps(part[0].1) == overlap);
+        wanted.map(|part| part.iter().map(|&(t, value)| (t, value.abs().max(floor))).collect()).collect()
+    };
+    let style = stroke(approach);
+    let mut curves =
+        vec![Curve { label: Some(legend(approach).to_owned()), stroke: style, pieces: pieces(false) }];
+    let negative = pieces(true);
+    if with_overlap && !negative.is_empty() {
+        let label = format!("{}, *D* < 0", legend(approach));
+        let stroke = Stroke { color: OVERLAP_COLOR, ..style };
+        curves.push(Curve { label: Some(label), stroke, pieces: negative });
+    }
+    curves
+}
+
+fn clipped(times: &[f64], gap: &[f64], floor: f64) -> Vec<(f64, f64)> {
+    times.iter().zip(gap).map(|(&t, &value)| (t, value.max(floor))).collect()
+}
+
+/// Says that values were clipped, if they were.
+fn floor_note(curves: &[Curve], floor: f64) -> Option<String> {
+    let clipped = values(curves).any(|(_, value)| *value <= floor);
+    let exponent = format!("{:.0}", floor.log10()).replace('-', "\u{2212}");
+    clipped.then(|| format!("Contact: gaps below 10^{{{exponent}}} *a* are drawn at 10^{{{exponent}}}."))
+}
+
+fn values(curves: &[Curve]) -> impl Iterator<Item = &(f64, f64)> {
+    curves.iter().flat_map(|curve| curve.pieces.iter().flatten())
+}
+
+/// Times from 0 to the end of the longest curve, in units of 1/shear rate.
+fn time_axis(curves: &[Curve]) -> Axis {
+    let end = values(curves).map(|(t, _)| *t).fold(1.0, f64::max);
+    let runs_end =
+        curves.iter().filter(|c| c.stroke != super::EXACT_STROKE).flat_map(|c| c.pieces.iter().flatten());
+    let end = runs_end.map(|(t, _)| *t).reduce(f64::max).unwrap_or(end);
+    let tick = if end > 20.0 { 5.0 } else { 2.0 };
+    Axis { label: "*t* (1/shear rate)".to_owned(), min: 0.0, max: (end - 1e-9).ceil(), tick, log: false }
+}
+
+/// From the floor (or the decade below the smallest value) to the decade above the largest value.
+fn gap_axis(label: &str, curves: &[Curve], floor: f64) -> Axis {
+    let low = values(curves).map(|(_, value)| *value).fold(1.0, f64::min).max(floor);
+    let high = values(curves).map(|(_, value)| *value).fold(low * 10.0, f64::max);
+    let decade = |value: f64| 10f64.powf(value);
+    Axis {
+        label: label.to_owned(),
+        min: decade((low.log10() + 1e-9).floor()),
+        max: decade((high.log10() - 1e-9).ceil()),
+        tick: 1.0,
+        log: true,
+    }
+}

@@ -1,0 +1,91 @@
+//! The paper's figures, drawn from whatever runs exist.
+
+pub mod canvas;
+pub mod chart;
+mod gaps;
+mod setups;
+pub mod text;
+mod trajectories;
+
+use std::collections::BTreeMap;
+
+use crate::reproduce::plan::{Approach, CaseName, FigureName, RunKey};
+use crate::reproduce::trajectory::Trajectory;
+use canvas::Canvas;
+use chart::{Curve, Stroke};
+
+/// What figures are drawn from.
+#[derive(Debug, Default)]
+pub struct Data {
+    /// Trajectories of the runs that succeeded.
+    pub runs: BTreeMap<RunKey, Trajectory>,
+    /// Exact solutions.
+    pub exact: BTreeMap<CaseName, Trajectory>,
+    /// The runs are those of `--quick`; the figures say so.
+    pub quick: bool,
+}
+
+/// Draws one figure.
+pub fn draw(figure: FigureName, data: &Data) -> Canvas {
+    match figure {
+        FigureName::Fig4 => setups::two_particles(),
+        FigureName::Fig8 => setups::three_particles(),
+        FigureName::Fig5 | FigureName::Fig7a => gaps::pair(figure, data),
+        FigureName::Fig9 => gaps::trio(data),
+        FigureName::Fig6 | FigureName::Fig7b => trajectories::pair(figure, data),
+        FigureName::Fig10 | FigureName::Fig11 => trajectories::trio(figure, data),
+    }
+}
+
+impl Data {
+    /// The runs a figure shows, those that exist.
+    fn runs_of(&self, figure: FigureName) -> Vec<(Approach, &Trajectory)> {
+        let run = |approach| self.runs.get(&RunKey { case: figure.case(), approach });
+        figure.approaches().into_iter().filter_map(|approach| Some((approach, run(approach)?))).collect()
+    }
+
+    /// What a reader of the figure must know: missing runs, reduced settings.
+    fn notes(&self, figure: FigureName) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.quick {
+            notes.push("Computed with --quick: coarse mesh and large time steps.".to_owned());
+        }
+        let missing: Vec<&str> = figure
+            .approaches()
+            .into_iter()
+            .filter(|&approach| !self.runs.contains_key(&RunKey { case: figure.case(), approach }))
+            .map(legend)
+            .collect();
+        if !missing.is_empty() {
+            notes.push(format!("Missing, because the run failed: {}.", missing.join(", ")));
+        }
+        notes
+    }
+}
+
+/// Line of a way of computing: the paper's styles, and colours that stay apart for colour-blind readers.
+fn stroke(approach: Approach) -> Stroke {
+    match approach {
+        Approach::Gluey => Stroke { color: "#0b4f9e", width: 1.8, dashes: None },
+        Approach::Inelastic => Stroke { color: "#c8471b", width: 1.8, dashes: Some("9 4") },
+        Approach::None => Stroke { color: "#1b7f4d", width: 1.8, dashes: Some("9 3 2 3") },
+        Approach::GlueyRigidDofs => Stroke { color: "#8a3ea0", width: 1.8, dashes: Some("2 2.5") },
+    }
+}
+
+/// Thin grey line of exact solutions.
+const EXACT_STROKE: Stroke = Stroke { color: "#8c8c8c", width: 1.0, dashes: None };
+
+/// Name of a way of computing in legends.
+pub fn legend(approach: Approach) -> &'static str {
+    match approach {
+        Approach::Gluey => "gluey contact",
+        Approach::Inelastic => "inelastic collision",
+        Approach::None => "no correction",
+        Approach::GlueyRigidDofs => "gluey contact, rigid-dofs",
+    }
+}
+
+fn exact_curve(label: &str, pieces: Vec<Vec<(f64, f64)>>) -> Curve {
+    Curve { label: Some(label.to_owned()), stroke: EXACT_STROKE, pieces }
+}

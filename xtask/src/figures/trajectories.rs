@@ -1,0 +1,71 @@
+//! Paths of the centres in the x-y plane, both axes to one scale: figures 6, 7b, 10 and 11.
+
+use super::canvas::Canvas;
+use super::chart::{Axis, Chart, Curve, Mark, equal_aspect_height, stack};
+use super::{Data, exact_curve, legend, stroke};
+use crate::reproduce::plan::FigureName;
+use crate::reproduce::trajectory::Trajectory;
+
+/// Figure 6 or 7b: both particles of a pair.
+pub fn pair(figure: FigureName, data: &Data) -> Canvas {
+    paths(figure, data, 2)
+}
+
+/// Figure 10 or 11: the three discs.
+pub fn trio(figure: FigureName, data: &Data) -> Canvas {
+    paths(figure, data, 3)
+}
+
+fn paths(figure: FigureName, data: &Data, particle_count: usize) -> Canvas {
+    let all =
+        |run: &Trajectory| (1..=particle_count).map(|particle| run.path_xy(particle)).collect::<Vec<_>>();
+    let mut curves: Vec<Curve> = Vec::new();
+    for (approach, run) in data.runs_of(figure) {
+        let label = Some(legend(approach).to_owned());
+        curves.push(Curve { label, stroke: stroke(approach), pieces: all(run) });
+    }
+    curves.extend(data.exact.get(&figure.case()).map(|exact| exact_curve("exact", all(exact))));
+    let (x, y) = axes(&curves);
+    let chart = Chart { x, y, marks: starts(&curves), curves, notes: data.notes(figure) };
+    stack(&[chart], equal_aspect_height)
+}
+
+/// The numbers of the particles where their paths begin.
+fn starts(curves: &[Curve]) -> Vec<Mark> {
+    let paths = curves.first().map_or(&[][..], |curve| &curve.pieces);
+    let first_points = paths.iter().filter_map(|path| path.first());
+    first_points.zip(1..).map(|(&at, number)| Mark { at, label: format!("{number}") }).collect()
+}
+
+/// Axes around all points, widened to whole ticks.
+fn axes(curves: &[Curve]) -> (Axis, Axis) {
+    let points = || curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
+    let bounds = |pick: fn(&(f64, f64)) -> f64| {
+        let values = || points().map(pick).filter(|value| value.is_finite());
+        (values().reduce(f64::min).unwrap_or(0.0), values().reduce(f64::max).unwrap_or(1.0))
+    };
+    let (x, y) = (bounds(|p| p.0), bounds(|p| p.1));
+    (axis("*x*", x), axis("*y*", y))
+}
+
+fn axis(label: &str, (low, high): (f64, f64)) -> Axis {
+    let tick = [0.2, 0.1, 0.05, 0.02].into_iter().find(|tick| high - low > 3.5 * tick).unwrap_or(0.01);
+    let half = 0.5 * tick;
+    let (min, max) = ((low / half - 0.2).floor() * half, (high / half + 0.2).ceil() * half);
+    Axis { label: label.to_owned(), min, max, tick, log: false }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EXACT_STROKE;
+    use super::*;
+
+    #[test]
+    fn axes_hold_all_points_with_whole_half_ticks() {
+        let curve =
+            Curve { label: None, stroke: EXACT_STROKE, pieces: vec![vec![(0.3, 0.45), (0.71, 0.55)]] };
+        let (x, y) = axes(&[curve]);
+        assert!(x.min <= 0.3 && x.max >= 0.71 && y.min <= 0.45 && y.max >= 0.55);
+        assert!(((x.min / (0.5 * x.tick)).fract()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,145 @@
+//! `cargo xtask reproduce-figures`: makes the runs, draws the figures, says how they compare.
+
+pub mod checks;
+pub mod files;
+pub mod findings;
+pub mod measures;
+pub mod page;
+pub mod plan;
+pub mod progress;
+pub mod reference;
+mod runner;
+pub mod schedule;
+pub mod summary;
+pub mod trajectory;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use gluey::RunReport;
+
+use crate::figures::{self, Data};
+use checks::Evidence;
+use files::WriteError;
+use page::Section;
+use plan::{CaseName, FigureName, RunKey};
+use summary::{Failure, Summary};
+use trajectory::Trajectory;
+
+/// Times shown by figures of the 2D pair end here; its exact orbit is continued to this time.
+const LATEST_END: f64 = 30.0;
+
+/// What to reproduce, and where to put it.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Coarse and fast.
+    pub quick: bool,
+    /// The figures to make.
+    pub figures: Vec<FigureName>,
+    /// Folder of the workspace, where `data` lies.
+    pub root: PathBuf,
+    /// Output folder.
+    pub out: PathBuf,
+    /// Runs at a time.
+    pub jobs: usize,
+}
+
+/// Makes the runs and figures. Failures of single runs or figures are part of the summary; an error means that nothing
+/// could be written.
+pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
+    let start = Instant::now();
+    let runs_folder = options.out.join("runs");
+    files::prepare_folder(&options.out)?;
+    files::prepare_folder(&runs_folder)?;
+
+    let mut failures = Vec::new();
+    let reports = make_runs(options, &runs_folder, &mut failures);
+    let data = load(options, &runs_folder, &reports, &mut failures);
+    let evidence = Evidence { data: &data, reports: &reports };
+    let sections: Vec<Section> = options.figures.iter().map(|&figure| section(figure, &evidence)).collect();
+    for section in &sections {
+        write_figure(&options.out, section, &mut failures)?;
+    }
+
+    let summary = Summary {
+        version: env!("CARGO_PKG_VERSION"),
+        quick: options.quick,
+        wall_s: start.elapsed().as_secs_f64(),
+        figures: options.figures.iter().map(FigureName::to_string).collect(),
+        checks: checks::all(&options.figures, &evidence),
+        runs: reports.into_values().collect(),
+        failures,
+    };
+    write_summary(&options.out, &summary)?;
+    files::write(&options.out.join("index.html"), page::html(&summary, &sections).as_bytes())?;
+    Ok(summary)
+}
+
+fn make_runs(options: &Options, folder: &Path, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, RunReport> {
+    let keys = plan::runs_for(&options.figures);
+    let board = progress::Board::new();
+    let results = schedule::in_parallel(&keys, options.jobs, |&key| {
+        runner::run(&options.root, folder, key, options.quick, &board)
+    });
+    let mut reports = BTreeMap::new();
+    for (key, result) in keys.into_iter().zip(results) {
+        match result {
+            Ok(report) => drop(reports.insert(key, report)),
+            Err(error) => failures.push(Failure { what: format!("run {key}"), error }),
+        }
+    }
+    reports
+}
+
+/// The trajectories of the runs that succeeded, and the exact ones.
+fn load(
+    options: &Options,
+    folder: &Path,
+    reports: &BTreeMap<RunKey, RunReport>,
+    failures: &mut Vec<Failure>,
+) -> Data {
+    let mut data = Data { quick: options.quick, ..Data::default() };
+    let mut keep = |what: String, result: Result<Trajectory, trajectory::TrajectoryError>| {
+        result.map_err(|error| failures.push(Failure { what, error: runner::chain(&error) })).ok()
+    };
+    for &key in reports.keys() {
+        let run = keep(format!("run {key}"), Trajectory::read(&folder.join(format!("{key}.csv"))));
+        data.runs.extend(run.map(|run| (key, run)));
+    }
+    let mut cases: Vec<CaseName> = options.figures.iter().map(|figure| figure.case()).collect();
+    cases.sort();
+    cases.dedup();
+    for case in cases {
+        let exact =
+            keep(format!("exact solution of {case}"), reference::load(&options.root, case, LATEST_END));
+        data.exact.extend(exact.map(|exact| (case, exact)));
+    }
+    data
+}
+
+fn section(figure: FigureName, evidence: &Evidence<'_>) -> Section {
+    Section {
+        figure,
+        drawing: figures::draw(figure, evidence.data),
+        table: findings::table(figure, evidence),
+    }
+}
+
+fn write_figure(out: &Path, section: &Section, failures: &mut Vec<Failure>) -> Result<(), WriteError> {
+    let name = section.figure.as_str();
+    files::write(&out.join(format!("{name}.svg")), section.drawing.svg().as_bytes())?;
+    match section.drawing.png() {
+        Ok(png) => files::write(&out.join(format!("{name}.png")), &png)?,
+        Err(error) => failures.push(Failure { what: format!("{name}.png"), error: runner::chain(&error) }),
+    }
+    Ok(())
+}
+
+fn write_summary(out: &Path, summary: &Summary) -> Result<(), WriteError> {
+    let path = out.join("summary.json");
+    match summary.to_json() {
+        Ok(json) => files::write(&path, json.as_bytes()),
+        Err(error) => Err(WriteError { path, source: error.into() }),
+    }
+}

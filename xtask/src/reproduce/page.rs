@@ -1,0 +1,216 @@
+//! `index.html`: one self-contained page with the figures, the runs and how they compare.
+
+use std::fmt::Write;
+
+use super::checks::Check;
+use super::findings::{self, Table};
+use super::plan::FigureName;
+use super::progress::duration;
+use super::summary::Summary;
+use crate::figures::canvas::{Canvas, font_faces};
+
+/// A figure with what is said about it.
+pub struct Section {
+    /// Which figure.
+    pub figure: FigureName,
+    /// The drawing.
+    pub drawing: Canvas,
+    /// Exact solution and runs in numbers.
+    pub table: Option<Table>,
+}
+
+const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:50rem;margin:2rem auto;padding:0 1rem;\
+line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\
+table{border-collapse:collapse;margin:1rem 0;font-size:.9rem;display:block;overflow-x:auto}\
+th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd;font-variant-numeric:lining-nums}\
+th{font-weight:normal;border-bottom:1px solid #111;vertical-align:bottom}td:first-child,th:first-child,td.t,th.t{text-align:left}\
+.bad{color:#b00020}.note{background:#fff4d6;padding:.6rem 1rem}";
+
+/// The page.
+pub fn html(summary: &Summary, sections: &[Section]) -> String {
+    let mut page = String::new();
+    write_page(&mut page, summary, sections).expect("writing to a String cannot fail");
+    page
+}
+
+fn write_page(out: &mut String, summary: &Summary, sections: &[Section]) -> std::fmt::Result {
+    writeln!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>gluey: the paper's figures</title>\n\
+         <style>{}{STYLE}</style>\n</head>\n<body>",
+        font_faces()
+    )?;
+    write_head(out, summary)?;
+    for section in sections {
+        write_section(out, summary, section)?;
+    }
+    writeln!(out, "</body>\n</html>")
+}
+
+fn write_head(out: &mut String, summary: &Summary) -> std::fmt::Result {
+    writeln!(
+        out,
+        "<h1>Contact problems for particles in a shear flow</h1>\n<p>The figures of Verdon, Lefebvre-Lepot, Lobry and \
+         Laure (2010), computed by gluey {} in {}. Thin grey lines are exact solutions; the dotted line is gluey contact \
+         in the formulation <code>rigid-dofs</code>, all others are in the formulation <code>paper</code>. Lengths are in \
+         units of the box, times in units of 1/shear rate.</p>",
+        summary.version,
+        duration(summary.wall_s)
+    )?;
+    if summary.quick {
+        writeln!(
+            out,
+            "<p class=\"note\">Computed with <code>--quick</code>: a coarse mesh, large time steps and shorter runs. The \
+             limits below are meant for the full computation.</p>"
+        )?;
+    }
+    for failure in &summary.failures {
+        writeln!(out, "<p class=\"note bad\">{}: {}</p>", escape(&failure.what), escape(&failure.error))?;
+    }
+    let failed = summary.checks.iter().filter(|check| !check.ok).count();
+    let count = summary.checks.len();
+    if count > 0 {
+        writeln!(out, "<p>{} of {count} checks hold.</p>", count - failed)?;
+    }
+    write_runs(out, summary)
+}
+
+fn write_runs(out: &mut String, summary: &Summary) -> std::fmt::Result {
+    if summary.runs.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "<h2>Runs</h2>\n<table><tr><th>case</th><th class=\"t\">strategy</th><th class=\"t\">formulation</th><th>steps</th>\
+         <th>wall time</th><th>cells</th><th>unknowns</th><th>smallest D/a</th><th>D/a at the end</th>\
+         <th>reversibility error</th><th>end error</th><th>largest error / a</th></tr>"
+    )?;
+    for run in &summary.runs {
+        writeln!(
+            out,
+            "<tr><td>{}</td><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(&run.case),
+            run.strategy,
+            escape(&run.formulation),
+            run.steps,
+            duration(run.wall_s),
+            run.cells,
+            run.dofs,
+            number(run.min_gap_over_a),
+            number(run.end_gap_over_a),
+            number(run.reversibility_error),
+            number(run.end_gap_rel_error),
+            number(run.max_abs_error_over_a)
+        )?;
+    }
+    writeln!(out, "</table>")
+}
+
+fn write_section(out: &mut String, summary: &Summary, section: &Section) -> std::fmt::Result {
+    let figure = section.figure;
+    writeln!(
+        out,
+        "<section id=\"{figure}\">\n<h2>{}</h2>\n{}",
+        findings::title(figure),
+        section.drawing.inline_svg()
+    )?;
+    writeln!(out, "<p>The paper: {}</p>", escape(findings::paper_statement(figure)))?;
+    if let Some(verdict) = findings::verdict(figure, &summary.checks) {
+        writeln!(out, "<p>Here: {}</p>", escape(&verdict))?;
+    }
+    let checks: Vec<&Check> = summary.checks.iter().filter(|check| check.figure == figure.as_str()).collect();
+    write_checks(out, &checks)?;
+    if let Some(table) = &section.table {
+        write_table(out, table)?;
+    }
+    writeln!(out, "</section>")
+}
+
+fn write_checks(out: &mut String, checks: &[&Check]) -> std::fmt::Result {
+    if checks.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "<table><tr><th>run</th><th class=\"t\">measured</th><th>value</th><th class=\"t\">wanted</th><th></th></tr>"
+    )?;
+    for check in checks {
+        let (class, mark) = if check.ok { ("t", "holds") } else { ("t bad", "does not hold") };
+        writeln!(
+            out,
+            "<tr><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"t\">{}</td><td class=\"{class}\">{mark}</td></tr>",
+            escape(&check.run),
+            escape(&check.name),
+            number(check.value),
+            escape(&check.wanted)
+        )?;
+    }
+    writeln!(out, "</table>")
+}
+
+fn write_table(out: &mut String, table: &Table) -> std::fmt::Result {
+    write!(out, "<table><tr><th></th>")?;
+    table.columns.iter().try_for_each(|name| write!(out, "<th>{}</th>", escape(name)))?;
+    writeln!(out, "</tr>")?;
+    for (name, values) in &table.rows {
+        write!(out, "<tr><td>{}</td>", escape(name))?;
+        values.iter().try_for_each(|value| write!(out, "<td>{}</td>", number(*value)))?;
+        writeln!(out, "</tr>")?;
+    }
+    writeln!(out, "</table>")
+}
+
+/// Four significant digits; a dash for what was not measured.
+pub fn number(value: Option<f64>) -> String {
+    match value {
+        None => "–".to_owned(),
+        Some(0.0) => "0".to_owned(),
+        Some(value) if (1e-3..1e4).contains(&value.abs()) => {
+            let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
+            format!("{value:.digits$}").replace('-', "−")
+        }
+        Some(value) => {
+            let text = format!("{value:.2e}");
+            let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+            format!("{mantissa}·10<sup>{exponent}</sup>").replace('-', "−")
+        }
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits_or_a_power_of_ten() {
+        assert_eq!(number(Some(7.76913)), "7.769");
+        assert_eq!(number(Some(-0.0153)), "−0.01530");
+        assert_eq!(number(Some(4.03e-4)), "4.03·10<sup>−4</sup>");
+        assert_eq!(number(Some(0.0)), "0");
+        assert_eq!(number(None), "–");
+    }
+
+    #[test]
+    fn a_page_without_runs_names_the_failure() {
+        let failures = vec![super::super::summary::Failure { what: "pair-2d".into(), error: "a < b".into() }];
+        let summary = Summary {
+            version: "0",
+            quick: true,
+            wall_s: 1.0,
+            figures: vec![],
+            runs: vec![],
+            failures,
+            checks: vec![],
+        };
+        let page = html(&summary, &[]);
+        assert!(
+            page.contains("pair-2d: a &lt; b") && page.contains("--quick") && page.ends_with("</html>\n")
+        );
+    }
+}

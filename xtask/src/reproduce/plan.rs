@@ -1,0 +1,245 @@
+//! Which runs a figure needs, in what order they go, and what `--quick` changes about them.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The cases of the paper, as named in `data/cases`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CaseName {
+    /// Two discs that nearly touch (paper, figures 5 and 6).
+    Pair2d,
+    /// Two spheres that meet (figure 7).
+    Pair3d,
+    /// The pair of discs and a third one (figures 9 to 11).
+    Trio2d,
+}
+
+impl CaseName {
+    /// Name of the case file without its extension.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Pair2d => "pair-2d",
+            Self::Pair3d => "pair-3d",
+            Self::Trio2d => "trio-2d",
+        }
+    }
+}
+
+impl fmt::Display for CaseName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// The four ways each case is computed: the paper's three strategies in its formulation, and gluey contact in the
+/// accurate one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Approach {
+    /// No contact model, formulation `paper`.
+    None,
+    /// Inelastic collisions, formulation `paper`.
+    Inelastic,
+    /// Gluey contact, formulation `paper`.
+    Gluey,
+    /// Gluey contact, formulation `rigid-dofs`.
+    GlueyRigidDofs,
+}
+
+impl Approach {
+    /// All of them, in the order of legends and tables.
+    pub const ALL: [Self; 4] = [Self::Gluey, Self::Inelastic, Self::None, Self::GlueyRigidDofs];
+
+    /// What stands after the case in a run's name.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Inelastic => "inelastic",
+            Self::Gluey => "gluey",
+            Self::GlueyRigidDofs => "gluey-rigid-dofs",
+        }
+    }
+}
+
+/// One run: a case and the way it is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RunKey {
+    /// What is computed.
+    pub case: CaseName,
+    /// How.
+    pub approach: Approach,
+}
+
+impl RunKey {
+    /// Name of the run's CSV file without its extension.
+    pub fn name(self) -> String {
+        format!("{}-{}", self.case, self.approach.as_str())
+    }
+
+    /// A guess at the cost of the run relative to the others; only the order of the runs depends on it.
+    fn cost(self) -> u32 {
+        let case = match self.case {
+            CaseName::Pair3d => 100,
+            CaseName::Trio2d => 15,
+            CaseName::Pair2d => 10,
+        };
+        case * if self.approach == Approach::GlueyRigidDofs { 2 } else { 3 }
+    }
+}
+
+impl fmt::Display for RunKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name())
+    }
+}
+
+/// The figures of the paper that show its results and set-ups.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FigureName {
+    /// Set-up with two particles.
+    Fig4,
+    /// 2D pair, gap over time.
+    Fig5,
+    /// 2D pair, trajectories.
+    Fig6,
+    /// 3D pair, gap over time.
+    Fig7a,
+    /// 3D pair, trajectories.
+    Fig7b,
+    /// Set-up with three particles.
+    Fig8,
+    /// Three discs, gaps over time.
+    Fig9,
+    /// Three discs, trajectories: gluey and none.
+    Fig10,
+    /// Three discs, trajectories: gluey and inelastic.
+    Fig11,
+}
+
+impl FigureName {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 9] = [
+        Self::Fig4,
+        Self::Fig5,
+        Self::Fig6,
+        Self::Fig7a,
+        Self::Fig7b,
+        Self::Fig8,
+        Self::Fig9,
+        Self::Fig10,
+        Self::Fig11,
+    ];
+
+    /// Name of the figure's files without their extension.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Fig4 => "fig4",
+            Self::Fig5 => "fig5",
+            Self::Fig6 => "fig6",
+            Self::Fig7a => "fig7a",
+            Self::Fig7b => "fig7b",
+            Self::Fig8 => "fig8",
+            Self::Fig9 => "fig9",
+            Self::Fig10 => "fig10",
+            Self::Fig11 => "fig11",
+        }
+    }
+
+    /// The case whose set-up or runs it shows.
+    pub fn case(self) -> CaseName {
+        match self {
+            Self::Fig4 | Self::Fig5 | Self::Fig6 => CaseName::Pair2d,
+            Self::Fig7a | Self::Fig7b => CaseName::Pair3d,
+            Self::Fig8 | Self::Fig9 | Self::Fig10 | Self::Fig11 => CaseName::Trio2d,
+        }
+    }
+
+    /// The ways of computing its case that it shows, in the order of its legend.
+    pub fn approaches(self) -> Vec<Approach> {
+        match self {
+            Self::Fig4 | Self::Fig8 => Vec::new(),
+            Self::Fig10 => vec![Approach::Gluey, Approach::None, Approach::GlueyRigidDofs],
+            Self::Fig11 => vec![Approach::Gluey, Approach::Inelastic, Approach::GlueyRigidDofs],
+            _ => Approach::ALL.to_vec(),
+        }
+    }
+}
+
+impl fmt::Display for FigureName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// `--only` names a figure that does not exist.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no figure `{0}`; the figures are fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11")]
+pub struct UnknownFigure(String);
+
+impl FromStr for FigureName {
+    type Err = UnknownFigure;
+
+    fn from_str(name: &str) -> Result<Self, UnknownFigure> {
+        let found = Self::ALL.into_iter().find(|figure| figure.as_str() == name);
+        found.ok_or_else(|| UnknownFigure(name.to_owned()))
+    }
+}
+
+/// The runs these figures need, each once, the longest first.
+pub fn runs_for(figures: &[FigureName]) -> Vec<RunKey> {
+    let needed = figures.iter().flat_map(|figure| {
+        figure.approaches().into_iter().map(|approach| RunKey { case: figure.case(), approach })
+    });
+    let mut runs: Vec<RunKey> = needed.collect();
+    runs.sort();
+    runs.dedup();
+    runs.sort_by_key(|run| std::cmp::Reverse(run.cost()));
+    runs
+}
+
+/// What `--quick` changes of a case: the only place for these numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuickSettings {
+    /// Finest cells per radius, `a / h`.
+    pub cells_per_radius: f64,
+    /// The time step is multiplied by this.
+    pub step_factor: f64,
+    /// The run ends at this time (units of 1/shear rate) unless the case ends earlier.
+    pub latest_end: f64,
+}
+
+/// The settings of `--quick` for a case.
+pub fn quick_settings(case: CaseName) -> QuickSettings {
+    match case {
+        CaseName::Pair2d | CaseName::Trio2d => {
+            QuickSettings { cells_per_radius: 3.2, step_factor: 2.0, latest_end: 16.0 }
+        }
+        CaseName::Pair3d => QuickSettings { cells_per_radius: 1.6, step_factor: 2.0, latest_end: 16.85 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_figures_need_twelve_runs_and_the_spheres_go_first() {
+        let runs = runs_for(&FigureName::ALL);
+        assert_eq!(runs.len(), 12);
+        assert!(runs[..4].iter().all(|run| run.case == CaseName::Pair3d));
+    }
+
+    #[test]
+    fn a_single_figure_makes_only_its_own_runs() {
+        let names: Vec<String> = runs_for(&[FigureName::Fig10]).iter().map(|run| run.name()).collect();
+        assert_eq!(names, ["trio-2d-none", "trio-2d-gluey", "trio-2d-gluey-rigid-dofs"]);
+        assert!(runs_for(&[FigureName::Fig4, FigureName::Fig8]).is_empty());
+    }
+
+    #[test]
+    fn figure_names_are_read_back_and_others_refused() {
+        for figure in FigureName::ALL {
+            assert_eq!(figure.as_str().parse(), Ok(figure));
+        }
+        assert!("fig7".parse::<FigureName>().is_err());
+    }
+}

@@ -1,0 +1,63 @@
+//! One run: the case file with the approach's settings, handed to `gluey::run`.
+
+use std::error::Error;
+use std::path::Path;
+
+use gluey::{Case, CaseError, Formulation, RunOptions, RunReport, Strategy};
+
+use super::plan::{Approach, RunKey, quick_settings};
+use super::progress::{Board, duration};
+
+/// The case of a run, ready to go.
+pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
+    let mut case = Case::load(root.join("data/cases").join(format!("{}.toml", key.case)))?;
+    (case.contact.strategy, case.flow.formulation) = match key.approach {
+        Approach::None => (Strategy::None, Formulation::Paper),
+        Approach::Inelastic => (Strategy::Inelastic, Formulation::Paper),
+        Approach::Gluey => (Strategy::Gluey, Formulation::Paper),
+        Approach::GlueyRigidDofs => (Strategy::Gluey, Formulation::RigidDofs),
+    };
+    case.contact.exact_gap = true;
+    if quick {
+        let settings = quick_settings(key.case);
+        case.flow.mesh.cells_per_radius = settings.cells_per_radius;
+        case.time.step *= settings.step_factor;
+        case.time.end = case.time.end.min(settings.latest_end);
+    }
+    Ok(case)
+}
+
+/// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.part` holds what a failed run wrote.
+pub fn run(root: &Path, folder: &Path, key: RunKey, quick: bool, board: &Board) -> Result<RunReport, String> {
+    let line = board.start(key);
+    let result = run_to_files(root, folder, key, quick, &line);
+    match &result {
+        Ok(report) => line.finish(&format!("done in {}", duration(report.wall_s))),
+        Err(error) => line.finish(&format!("failed: {error}")),
+    }
+    result
+}
+
+fn run_to_files(
+    root: &Path,
+    folder: &Path,
+    key: RunKey,
+    quick: bool,
+    line: &dyn gluey::Progress,
+) -> Result<RunReport, String> {
+    let csv = folder.join(format!("{key}.csv"));
+    let part = folder.join(format!("{key}.csv.part"));
+    let case = case(root, key, quick).map_err(|error| chain(&error))?;
+    let report = gluey::run(&case, &RunOptions::csv(&part), line).map_err(|error| chain(&error))?;
+    std::fs::rename(&part, &csv).map_err(|error| format!("cannot write {}: {error}", csv.display()))?;
+    Ok(report)
+}
+
+/// An error with its causes.
+pub fn chain(error: &dyn Error) -> String {
+    let causes = std::iter::successors(error.source(), |&cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| {
+        let cause = cause.to_string();
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
+}

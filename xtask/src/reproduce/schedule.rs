@@ -1,0 +1,67 @@
+//! Independent jobs on a few threads; one that fails or panics does not disturb the others.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Does every job, at most `workers` at a time and in the order given; the results stand in the order of the jobs.
+pub fn in_parallel<J: Sync, T: Send>(
+    jobs: &[J],
+    workers: usize,
+    work: impl Fn(&J) -> Result<T, String> + Sync,
+) -> Vec<Result<T, String>> {
+    let next = AtomicUsize::new(0);
+    let results: Vec<Mutex<Option<Result<T, String>>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..workers.clamp(1, jobs.len().max(1)) {
+            scope.spawn(|| {
+                while let Some((job, slot)) = take(&next, jobs, &results) {
+                    let result = catch_unwind(AssertUnwindSafe(|| work(job)));
+                    *slot.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) =
+                        Some(result.unwrap_or_else(|panic| Err(format!("panicked: {}", message(&*panic)))));
+                }
+            });
+        }
+    });
+    let finished =
+        results.into_iter().map(|slot| slot.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()));
+    finished.map(|result| result.unwrap_or_else(|| Err("was never started".to_owned()))).collect()
+}
+
+fn take<'a, J, S>(next: &AtomicUsize, jobs: &'a [J], slots: &'a [S]) -> Option<(&'a J, &'a S)> {
+    let index = next.fetch_add(1, Ordering::Relaxed);
+    Some((jobs.get(index)?, slots.get(index)?))
+}
+
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_and_panics_leave_the_other_jobs_alone() {
+        let results = in_parallel(&[0, 1, 2, 3], 2, |&job| match job {
+            1 => Err("no".to_owned()),
+            2 => panic!("job {job} broke"),
+            _ => Ok(job * 10),
+        });
+        assert_eq!(results, [Ok(0), Err("no".to_owned()), Err("panicked: job 2 broke".to_owned()), Ok(30)]);
+    }
+
+    #[test]
+    fn no_more_jobs_run_at_once_than_there_are_workers() {
+        let (running, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        in_parallel(&[(); 12], 3, |()| {
+            most.fetch_max(running.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            running.fetch_sub(1, Ordering::SeqCst);
+            Ok(())
+        });
+        assert!((1..=3).contains(&most.into_inner()));
+    }
+}

@@ -1,0 +1,111 @@
+//! Dependencies between the crates of the workspace, as cargo sees them, against the law.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use serde::Deserialize;
+
+use super::TidyError;
+use super::law::Law;
+
+/// The crate that tests, and only tests, may use everywhere.
+const TEST_CRATE: &str = "gluey-testkit";
+
+/// What is needed of `cargo metadata`.
+#[derive(Debug, Deserialize)]
+pub struct Metadata {
+    packages: Vec<Package>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Package {
+    name: String,
+    dependencies: Vec<Dependency>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Dependency {
+    name: String,
+    /// `dev`, `build`, or none for a normal dependency.
+    kind: Option<String>,
+}
+
+/// Asks cargo for the members of the workspace.
+pub fn metadata(root: &Path) -> Result<Metadata, TidyError> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
+        .current_dir(root)
+        .output()
+        .map_err(|error| TidyError::Metadata(error.to_string()))?;
+    if !output.status.success() {
+        return Err(TidyError::Metadata(String::from_utf8_lossy(&output.stderr).into_owned()));
+    }
+    serde_json::from_slice(&output.stdout).map_err(|error| TidyError::Metadata(error.to_string()))
+}
+
+/// Arrows that the law does not know, crates it does not name and names that are no crates.
+pub fn offences(law: &Law, metadata: &Metadata) -> Vec<String> {
+    let members: BTreeSet<&str> = metadata.packages.iter().map(|package| &*package.name).collect();
+    let mut offences: Vec<String> = law
+        .arrows
+        .keys()
+        .filter(|name| !members.contains(&***name))
+        .map(|name| format!("ARCHITECTURE.md: `{name}` is not a crate of the workspace"))
+        .collect();
+    for package in &metadata.packages {
+        let Some(allowed) = law.arrows.get(&package.name) else {
+            offences.push(format!("{}: not in the arrows of ARCHITECTURE.md", package.name));
+            continue;
+        };
+        let internal = package.dependencies.iter().filter(|dependency| members.contains(&*dependency.name));
+        for dependency in internal.filter(|dependency| !allowed.contains(&dependency.name)) {
+            if dependency.kind.as_deref() != Some("dev") {
+                offences.push(format!("{} -> {}: not in ARCHITECTURE.md", package.name, dependency.name));
+            } else if !allowed_in_tests(law, &package.name, &dependency.name) {
+                offences.push(format!("{} ~> {}: not in ARCHITECTURE.md", package.name, dependency.name));
+            }
+        }
+    }
+    offences
+}
+
+fn allowed_in_tests(law: &Law, package: &str, dependency: &str) -> bool {
+    dependency == TEST_CRATE
+        || law.test_arrows.get(package).is_some_and(|allowed| allowed.contains(dependency))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn metadata(json: &str) -> Metadata {
+        serde_json::from_str(json).unwrap()
+    }
+
+    fn law() -> Law {
+        let mut law = Law::default();
+        law.arrows.insert("a".into(), BTreeSet::new());
+        law.arrows.insert("b".into(), BTreeSet::from(["a".into()]));
+        law
+    }
+
+    #[test]
+    fn known_arrows_pass_and_unknown_ones_are_named() {
+        let good = r#"{"packages":[{"name":"a","dependencies":[{"name":"serde","kind":null}]},
+            {"name":"b","dependencies":[{"name":"a","kind":null}]}]}"#;
+        assert!(offences(&law(), &metadata(good)).is_empty());
+        let upward = r#"{"packages":[{"name":"a","dependencies":[{"name":"b","kind":null}]},
+            {"name":"b","dependencies":[]}]}"#;
+        assert_eq!(offences(&law(), &metadata(upward)), ["a -> b: not in ARCHITECTURE.md"]);
+        let upward_in_tests = upward.replace("null", "\"dev\"");
+        assert_eq!(offences(&law(), &metadata(&upward_in_tests)), ["a ~> b: not in ARCHITECTURE.md"]);
+    }
+
+    #[test]
+    fn crates_and_law_name_each_other() {
+        let other = r#"{"packages":[{"name":"a","dependencies":[]},{"name":"c","dependencies":[]}]}"#;
+        assert_eq!(offences(&law(), &metadata(other)).len(), 2);
+    }
+}

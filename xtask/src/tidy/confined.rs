@@ -1,0 +1,70 @@
+//! Libraries whose names may be used in a few places only.
+
+use super::law::Law;
+use super::sources::Source;
+
+/// Uses of confined names outside their places.
+pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
+    let mut offences = Vec::new();
+    for source in sources {
+        for (name, places) in &law.confined {
+            if places.iter().any(|place| lies_in(&source.path, place)) {
+                continue;
+            }
+            let uses = source.all_code().filter(|(_, line)| uses(line, name));
+            let places = places.join(" or ");
+            offences.extend(
+                uses.map(|(line, _)| format!("{}:{line}: `{name}` belongs in {places}", source.path)),
+            );
+        }
+    }
+    offences
+}
+
+/// Whether `path` is `place` or lies under it.
+fn lies_in(path: &str, place: &str) -> bool {
+    path.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+}
+
+/// Whether a line of code names the library in a path: `name::...` or `use name`.
+fn uses(line: &str, name: &str) -> bool {
+    let mut rest = line;
+    while let Some(at) = rest.find(name) {
+        let (before, after) = (&rest[..at], &rest[at + name.len()..]);
+        let inside_word = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+        let starts = !inside_word(before.chars().next_back()) && !before.ends_with("::");
+        if starts
+            && (after.starts_with("::") || before.ends_with("use "))
+            && !inside_word(after.chars().next())
+        {
+            return true;
+        }
+        rest = after;
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_in_paths_only() {
+        assert!(uses("use widget::Mat;", "widget"));
+        assert!(uses("    let m = widget::Mat::zeros(1, 1);", "widget"));
+        assert!(uses("use widget;", "widget"));
+        assert!(!uses("let widget_matrix = 1;", "widget"));
+        assert!(!uses("use crate::widget::x;", "widget"));
+        assert!(!uses("\"solved by widget\"", "widget"));
+    }
+
+    #[test]
+    fn a_use_in_the_wrong_place_is_reported_with_its_line() {
+        let mut law = Law::default();
+        law.confined.insert("widget".into(), vec!["crates/gadget".into()]);
+        let source = |path: &str| Source::new(path.into(), "// widget::\nuse widget::Mat;\n");
+        assert!(offences(&law, &[source("crates/gadget/src/a.rs")]).is_empty());
+        let found = offences(&law, &[source("crates/gadget2/src/a.rs")]);
+        assert_eq!(found, ["crates/gadget2/src/a.rs:2: `widget` belongs in crates/gadget"]);
+    }
+}

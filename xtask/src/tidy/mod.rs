@@ -1,0 +1,47 @@
+//! `cargo xtask tidy`: does the code keep the law of ARCHITECTURE.md and the rules of the house?
+
+mod arrows;
+mod confined;
+mod law;
+mod sources;
+mod style;
+
+use std::path::{Path, PathBuf};
+
+/// Why the check itself could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum TidyError {
+    /// A file or folder cannot be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A block of the law is missing or a line of it makes no sense.
+    #[error("ARCHITECTURE.md: {0}")]
+    Law(String),
+    /// `cargo metadata` did not answer.
+    #[error("cargo metadata: {0}")]
+    Metadata(String),
+}
+
+/// All offences, each with its place; an empty list is a tidy workspace.
+pub fn offences(root: &Path) -> Result<Vec<String>, TidyError> {
+    let law = law::Law::read(&root.join("ARCHITECTURE.md"))?;
+    let sources = sources::all(root)?;
+    let mut offences = arrows::offences(&law, &arrows::metadata(root)?);
+    offences.extend(confined::offences(&law, &sources));
+    offences.extend(style::offences(&sources));
+    Ok(offences)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_workspace_is_tidy() {
+        let offences = super::offences(&crate::workspace_root()).unwrap();
+        assert!(offences.is_empty(), "\n{}", offences.join("\n"));
+    }
+}

@@ -1,0 +1,90 @@
+//! All Rust sources of the workspace, with the lines that are tests marked.
+
+use std::path::{Path, PathBuf};
+
+use super::TidyError;
+
+/// Folders that hold Rust sources.
+const FOLDERS: [&str; 4] = ["crates", "xtask", "tests", "benches"];
+/// Folders whose files are tests, examples or timings as a whole.
+const TEST_FOLDERS: [&str; 3] = ["/tests/", "/benches/", "/examples/"];
+
+/// One source file.
+#[derive(Debug)]
+pub struct Source {
+    /// Path from the root of the workspace, with `/`.
+    pub path: String,
+    /// Its lines.
+    pub lines: Vec<String>,
+    /// Index of the first line that belongs to tests; the number of lines if there is none.
+    pub tests_from: usize,
+}
+
+impl Source {
+    /// A source under this path.
+    pub fn new(path: String, text: &str) -> Self {
+        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let rooted = format!("/{path}");
+        let tests_from = if TEST_FOLDERS.iter().any(|folder| rooted.contains(folder)) {
+            0
+        } else {
+            lines.iter().position(|line| line.trim() == "#[cfg(test)]").unwrap_or(lines.len())
+        };
+        Self { path, lines, tests_from }
+    }
+
+    /// Line numbers (from 1) and code outside tests and comments.
+    pub fn code(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.all_code().take_while(|(number, _)| *number <= self.tests_from)
+    }
+
+    /// Line numbers (from 1) and code outside comments.
+    pub fn all_code(&self) -> impl Iterator<Item = (usize, &str)> {
+        let numbered = self.lines.iter().enumerate().map(|(index, line)| (index + 1, line.as_str()));
+        numbered.filter(|(_, line)| !line.trim_start().starts_with("//"))
+    }
+}
+
+/// Every `.rs` file, ordered by path.
+pub fn all(root: &Path) -> Result<Vec<Source>, TidyError> {
+    let mut paths = Vec::new();
+    for folder in FOLDERS.map(|folder| root.join(folder)).into_iter().filter(|folder| folder.is_dir()) {
+        collect(&folder, &mut paths)?;
+    }
+    paths.sort();
+    paths.iter().map(|path| read(root, path)).collect()
+}
+
+fn collect(folder: &Path, paths: &mut Vec<PathBuf>) -> Result<(), TidyError> {
+    let error = |source| TidyError::Read { path: folder.to_owned(), source };
+    for entry in std::fs::read_dir(folder).map_err(error)? {
+        let path = entry.map_err(error)?.path();
+        if path.is_dir() {
+            collect(&path, paths)?;
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            paths.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn read(root: &Path, path: &Path) -> Result<Source, TidyError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| TidyError::Read { path: path.to_owned(), source })?;
+    let own = path.strip_prefix(root).unwrap_or(path);
+    Ok(Source::new(own.to_string_lossy().replace('\\', "/"), &text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_and_comments_are_not_code() {
+        let text = "//! doc\nfn a() {}\n#[cfg(test)]\nmod tests {}\n";
+        let source = Source::new("crates/a/src/lib.rs".into(), text);
+        assert_eq!(source.code().collect::<Vec<_>>(), [(2, "fn a() {}")]);
+        assert_eq!(source.all_code().count(), 3);
+        assert_eq!(Source::new("crates/a/tests/b.rs".into(), text).code().count(), 0);
+    }
+}
