@@ -159,8 +159,9 @@ pub struct FlowSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSpec {
-    /// The finest cells have at least this many edges in a radius of the smallest particle.
-    pub cells_per_radius: f64,
+    /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when absent, what
+    /// [`crate::flow::default_cells_per_radius`] gives.
+    pub cells_per_radius: Option<f64>,
     /// Cells are at least `2^-coarsest_level` of the box.
     pub coarsest_level: u32,
     /// Cells of the finest level kept on either side of each particle's surface.
@@ -187,6 +188,11 @@ pub struct PaperSpec {
 pub struct RigidDofsSpec {
     /// A node is rigid where the signed distance (positive inside) is at least this many cells.
     pub offset: f64,
+    /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves gaps
+    /// alone. When absent: 1 in 2D, 0 in 3D.
+    pub gap_fraction: Option<f64>,
+    /// Levels beyond that of the surfaces that gaps may use.
+    pub gap_levels: u32,
 }
 
 /// Parameters of the `pair-mobility` model.
@@ -221,7 +227,7 @@ impl Default for FlowSpec {
 
 impl Default for MeshSpec {
     fn default() -> Self {
-        Self { cells_per_radius: 6.4, coarsest_level: 3, band: 2.0 }
+        Self { cells_per_radius: None, coarsest_level: 3, band: 2.0 }
     }
 }
 
@@ -233,7 +239,7 @@ impl Default for PaperSpec {
 
 impl Default for RigidDofsSpec {
     fn default() -> Self {
-        Self { offset: -0.1 }
+        Self { offset: -0.1, gap_fraction: None, gap_levels: 9 }
     }
 }
 

@@ -47,7 +47,7 @@ where
 #[derive(Debug, Error)]
 pub enum CheckpointError {
     /// It could not be read.
-    #[error("{}: cannot be read: {source}", path.display())]
+    #[error("{}: cannot be read", path.display())]
     Read {
         /// The file.
         path: PathBuf,

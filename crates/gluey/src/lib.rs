@@ -1,9 +1,27 @@
 //! Rigid particles in a Stokes flow, kept apart by the gluey contact model of Verdon et al. (2010).
 //!
-//! A [`Case`] says what to run, [`run()`] runs it, a [`RunReport`] says what came out.
+//! A [`Case`] says what to run, [`run()`] runs it, a [`RunReport`] says what came out:
+//!
+//! ```
+//! use gluey::{Case, RunOptions, Silent};
+//!
+//! fn main() -> Result<(), gluey::RunError> {
+//!     let case = Case::load("../../data/cases/pair-3d-mobility.toml")?;
+//!     let report = gluey::run(&case, &RunOptions::csv("../../target/pair.csv"), &Silent)?;
+//!     println!("{report}");
+//!     Ok(())
+//! }
+//! ```
+//!
+//! One step predicts the velocities of all particles from the flow, corrects them for contact and moves the particles:
+//! `x^{n+1} = x^n + c P(u*) + drift`. [`Simulation`] does it step by step, for any [`gluey_motion::Hydrodynamics`] and
+//! any [`gluey_contact::ContactModel`].
+//!
+//! Not for inertia (Stokes flow only), and not for particles that are not round.
 
 pub mod case;
 mod checkpoint;
+pub mod flow;
 mod interpolate;
 pub mod output;
 mod phases;
@@ -16,6 +34,7 @@ mod trajectory;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
 pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError};
+pub use flow::FlowError;
 pub use output::OutputError;
 pub use phases::PhaseTable;
 pub use progress::{Progress, ProgressState, Silent};

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 /// A file could not be written.
 #[derive(Debug, Error)]
-#[error("{}: cannot {action}: {source}", path.display())]
+#[error("{}: cannot {action}", path.display())]
 pub struct OutputError {
     /// The file or folder.
     pub path: PathBuf,

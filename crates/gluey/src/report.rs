@@ -172,3 +172,46 @@ fn write_number(f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>) -> f
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gluey_geom::{Particle, Twist, Vector};
+
+    use super::*;
+
+    const A: f64 = 0.05;
+
+    /// Particle 2 passes above particle 1 at `t = 5`, at the distance `above(t)` in y.
+    fn passing(end: f64, above: impl Fn(f64) -> f64) -> Trajectory<2> {
+        let mut trajectory = Trajectory::new(vec![A; 2]);
+        let mut t = 0.0;
+        while t <= end {
+            let other = Vector::<2>::new(0.1 * (t - 5.0), above(t));
+            let particles = [Particle::new(Vector::zeros(), A), Particle::new(other, A)];
+            trajectory.push(t, &particles, &[Twist::default(); 2]);
+            t += 0.1;
+        }
+        trajectory
+    }
+
+    #[test]
+    fn a_symmetric_passage_is_reversible() {
+        let error = reversibility_error(&passing(9.03, |_| 0.11)).expect("a mirror time");
+        assert!(error < 1e-4, "{error}");
+    }
+
+    #[test]
+    fn a_passage_that_ends_elsewhere_is_not() {
+        let trajectory = passing(9.03, |t| if t < 5.0 { 0.11 } else { 0.3 });
+        let error = reversibility_error(&trajectory).expect("a mirror time");
+        let gap = |y: f64| 0.4f64.hypot(y) - 2.0 * A;
+        assert!((error - (gap(0.3) - gap(0.11)) / gap(0.11)).abs() < 1e-3, "{error}");
+    }
+
+    #[test]
+    fn without_a_mirror_time_there_is_no_such_error() {
+        assert_eq!(reversibility_error(&passing(4.0, |_| 0.11)), None);
+        assert_eq!(reversibility_error(&passing(11.0, |_| 0.11)), None);
+        assert_eq!(reversibility_error(&Trajectory::<2>::new(vec![A])), None);
+    }
+}

@@ -14,6 +14,7 @@ use thiserror::Error;
 
 use crate::case::{Boundary, Case, CaseError, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::flow::{FlowError, StokesFlow, stokes_flow};
 use crate::output::csv::CsvWriter;
 use crate::output::vtk::{Frame, VtkWriter};
 use crate::output::{OutputError, prepare_folder_of};
@@ -61,6 +62,9 @@ pub enum HydrodynamicsError {
     /// By the analytic model of two spheres.
     #[error(transparent)]
     PairMobility(#[from] PairMobilityError),
+    /// By the finite-element solver.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
     /// The model does not exist in this dimension.
     #[error("there is no {hydrodynamics} hydrodynamics in {dimension}D")]
     Unfit {
@@ -133,15 +137,26 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     }
 }
 
-fn run_2d(case: &Case, _options: &RunOptions, _progress: &dyn Progress) -> Result<RunReport, RunError> {
-    Err(HydrodynamicsError::unfit(case).into())
+fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
+    match case.flow.hydrodynamics {
+        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<2>(case)?)?.finish(),
+        Hydrodynamics::PairMobility => Err(HydrodynamicsError::unfit(case).into()),
+    }
 }
 
 fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
         Hydrodynamics::PairMobility => Run::start(case, options, progress, pair_mobility(case))?.finish(),
-        Hydrodynamics::Stokes => Err(HydrodynamicsError::unfit(case).into()),
+        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<3>(case)?)?.finish(),
     }
+}
+
+/// The finite-element flow of `case`.
+fn stokes<const D: usize>(case: &Case) -> Result<StokesFlow<D>, HydrodynamicsError>
+where
+    Dim<D>: Space<D>,
+{
+    Ok(stokes_flow(case)?)
 }
 
 /// Two spheres in the shear of `case`, unbounded.

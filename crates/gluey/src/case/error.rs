@@ -13,7 +13,7 @@ use super::names::UnknownName;
 #[derive(Debug, Error)]
 pub enum CaseError {
     /// The file could not be read.
-    #[error("{}: cannot be read: {source}", path.display())]
+    #[error("{}: cannot be read", path.display())]
     Read {
         /// The file.
         path: PathBuf,

@@ -1,0 +1,296 @@
+//! The finite-element flow as [`Hydrodynamics`]: particles in, velocities out.
+//!
+//! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves the Stokes
+//! problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x`, and reads off the twists.
+
+mod fields;
+
+use std::time::Instant;
+
+use gluey_fem::{MeshError, TreeMesh};
+use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
+use gluey_levelset::Ball;
+use gluey_motion::{Fields, FlowStatistics, Hydrodynamics};
+use gluey_stokes::{
+    Flow, FlowParams, FlowSolver, PaperParams, Refinement, SolverKind, StokesError, WeakPressures,
+};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::case::{Boundary, Case, Formulation, Solver};
+
+/// A box is divided into at most so many root cubes along its shortest edge.
+const MOST_ROOTS: u32 = 16;
+
+/// Why the finite-element flow failed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum FlowError {
+    /// In mesh, assembly or solution.
+    #[error(transparent)]
+    Stokes(#[from] StokesError),
+    /// The box is not made of cubes.
+    #[error("[domain]: a box of {extent:?} is not a small number of cubes; make the ratios of its edges simple, such as 2:1")]
+    Box {
+        /// Edge lengths.
+        extent: Vec<f64>,
+    },
+    /// Two particles come close across a periodic border, where contact is not handled.
+    #[error(
+        "particles {} and {} are {gap:.3e} apart across a periodic border: contact there is not supported; use a longer box",
+        .pair[0] + 1,
+        .pair[1] + 1
+    )]
+    PeriodicContact {
+        /// Indices of the particles, from 0.
+        pair: [usize; 2],
+        /// The gap across the border.
+        gap: f64,
+    },
+}
+
+impl From<MeshError> for FlowError {
+    fn from(error: MeshError) -> Self {
+        Self::Stokes(error.into())
+    }
+}
+
+/// What the next prediction starts from, for checkpoints.
+#[derive(Serialize, Deserialize)]
+struct WarmStart<const D: usize> {
+    centers: Vec<Vector<D>>,
+    velocity: Vec<f64>,
+    pressure: Vec<f64>,
+}
+
+/// Finite-element flow around the particles of a case.
+pub struct StokesFlow<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    solver: FlowSolver<D>,
+    params: FlowParams,
+    refinement: Refinement,
+    domain: Aabb<D>,
+    roots: [u32; D],
+    periodic: [bool; D],
+    shear_rate: f64,
+    shear_factor: f64,
+    radii: Vec<f64>,
+    last: Option<Flow<D>>,
+    last_balls: Vec<Ball<D>>,
+}
+
+/// Sets up the finite-element flow of a checked case.
+///
+/// # Errors
+/// [`FlowError`] if the box cannot be meshed or a parameter is out of range.
+pub fn stokes_flow<const D: usize>(case: &Case) -> Result<StokesFlow<D>, FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
+    let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
+    let roots = root_cells(&domain)?;
+    let radii: Vec<f64> = case.particles.iter().map(|p| p.radius).collect();
+    let params = flow_params::<D>(case);
+    let periodic = std::array::from_fn(|d| case.domain.boundary == Boundary::Periodic && d != 1);
+    Ok(StokesFlow {
+        solver: FlowSolver::new(params, seconds)?,
+        params,
+        refinement: refinement::<D>(case, domain.extent()[0] / f64::from(roots[0]), &radii),
+        domain,
+        roots,
+        periodic,
+        shear_rate: case.shear_rate,
+        shear_factor: 1.0,
+        radii,
+        last: None,
+        last_balls: Vec::new(),
+    })
+}
+
+impl<const D: usize> StokesFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn balls(&self, centers: impl Iterator<Item = Vector<D>>) -> Vec<Ball<D>> {
+        let extent = self.domain.extent();
+        let period = std::array::from_fn(|d| self.periodic[d].then_some(extent[d]));
+        centers.zip(&self.radii).map(|(center, &radius)| Ball::periodic(center, radius, period)).collect()
+    }
+
+    fn mesh(&self, balls: &[Ball<D>]) -> Result<TreeMesh<D>, FlowError> {
+        Ok(self.refinement.mesh(self.domain, self.roots, self.periodic, balls)?)
+    }
+
+    /// Pairs whose nearest images are closer to each other than the particles themselves must not be in contact.
+    fn check_periodic_contact(&self, balls: &[Ball<D>]) -> Result<(), FlowError> {
+        use gluey_levelset::Body;
+        for (i, first) in balls.iter().enumerate() {
+            for (j, second) in balls.iter().enumerate().skip(i + 1) {
+                let image = first.arm(second.center());
+                let direct = second.center() - first.center();
+                let gap = image.norm() - self.radii[i] - self.radii[j];
+                if (image - direct).norm() > 1e-9 && gap < 0.1 * self.radii[i].min(self.radii[j]) {
+                    return Err(FlowError::PeriodicContact { pair: [i, j], gap });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Error = FlowError;
+
+    fn predict(
+        &mut self,
+        _t: f64,
+        particles: &[Particle<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), FlowError> {
+        let balls = self.balls(particles.iter().map(|p| p.pose.position));
+        self.check_periodic_contact(&balls)?;
+        let start = seconds();
+        let mesh = self.mesh(&balls)?;
+        let meshed = seconds() - start;
+        let middle = self.domain.center()[1];
+        let rate = self.shear_rate * self.shear_factor;
+        let shear = move |x: &Vector<D>| {
+            let mut u = Vector::zeros();
+            u[0] = rate * (x[1] - middle);
+            u
+        };
+        let mut flow = self.solver.solve(mesh, &balls, &shear)?;
+        flow.phases[0] += meshed;
+        twists.copy_from_slice(&flow.twists);
+        self.last = Some(flow);
+        self.last_balls = balls;
+        Ok(())
+    }
+
+    fn set_shear_factor(&mut self, factor: f64) {
+        self.shear_factor = factor;
+    }
+
+    fn statistics(&self) -> FlowStatistics {
+        let Some(flow) = &self.last else { return FlowStatistics::default() };
+        let names = ["mesh and assembly", "solver set-up", "solve"];
+        FlowStatistics {
+            cell_count: flow.discretisation.mesh.cell_count(),
+            dof_count: flow.discretisation.dof_count(),
+            solve_count: flow.solve_count,
+            iteration_count: flow.iteration_count,
+            phases: names.into_iter().zip(flow.phases).collect(),
+        }
+    }
+
+    fn fields(&self) -> Option<Fields<D>> {
+        let flow = self.last.as_ref()?;
+        Some(fields::fields(flow, &self.last_balls, &self.params))
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        let Some((velocity, pressure)) = self.solver.warm_start() else { return Vec::new() };
+        let centers = self.last_balls.iter().map(|b| *b.center()).collect();
+        let state = WarmStart { centers, velocity: velocity.to_vec(), pressure: pressure.to_vec() };
+        postcard::to_allocvec(&state).unwrap_or_default()
+    }
+
+    fn resume(&mut self, state: &[u8]) -> bool {
+        if state.is_empty() {
+            return true;
+        }
+        let Ok(state) = postcard::from_bytes::<WarmStart<D>>(state) else { return false };
+        if state.centers.len() != self.radii.len() {
+            return false;
+        }
+        let balls = self.balls(state.centers.into_iter());
+        match self.mesh(&balls) {
+            Ok(mesh) => {
+                self.last_balls = balls;
+                self.solver.set_warm_start(mesh, state.velocity, state.pressure)
+            }
+            Err(_) => false,
+        }
+    }
+}
+
+/// Seconds since the first call.
+fn seconds() -> f64 {
+    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
+/// The smallest numbers of equal cubes along the edges of a box.
+fn root_cells<const D: usize>(domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
+    let extent = domain.extent();
+    let shortest = extent.min();
+    let fits = |count: &u32| {
+        let size = shortest / f64::from(*count);
+        (0..D).all(|d| {
+            let ratio = extent[d] / size;
+            (ratio - ratio.round()).abs() <= 1e-9 * ratio
+        })
+    };
+    match (1..=MOST_ROOTS).find(fits) {
+        Some(count) => {
+            Ok(std::array::from_fn(|d| (extent[d] / shortest * f64::from(count)).round() as u32))
+        }
+        None => Err(FlowError::Box { extent: extent.iter().copied().collect() }),
+    }
+}
+
+/// Level at which `cells` cells fit into the smallest radius, and what else the mesh follows.
+fn refinement<const D: usize>(case: &Case, root_size: f64, radii: &[f64]) -> Refinement {
+    let flow = &case.flow;
+    let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
+    let cells = flow.mesh.cells_per_radius.unwrap_or(default_cells_per_radius(D, flow.formulation));
+    let surface = (cells * root_size / smallest * (1.0 - 1e-9)).log2().ceil().max(0.0) as u8;
+    let rigid = flow.formulation == Formulation::RigidDofs;
+    let gap_fraction = flow.rigid_dofs.gap_fraction.unwrap_or(if D == 2 { 1.0 } else { 0.0 });
+    Refinement {
+        coarsest: flow.mesh.coarsest_level.min(u32::from(surface)) as u8,
+        surface,
+        band: flow.mesh.band,
+        gap_fraction: if rigid { gap_fraction } else { 0.0 },
+        gap_levels: flow.rigid_dofs.gap_levels as u8,
+    }
+}
+
+/// Resolution where a case does not state one.
+pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f64 {
+    match (dimension, formulation) {
+        (2, Formulation::RigidDofs) => 12.8,
+        (2, Formulation::Paper) => 6.4,
+        (_, Formulation::RigidDofs) => 6.4,
+        (_, Formulation::Paper) => 3.2,
+    }
+}
+
+fn flow_params<const D: usize>(case: &Case) -> FlowParams {
+    let flow = &case.flow;
+    let formulation = match flow.formulation {
+        Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
+            offset: flow.rigid_dofs.offset,
+            weak_pressures: WeakPressures::Aggregate,
+        },
+        Formulation::Paper => gluey_stokes::Formulation::Paper(PaperParams {
+            viscosity_ratio: flow.paper.viscosity_ratio,
+            ramp: flow.paper.ramp,
+            rho: flow.paper.rho,
+            uzawa_steps: flow.paper.uzawa_steps,
+            ..PaperParams::default()
+        }),
+    };
+    let solver = match flow.solver {
+        Solver::Direct => SolverKind::Direct,
+        Solver::Multigrid => SolverKind::Multigrid,
+        Solver::Auto if D == 2 => SolverKind::Direct,
+        Solver::Auto => SolverKind::Multigrid,
+    };
+    FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance }
+}
