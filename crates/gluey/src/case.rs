@@ -255,6 +255,12 @@ impl Case {
         self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64
     }
 
+    /// Cells a radius at the surfaces, as stated or by default.
+    pub fn cells_per_radius(&self) -> f64 {
+        let default = crate::flow::default_cells_per_radius(self.dimension, self.flow.formulation);
+        self.flow.mesh.cells_per_radius.unwrap_or(default)
+    }
+
     /// Lower corner of the box, one coordinate a dimension.
     pub fn lower(&self) -> Vec<f64> {
         self.domain.lower.clone().unwrap_or_else(|| vec![0.0; self.dimension])

@@ -29,7 +29,9 @@ pub enum FlowError {
     #[error(transparent)]
     Stokes(#[from] StokesError),
     /// The box is not made of cubes.
-    #[error("[domain]: a box of {extent:?} is not a small number of cubes; make the ratios of its edges simple, such as 2:1")]
+    #[error(
+        "[domain]: a box of {extent:?} is not a small number of cubes; make the ratios of its edges simple, such as 2:1"
+    )]
     Box {
         /// Edge lengths.
         extent: Vec<f64>,
@@ -237,9 +239,7 @@ fn root_cells<const D: usize>(domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
         })
     };
     match (1..=MOST_ROOTS).find(fits) {
-        Some(count) => {
-            Ok(std::array::from_fn(|d| (extent[d] / shortest * f64::from(count)).round() as u32))
-        }
+        Some(count) => Ok(std::array::from_fn(|d| (extent[d] / shortest * f64::from(count)).round() as u32)),
         None => Err(FlowError::Box { extent: extent.iter().copied().collect() }),
     }
 }
@@ -248,7 +248,7 @@ fn root_cells<const D: usize>(domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
 fn refinement<const D: usize>(case: &Case, root_size: f64, radii: &[f64]) -> Refinement {
     let flow = &case.flow;
     let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
-    let cells = flow.mesh.cells_per_radius.unwrap_or(default_cells_per_radius(D, flow.formulation));
+    let cells = case.cells_per_radius();
     let surface = (cells * root_size / smallest * (1.0 - 1e-9)).log2().ceil().max(0.0) as u8;
     let rigid = flow.formulation == Formulation::RigidDofs;
     let gap_fraction = flow.rigid_dofs.gap_fraction.unwrap_or(if D == 2 { 1.0 } else { 0.0 });

@@ -326,7 +326,7 @@ mod tests {
         })
         .unwrap();
         let discretisation = Discretisation::new(mesh);
-        let solid = solid_nodes(&discretisation.velocity, &balls, 0.0);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
         let system = StokesSystem::new(&discretisation, space, 1.5, WeakPressures::Aggregate, None);
         let assembled = assemble_stokes(&discretisation, &system).unwrap();

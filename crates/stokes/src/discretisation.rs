@@ -1,7 +1,7 @@
 //! A mesh with its velocity and pressure nodes, and how its cells meet the bodies.
 
 use gluey_fem::{NodeMap, TreeMesh};
-use gluey_geom::Vector;
+
 use gluey_levelset::{LevelSet, nearest};
 
 use crate::space::SolidNodes;
@@ -35,15 +35,25 @@ impl<const D: usize> Discretisation<D> {
     }
 }
 
-/// The nodes with `alpha >= offset`, each with the body whose level set is largest there. A negative offset takes
-/// nodes slightly outside the surface; it is a length.
+/// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size of the
+/// smallest cell at the node. A negative offset takes nodes slightly outside the surface.
 pub fn solid_nodes<const D: usize, B: LevelSet<D>>(
+    mesh: &TreeMesh<D>,
     nodes: &NodeMap<D>,
     bodies: &[B],
     offset: f64,
 ) -> SolidNodes {
-    let at = |x: Vector<D>| nearest(bodies, &x).filter(|b| b.1 >= offset).map(|b| b.0 as u32);
-    (0..nodes.node_count()).map(|n| at(nodes.point(n))).collect()
+    let mut finest = vec![0; nodes.node_count()];
+    for (index, cell) in mesh.cells().iter().enumerate() {
+        for &node in nodes.cell(index) {
+            finest[node as usize] = cell.level.max(finest[node as usize]);
+        }
+    }
+    let at = |node: usize| {
+        let threshold = offset * mesh.size(finest[node]);
+        nearest(bodies, &nodes.point(node)).filter(|b| b.1 >= threshold).map(|b| b.0 as u32)
+    };
+    (0..nodes.node_count()).map(at).collect()
 }
 
 /// How the cells of a mesh are made of free and rigid nodes.

@@ -178,7 +178,7 @@ where
         start: f64,
     ) -> Result<Flow<D>, StokesError> {
         let h = discretisation.mesh.size(discretisation.mesh.max_level());
-        let solid = solid_nodes(&discretisation.velocity, bodies, offset * h);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, bodies, offset);
         let space = VelocitySpace::new(discretisation.velocity.clone(), bodies, &solid);
         check_resolved(&space, bodies, h)?;
         let viscosity = self.params.viscosity;
@@ -280,6 +280,22 @@ where
             iteration_count,
             phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
         })
+    }
+
+    /// Velocity and pressure at the nodes from which the next solve starts, where the solver is iterative.
+    pub fn warm_start(&self) -> Option<(&[f64], &[f64])> {
+        self.guess.as_ref().map(|g| (g.velocity.as_slice(), g.pressure.as_slice()))
+    }
+
+    /// Restores what [`FlowSolver::warm_start`] gave, on the mesh it belongs to; `false` if the lengths do not fit.
+    pub fn set_warm_start(&mut self, mesh: TreeMesh<D>, velocity: Vec<f64>, pressure: Vec<f64>) -> bool {
+        let discretisation = Discretisation::new(mesh);
+        let fits = velocity.len() == discretisation.velocity.node_count() * D
+            && pressure.len() == discretisation.pressure.node_count();
+        if fits {
+            self.guess = Some(Guess { discretisation, velocity, pressure });
+        }
+        fits
     }
 
     /// The last flow on the new mesh, or zero.

@@ -281,11 +281,10 @@ where
     Dim<D>: Space<D>,
 {
     let bodies: &[Ball<D>] = preparation.bodies;
-    let h = mesh.mesh.size(mesh.mesh.max_level());
     match preparation.touched {
         Some(touched) if is_finest => VelocitySpace::new(mesh.velocity.clone(), bodies, &touched.to_vec()),
         _ => {
-            let solid = solid_nodes(&mesh.velocity, bodies, preparation.offset * h);
+            let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, preparation.offset);
             VelocitySpace::new(mesh.velocity.clone(), bodies, &solid)
         }
     }

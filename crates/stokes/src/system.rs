@@ -271,7 +271,7 @@ mod tests {
         })
         .unwrap();
         let discretisation = Discretisation::new(mesh);
-        let solid = solid_nodes(&discretisation.velocity, &balls, 0.0);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
         let system = StokesSystem::new(&discretisation, space, 1.5, weak, None);
         let mut x = vec![0.0; system.dim()];

@@ -170,6 +170,14 @@ fn check_flow(case: &Case, key: &Key) -> Check {
     check_mesh(case, &key.name("mesh"))?;
     check_paper(case, &key.name("paper"))?;
     between(flow.rigid_dofs.offset, -1.0, 1.0, key.name("rigid-dofs").name("offset"))?;
+    let (rigid, name) = (&flow.rigid_dofs, key.name("rigid-dofs"));
+    let gap_fraction = rigid.gap_fraction.unwrap_or(1.0);
+    if gap_fraction != 0.0 && !(0.1..=10.0).contains(&gap_fraction) {
+        return out_of_range(gap_fraction, "from 0.1 to 10, or 0", name.name("gap_fraction"));
+    }
+    if rigid.gap_levels > 9 {
+        return out_of_range(f64::from(rigid.gap_levels), "from 0 to 9", name.name("gap_levels"));
+    }
     let offset = flow.pair_mobility.gap_offset;
     if !(offset >= 0.0 && offset.is_finite()) {
         return out_of_range(offset, "of 0 or more", key.name("pair-mobility").name("gap_offset"));
@@ -182,18 +190,18 @@ fn check_flow(case: &Case, key: &Key) -> Check {
 
 fn check_mesh(case: &Case, key: &Key) -> Check {
     let mesh = &case.flow.mesh;
-    if !(mesh.cells_per_radius >= 1.0 && mesh.cells_per_radius.is_finite()) {
-        return out_of_range(mesh.cells_per_radius, "of 1 or more", key.name("cells_per_radius"));
+    let cells_per_radius = case.cells_per_radius();
+    if !(cells_per_radius >= 1.0 && cells_per_radius.is_finite()) {
+        return out_of_range(cells_per_radius, "of 1 or more", key.name("cells_per_radius"));
     }
     if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
         return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
     }
     let radius = smallest(case.particles.iter().map(|particle| particle.radius));
     let root_edge = smallest(edges(case).into_iter());
-    let level = (mesh.cells_per_radius * root_edge / radius).log2().ceil().max(0.0);
+    let level = (cells_per_radius * root_edge / radius).log2().ceil().max(0.0);
     if level > f64::from(FINEST_LEVEL) {
         let largest = radius / root_edge * f64::from(1u32 << FINEST_LEVEL);
-        let cells_per_radius = mesh.cells_per_radius;
         let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest: FINEST_LEVEL, largest };
         return fail(key.name("cells_per_radius"), problem);
     }

@@ -1,0 +1,92 @@
+//! Meshes refined near bodies and in the gaps between them.
+
+use gluey_fem::{MeshError, TreeMesh};
+use gluey_geom::{Aabb, Vector};
+use gluey_levelset::{Ball, Body, LevelSet};
+
+/// How a mesh follows the bodies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Every cell has at least this level.
+    pub coarsest: u8,
+    /// Level of the cells at the surfaces.
+    pub surface: u8,
+    /// Cells of each level are kept to this many cell sizes from a body.
+    pub band: f64,
+    /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for none.
+    pub gap_fraction: f64,
+    /// Levels beyond `surface` that gaps may use.
+    pub gap_levels: u8,
+}
+
+impl Refinement {
+    /// The mesh of `domain` around `bodies`.
+    ///
+    /// # Errors
+    /// [`MeshError`] as [`TreeMesh::refine`].
+    pub fn mesh<const D: usize>(
+        &self,
+        domain: Aabb<D>,
+        roots: [u32; D],
+        periodic: [bool; D],
+        bodies: &[Ball<D>],
+    ) -> Result<TreeMesh<D>, MeshError> {
+        let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
+        let deepest = self.surface + gap_levels;
+        let mesh = TreeMesh::refine(domain, roots, periodic, deepest, |lower, h, level| {
+            let center = lower + Vector::repeat(0.5 * h);
+            level < self.coarsest
+                || (level < self.surface && self.is_near_surface(&center, h, bodies))
+                || (level >= self.surface && self.is_in_gap(&center, h, bodies))
+        })?;
+        let used = mesh.cells().iter().map(|c| c.level).max().unwrap_or(0);
+        Ok(if used < deepest { mesh.coarsened(used) } else { mesh })
+    }
+
+    /// Whether a cell of size `h` comes closer to a body than the band of its children.
+    fn is_near_surface<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &[Ball<D>]) -> bool {
+        bodies.iter().any(|body| {
+            let outside = body.arm(center).map(|x| (x.abs() - 0.5 * h).max(0.0)).norm();
+            outside < body.bounding_radius() + self.band * 0.5 * h
+        })
+    }
+
+    /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two surfaces is
+    /// their distance from each other there, for points between them and not far inside.
+    fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &[Ball<D>]) -> bool {
+        let reach = 0.5 * h * (D as f64).sqrt();
+        let near = |b: &&Ball<D>| -b.value(center) < b.bounding_radius();
+        let near: Vec<&Ball<D>> = bodies.iter().filter(near).collect();
+        near.iter().enumerate().any(|(i, first)| {
+            near[i + 1..].iter().any(|second| {
+                let (d1, d2) = (-first.value(center), -second.value(center));
+                let width = (d1 + d2 - 2.0 * reach).max(0.0);
+                let between = d1.max(d2) <= width + 2.0 * reach;
+                between && h > self.gap_fraction * width
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_resolved_and_the_rest_is_not() {
+        let balls = [0.449, 0.551].map(|x| Ball::new(Vector::<2>::new(x, 0.5), 0.05));
+        let refinement =
+            Refinement { coarsest: 3, surface: 6, band: 2.0, gap_fraction: 0.5, gap_levels: 8 };
+        let mesh = refinement.mesh(Aabb::unit(), [1, 1], [false; 2], &balls).unwrap();
+        let size_at = |x: f64| {
+            let cell = mesh.cells().iter().find(|c| {
+                let (lower, h) = (mesh.lower_corner(c), mesh.size(c.level));
+                lower[0] <= x && x < lower[0] + h && lower[1] <= 0.5 && 0.5 < lower[1] + h
+            });
+            mesh.size(cell.unwrap().level)
+        };
+        assert!(size_at(0.5) <= 0.5 * 0.002);
+        assert_eq!(size_at(0.4), 1.0 / 64.0);
+        assert!(mesh.cell_count() < 3000, "{}", mesh.cell_count());
+    }
+}
