@@ -187,11 +187,8 @@ fn boxes_that_are_none() {
     let empty = "the box is empty along y: lower 0, upper -1";
     refused_line(5, "upper = [1.0, -1.0, 1.0]", &["domain.upper", empty, "must exceed"]);
     let stokes = with_line(21, "hydrodynamics = \"stokes\"");
-    let uneven = stokes.replace("upper = [1.0, 1.0, 1.0]", "upper = [1.5, 1.0, 1.0]");
-    refused(
-        &uneven,
-        &["case.toml:5:", "edge 1.5 along x is not a whole multiple of the shortest edge 1", "take 2"],
-    );
+    let uneven = stokes.replace("upper = [1.0, 1.0, 1.0]", "upper = [1.517, 1.0, 1.0]");
+    refused(&uneven, &["case.toml:5:", "edges [1.517, 1.0, 1.0]", "ratios of the edges simple"]);
 }
 
 #[test]
@@ -262,6 +259,8 @@ fn choices_that_do_not_fit_together() {
 #[test]
 fn meshes_that_cannot_be_numbered() {
     refused_line(25, "cells_per_radius = 1e9", &["flow.mesh.cells_per_radius = 1e9", "level", "at most"]);
+    let gaps = with_line(22, "formulation = \"rigid-dofs\"\nrigid-dofs = { gap_levels = 12 }");
+    refused(&gaps, &["case.toml:23:", "flow.rigid-dofs.gap_levels = 12", "from 0 to 11"]);
     refused_line(26, "coarsest_level = 12", &["flow.mesh.coarsest_level = 12", "between 0 and 7"]);
 }
 

@@ -50,7 +50,7 @@ fn every_case_runs_its_first_steps() {
         assert_eq!(Some(case.name.as_str()), file.file_stem().and_then(|stem| stem.to_str()));
         case.time.end = 2.0 * case.time.step;
         // Coarse: this asks whether it runs, not how well.
-        case.flow.mesh.cells_per_radius = 1.0;
+        case.flow.mesh.cells_per_radius = Some(2.0);
         let folder = TempDir::new().expect("a folder");
         let csv = folder.path().join("runs").join("trajectory.csv");
         let report = run(&case, &RunOptions::csv(&csv), &Silent).unwrap_or_else(|error| panic!("{error}"));

@@ -30,6 +30,9 @@ pub use names::{Boundary, Formulation, Hydrodynamics, Solver, UnknownName};
 use gluey_contact::ContactParams;
 use serde::{Deserialize, Serialize};
 
+/// Largest number of root cells along the shortest edge of the box.
+const MOST_ROOTS: u32 = 16;
+
 /// A complete, checked description of one run.
 ///
 /// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1.
@@ -269,6 +272,20 @@ impl Case {
     /// Upper corner of the box, one coordinate a dimension.
     pub fn upper(&self) -> Vec<f64> {
         self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
+    }
+
+    /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the mesh. `None`
+    /// if it takes more than 16 of them along the shortest edge.
+    pub fn root_cells(&self) -> Option<Vec<u32>> {
+        let edges: Vec<f64> =
+            self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect();
+        let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);
+        let counts = |along_shortest: u32| -> Option<Vec<u32>> {
+            let exact = edges.iter().map(|edge| edge / shortest * f64::from(along_shortest));
+            let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count;
+            exact.map(|count| whole(count).then(|| count.round() as u32)).collect()
+        };
+        (1..=MOST_ROOTS).find_map(counts)
     }
 
     /// Name of the output files of this case: case and strategy, and the formulation where it is not the paper's.

@@ -19,9 +19,6 @@ use thiserror::Error;
 
 use crate::case::{Boundary, Case, Formulation, Solver};
 
-/// A box is divided into at most so many root cubes along its shortest edge.
-const MOST_ROOTS: u32 = 16;
-
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FlowError {
@@ -92,7 +89,7 @@ where
 {
     let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
     let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
-    let roots = root_cells(&domain)?;
+    let roots = root_cells(case, &domain)?;
     let radii: Vec<f64> = case.particles.iter().map(|p| p.radius).collect();
     let params = flow_params::<D>(case);
     let periodic = std::array::from_fn(|d| case.domain.boundary == Boundary::Periodic && d != 1);
@@ -227,21 +224,10 @@ fn seconds() -> f64 {
     START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
 
-/// The smallest numbers of equal cubes along the edges of a box.
-fn root_cells<const D: usize>(domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
-    let extent = domain.extent();
-    let shortest = extent.min();
-    let fits = |count: &u32| {
-        let size = shortest / f64::from(*count);
-        (0..D).all(|d| {
-            let ratio = extent[d] / size;
-            (ratio - ratio.round()).abs() <= 1e-9 * ratio
-        })
-    };
-    match (1..=MOST_ROOTS).find(fits) {
-        Some(count) => Ok(std::array::from_fn(|d| (extent[d] / shortest * f64::from(count)).round() as u32)),
-        None => Err(FlowError::Box { extent: extent.iter().copied().collect() }),
-    }
+/// The root cells along each axis of a box.
+fn root_cells<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
+    let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
+    roots.ok_or_else(|| FlowError::Box { extent: domain.extent().iter().copied().collect() })
 }
 
 /// Level at which `cells` cells fit into the smallest radius, and what else the mesh follows.

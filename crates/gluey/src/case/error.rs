@@ -191,15 +191,11 @@ pub enum Problem {
         /// Upper bound.
         upper: f64,
     },
-    /// Edges whose ratio is not a whole number cannot be filled with cubes of one size.
-    #[error("edge {edge} along {axis} is not a whole multiple of the shortest edge {shortest}")]
+    /// Edges whose ratios are not simple cannot be filled with cubes of one size.
+    #[error("a box of edges {edges:?} is not a small number of cubes")]
     UnevenBox {
-        /// Name of the axis.
-        axis: char,
-        /// Its edge.
-        edge: f64,
-        /// The shortest edge.
-        shortest: f64,
+        /// Edge lengths.
+        edges: Vec<f64>,
     },
     /// A particle wider than the box.
     #[error("particle {particle} of diameter {diameter} does not fit in a box of edge {edge} along {axis}")]
@@ -303,8 +299,8 @@ impl Problem {
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
-            Self::UnevenBox { edge, shortest, .. } => {
-                format!("the mesh is made of cubes: take {}", (edge / shortest).round().max(1.0) * shortest)
+            Self::UnevenBox { .. } => {
+                "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2".into()
             }
             Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
             Self::OutsideBox { axis, range, .. } => {

@@ -2,7 +2,8 @@
 
 use super::Case;
 use super::error::{Key, Problem};
-use super::names::{Hydrodynamics, UnknownName};
+use super::names::{Formulation, Hydrodynamics, UnknownName};
+use crate::flow::default_cells_per_radius;
 use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
@@ -14,8 +15,8 @@ pub(super) struct Violation {
 
 type Check = Result<(), Violation>;
 
-/// Finest level of the tree: two bits of 21 a coordinate are kept for the nodes between the corners.
-const FINEST_LEVEL: u32 = 19;
+/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for nodes.
+const FINEST_LEVEL: u32 = 18;
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
 const AXES: [char; 3] = ['x', 'y', 'z'];
@@ -71,21 +72,11 @@ fn check_domain(case: &Case, key: &Key) -> Check {
         }
     }
     match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => check_cubes(&edges(case), key),
-        Hydrodynamics::PairMobility => Ok(()),
-    }
-}
-
-/// The mesh is a row of cubes along each axis.
-fn check_cubes(edges: &[f64], key: &Key) -> Check {
-    let shortest = smallest(edges.iter().copied());
-    for (d, &edge) in edges.iter().enumerate() {
-        let ratio = edge / shortest;
-        if (ratio - ratio.round()).abs() > 1e-9 * ratio {
-            return fail(key.name("upper"), Problem::UnevenBox { axis: AXES[d], edge, shortest });
+        Hydrodynamics::Stokes if case.root_cells().is_none() => {
+            fail(key.name("upper"), Problem::UnevenBox { edges: edges(case) })
         }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 fn check_particles(case: &Case, key: &Key) -> Check {
@@ -169,7 +160,6 @@ fn check_flow(case: &Case, key: &Key) -> Check {
     between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
     check_mesh(case, &key.name("mesh"))?;
     check_paper(case, &key.name("paper"))?;
-    between(flow.rigid_dofs.offset, -1.0, 1.0, key.name("rigid-dofs").name("offset"))?;
     let (rigid, name) = (&flow.rigid_dofs, key.name("rigid-dofs"));
     let gap_fraction = rigid.gap_fraction.unwrap_or(1.0);
     if gap_fraction != 0.0 && !(0.1..=10.0).contains(&gap_fraction) {
@@ -190,24 +180,48 @@ fn check_flow(case: &Case, key: &Key) -> Check {
 
 fn check_mesh(case: &Case, key: &Key) -> Check {
     let mesh = &case.flow.mesh;
-    let cells_per_radius = case.cells_per_radius();
-    if !(cells_per_radius >= 1.0 && cells_per_radius.is_finite()) {
-        return out_of_range(cells_per_radius, "of 1 or more", key.name("cells_per_radius"));
-    }
     if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
         return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
     }
+    let cells = mesh
+        .cells_per_radius
+        .unwrap_or_else(|| default_cells_per_radius(case.dimension, case.flow.formulation));
+    if !(cells >= 1.0 && cells.is_finite()) {
+        return out_of_range(cells, "of 1 or more", key.name("cells_per_radius"));
+    }
+    // An analytic model has no mesh to be too fine.
+    let Some(roots) = case.root_cells() else { return Ok(()) };
     let radius = smallest(case.particles.iter().map(|particle| particle.radius));
-    let root_edge = smallest(edges(case).into_iter());
-    let level = (cells_per_radius * root_edge / radius).log2().ceil().max(0.0);
-    if level > f64::from(FINEST_LEVEL) {
-        let largest = radius / root_edge * f64::from(1u32 << FINEST_LEVEL);
-        let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest: FINEST_LEVEL, largest };
+    let root_size = edges(case)[0] / f64::from(roots[0]);
+    let finest = FINEST_LEVEL - roots.iter().max().map_or(0, |most| most.next_power_of_two().ilog2());
+    let level = (cells * root_size / radius * (1.0 - 1e-9)).log2().ceil().max(0.0);
+    if level > f64::from(finest) {
+        let largest = radius / root_size * f64::from(1u32 << finest);
+        let problem = Problem::MeshTooFine { cells_per_radius: cells, radius, level, finest, largest };
         return fail(key.name("cells_per_radius"), problem);
     }
-    if f64::from(mesh.coarsest_level) > level {
-        let problem = Problem::CoarseTooFine { found: mesh.coarsest_level, finest: level as u32 };
+    let level = level as u32;
+    if mesh.coarsest_level > level {
+        let problem = Problem::CoarseTooFine { found: mesh.coarsest_level, finest: level };
         return fail(key.name("coarsest_level"), problem);
+    }
+    check_rigid_dofs(case, finest - level)
+}
+
+/// `levels_left` is what the tree has beyond the level of the surfaces.
+fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
+    let key = Key::default().name("flow").name("rigid-dofs");
+    let rigid = &case.flow.rigid_dofs;
+    between(rigid.offset, -1.0, 1.0, key.name("offset"))?;
+    match rigid.gap_fraction {
+        Some(fraction) if !(0.0..=100.0).contains(&fraction) => {
+            return out_of_range(fraction, "from 0 to 100", key.name("gap_fraction"));
+        }
+        _ => {}
+    }
+    if case.flow.formulation == Formulation::RigidDofs && rigid.gap_levels > levels_left {
+        let range = format!("from 0 to {levels_left} with surfaces this fine");
+        return out_of_range(f64::from(rigid.gap_levels), &range, key.name("gap_levels"));
     }
     Ok(())
 }
