@@ -44,6 +44,11 @@ impl Canvas {
         Self { width, height, body: String::new() }
     }
 
+    /// Height in SVG pixels.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
     /// A straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), stroke: Stroke) {
         let dashes = stroke.dashes.map(|d| format!(r#" stroke-dasharray="{d}""#)).unwrap_or_default();

@@ -90,7 +90,7 @@ pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
     let mut canvas = Canvas::new(WIDTH, y + heights.iter().sum::<f64>());
     draw_legend(&mut canvas, &entries, &notes);
     for (chart, height) in charts.iter().zip(heights) {
-        canvas.embed(&chart.svg(height), 0.0, y);
+        canvas.embed(&chart.svg(WIDTH, height), 0.0, y);
         chart.draw_marks(&mut canvas, y + MARGIN_TOP, frame_height(chart));
         y += height;
     }
@@ -104,11 +104,11 @@ pub fn equal_aspect_height(chart: &Chart) -> f64 {
 }
 
 impl Chart {
-    /// The chart alone, `height` high with its margins.
-    fn svg(&self, height: f64) -> String {
+    /// The chart alone, of this size with its margins.
+    pub fn svg(&self, width: f64, height: f64) -> String {
         let plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve)).collect();
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
-            .with_width(WIDTH)
+            .with_width(width)
             .with_height(height)
             .with_force_margins(MARGIN_LEFT, MARGIN_RIGHT)
             .with_force_margins_y(MARGIN_TOP, self.margin_bottom())
@@ -137,12 +137,23 @@ impl Chart {
         if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
     }
 
+    /// Where a point (linear axes) lies on a canvas of this height that has only this chart, with equal scales.
+    pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
+        let frame_height = equal_aspect_height(self);
+        self.point(canvas_height - self.margin_bottom() - frame_height, frame_height, at)
+    }
+
+    /// A point (linear axes) in a frame of this height whose upper edge is at `top`.
+    fn point(&self, top: f64, frame_height: f64, at: (f64, f64)) -> (f64, f64) {
+        let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
+        let x = MARGIN_LEFT + frame_width * (at.0 - self.x.min) / (self.x.max - self.x.min);
+        (x, top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min))
+    }
+
     /// Draws the marks over a frame whose upper edge is at `top`.
     fn draw_marks(&self, canvas: &mut Canvas, top: f64, frame_height: f64) {
-        let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
         for Mark { at, label } in &self.marks {
-            let x = MARGIN_LEFT + frame_width * (at.0 - self.x.min) / (self.x.max - self.x.min);
-            let y = top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min);
+            let (x, y) = self.point(top, frame_height, *at);
             canvas.circle((x, y), 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
             canvas.text(x + 6.0, y + 15.0, 15.0, "start", label);
         }

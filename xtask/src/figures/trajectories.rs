@@ -27,7 +27,43 @@ fn paths(figure: FigureName, data: &Data, particle_count: usize) -> Canvas {
     curves.extend(data.exact.get(&figure.case()).map(|exact| exact_curve("exact", all(exact))));
     let (x, y) = axes(&curves);
     let chart = Chart { x, y, marks: starts(&curves), curves, notes: data.notes(figure) };
-    stack(&[chart], equal_aspect_height)
+    let mut canvas = stack(std::slice::from_ref(&chart), equal_aspect_height);
+    if figure == FigureName::Fig6 {
+        enlarge_right_edge(&mut canvas, &chart);
+    }
+    canvas
+}
+
+/// Draws into the empty middle of the circles of figure 6 where they cross the x axis on the right, x stretched:
+/// the orbits differ by less than a line's width elsewhere.
+fn enlarge_right_edge(canvas: &mut Canvas, chart: &Chart) {
+    let half_height = 0.01;
+    let points = chart.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
+    let edge = points.filter(|(x, y)| (y - 0.5).abs() <= half_height && *x > 0.5).map(|(x, _)| *x);
+    let Some((low, high)) = edge.map(|x| (x, x)).reduce(|(low, high), (x, _)| (low.min(x), high.max(x)))
+    else {
+        return;
+    };
+    let tick = if high - low > 0.004 { 0.005 } else { 0.001 };
+    let pad = 0.3 * tick;
+    let inset = Chart {
+        x: Axis { label: String::new(), min: low - pad, max: high + pad, tick, log: false },
+        y: Axis {
+            label: String::new(),
+            min: 0.5 - half_height,
+            max: 0.5 + half_height,
+            tick: 0.01,
+            log: false,
+        },
+        curves: chart.curves.clone(),
+        notes: Vec::new(),
+        marks: Vec::new(),
+    };
+    let size = (300.0, 240.0);
+    let (center_x, center_y) = chart.point_in_stack(canvas.height(), (0.5, 0.5));
+    let corner = (center_x - 0.5 * size.0 - 20.0, center_y - 0.5 * size.1);
+    canvas.embed(&inset.svg(size.0, size.1), corner.0, corner.1);
+    canvas.text(center_x, corner.1 - 4.0, 14.0, "middle", "right edge, *x* stretched");
 }
 
 /// The numbers of the particles where their paths begin.

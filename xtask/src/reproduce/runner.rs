@@ -20,7 +20,7 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     case.contact.exact_gap = true;
     if quick {
         let settings = quick_settings(key.case);
-        case.flow.mesh.cells_per_radius = settings.cells_per_radius;
+        case.flow.mesh.cells_per_radius = Some(settings.cells_per_radius);
         case.time.step *= settings.step_factor;
         case.time.end = case.time.end.min(settings.latest_end);
     }
