@@ -76,9 +76,9 @@ pub fn verdict(figure: FigureName, checks: &[Check]) -> Option<String> {
         own.iter().filter(|check| !check.ok).map(|check| format!("{}: {}", check.run, check.name)).collect();
     match (own.len(), failed.len()) {
         (0, _) => None,
-        (count, 0) => Some(format!("All {count} checks of this figure hold.")),
+        (count, 0) => Some(format!("checks that hold: {count} of {count}.")),
         (count, bad) => {
-            Some(format!("{bad} of the {count} checks of this figure do not hold: {}.", failed.join("; ")))
+            Some(format!("checks that hold: {} of {count}; not: {}.", count - bad, failed.join("; ")))
         }
     }
 }
@@ -195,7 +195,7 @@ mod tests {
             wanted: "at most 0".to_owned(),
             ok,
         };
-        assert_eq!(verdict(FigureName::Fig5, &[check(true)]).unwrap(), "All 1 checks of this figure hold.");
+        assert_eq!(verdict(FigureName::Fig5, &[check(true)]).unwrap(), "checks that hold: 1 of 1.");
         assert!(verdict(FigureName::Fig5, &[check(true), check(false)]).unwrap().contains("pair-2d-none"));
         assert_eq!(verdict(FigureName::Fig6, &[check(true)]), None);
     }
