@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use gluey::case::{Formulation, Solver};
 use gluey::{Case, CheckpointError, Progress, ProgressState, RunError, RunOptions, Silent, Strategy, run};
 use tempfile::TempDir;
 
@@ -83,6 +84,22 @@ fn on_the_way_back() {
     case.time.reverse_at = Some(8.0);
     resumes_bit_by_bit(&case, 159);
     resumes_bit_by_bit(&case, 200);
+}
+
+/// Five steps of the finite-element flow on a coarse mesh; the iterative solver starts from the last step's solution.
+#[test]
+fn with_the_finite_element_flow() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");
+    for solver in [Solver::Direct, Solver::Multigrid] {
+        for formulation in [Formulation::Paper, Formulation::RigidDofs] {
+            let mut case = Case::load(file).expect("a case");
+            case.time.end = 5.0 * case.time.step;
+            case.flow.mesh.cells_per_radius = Some(3.2);
+            case.flow.rigid_dofs.gap_fraction = Some(0.0);
+            (case.flow.solver, case.flow.formulation) = (solver, formulation);
+            resumes_bit_by_bit(&case, 2);
+        }
+    }
 }
 
 #[test]

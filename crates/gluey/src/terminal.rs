@@ -87,9 +87,9 @@ fn duration(seconds: f64) -> String {
 pub fn print_report(report: &RunReport) {
     print!("{report}");
     let total: f64 = report.phases.iter().map(|(_, seconds)| seconds).sum();
-    println!("  phase            seconds   share");
+    println!("  phase                seconds   share");
     for (name, seconds) in &report.phases {
-        println!("  {name:<14} {seconds:>9.3} {:>6.1} %", 100.0 * seconds / total.max(f64::MIN_POSITIVE));
+        println!("  {name:<18} {seconds:>9.3} {:>6.1} %", 100.0 * seconds / total.max(f64::MIN_POSITIVE));
     }
 }
 

@@ -5,6 +5,7 @@
 //! contact, from centre to centre: gamma, lambda, gap; and a vertex for every particle, so that the file is
 //! readable when nothing touches).
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use gluey_contact::Contact;
@@ -231,10 +232,17 @@ fn write_piece(path: &Path, piece: UnstructuredGridPiece) -> Result<(), OutputEr
         file_path: None,
     };
     let mut bytes = Vec::new();
-    vtk.try_into_xml_format(Compressor::ZLib, COMPRESSION_LEVEL)
+    let encoded = vtk
+        .try_into_xml_format(Compressor::ZLib, COMPRESSION_LEVEL)
         .and_then(|file| file.write(&mut bytes))
-        .map_err(|error| {
-            OutputError::new(path, "encode the file", std::io::Error::other(error.to_string()))
-        })?;
-    write_atomically(path, &bytes)
+        .map_err(|error| io::Error::other(error.to_string()))
+        .and_then(|()| String::from_utf8(bytes).map_err(io::Error::other));
+    let text = encoded.map_err(|error| OutputError::new(path, "encode the file", error))?;
+    write_atomically(path, signed_indices(&text).as_bytes())
+}
+
+/// vtkio writes node numbers as unsigned; with those, numpy (in meshio) ends up with floating-point indices. Numbers
+/// below 2^63 have the same bytes in both types, and the data themselves are base64, which holds no `<`.
+fn signed_indices(text: &str) -> String {
+    text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
 }
