@@ -219,7 +219,7 @@ impl Default for FlowSpec {
             hydrodynamics: Hydrodynamics::default(),
             formulation: Formulation::default(),
             solver: Solver::default(),
-            tolerance: 1e-8,
+            tolerance: 1e-6,
             mesh: MeshSpec::default(),
             paper: PaperSpec::default(),
             rigid_dofs: RigidDofsSpec::default(),

@@ -75,8 +75,7 @@ mod tests {
     #[test]
     fn gaps_are_resolved_and_the_rest_is_not() {
         let balls = [0.449, 0.551].map(|x| Ball::new(Vector::<2>::new(x, 0.5), 0.05));
-        let refinement =
-            Refinement { coarsest: 3, surface: 6, band: 2.0, gap_fraction: 0.5, gap_levels: 8 };
+        let refinement = Refinement { coarsest: 3, surface: 6, band: 2.0, gap_fraction: 0.5, gap_levels: 8 };
         let mesh = refinement.mesh(Aabb::unit(), [1, 1], [false; 2], &balls).unwrap();
         let size_at = |x: f64| {
             let cell = mesh.cells().iter().find(|c| {

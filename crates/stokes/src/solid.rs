@@ -6,7 +6,7 @@
 //! integrated with enough Gauss points to see the surface.
 
 use gluey_fem::element::{gauss_cube, node_count, value};
-use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
+use gluey_fem::kernel::{CellBatches, CellData, CubeKernel, multiply_symmetric};
 use gluey_fem::{NodeMap, Reference};
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
 use gluey_levelset::{Ball, Body, Ramp, nearest};
@@ -252,20 +252,16 @@ impl<T: Scalar, const D: usize> SolidStress<T, D> {
     pub fn apply(&self, nodes: &NodeMap<D>, x: &[T], y: &mut [T]) {
         self.kernel.viscous(&self.interior_batches, x, y);
         let n = Reference::<D>::VELOCITY;
-        let mut local = [T::ZERO; 81];
+        let (mut local, mut image) = ([T::ZERO; 81], [T::ZERO; 81]);
         for cut in &self.cut {
             let nodes = nodes.cell(cut.cell as usize);
             for (i, &node) in nodes.iter().enumerate() {
                 local[i * D..][..D].copy_from_slice(&x[node as usize * D..][..D]);
             }
+            multiply_symmetric(&cut.matrix, &local[..n], &mut image[..n]);
             for (i, &node) in nodes.iter().enumerate() {
                 for c in 0..D {
-                    let row = &cut.matrix[(i * D + c) * n..][..n];
-                    let mut sum = T::ZERO;
-                    for (&k, &u) in row.iter().zip(&local[..n]) {
-                        sum += k * u;
-                    }
-                    y[node as usize * D + c] += sum;
+                    y[node as usize * D + c] += image[i * D + c];
                 }
             }
         }
