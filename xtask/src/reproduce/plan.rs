@@ -77,12 +77,14 @@ impl RunKey {
 
     /// A guess at the cost of the run relative to the others; only the order of the runs depends on it.
     fn cost(self) -> u32 {
-        let case = match self.case {
-            CaseName::Pair3d => 100,
-            CaseName::Trio2d => 15,
-            CaseName::Pair2d => 10,
-        };
-        case * if self.approach == Approach::GlueyRigidDofs { 4 } else { 1 }
+        match (self.case, self.approach) {
+            (CaseName::Pair3d, Approach::GlueyRigidDofs) => 100,
+            (CaseName::Pair3d, _) => 200,
+            (CaseName::Trio2d, Approach::GlueyRigidDofs) => 60,
+            (CaseName::Pair2d, Approach::GlueyRigidDofs) => 50,
+            (CaseName::Trio2d, _) => 15,
+            (CaseName::Pair2d, _) => 10,
+        }
     }
 }
 
