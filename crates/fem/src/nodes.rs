@@ -68,6 +68,11 @@ impl<const D: usize> NodeMap<D> {
         self.lattice.len()
     }
 
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.cell_nodes.len() / self.nodes_per_cell
+    }
+
     /// Nodes of a cell, `(degree+1)^D`.
     pub fn nodes_per_cell(&self) -> usize {
         self.nodes_per_cell

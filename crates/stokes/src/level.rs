@@ -1,7 +1,7 @@
 //! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
 
 use gluey_fem::kernel::{CellBatches, CubeKernel};
-use gluey_fem::{Interpolation, Reference};
+use gluey_fem::{Interpolation, NodeMap, Reference};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, invert_spd,
@@ -98,6 +98,9 @@ pub enum Transfer {
 }
 
 /// One level of the multigrid.
+///
+/// Only some nodes are smoothed; the cells that act on them take part in the operator. From a zero guess the iterate
+/// then vanishes elsewhere, and all residuals that are used are those of the whole operator.
 #[derive(Clone, Debug)]
 pub struct Level<const D: usize>
 where
@@ -118,17 +121,58 @@ impl<const D: usize> Level<D>
 where
     Dim<D>: Space<D>,
 {
-    /// Sets up operator and smoother; `index` names the level in errors.
-    pub fn new(
+    /// A level with rigid bodies; `index` names it in errors. It smooths around its finest cells only: the others are
+    /// those of the next coarser level, which smooths them.
+    pub fn rigid(
         discretisation: &Discretisation<D>,
         space: VelocitySpace<D>,
         viscosity: f64,
+        index: usize,
+    ) -> Result<Self, StokesError> {
+        let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
+        let mut finest = vec![false; nodes.node_count()];
+        for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
+            nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
+        }
+        Self::new(discretisation, space, viscosity, &finest, None, index)
+    }
+
+    /// The penalised level, which smooths around the solid only: elsewhere the rigid level on the same mesh has the same
+    /// operator.
+    pub fn penalised(
+        discretisation: &Discretisation<D>,
+        space: VelocitySpace<D>,
+        viscosity: f64,
+        penalty: Penalty<f32, D>,
+        touched: &[Option<u32>],
+        index: usize,
+    ) -> Result<Self, StokesError> {
+        let solid: Vec<bool> = touched.iter().map(Option::is_some).collect();
+        Self::new(discretisation, space, viscosity, &solid, Some(penalty), index)
+    }
+
+    fn new(
+        discretisation: &Discretisation<D>,
+        space: VelocitySpace<D>,
+        viscosity: f64,
+        core: &[bool],
         penalty: Option<Penalty<f32, D>>,
         index: usize,
     ) -> Result<Self, StokesError> {
-        let cells = active_cells(discretisation, &space, viscosity);
-        let mut diagonal = block_diagonal(discretisation, &space, &cells, penalty.as_ref())
+        let nodes = &discretisation.velocity;
+        let smoothed = &nodes_of_cells_with(nodes, core);
+        let mut cells = active_cells(discretisation, &space, viscosity);
+        let touches = cells_touching(nodes, smoothed);
+        let holds_a_body = |c: &ActiveCell| {
+            nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some())
+        };
+        let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
+        cells.retain(|c| touches[c.cell as usize]);
+        let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed, penalty.as_ref())
             .map_err(|reason| StokesError::Smoother { level: index, reason })?;
+        if !smooths_twists {
+            diagonal.twists.fill(0.0);
+        }
         let dim = space.dim();
         let penalty_work = if penalty.is_some() { dim } else { 0 };
         let mut operator = LevelOperator {
@@ -200,10 +244,31 @@ where
     }
 }
 
+/// The nodes of all cells that have a marked node.
+fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+    let mut around = vec![false; nodes.node_count()];
+    for cell in 0..nodes.cell_count() {
+        if nodes.cell(cell).iter().any(|&n| marked[n as usize]) {
+            nodes.cell(cell).iter().for_each(|&n| around[n as usize] = true);
+        }
+    }
+    around
+}
+
+/// The cells with a marked node, or with a hanging node that hangs on one: those whose stress acts on marked nodes.
+fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+    let mut acting = marked.to_vec();
+    for constraint in nodes.constraints() {
+        acting[constraint.node as usize] |= constraint.masters.iter().any(|m| marked[m.0 as usize]);
+    }
+    (0..nodes.cell_count()).map(|c| nodes.cell(c).iter().any(|&n| acting[n as usize])).collect()
+}
+
 fn block_diagonal<const D: usize>(
     discretisation: &Discretisation<D>,
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
+    smoothed: &[bool],
     penalty: Option<&Penalty<f32, D>>,
 ) -> Result<BlockDiagonal, String>
 where
@@ -228,7 +293,7 @@ where
     }
     nodes.collect(D, |w| w as f32, &mut nodal);
     for (k, value) in nodal.iter_mut().enumerate() {
-        *value = match space.is_free(k / D) {
+        *value = match space.is_free(k / D) && smoothed[k / D] {
             true if *value > 0.0 => 1.0 / *value,
             true => return Err(format!("diagonal entry {value:e} at node {}", k / D)),
             false => 0.0,

@@ -208,7 +208,7 @@ where
         for (index, mesh) in meshes.iter().enumerate() {
             let is_finest = index + 1 == meshes.len();
             let space = rigid_space(mesh, preparation, is_finest);
-            levels.push(Level::new(mesh, space, preparation.viscosity, None, index)?);
+            levels.push(Level::rigid(mesh, space, preparation.viscosity, index)?);
         }
         let mut transfers: Vec<Transfer> = meshes
             .windows(2)
@@ -222,7 +222,9 @@ where
             let penalty = Penalty { factor: penalty.factor, stress };
             let index = levels.len();
             let space = system.space.clone();
-            levels.push(Level::new(discretisation, space, preparation.viscosity, Some(penalty), index)?);
+            let touched = preparation.touched.unwrap_or_default();
+            let viscosity = preparation.viscosity;
+            levels.push(Level::penalised(discretisation, space, viscosity, penalty, touched, index)?);
             transfers.push(Transfer::SameMesh);
         }
         let coarse_space = levels[0].operator.space.clone();
