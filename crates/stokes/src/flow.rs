@@ -4,9 +4,10 @@
 //! force and torque on a free body vanish because they are the residual of its own unknowns.
 //!
 //! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian of
-//! eqs. 9 and 10: `K(eta) u^k - B^T p^k = -K(I eta_s) lambda^(k-1)`, `B u^k = 0`, `lambda^k = lambda^(k-1) + rho u^k`. The
-//! bilinear form carries `2 eta_s` and the update steps with `eta_s`, so it converges for `0 < rho < 4`. Each prediction
-//! starts cold (`lambda = 0`) and makes a fixed number of steps: the softness this leaves is part of the formulation.
+//! eqs. 9 and 10: `K(eta) u^k - B^T p^k = -1/2 K(I eta_s) lambda^(k-1)`, `B u^k = 0`, `lambda^k = lambda^(k-1) + rho u^k`,
+//! where `K(eta)` is the matrix of `int 2 eta eps(u):eps(v)`. The bilinear form carries `2 eta_s` and the update steps with
+//! `eta_s`, so it converges for `0 < rho < 4`. Each prediction starts cold (`lambda = 0`) and makes a fixed number of steps:
+//! the softness this leaves is part of the formulation.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Twist, Vector};
@@ -348,7 +349,7 @@ where
     }
 }
 
-/// `b -= K(I eta_s) lambda`.
+/// `b -= int I eta_s eps(lambda):eps(v)`: half of `K(I eta_s) lambda`, which carries `2 eta_s`.
 fn subtract_multiplier<const D: usize>(system: &StokesSystem<D>, multiplier: &[f64], b: &mut [f64])
 where
     Dim<D>: Space<D>,
@@ -357,7 +358,7 @@ where
         let mut load = vec![0.0; system.velocity_dim()];
         penalty.stress.apply(system.space.nodes(), multiplier, &mut load);
         system.space.reduce(&mut load);
-        vector::axpy(-1.0, &load, &mut b[..system.velocity_dim()]);
+        vector::axpy(-0.5, &load, &mut b[..system.velocity_dim()]);
     }
 }
 
