@@ -421,6 +421,7 @@ fn check(params: &FlowParams) -> Result<(), StokesError> {
         Formulation::Paper(p) if !(p.ramp > 0.0 && p.ramp.is_finite()) => {
             wrong("ramp", p.ramp, "must be positive")
         }
+        Formulation::Paper(p) if p.quadrature == 0 => wrong("quadrature", 0.0, "must be at least 1"),
         Formulation::Paper(p) if p.uzawa_steps == 0 => wrong("uzawa_steps", 0.0, "must be at least 1"),
         _ => Ok(()),
     }
