@@ -32,7 +32,7 @@ impl Refinement {
         bodies: &[Ball<D>],
     ) -> Result<TreeMesh<D>, MeshError> {
         let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
-        let deepest = self.surface + gap_levels;
+        let deepest = self.surface.saturating_add(gap_levels);
         let mesh = TreeMesh::refine(domain, roots, periodic, deepest, |lower, h, level| {
             let center = lower + Vector::repeat(0.5 * h);
             level < self.coarsest
