@@ -183,7 +183,11 @@ where
             penalty_work: vec![0.0; penalty_work],
             space,
         };
-        let lambda_max = estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
+        let lambda_max = match smoothed.contains(&true) {
+            true => estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?,
+            // Nothing to smooth: any interval will do.
+            false => 1.0,
+        };
         let smoothing = if operator.penalty.is_some() { PENALISED_SMOOTHING } else { RIGID_SMOOTHING };
         let interval = SpectralInterval::upper_part(lambda_max, smoothing.ratio, SMOOTHER_SAFETY);
         let zeros = || vec![0.0; dim];
@@ -291,7 +295,8 @@ where
         penalty.stress.add_diagonal(nodes, &reference, &mut added);
         gluey_linalg::vector::axpy(penalty.factor, &added, &mut nodal);
     }
-    nodes.collect(D, |w| w as f32, &mut nodal);
+    // The squares keep the sum positive: weights of hanging nodes may be negative.
+    nodes.collect(D, |w| (w * w) as f32, &mut nodal);
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
             true if *value > 0.0 => 1.0 / *value,
