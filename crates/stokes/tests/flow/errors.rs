@@ -1,0 +1,127 @@
+//! What cannot be computed is answered with a typed error that says why.
+
+use gluey_fem::MeshError;
+use gluey_geom::{Aabb, Vector};
+use gluey_levelset::Ball;
+use gluey_linalg::KrylovError;
+use gluey_stokes::{
+    FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError, WeakPressures,
+};
+
+use crate::support::{
+    RADIUS, RIGID, SOLVERS, balls, bands, couette, mesh, no_clock, paper, params, try_solve,
+};
+
+fn one_disc() -> Vec<Ball<2>> {
+    balls(&[Vector::<2>::new(0.52, 0.47)])
+}
+
+#[test]
+fn a_body_smaller_than_a_cell_is_refused() {
+    let pair = balls(&[Vector::<2>::new(0.3, 0.5), Vector::<2>::new(0.5, 0.5)]);
+    for formulation in [RIGID, paper(1e3, 1)] {
+        for solver in SOLVERS {
+            let refused =
+                try_solve(params(formulation, solver, 1e-8), mesh(&bands(3), &pair), &pair, &couette);
+            let expected = StokesError::Unresolved { body: 0, radius: RADIUS, cell_size: 0.125 };
+            assert_eq!(refused.err(), Some(expected));
+        }
+    }
+    let spheres = balls(&[Vector::<3>::repeat(0.5)]);
+    let refused =
+        try_solve(params(RIGID, SolverKind::Multigrid, 1e-8), mesh(&bands(3), &spheres), &spheres, &couette);
+    assert!(matches!(refused, Err(StokesError::Unresolved { body: 0, .. })));
+}
+
+#[test]
+fn a_body_that_is_nowhere_is_refused() {
+    for at in [Vector::<2>::repeat(f64::NAN), Vector::<2>::repeat(3.0)] {
+        for formulation in [RIGID, paper(1e3, 1)] {
+            let mut bodies = one_disc();
+            bodies.push(Ball::new(at, RADIUS));
+            let mesh = mesh(&bands(6), &one_disc());
+            let refused = try_solve(params(formulation, SolverKind::Direct, 1e-8), mesh, &bodies, &couette);
+            assert!(matches!(refused, Err(StokesError::Unresolved { body: 1, .. })), "{:?}", refused.err());
+        }
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let good = params(RIGID, SolverKind::Direct, 1e-8);
+    let rigid = |offset| FlowParams {
+        formulation: Formulation::RigidDofs { offset, weak_pressures: WeakPressures::Keep },
+        ..good
+    };
+    let soft = |p: PaperParams| FlowParams { formulation: Formulation::Paper(p), ..good };
+    let usual = PaperParams::default();
+    let cases: Vec<(&str, FlowParams)> = vec![
+        ("viscosity", FlowParams { viscosity: 0.0, ..good }),
+        ("viscosity", FlowParams { viscosity: -1.0, ..good }),
+        ("viscosity", FlowParams { viscosity: f64::NAN, ..good }),
+        ("viscosity", FlowParams { viscosity: f64::INFINITY, ..good }),
+        ("tolerance", FlowParams { tolerance: 0.0, ..good }),
+        ("tolerance", FlowParams { tolerance: 1.0, ..good }),
+        ("tolerance", FlowParams { tolerance: f64::NAN, ..good }),
+        ("offset", rigid(1.0)),
+        ("offset", rigid(f64::NAN)),
+        ("viscosity_ratio", soft(PaperParams { viscosity_ratio: 1.0, ..usual })),
+        ("viscosity_ratio", soft(PaperParams { viscosity_ratio: f64::NAN, ..usual })),
+        ("rho", soft(PaperParams { rho: 0.0, ..usual })),
+        ("rho", soft(PaperParams { rho: 4.0, ..usual })),
+        ("rho", soft(PaperParams { rho: f64::NAN, ..usual })),
+        ("ramp", soft(PaperParams { ramp: 0.0, ..usual })),
+        ("ramp", soft(PaperParams { ramp: f64::NAN, ..usual })),
+        ("uzawa_steps", soft(PaperParams { uzawa_steps: 0, ..usual })),
+        ("quadrature", soft(PaperParams { quadrature: 0, ..usual })),
+    ];
+    for (wrong, params) in cases {
+        match FlowSolver::<2>::new(params, no_clock).err() {
+            Some(StokesError::Parameter { name, .. }) => assert_eq!(name, wrong),
+            other => panic!("{wrong}: {other:?} for {params:?}"),
+        }
+    }
+    assert!(FlowSolver::<2>::new(good, no_clock).is_ok());
+    assert!(FlowSolver::<3>::new(soft(usual), no_clock).is_ok());
+}
+
+#[test]
+fn without_convergence_the_residuals_are_handed_back() {
+    let disc = one_disc();
+    for formulation in [RIGID, paper(1e3, 1)] {
+        let run = |solver| {
+            try_solve(params(formulation, solver, 1e-30), mesh(&bands(6), &disc), &disc, &couette).err()
+        };
+        match run(SolverKind::Multigrid) {
+            Some(StokesError::Krylov(KrylovError::NotConverged { iterations, history, .. })) => {
+                assert_eq!(history.len(), iterations + 1);
+                let least = history.iter().copied().fold(f64::INFINITY, f64::min);
+                assert!(least < 1e-8 * history[0], "{least:e} of {:e}", history[0]);
+            }
+            other => panic!("{formulation:?}: {other:?}"),
+        }
+        // The direct solver stops at rounding error and says no more than that is possible.
+        assert_eq!(run(SolverKind::Direct), None);
+    }
+}
+
+#[test]
+fn boundary_data_that_are_no_numbers_are_noticed() {
+    let disc = one_disc();
+    for formulation in [RIGID, paper(1e3, 1)] {
+        for solver in SOLVERS {
+            let torn = |x: &Vector<2>| if x[0] == 0.0 { Vector::repeat(f64::NAN) } else { couette(x) };
+            let refused = try_solve(params(formulation, solver, 1e-8), mesh(&bands(5), &disc), &disc, &torn);
+            assert!(refused.is_err(), "{formulation:?}, {solver:?}");
+        }
+    }
+}
+
+#[test]
+fn a_mesh_beyond_the_finest_lattice_is_refused() {
+    for (surface, gap_levels) in [(30, 0), (40, 9), (250, 9)] {
+        let refinement = Refinement { gap_fraction: 1.0, gap_levels, ..bands(surface) };
+        let refused = refinement.mesh(Aabb::unit(), [1; 2], [false; 2], &one_disc());
+        assert!(matches!(refused, Err(MeshError::TooFine { .. })), "{:?}", refused.map(|m| m.cell_count()));
+    }
+}

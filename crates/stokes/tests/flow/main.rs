@@ -1,0 +1,11 @@
+//! Tests of the flow against exact answers: identities first, then analytic solutions and their orders, then the
+//! reference data. One binary, since every binary would compile the solvers anew.
+
+mod errors;
+mod exactness;
+mod formulations;
+mod orders;
+mod pairs;
+mod single;
+mod solvers;
+mod support;

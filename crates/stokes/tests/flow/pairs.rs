@@ -1,0 +1,101 @@
+//! Two particles near contact against the reference data.
+
+use gluey_geom::{Dim, Space, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::{Refinement, SolverKind};
+use gluey_testkit::reference::pair_2d_velocities;
+
+use crate::support::{
+    PairMotion, RADIUS, RIGID, balls, bands, couette, mesh, pair_at, pair_motion, params, resolved_gaps,
+    solve,
+};
+
+fn motion<const D: usize>(balls: &[Ball<D>], refinement: &Refinement, solver: SolverKind) -> PairMotion
+where
+    Dim<D>: Space<D>,
+{
+    let flow = solve(params(RIGID, solver, 1e-8), mesh(refinement, balls), balls, &couette);
+    pair_motion(balls, &flow.twists)
+}
+
+/// The exact motion at a gap (in radii) and an angle.
+fn exact(gap: f64, degrees: f64) -> PairMotion {
+    let table = pair_2d_velocities().unwrap();
+    let column = |name: &str| table.column(name).unwrap();
+    let row = (0..table.row_count())
+        .find(|&r| column("xi")[r] == gap && column("theta_deg")[r] == degrees)
+        .expect("the reference has this gap and angle");
+    PairMotion {
+        normal_speed: column("vn")[row],
+        line_rotation: column("rot")[row],
+        spins: [column("omega1")[row], column("omega2")[row]],
+    }
+}
+
+/// Largest errors of the motion from the exact one: normal speed (relative, where it is not zero by symmetry), line
+/// rotation and spins.
+fn errors(found: &PairMotion, exact: &PairMotion, degrees: f64) -> [f64; 3] {
+    let speed = match degrees == 0.0 {
+        true => found.normal_speed / RADIUS,
+        false => found.normal_speed / exact.normal_speed - 1.0,
+    };
+    let spin = |body: usize| (found.spins[body] - exact.spins[body]).abs();
+    [speed.abs(), (found.line_rotation - exact.line_rotation).abs(), spin(0).max(spin(1))]
+}
+
+/// A mesh that locks would miss the normal speed by all of it, and the spins by 0.3 at the smallest gap.
+#[test]
+fn two_discs_move_as_the_reference_says_down_to_a_hundredth_of_a_radius() {
+    for (gap, tolerance) in [(1.0, 0.01), (0.2, 0.05), (0.01, 0.2)] {
+        for degrees in [0.0, 45.0] {
+            let pair = pair_at(Vector::<2>::new(0.503, 0.4985), gap, degrees);
+            let found = motion(&pair, &resolved_gaps(8), SolverKind::Direct);
+            let exact = exact(gap, degrees);
+            let [speed, rotation, spin] = errors(&found, &exact, degrees);
+            let bound = if degrees == 0.0 { 1e-3 } else { tolerance };
+            assert!(speed < bound, "gap {gap}, {degrees} degrees: {found:?} and {exact:?}");
+            assert!(rotation < 2e-3, "gap {gap}, {degrees} degrees: {found:?} and {exact:?}");
+            assert!(spin < 8e-3, "gap {gap}, {degrees} degrees: {found:?} and {exact:?}");
+        }
+    }
+}
+
+/// Eight positions of a pair in its cells: mean of the relative error of the normal speed, and the largest distance
+/// from that mean.
+fn normal_speed_over_positions(gap: f64, surface: u8) -> (f64, f64) {
+    let h = 0.5f64.powi(surface.into());
+    let errors: Vec<f64> = (0..8)
+        .map(|k| {
+            // No two of them are reflections of each other.
+            let shift =
+                Vector::<2>::new(0.0625 + 0.125 * f64::from(k), 0.03125 + 0.125 * f64::from(3 * k % 8)) * h;
+            let pair = pair_at(Vector::<2>::repeat(0.5) + shift, gap, 45.0);
+            let speed = motion(&pair, &resolved_gaps(surface), SolverKind::Direct).normal_speed;
+            speed / exact(gap, 45.0).normal_speed - 1.0
+        })
+        .collect();
+    let mean = errors.iter().sum::<f64>() / 8.0;
+    (mean, errors.iter().map(|r| (r - mean).abs()).fold(0.0, f64::max))
+}
+
+#[test]
+fn the_normal_speed_hardly_depends_on_the_position_in_the_mesh() {
+    for (surface, gap, bias, spread) in
+        [(7, 1.0, 0.02, 0.03), (7, 0.2, 0.12, 0.06), (8, 1.0, 0.01, 0.005), (8, 0.2, 0.05, 0.03)]
+    {
+        let (mean, distance) = normal_speed_over_positions(gap, surface);
+        let cells = RADIUS * 2f64.powi(surface.into());
+        assert!(mean.abs() < bias, "a/h = {cells}, gap {gap}: mean {mean}");
+        assert!(distance < spread, "a/h = {cells}, gap {gap}: spread {distance}");
+    }
+}
+
+/// At the start of the paper's figure 7, in the box; the exact rates have three digits.
+#[test]
+fn two_spheres_approach_as_the_reference_says() {
+    let pair = balls(&[Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)]);
+    let found = motion(&pair, &bands(7), SolverKind::Multigrid);
+    assert!((found.normal_speed / -0.049445 - 1.0).abs() < 0.005, "{found:?}");
+    assert!((found.line_rotation / -0.01255 - 1.0).abs() < 0.06, "{found:?}");
+    assert!((found.spins[0] - found.spins[1]).abs() < 5e-3, "{found:?}");
+}

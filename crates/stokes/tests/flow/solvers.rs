@@ -1,0 +1,113 @@
+//! The linear solvers: they agree, they repeat themselves to the bit, and their effort does not grow.
+
+use gluey_geom::{Dim, Space, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::{Flow, FlowSolver, Formulation, SolverKind};
+
+use crate::support::{
+    RIGID, SOLVERS, balls, bands, couette, doublet, mesh, no_clock, pair_at, paper, params, resolved_gaps,
+    solve, twist_distance,
+};
+
+#[test]
+fn direct_and_multigrid_agree() {
+    for formulation in [RIGID, paper(1e3, 2)] {
+        for (gap, refinement) in [(1.0, bands(6)), (0.2, bands(7)), (0.2, resolved_gaps(6))] {
+            let pair = pair_at(Vector::<2>::new(0.503, 0.497), gap, 30.0);
+            let [direct, multigrid] = SOLVERS
+                .map(|s| solve(params(formulation, s, 1e-10), mesh(&refinement, &pair), &pair, &couette));
+            let difference = twist_distance(&direct.twists, &multigrid.twists);
+            assert!(difference < 1e-7, "{formulation:?}, gap {gap}: {difference:e}");
+        }
+    }
+}
+
+fn iterations<const D: usize>(formulation: Formulation, balls: &[Ball<D>], levels: &[u8]) -> Vec<usize>
+where
+    Dim<D>: Space<D>,
+{
+    let count = |&level| {
+        let params = params(formulation, SolverKind::Multigrid, 1e-8);
+        solve(params, mesh(&bands(level), balls), balls, &couette).iteration_count
+    };
+    levels.iter().map(count).collect()
+}
+
+/// Discs on a lattice of `n` by `n`, moved off the lattice so that no two meet the mesh in the same way.
+fn lattice(n: usize) -> Vec<Ball<2>> {
+    let center = |k: usize| {
+        let (i, j) = ((k % n) as f64, (k / n) as f64);
+        let jitter = Vector::<2>::new((7.3 * i + 1.1 * j).sin(), (2.7 * i - 5.9 * j).sin()) * 0.01;
+        Vector::<2>::new(i + 0.5, j + 0.5) / n as f64 + jitter
+    };
+    balls(&(0..n * n).map(center).collect::<Vec<_>>())
+}
+
+#[test]
+fn iterations_do_not_grow_with_resolution_or_the_number_of_bodies() {
+    let apart = pair_at(Vector::<2>::new(0.503, 0.497), 1.0, 30.0);
+    let counts = iterations(RIGID, &apart, &[6, 7, 8, 9]);
+    assert!(counts.iter().all(|&c| (15..=25).contains(&c)), "{counts:?}");
+    let counts = [2, 3, 5].map(|n| iterations(RIGID, &lattice(n), &[7])[0]);
+    assert!(counts.iter().all(|&c| c <= 40), "{counts:?}");
+    let counts = iterations(RIGID, &doublet(), &[6, 7, 8, 9]);
+    assert!(counts.iter().all(|&c| c <= 55), "{counts:?}");
+    let spheres = balls(&[Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)]);
+    let counts = iterations(RIGID, &spheres, &[5, 6]);
+    assert!(counts.iter().all(|&c| c <= 30), "{counts:?}");
+}
+
+/// Everything a flow is made of, as bits.
+fn bits<const D: usize>(flow: &Flow<D>) -> Vec<u64>
+where
+    Dim<D>: Space<D>,
+{
+    let twists = flow.twists.iter().flat_map(|t| {
+        t.velocity.iter().copied().chain(Dim::<D>::spin_slice(&t.spin).iter().copied()).collect::<Vec<_>>()
+    });
+    let fields = flow.velocity.iter().chain(&flow.pressure).chain(&flow.multiplier).copied();
+    fields.chain(twists).map(f64::to_bits).collect()
+}
+
+fn runs_repeat<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKind])
+where
+    Dim<D>: Space<D>,
+{
+    for formulation in [RIGID, paper(1e3, 2)] {
+        for &solver in solvers {
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let params = params(formulation, solver, 1e-8);
+                pool.install(|| bits(&solve(params, mesh(&bands(level), balls), balls, &couette)))
+            };
+            assert!(run(1) == run(2), "{D}D, {formulation:?}, {solver:?}: runs differ");
+        }
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    runs_repeat(&doublet(), 6, &SOLVERS);
+    let spheres = [Ball::new(Vector::<3>::new(0.3, 0.52, 0.5), 0.15), Ball::new(Vector::repeat(0.66), 0.15)];
+    runs_repeat(&spheres, 4, &[SolverKind::Multigrid]);
+}
+
+#[test]
+fn the_last_flow_is_a_good_start_for_the_next() {
+    let at = |x: f64| balls(&[Vector::<2>::new(x, 0.52), Vector::<2>::new(0.7, 0.47)]);
+    let parameters = params(RIGID, SolverKind::Multigrid, 1e-9);
+    let mut solver = FlowSolver::<2>::new(parameters, no_clock).unwrap();
+    let (before, now) = (at(0.3), at(0.3005));
+    let first = solver.solve(mesh(&bands(7), &before), &before, &couette).unwrap();
+    let (velocity, pressure) = solver.warm_start().map(|(u, p)| (u.to_vec(), p.to_vec())).unwrap();
+    let warm = solver.solve(mesh(&bands(7), &now), &now, &couette).unwrap();
+    let cold = solve(parameters, mesh(&bands(7), &now), &now, &couette);
+    assert!(warm.iteration_count < cold.iteration_count.min(first.iteration_count));
+    assert!(twist_distance(&warm.twists, &cold.twists) < 1e-8);
+
+    let mut resumed = FlowSolver::<2>::new(parameters, no_clock).unwrap();
+    assert!(!resumed.set_warm_start(mesh(&bands(6), &before), velocity.clone(), pressure.clone()));
+    assert!(resumed.set_warm_start(mesh(&bands(7), &before), velocity, pressure));
+    let again = resumed.solve(mesh(&bands(7), &now), &now, &couette).unwrap();
+    assert!(bits(&again) == bits(&warm), "resumed and uninterrupted runs differ");
+}
