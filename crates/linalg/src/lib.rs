@@ -18,6 +18,7 @@
 //! Everything runs in one thread and sums in a fixed order: equal input gives equal bits.
 
 mod block;
+mod blocked;
 mod chebyshev;
 mod direct;
 mod krylov;
@@ -28,6 +29,7 @@ mod spectrum;
 pub mod vector;
 
 pub use block::{BlockError, BlockJacobi, BlockJacobiError, DenseCholesky, invert_general, invert_spd};
+pub use blocked::{BlockGroups, BlockPattern};
 pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,

@@ -65,9 +65,47 @@ impl Pattern {
                     builder.insert(column);
                 }
             }
-            builder.close_row()?;
+            builder.end_row()?;
         }
-        Ok(builder.pattern)
+        Ok(builder.pattern.into_ascending())
+    }
+
+    /// The pattern in which row and column `b` of this square one stand for `first[b] .. first[b + 1]`.
+    pub(crate) fn expanded(&self, first: &[u32]) -> Result<Self, SparseError> {
+        let dim = first.last().map_or(0, |&dim| dim as usize);
+        let size = |b: usize| (first[b + 1] - first[b]) as usize;
+        let width = |row: usize| -> usize { self.columns_of(row).iter().map(|&c| size(c as usize)).sum() };
+        let entry_count = (0..self.row_count()).map(|row| size(row) * width(row)).sum();
+        if u32::try_from(entry_count).is_err() {
+            return Err(SparseError::TooLarge { entry_count });
+        }
+        let mut row_start = Vec::with_capacity(dim + 1);
+        let mut columns = Vec::with_capacity(entry_count);
+        row_start.push(0);
+        for row in 0..self.row_count() {
+            for _ in 0..size(row) {
+                let spans = self.columns_of(row).iter().map(|&c| first[c as usize]..first[c as usize + 1]);
+                columns.extend(spans.flatten());
+                row_start.push(columns.len() as u32);
+            }
+        }
+        Ok(Self { column_count: dim, row_start, columns })
+    }
+
+    /// This symmetric pattern, whose rows are not sorted, with rows sorted. Row `i` is column `i`, so handing out rows
+    /// in ascending order to their columns sorts them all, without a comparison.
+    fn into_ascending(mut self) -> Self {
+        let mut end = self.row_start.clone();
+        let mut columns = vec![0; self.columns.len()];
+        for row in 0..self.row_count() {
+            for &column in self.columns_of(row) {
+                let cursor = &mut end[column as usize];
+                columns[*cursor as usize] = row as u32;
+                *cursor += 1;
+            }
+        }
+        self.columns = columns;
+        self
     }
 
     /// Pattern of the entries `(row, column)`, in any order, repetitions allowed.
@@ -87,7 +125,7 @@ impl Pattern {
                 }
                 builder.insert(column);
             }
-            builder.close_row()?;
+            builder.end_row()?;
         }
         match next.next() {
             Some(&(row, column)) => Err(SparseError::OutOfRange { row, column, row_count, column_count }),
@@ -220,10 +258,9 @@ impl RowBuilder {
         }
     }
 
-    fn close_row(&mut self) -> Result<(), SparseError> {
+    /// Ends a row and leaves its columns in the order they came.
+    fn end_row(&mut self) -> Result<(), SparseError> {
         let Pattern { row_start, columns, .. } = &mut self.pattern;
-        let begin = row_start[row_start.len() - 1] as usize;
-        columns[begin..].sort_unstable();
         let end =
             u32::try_from(columns.len()).map_err(|_| SparseError::TooLarge { entry_count: columns.len() })?;
         row_start.push(end);

@@ -2,42 +2,65 @@
 //!
 //! Every nodal unknown is a short linear form in the reduced unknowns (one term for a free node, the masters of a
 //! hanging node, the entries of a body's twist for a rigid node, nothing on the boundary), so a cell contributes
-//! `C^T K C` to its reduced unknowns.
-
-use std::sync::Arc;
+//! `C^T K C` to its reduced unknowns. These come in blocks that are coupled alike: the components at a free node, the
+//! twist of a body, a pressure.
 
 use gluey_fem::Reference;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Pattern, SparseError, SparseMatrix};
+use gluey_linalg::{BlockGroups, BlockPattern, SparseError, SparseMatrix};
 
 use crate::discretisation::Discretisation;
+use crate::element::Elements;
 use crate::space::VelocitySpace;
 use crate::system::StokesSystem;
-
-/// The fluid of a direct solve is so compressible, relative to its viscosity: enough to make pressures that no
-/// velocity sees harmless, too little to matter.
-const COMPRESSIBILITY: f64 = 1e-9;
 
 /// Linear forms of nodal unknowns in reduced ones, compressed.
 #[derive(Clone, Debug)]
 pub struct Expansion {
-    starts: Vec<u32>,
+    /// Where the terms of each form start and end.
+    ranges: Vec<(u32, u32)>,
     terms: Vec<(u32, f64)>,
 }
 
 impl Expansion {
-    fn from_rows(rows: &[Vec<(u32, f64)>]) -> Self {
-        let mut new = Self { starts: vec![0], terms: Vec::new() };
-        for row in rows {
-            new.terms.extend_from_slice(row);
-            new.starts.push(new.terms.len() as u32);
+    fn zeros(count: usize) -> Self {
+        Self { ranges: vec![(0, 0); count], terms: Vec::with_capacity(count) }
+    }
+
+    /// Sets a form that was zero.
+    fn set(&mut self, nodal: usize, terms: impl IntoIterator<Item = (u32, f64)>) {
+        let start = self.terms.len() as u32;
+        self.terms.extend(terms);
+        self.ranges[nodal] = (start, self.terms.len() as u32);
+    }
+
+    /// Sets a form that was zero to the weighted sum of others.
+    fn set_sum(&mut self, nodal: usize, parts: impl Iterator<Item = (usize, f64)>) {
+        let start = self.terms.len() as u32;
+        for (part, weight) in parts {
+            let (from, to) = self.ranges[part];
+            for term in from..to {
+                let (k, w) = self.terms[term as usize];
+                self.terms.push((k, w * weight));
+            }
         }
-        new
+        self.ranges[nodal] = (start, self.terms.len() as u32);
     }
 
     /// Terms `(unknown, weight)` of a nodal unknown.
     pub fn of(&self, nodal: usize) -> &[(u32, f64)] {
-        &self.terms[self.starts[nodal] as usize..self.starts[nodal + 1] as usize]
+        let (start, end) = self.ranges[nodal];
+        &self.terms[start as usize..end as usize]
+    }
+
+    /// The forms in the numbers of the kept unknowns, where those of this one are positions less `shift`.
+    fn renumbered(&self, shift: usize, unknowns: &Unknowns) -> Self {
+        let mut new = Self::zeros(self.ranges.len());
+        for nodal in 0..self.ranges.len() {
+            let terms = self.of(nodal).iter().map(|&(k, w)| (unknowns.number[k as usize + shift], w));
+            new.set(nodal, terms.filter(|term| term.0 != u32::MAX));
+        }
+        new
     }
 }
 
@@ -47,29 +70,26 @@ where
     Dim<D>: Space<D>,
 {
     let nodes = space.nodes();
-    let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); space.full_dim()];
+    let mut expansion = Expansion::zeros(space.full_dim());
     for node in (0..nodes.node_count()).filter(|&n| space.is_free(n)) {
         for k in node * D..(node + 1) * D {
-            rows[k].push((k as u32, 1.0));
+            expansion.set(k, [(k as u32, 1.0)]);
         }
     }
     for (node, body, matrix) in space.rigid_rows() {
         let first = space.full_dim() + body as usize * Dim::<D>::RIGID;
         for (c, row) in matrix.chunks_exact(Dim::<D>::RIGID).enumerate() {
             let terms = row.iter().enumerate().filter(|t| *t.1 != 0.0);
-            rows[node as usize * D + c] = terms.map(|(k, &w)| ((first + k) as u32, w)).collect();
+            expansion.set(node as usize * D + c, terms.map(|(k, &w)| ((first + k) as u32, w)));
         }
     }
     for constraint in nodes.constraints() {
         for c in 0..D {
-            let mut terms = Vec::new();
-            for &(master, weight) in &constraint.masters {
-                terms.extend(rows[master as usize * D + c].iter().map(|&(k, w)| (k, w * weight)));
-            }
-            rows[constraint.node as usize * D + c] = terms;
+            let masters = constraint.masters.iter().map(|&(m, w)| (m as usize * D + c, w));
+            expansion.set_sum(constraint.node as usize * D + c, masters);
         }
     }
-    Expansion::from_rows(&rows)
+    expansion
 }
 
 /// Linear forms of the pressure nodes in the free ones.
@@ -78,14 +98,15 @@ where
     Dim<D>: Space<D>,
 {
     let pressure = &system.pressure;
-    let own = |q: usize| if pressure.is_free(q) { vec![(q as u32, 1.0)] } else { Vec::new() };
-    let mut rows: Vec<Vec<(u32, f64)>> = (0..pressure.dim()).map(own).collect();
-    for constraint in pressure.constraints() {
-        let terms = constraint.masters.iter();
-        let terms = terms.flat_map(|&(m, w)| rows[m as usize].iter().map(move |&(q, v)| (q, v * w)));
-        rows[constraint.node as usize] = terms.collect();
+    let mut expansion = Expansion::zeros(pressure.dim());
+    for q in (0..pressure.dim()).filter(|&q| pressure.is_free(q)) {
+        expansion.set(q, [(q as u32, 1.0)]);
     }
-    Expansion::from_rows(&rows)
+    for constraint in pressure.constraints() {
+        let masters = constraint.masters.iter().map(|&(m, w)| (m as usize, w));
+        expansion.set_sum(constraint.node as usize, masters);
+    }
+    expansion
 }
 
 /// Numbering of the unknowns that a matrix keeps out of all positions of a reduced vector.
@@ -122,17 +143,13 @@ impl Unknowns {
     }
 }
 
-/// One cell's reduced unknowns and its matrix in them.
-struct Contribution {
-    unknowns: Vec<usize>,
-    matrix: Vec<f64>,
-}
-
 /// A sparse matrix in the kept unknowns.
 #[derive(Clone, Debug)]
 pub struct Assembled {
     /// The kept unknowns.
     pub unknowns: Unknowns,
+    /// Their couplings.
+    pub blocks: BlockPattern,
     /// The matrix.
     pub matrix: SparseMatrix,
 }
@@ -146,32 +163,20 @@ pub fn assemble_stokes<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
-    let velocity = velocity_expansion(&system.space);
-    let pressure = pressure_expansion(system);
     let split = system.velocity_dim();
     let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
-    let total = split + system.pressure.dim();
-    let unknowns = Unknowns::new(total, |k| match k.checked_sub(split) {
+    let unknowns = Unknowns::new(split + system.pressure.dim(), |k| match k.checked_sub(split) {
         Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
         None => keeps_velocity(&system.space, k),
     });
-    let local = local_matrices(discretisation, system, true);
-    let contributions: Vec<Contribution> = system
-        .cells
-        .iter()
-        .zip(local)
-        .map(|(cell, matrix)| {
-            let cell = cell.cell as usize;
-            let u = discretisation.velocity.cell(cell).iter();
-            let u = u.flat_map(|&v| (0..D).map(move |c| v as usize * D + c)).map(|k| velocity.of(k));
-            let mut terms: Vec<Vec<(u32, f64)>> = u.map(<[_]>::to_vec).collect();
-            let p = discretisation.pressure.cell(cell).iter().map(|&q| pressure.of(q as usize));
-            terms.extend(p.map(|t| t.iter().map(|&(q, w)| (q + split as u32, w)).collect()));
-            contribution(&terms, &matrix, n + m, &unknowns)
-        })
-        .collect();
-    collect(unknowns, &contributions)
+    let velocity = velocity_expansion(&system.space).renumbered(0, &unknowns);
+    let pressure = pressure_expansion(system).renumbered(split, &unknowns);
+    let forms = |cell: usize, local: &mut CellForms| {
+        local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
+        discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.of(q as usize)));
+    };
+    let size = Reference::<D>::VELOCITY + Reference::<D>::PRESSURE;
+    assemble(system, unknowns, forms, &Elements::new(discretisation, system, size))
 }
 
 /// Assembles the velocity block alone.
@@ -182,22 +187,12 @@ pub fn assemble_viscous<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let velocity = velocity_expansion(&system.space);
     let unknowns = Unknowns::new(system.velocity_dim(), |k| keeps_velocity(&system.space, k));
-    let n = Reference::<D>::VELOCITY;
-    let local = local_matrices(discretisation, system, false);
-    let contributions: Vec<Contribution> = system
-        .cells
-        .iter()
-        .zip(local)
-        .map(|(cell, matrix)| {
-            let u = discretisation.velocity.cell(cell.cell as usize).iter();
-            let u = u.flat_map(|&v| (0..D).map(move |c| v as usize * D + c)).map(|k| velocity.of(k));
-            let terms: Vec<Vec<(u32, f64)>> = u.map(<[_]>::to_vec).collect();
-            contribution(&terms, &matrix, n, &unknowns)
-        })
-        .collect();
-    collect(unknowns, &contributions)
+    let velocity = velocity_expansion(&system.space).renumbered(0, &unknowns);
+    let forms = |cell: usize, local: &mut CellForms| {
+        local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
+    };
+    assemble(system, unknowns, forms, &Elements::new(discretisation, system, Reference::<D>::VELOCITY))
 }
 
 fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool
@@ -210,98 +205,157 @@ where
     }
 }
 
-/// Element matrices of the active cells: the viscous one, or the whole saddle.
-fn local_matrices<const D: usize>(
-    discretisation: &Discretisation<D>,
+/// Sums up the matrices of the active cells, whose local unknowns are given by `forms`.
+fn assemble<const D: usize>(
     system: &StokesSystem<D>,
-    saddle: bool,
-) -> Vec<Vec<f64>>
+    unknowns: Unknowns,
+    forms: impl Fn(usize, &mut CellForms),
+    elements: &Elements<'_, D>,
+) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
 {
-    let reference = Reference::<D>::new();
-    let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
-    let size = if saddle { n + m } else { n };
-    let mut slot = vec![usize::MAX; discretisation.mesh.cell_count()];
-    let mut matrices = Vec::with_capacity(system.cells.len());
-    for (k, cell) in system.cells.iter().enumerate() {
-        let viscosity = cell.viscous * (cell.volume / cell.divergence).powi(2) / cell.volume;
-        slot[cell.cell as usize] = k;
-        let mut matrix = vec![0.0; size * size];
-        for i in 0..n {
-            for j in 0..n {
-                matrix[i * size + j] = cell.viscous * reference.viscous[i * n + j];
-            }
-        }
-        for q in 0..size - n {
-            for r in 0..m {
-                matrix[(n + q) * size + n + r] =
-                    -COMPRESSIBILITY * cell.volume / viscosity * reference.pressure_mass[q * m + r];
-            }
-            for j in 0..n {
-                let value = -cell.divergence * reference.divergence[q * n + j];
-                matrix[(n + q) * size + j] = value;
-                matrix[j * size + n + q] = value;
-            }
-        }
-        matrices.push(matrix);
+    let numbering = Blocks::new(system, &unknowns);
+    let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
+    for cell in &system.cells {
+        forms(cell.cell as usize, &mut local);
+        groups.push(local.terms.iter().map(|term| numbering.of[term.0 as usize] as usize));
     }
-    if let Some(penalty) = &system.penalty {
-        penalty.stress.for_each_cell(|cell, scale, own| {
-            let matrix = &mut matrices[slot[cell as usize]];
-            for i in 0..n {
-                for j in 0..n {
-                    let k = own.map_or(reference.viscous[i * n + j], |own| own[i * n + j]);
-                    matrix[i * size + j] += penalty.factor * scale * k;
-                }
-            }
-        });
-    }
-    matrices
+    let blocks = BlockPattern::new(numbering.first, groups)?;
+    let mut reduction = Reduction::new(unknowns.positions.len(), elements.size());
+    let mut cells = system.cells.iter().enumerate();
+    let matrix = blocks.sum(|group, target| {
+        let Some((index, cell)) = cells.next() else { return };
+        forms(cell.cell as usize, &mut local);
+        reduction.place(&mut local, blocks.unknowns_of(group));
+        if local.is_identity() {
+            elements.fill(index, target);
+        } else {
+            elements.fill(index, &mut reduction.element);
+            reduction.multiply(&local, target);
+        }
+    });
+    Ok(Assembled { unknowns, blocks, matrix })
 }
 
-/// `C^T K C` for a cell whose local unknowns are the given linear forms.
-fn contribution(terms: &[Vec<(u32, f64)>], matrix: &[f64], size: usize, unknowns: &Unknowns) -> Contribution {
-    let mut group: Vec<usize> = Vec::with_capacity(size);
-    let mut forms: Vec<Vec<(usize, f64)>> = Vec::with_capacity(size);
-    for form in terms {
-        let mut kept = Vec::with_capacity(form.len());
-        for &(k, w) in form {
-            let number = unknowns.number[k as usize] as usize;
-            if number == u32::MAX as usize {
+/// Blocks of the kept unknowns.
+struct Blocks {
+    /// Block of each unknown.
+    of: Vec<u32>,
+    /// First unknown of each block, and the number of unknowns.
+    first: Vec<u32>,
+}
+
+impl Blocks {
+    fn new<const D: usize>(system: &StokesSystem<D>, unknowns: &Unknowns) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
+        let starts_block = |k: usize| match k {
+            k if k < nodal => k % D == 0,
+            k if k < split => (k - nodal) % Dim::<D>::RIGID == 0,
+            _ => true,
+        };
+        let mut new = Self { of: Vec::with_capacity(unknowns.positions.len()), first: Vec::new() };
+        for (unknown, &k) in unknowns.positions.iter().enumerate() {
+            if starts_block(k as usize) {
+                new.first.push(unknown as u32);
+            }
+            new.of.push(new.first.len() as u32 - 1);
+        }
+        new.first.push(unknowns.positions.len() as u32);
+        new
+    }
+}
+
+/// The linear forms of a cell's local unknowns, in a row.
+#[derive(Default)]
+struct CellForms {
+    ends: Vec<u32>,
+    terms: Vec<(u32, f64)>,
+    /// The local unknown that each term belongs to.
+    locals: Vec<u32>,
+}
+
+impl CellForms {
+    /// The forms of the velocities at `nodes`, and no others.
+    fn set_velocity(&mut self, velocity: &Expansion, nodes: &[u32], component_count: usize) {
+        self.ends.clear();
+        self.terms.clear();
+        self.locals.clear();
+        for &node in nodes {
+            let first = node as usize * component_count;
+            (first..first + component_count).for_each(|k| self.push(velocity.of(k)));
+        }
+    }
+
+    fn push(&mut self, form: &[(u32, f64)]) {
+        self.terms.extend_from_slice(form);
+        self.locals.resize(self.terms.len(), self.ends.len() as u32);
+        self.ends.push(self.terms.len() as u32);
+    }
+
+    /// Whether each form is the unknown in its place.
+    fn is_identity(&self) -> bool {
+        let own = |(term, k): (&(u32, f64), u32)| *term == (k, 1.0);
+        self.ends.iter().zip(1..).all(|(&end, k)| end == k) && self.terms.iter().zip(0..).all(own)
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[(u32, f64)]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.terms[start as usize..end as usize])
+    }
+}
+
+/// Workspace of `C^T K C`.
+struct Reduction {
+    /// Place of each unknown among those of the cell at hand.
+    place: Vec<u32>,
+    /// Number of these.
+    count: usize,
+    /// `K`.
+    element: Vec<f64>,
+    /// Its number of rows.
+    size: usize,
+    /// A row of `K C`.
+    row: Vec<f64>,
+}
+
+impl Reduction {
+    fn new(dim: usize, size: usize) -> Self {
+        Self { place: vec![0; dim], count: 0, element: vec![0.0; size * size], size, row: Vec::new() }
+    }
+
+    /// Turns the unknowns in `forms` into places among those of the cell.
+    fn place(&mut self, forms: &mut CellForms, unknowns: impl Iterator<Item = usize>) {
+        self.count = 0;
+        for unknown in unknowns {
+            self.place[unknown] = self.count as u32;
+            self.count += 1;
+        }
+        for term in &mut forms.terms {
+            term.0 = self.place[term.0 as usize];
+        }
+    }
+
+    /// Adds `C^T K C` to `target`.
+    fn multiply(&mut self, forms: &CellForms, target: &mut [f64]) {
+        self.row.resize(self.count, 0.0);
+        for (rows, values) in forms.iter().zip(self.element.chunks_exact(self.size)) {
+            if rows.is_empty() {
                 continue;
             }
-            let place = group.iter().position(|&g| g == number).unwrap_or_else(|| {
-                group.push(number);
-                group.len() - 1
-            });
-            kept.push((place, w));
-        }
-        forms.push(kept);
-    }
-    let count = group.len();
-    let mut reduced = vec![0.0; count * count];
-    for (i, rows) in forms.iter().enumerate() {
-        for &(r, wr) in rows {
-            for (j, columns) in forms.iter().enumerate() {
-                let value = wr * matrix[i * size + j];
-                for &(c, wc) in columns {
-                    reduced[r * count + c] += value * wc;
-                }
+            self.row.fill(0.0);
+            for (&(column, weight), &local) in forms.terms.iter().zip(&forms.locals) {
+                self.row[column as usize] += weight * values[local as usize];
+            }
+            for &(r, weight) in rows {
+                let target = &mut target[r as usize * self.count..][..self.count];
+                target.iter_mut().zip(&self.row).for_each(|(t, v)| *t += weight * v);
             }
         }
     }
-    Contribution { unknowns: group, matrix: reduced }
-}
-
-fn collect(unknowns: Unknowns, contributions: &[Contribution]) -> Result<Assembled, SparseError> {
-    let groups: Vec<&[usize]> = contributions.iter().map(|c| c.unknowns.as_slice()).collect();
-    let pattern = Pattern::from_groups(unknowns.positions.len(), &groups)?;
-    let mut matrix = SparseMatrix::zeros(Arc::new(pattern));
-    for c in contributions {
-        matrix.add_block(&c.unknowns, &c.matrix)?;
-    }
-    Ok(Assembled { unknowns, matrix })
 }
 
 #[cfg(test)]

@@ -11,8 +11,9 @@ use crate::error::StokesError;
 use crate::solver::{Preparation, SaddleSolver};
 use crate::system::StokesSystem;
 
-/// Sparse `L B L^T` factorisation of the assembled saddle-point matrix. The symbolic part is kept as long as the
-/// pattern of the matrix stands; every solve is checked by its residual.
+/// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
+/// approximate minimum degree. The symbolic part is kept as long as the pattern of the matrix stands; every solve is
+/// checked by its residual.
 #[derive(Debug, Default)]
 pub struct DirectSolver {
     factor: Option<DirectIndefinite>,
@@ -37,7 +38,8 @@ where
         let mut factor = match reusable {
             Some(factor) => factor,
             None => {
-                let symbolic = Symbolic::new(pattern.clone(), Ordering::Amd)?;
+                let order = assembled.blocks.minimum_degree()?;
+                let symbolic = Symbolic::new(pattern.clone(), Ordering::Custom(&order))?;
                 DirectIndefinite::new(Arc::new(symbolic), IndefiniteParams::default())?
             }
         };

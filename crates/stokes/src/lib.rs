@@ -6,6 +6,7 @@
 mod assembly;
 mod direct;
 mod discretisation;
+mod element;
 mod error;
 mod flow;
 mod level;

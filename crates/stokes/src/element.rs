@@ -1,0 +1,106 @@
+//! Element matrices of the Stokes system: the viscous one, or the whole saddle.
+
+use gluey_fem::Reference;
+use gluey_geom::{Dim, Space};
+
+use crate::discretisation::Discretisation;
+use crate::system::StokesSystem;
+
+/// The fluid of a direct solve is so compressible, relative to its viscosity: enough to make pressures that no
+/// velocity sees harmless, too little to matter.
+const COMPRESSIBILITY: f64 = 1e-9;
+
+/// The matrices of the active cells.
+pub struct Elements<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    system: &'a StokesSystem<D>,
+    reference: Reference<D>,
+    size: usize,
+    /// Scale of the viscous reference matrix in each cell.
+    viscous: Vec<f64>,
+    /// Index of the viscous matrix in `own` that a cell has in addition.
+    additional: Vec<Option<u32>>,
+    own: Vec<f64>,
+}
+
+impl<'a, const D: usize> Elements<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Matrices of `size` rows: velocities only, or velocities and pressures.
+    pub fn new(discretisation: &Discretisation<D>, system: &'a StokesSystem<D>, size: usize) -> Self {
+        let mut new = Self {
+            system,
+            reference: Reference::new(),
+            size,
+            viscous: system.cells.iter().map(|cell| cell.viscous).collect(),
+            additional: vec![None; system.cells.len()],
+            own: Vec::new(),
+        };
+        new.add_penalty(discretisation.mesh.cell_count());
+        new
+    }
+
+    /// Rows of a matrix.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    fn add_penalty(&mut self, cell_count: usize) {
+        let Some(penalty) = &self.system.penalty else { return };
+        let mut slot = vec![usize::MAX; cell_count];
+        for (k, cell) in self.system.cells.iter().enumerate() {
+            slot[cell.cell as usize] = k;
+        }
+        let mut own_count = 0;
+        penalty.stress.for_each_cell(|cell, scale, own| {
+            let slot = slot[cell as usize];
+            let scale = penalty.factor * scale;
+            match own {
+                None => self.viscous[slot] += scale,
+                Some(own) => {
+                    self.own.extend(own.iter().map(|k| scale * k));
+                    self.additional[slot] = Some(own_count);
+                    own_count += 1;
+                }
+            }
+        });
+    }
+
+    /// Writes the matrix of an active cell, row by row.
+    pub fn fill(&self, index: usize, matrix: &mut [f64]) {
+        let (n, size) = (Reference::<D>::VELOCITY, self.size);
+        let viscous = self.viscous[index];
+        for (row, from) in matrix.chunks_exact_mut(size).zip(self.reference.viscous.chunks_exact(n)) {
+            row.iter_mut().zip(from).for_each(|(value, k)| *value = viscous * k);
+        }
+        if let Some(own) = self.additional[index] {
+            let own = &self.own[own as usize * n * n..][..n * n];
+            for (row, from) in matrix.chunks_exact_mut(size).zip(own.chunks_exact(n)) {
+                row.iter_mut().zip(from).for_each(|(value, k)| *value += k);
+            }
+        }
+        if size > n {
+            self.fill_pressure(index, matrix);
+        }
+    }
+
+    fn fill_pressure(&self, index: usize, matrix: &mut [f64]) {
+        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let (reference, cell) = (&self.reference, &self.system.cells[index]);
+        let viscosity = cell.viscous * (cell.volume / cell.divergence).powi(2) / cell.volume;
+        let compressibility = COMPRESSIBILITY * cell.volume / viscosity;
+        for q in 0..m {
+            for r in 0..m {
+                matrix[(n + q) * self.size + n + r] = -compressibility * reference.pressure_mass[q * m + r];
+            }
+            for j in 0..n {
+                let value = -cell.divergence * reference.divergence[q * n + j];
+                matrix[(n + q) * self.size + j] = value;
+                matrix[j * self.size + n + q] = value;
+            }
+        }
+    }
+}
