@@ -95,7 +95,7 @@ fn with_the_finite_element_flow() {
             let mut case = Case::load(file).expect("a case");
             case.time.end = 5.0 * case.time.step;
             case.flow.mesh.cells_per_radius = Some(3.2);
-            case.flow.rigid_dofs.gap_fraction = Some(0.0);
+            case.flow.rigid_dofs.gap_fraction = 0.0;
             (case.flow.solver, case.flow.formulation) = (solver, formulation);
             resumes_bit_by_bit(&case, 2);
         }

@@ -33,6 +33,9 @@ use serde::{Deserialize, Serialize};
 /// Largest number of root cells along the shortest edge of the box.
 const MOST_ROOTS: u32 = 16;
 
+/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for nodes.
+const FINEST_LEVEL: u32 = 18;
+
 /// A complete, checked description of one run.
 ///
 /// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1.
@@ -192,10 +195,10 @@ pub struct RigidDofsSpec {
     /// A node is rigid where the signed distance (positive inside) is at least this many cells.
     pub offset: f64,
     /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves gaps
-    /// alone. When absent: 1 in 2D, 0 in 3D.
-    pub gap_fraction: Option<f64>,
-    /// Levels beyond that of the surfaces that gaps may use.
-    pub gap_levels: u32,
+    /// alone.
+    pub gap_fraction: f64,
+    /// Levels beyond that of the surfaces that gaps may use; when absent, what [`crate::flow::default_gap_levels`] gives.
+    pub gap_levels: Option<u32>,
 }
 
 /// Parameters of the `pair-mobility` model.
@@ -242,7 +245,7 @@ impl Default for PaperSpec {
 
 impl Default for RigidDofsSpec {
     fn default() -> Self {
-        Self { offset: -0.1, gap_fraction: None, gap_levels: 9 }
+        Self { offset: -0.1, gap_fraction: 1.0, gap_levels: None }
     }
 }
 
@@ -262,6 +265,12 @@ impl Case {
     pub fn cells_per_radius(&self) -> f64 {
         let default = crate::flow::default_cells_per_radius(self.dimension, self.flow.formulation);
         self.flow.mesh.cells_per_radius.unwrap_or(default)
+    }
+
+    /// The finest level of the tree over this box; `None` for a box that is not made of cubes.
+    pub(crate) fn finest_level(&self) -> Option<u32> {
+        let most = self.root_cells()?.into_iter().max()?;
+        FINEST_LEVEL.checked_sub(most.next_power_of_two().ilog2())
     }
 
     /// Lower corner of the box, one coordinate a dimension.

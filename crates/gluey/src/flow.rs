@@ -237,24 +237,29 @@ fn refinement<const D: usize>(case: &Case, root_size: f64, radii: &[f64]) -> Ref
     let cells = case.cells_per_radius();
     let surface = (cells * root_size / smallest * (1.0 - 1e-9)).log2().ceil().max(0.0) as u8;
     let rigid = flow.formulation == Formulation::RigidDofs;
-    let gap_fraction = flow.rigid_dofs.gap_fraction.unwrap_or(if D == 2 { 1.0 } else { 0.0 });
+    let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
+    let gap_levels = flow.rigid_dofs.gap_levels.unwrap_or(default_gap_levels(D)).min(levels_left);
     Refinement {
         coarsest: flow.mesh.coarsest_level.min(u32::from(surface)) as u8,
         surface,
         band: flow.mesh.band,
-        gap_fraction: if rigid { gap_fraction } else { 0.0 },
-        gap_levels: flow.rigid_dofs.gap_levels as u8,
+        gap_fraction: if rigid { flow.rigid_dofs.gap_fraction } else { 0.0 },
+        gap_levels: gap_levels as u8,
     }
 }
 
-/// Resolution where a case does not state one.
+/// Cells a radius where a case does not state them.
 pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f64 {
     match (dimension, formulation) {
         (2, Formulation::RigidDofs) => 12.8,
         (2, Formulation::Paper) => 6.4,
-        (_, Formulation::RigidDofs) => 6.4,
-        (_, Formulation::Paper) => 3.2,
+        _ => 3.2,
     }
+}
+
+/// Levels that gaps may use beyond that of the surfaces where a case does not state them.
+pub fn default_gap_levels(dimension: usize) -> u32 {
+    if dimension == 2 { 9 } else { 2 }
 }
 
 fn flow_params<const D: usize>(case: &Case) -> FlowParams {

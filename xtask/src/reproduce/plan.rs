@@ -213,9 +213,9 @@ pub struct QuickSettings {
 pub fn quick_settings(case: CaseName) -> QuickSettings {
     match case {
         CaseName::Pair2d | CaseName::Trio2d => {
-            QuickSettings { cells_per_radius: 3.2, step_factor: 2.0, latest_end: 16.0 }
+            QuickSettings { cells_per_radius: 6.4, step_factor: 2.0, latest_end: 16.0 }
         }
-        CaseName::Pair3d => QuickSettings { cells_per_radius: 1.6, step_factor: 2.0, latest_end: 16.85 },
+        CaseName::Pair3d => QuickSettings { cells_per_radius: 3.2, step_factor: 2.0, latest_end: 16.85 },
     }
 }
 

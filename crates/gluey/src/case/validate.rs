@@ -2,8 +2,7 @@
 
 use super::Case;
 use super::error::{Key, Problem};
-use super::names::{Formulation, Hydrodynamics, UnknownName};
-use crate::flow::default_cells_per_radius;
+use super::names::{Hydrodynamics, UnknownName};
 use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
@@ -15,8 +14,6 @@ pub(super) struct Violation {
 
 type Check = Result<(), Violation>;
 
-/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for nodes.
-const FINEST_LEVEL: u32 = 18;
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
 const AXES: [char; 3] = ['x', 'y', 'z'];
@@ -160,14 +157,6 @@ fn check_flow(case: &Case, key: &Key) -> Check {
     between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
     check_mesh(case, &key.name("mesh"))?;
     check_paper(case, &key.name("paper"))?;
-    let (rigid, name) = (&flow.rigid_dofs, key.name("rigid-dofs"));
-    let gap_fraction = rigid.gap_fraction.unwrap_or(1.0);
-    if gap_fraction != 0.0 && !(0.1..=10.0).contains(&gap_fraction) {
-        return out_of_range(gap_fraction, "from 0.1 to 10, or 0", name.name("gap_fraction"));
-    }
-    if rigid.gap_levels > 9 {
-        return out_of_range(f64::from(rigid.gap_levels), "from 0 to 9", name.name("gap_levels"));
-    }
     let offset = flow.pair_mobility.gap_offset;
     if !(offset >= 0.0 && offset.is_finite()) {
         return out_of_range(offset, "of 0 or more", key.name("pair-mobility").name("gap_offset"));
@@ -183,17 +172,14 @@ fn check_mesh(case: &Case, key: &Key) -> Check {
     if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
         return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
     }
-    let cells = mesh
-        .cells_per_radius
-        .unwrap_or_else(|| default_cells_per_radius(case.dimension, case.flow.formulation));
+    let cells = case.cells_per_radius();
     if !(cells >= 1.0 && cells.is_finite()) {
         return out_of_range(cells, "of 1 or more", key.name("cells_per_radius"));
     }
     // An analytic model has no mesh to be too fine.
-    let Some(roots) = case.root_cells() else { return Ok(()) };
+    let (Some(roots), Some(finest)) = (case.root_cells(), case.finest_level()) else { return Ok(()) };
     let radius = smallest(case.particles.iter().map(|particle| particle.radius));
     let root_size = edges(case)[0] / f64::from(roots[0]);
-    let finest = FINEST_LEVEL - roots.iter().max().map_or(0, |most| most.next_power_of_two().ilog2());
     let level = (cells * root_size / radius * (1.0 - 1e-9)).log2().ceil().max(0.0);
     if level > f64::from(finest) {
         let largest = radius / root_size * f64::from(1u32 << finest);
@@ -213,17 +199,16 @@ fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
     let key = Key::default().name("flow").name("rigid-dofs");
     let rigid = &case.flow.rigid_dofs;
     between(rigid.offset, -1.0, 1.0, key.name("offset"))?;
-    match rigid.gap_fraction {
-        Some(fraction) if !(0.0..=100.0).contains(&fraction) => {
-            return out_of_range(fraction, "from 0 to 100", key.name("gap_fraction"));
+    if rigid.gap_fraction != 0.0 && !(0.1..=10.0).contains(&rigid.gap_fraction) {
+        return out_of_range(rigid.gap_fraction, "from 0.1 to 10, or 0", key.name("gap_fraction"));
+    }
+    match rigid.gap_levels {
+        Some(levels) if levels > levels_left => {
+            let range = format!("from 0 to {levels_left} with surfaces this fine");
+            out_of_range(f64::from(levels), &range, key.name("gap_levels"))
         }
-        _ => {}
+        _ => Ok(()),
     }
-    if case.flow.formulation == Formulation::RigidDofs && rigid.gap_levels > levels_left {
-        let range = format!("from 0 to {levels_left} with surfaces this fine");
-        return out_of_range(f64::from(rigid.gap_levels), &range, key.name("gap_levels"));
-    }
-    Ok(())
 }
 
 fn check_paper(case: &Case, key: &Key) -> Check {
