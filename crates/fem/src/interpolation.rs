@@ -15,8 +15,10 @@ pub struct Interpolation {
 }
 
 impl Interpolation {
-    /// Interpolation between the spaces `coarse_nodes` on `coarse` and `fine_nodes` on `fine`, where `coarse` is
-    /// [`TreeMesh::coarsened`] from `fine`.
+    /// Interpolation between the spaces `coarse_nodes` on `coarse` and `fine_nodes` on `fine`.
+    ///
+    /// # Panics
+    /// If `coarse` is not `fine`, [`TreeMesh::coarsened`] by one level.
     pub fn new<const D: usize>(
         coarse: &TreeMesh<D>,
         coarse_nodes: &NodeMap<D>,
