@@ -1,0 +1,241 @@
+//! Timings of the Stokes core: operator, linear solves, one Uzawa step, and the flow of a whole time step.
+//!
+//! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
+
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use gluey_fem::TreeMesh;
+use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_levelset::{Ball, Ramp};
+use gluey_linalg::LinOp;
+use gluey_stokes::{
+    DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver, PaperParams, Penalty,
+    PointMatrices, Preparation, Refinement, SaddleSolver, SolidRegion, SolidStress, SolverKind, StokesSystem,
+    SystemOperator, VelocitySpace, WeakPressures, solid_nodes,
+};
+
+/// Offset of the rigid nodes in cells.
+const OFFSET: f64 = -0.1;
+/// Relative tolerance of a solve.
+const TOLERANCE: f64 = 1e-8;
+const VISCOSITY: f64 = 1.0;
+const RIGID: Formulation =
+    Formulation::RigidDofs { offset: OFFSET, weak_pressures: WeakPressures::Aggregate };
+
+fn pair_2d() -> Vec<Ball<2>> {
+    [(0.451, 0.51), (0.549, 0.49)].map(|(x, y)| Ball::new(Vector::<2>::new(x, y), 0.05)).to_vec()
+}
+
+fn pair_3d() -> Vec<Ball<3>> {
+    [(0.3, 0.525), (0.7, 0.475)].map(|(x, y)| Ball::new(Vector::<3>::new(x, y, 0.5), 0.05)).to_vec()
+}
+
+fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
+    let mut u = Vector::zeros();
+    u[0] = x[1] - 0.5;
+    u
+}
+
+fn mesh<const D: usize>(surface: u8, gap_fraction: f64, balls: &[Ball<D>]) -> TreeMesh<D> {
+    Refinement { coarsest: 3, surface, band: 2.0, gap_fraction, gap_levels: 9 }
+        .mesh(Aabb::unit(), [1; D], [false; D], balls)
+        .expect("the unit box is a cube and the levels are few")
+}
+
+/// What the linear solvers are given for one formulation.
+struct Problem<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    balls: Vec<Ball<D>>,
+    discretisation: Discretisation<D>,
+    system: StokesSystem<D>,
+    touched: Option<Vec<Option<u32>>>,
+    b: Vec<f64>,
+}
+
+impl<const D: usize> Problem<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// A uniform mesh without bodies.
+    fn empty(level: u8) -> Self {
+        let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level);
+        let discretisation =
+            Discretisation::new(mesh.expect("the unit box is a cube and the levels are few"));
+        Self::eliminated(Vec::new(), discretisation)
+    }
+
+    fn rigid(balls: Vec<Ball<D>>, surface: u8) -> Self {
+        let discretisation = Discretisation::new(mesh(surface, 0.0, &balls));
+        Self::eliminated(balls, discretisation)
+    }
+
+    fn eliminated(balls: Vec<Ball<D>>, discretisation: Discretisation<D>) -> Self {
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, OFFSET);
+        let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
+        let system = StokesSystem::new(&discretisation, space, VISCOSITY, WeakPressures::Aggregate, None);
+        Self::new(balls, discretisation, system, None)
+    }
+
+    fn penalised(balls: Vec<Ball<D>>, surface: u8) -> Self {
+        let paper = PaperParams::default();
+        let discretisation = Discretisation::new(mesh(surface, 0.0, &balls));
+        let ramp = Ramp::new(paper.ramp * discretisation.mesh.size(surface));
+        let matrices = PointMatrices::new(paper.quadrature);
+        let region = SolidRegion::new(&discretisation, &balls, ramp, &matrices);
+        let stress = SolidStress::new(&discretisation, &region, &matrices, VISCOSITY * paper.viscosity_ratio);
+        let touched = region.touched_nodes(&discretisation.velocity, &balls);
+        let nowhere = vec![None; discretisation.velocity.node_count()];
+        let space = VelocitySpace::new::<Ball<D>>(discretisation.velocity.clone(), &[], &nowhere);
+        let penalty = Penalty { factor: 1.0 - 1.0 / paper.viscosity_ratio, stress };
+        let system = StokesSystem::new(&discretisation, space, VISCOSITY, WeakPressures::Keep, Some(penalty));
+        Self::new(balls, discretisation, system, Some(touched))
+    }
+
+    /// The right-hand side is the residual of the undisturbed flow.
+    fn new(
+        balls: Vec<Ball<D>>,
+        discretisation: Discretisation<D>,
+        system: StokesSystem<D>,
+        touched: Option<Vec<Option<u32>>>,
+    ) -> Self {
+        let nodes = &discretisation.velocity;
+        let mut lift: Vec<f64> =
+            (0..nodes.node_count()).flat_map(|n| couette(&nodes.point(n)).data.0[0]).collect();
+        lift.resize(system.velocity_dim(), 0.0);
+        system.space.expand(&mut lift);
+        let mut b = vec![0.0; system.dim()];
+        system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
+        Self { balls, discretisation, system, touched, b }
+    }
+
+    fn prepare(&self, solver: &mut impl SaddleSolver<D>) {
+        let preparation = Preparation {
+            bodies: &self.balls,
+            offset: if self.touched.is_some() { 0.0 } else { OFFSET },
+            viscosity: VISCOSITY,
+            touched: self.touched.as_deref(),
+        };
+        solver.prepare(&self.discretisation, &self.system, &preparation).expect("the bodies are resolved");
+    }
+
+    fn dofs(&self) -> u64 {
+        self.discretisation.dof_count() as u64
+    }
+}
+
+/// One application of the Stokes operator; throughput in unknowns.
+fn operator<const D: usize>(criterion: &mut Criterion, name: &str, problem: &Problem<D>)
+where
+    Dim<D>: Space<D>,
+{
+    let mut group = criterion.benchmark_group(format!("operator-{D}d"));
+    group.throughput(Throughput::Elements(problem.dofs()));
+    let mut operator = SystemOperator::new(&problem.system);
+    let x: Vec<f64> = (0..problem.system.dim()).map(|i| (0.7 * i as f64).sin()).collect();
+    let mut y = vec![0.0; x.len()];
+    group.bench_function(BenchmarkId::new(name, problem.dofs()), |b| b.iter(|| operator.apply(&x, &mut y)));
+    group.finish();
+}
+
+/// Set-up of a solver, and a solve from zero to the tolerance; throughput in unknowns.
+fn solver<const D: usize, S: SaddleSolver<D> + Default>(
+    criterion: &mut Criterion,
+    name: &str,
+    problem: &Problem<D>,
+) where
+    Dim<D>: Space<D>,
+{
+    let mut group = criterion.benchmark_group(format!("solver-{D}d"));
+    group.throughput(Throughput::Elements(problem.dofs()));
+    let mut solver = S::default();
+    group.bench_function(BenchmarkId::new(format!("{name}-prepare"), problem.dofs()), |b| {
+        b.iter(|| problem.prepare(&mut solver));
+    });
+    group.bench_function(BenchmarkId::new(format!("{name}-solve"), problem.dofs()), |b| {
+        b.iter(|| {
+            let mut x = vec![0.0; problem.system.dim()];
+            solver.solve(&problem.system, &problem.b, &mut x, TOLERANCE).expect("it converges")
+        });
+    });
+    group.finish();
+}
+
+/// Mesh, assembly, set-up and solve for a pair that has moved by one step, again and again forth and back, so that every
+/// step starts from the flow before it as in a run. Contact and integration of the motion, which cost microseconds, are
+/// left out.
+fn step<const D: usize>(
+    criterion: &mut Criterion,
+    name: &str,
+    params: FlowParams,
+    balls: Vec<Ball<D>>,
+    (surface, gap_fraction): (u8, f64),
+    dt: f64,
+) where
+    Dim<D>: Space<D>,
+{
+    let no_clock = || 0.0;
+    let mut solver = FlowSolver::<D>::new(params, no_clock).expect("the parameters are in range");
+    let mut flow = |balls: &[Ball<D>]| {
+        solver.solve(mesh(surface, gap_fraction, balls), balls, &couette).expect("the bodies are resolved")
+    };
+    let twists = flow(&balls).twists;
+    let moved: Vec<Ball<D>> =
+        balls.iter().zip(&twists).map(|(b, t)| Ball::new(b.center() + t.velocity * dt, 0.05)).collect();
+    let mut group = criterion.benchmark_group("step");
+    let mut forth = false;
+    group.bench_function(name, |b| {
+        b.iter(|| {
+            forth = !forth;
+            flow(if forth { &moved } else { &balls })
+        });
+    });
+    group.finish();
+}
+
+fn operators(criterion: &mut Criterion) {
+    operator(criterion, "constant", &Problem::<2>::empty(8));
+    operator(criterion, "constant", &Problem::<3>::empty(5));
+    operator(criterion, "rigid-dofs", &Problem::rigid(pair_2d(), 8));
+    operator(criterion, "paper", &Problem::penalised(pair_2d(), 7));
+    operator(criterion, "rigid-dofs", &Problem::rigid(pair_3d(), 6));
+    operator(criterion, "paper", &Problem::penalised(pair_3d(), 6));
+}
+
+fn solvers(criterion: &mut Criterion) {
+    let (rigid, soft) = (Problem::rigid(pair_2d(), 8), Problem::penalised(pair_2d(), 7));
+    solver::<2, DirectSolver>(criterion, "rigid-dofs-direct", &rigid);
+    solver::<2, MultigridSolver<2>>(criterion, "rigid-dofs-multigrid", &rigid);
+    // A further step of Uzawa's iteration is one more solve with what is prepared.
+    solver::<2, DirectSolver>(criterion, "paper-direct-uzawa-step", &soft);
+    solver::<2, MultigridSolver<2>>(criterion, "paper-multigrid-uzawa-step", &soft);
+    solver::<3, MultigridSolver<3>>(criterion, "rigid-dofs-multigrid", &Problem::rigid(pair_3d(), 6));
+    solver::<3, MultigridSolver<3>>(
+        criterion,
+        "paper-multigrid-uzawa-step",
+        &Problem::penalised(pair_3d(), 6),
+    );
+}
+
+/// The steps of the cases `pair-2d` and `pair-3d` with their default meshes.
+fn steps(criterion: &mut Criterion) {
+    let paper = Formulation::Paper(PaperParams::default());
+    let params =
+        |formulation, solver| FlowParams { viscosity: VISCOSITY, formulation, solver, tolerance: TOLERANCE };
+    step(criterion, "pair-2d-paper", params(paper, SolverKind::Direct), pair_2d(), (7, 0.0), 0.025);
+    step(criterion, "pair-2d-rigid-dofs", params(RIGID, SolverKind::Direct), pair_2d(), (8, 1.0), 0.025);
+    step(criterion, "pair-3d-paper", params(paper, SolverKind::Multigrid), pair_3d(), (6, 0.0), 0.05);
+    step(criterion, "pair-3d-rigid-dofs", params(RIGID, SolverKind::Multigrid), pair_3d(), (7, 0.0), 0.05);
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_secs(1));
+    targets = operators, solvers, steps
+}
+criterion_main!(benches);
