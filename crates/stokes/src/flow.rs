@@ -409,7 +409,7 @@ fn check(params: &FlowParams) -> Result<(), StokesError> {
         return wrong("tolerance", params.tolerance, "must lie between 0 and 1");
     }
     match params.formulation {
-        Formulation::RigidDofs { offset, .. } if !(offset.abs() < 1.0) => {
+        Formulation::RigidDofs { offset, .. } if !(-1.0..=1.0).contains(&offset) => {
             wrong("offset", offset, "must lie between -1 and 1 cells")
         }
         Formulation::Paper(p) if !(p.viscosity_ratio > 1.0 && p.viscosity_ratio.is_finite()) => {
