@@ -44,17 +44,23 @@ fn lattice(n: usize) -> Vec<Ball<2>> {
 }
 
 #[test]
-fn iterations_do_not_grow_with_resolution_or_the_number_of_bodies() {
+fn iterations_do_not_grow_with_resolution_or_the_number_of_discs() {
     let apart = pair_at(Vector::<2>::new(0.503, 0.497), 1.0, 30.0);
     let counts = iterations(RIGID, &apart, &[6, 7, 8, 9]);
     assert!(counts.iter().all(|&c| (15..=25).contains(&c)), "{counts:?}");
     let counts = [2, 3, 5].map(|n| iterations(RIGID, &lattice(n), &[7])[0]);
-    assert!(counts.iter().all(|&c| c <= 40), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 30), "{counts:?}");
+}
+
+/// Bounds, not constancy: measured are 22, 46, 25, 33 for discs that nearly touch on cells larger than the gap, and 21,
+/// 26, 37 for spheres.
+#[test]
+fn iterations_stay_bounded_near_contact_and_in_3d() {
     let counts = iterations(RIGID, &doublet(), &[6, 7, 8, 9]);
     assert!(counts.iter().all(|&c| c <= 55), "{counts:?}");
     let spheres = balls(&[Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)]);
-    let counts = iterations(RIGID, &spheres, &[5, 6]);
-    assert!(counts.iter().all(|&c| c <= 30), "{counts:?}");
+    let counts = iterations(RIGID, &spheres, &[5, 6, 7]);
+    assert!(counts.iter().all(|&c| c <= 42), "{counts:?}");
 }
 
 /// Everything a flow is made of, as bits.
