@@ -100,8 +100,9 @@ fn gluey_particles_return_when_the_shear_is_reversed_and_inelastic_ones_do_not()
     assert!(inelastic > 0.05, "inelastic: {inelastic}");
 }
 
-/// The same for the two discs in the finite-element flow, on a coarse mesh. A quarter turn under pressure and one under
-/// tension leave an inelastic pair with an open gap; reversal does not close it.
+/// The same for the two discs in the finite-element flow. With r = 100 the solid yields enough for the difference to show
+/// in the positions: an inelastic pair is left with an open gap that reversal does not close. (With r = 1000 the pair is so
+/// stiff that inelastic contact misses by 0.007 radii only.)
 #[test]
 fn so_it_is_in_the_finite_element_flow() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");
@@ -111,13 +112,10 @@ fn so_it_is_in_the_finite_element_flow() {
         case.contact.strategy = strategy;
         case.time.reverse_at = Some(8.0);
         case.time.end = 16.0;
-        case.flow.mesh.cells_per_radius = Some(3.2);
+        case.flow.paper.viscosity_ratio = 100.0;
         ends(&case)
     };
     let [gluey, inelastic] = [Strategy::Gluey, Strategy::Inelastic].map(there_and_back);
     assert!(distance(2, &gluey) < 0.001, "gluey: {gluey:?}");
-    assert!(distance(2, &inelastic) > 0.005, "inelastic: {inelastic:?}");
-    let gap = |row: &[f64]| row[4];
-    assert!((gap(&gluey[1]) / gap(&gluey[0]) - 1.0).abs() < 0.2, "gluey: {gluey:?}");
-    assert!(gap(&inelastic[1]) > 10.0 * gap(&inelastic[0]), "inelastic: {inelastic:?}");
+    assert!(distance(2, &inelastic) > 0.05, "inelastic: {inelastic:?}");
 }
