@@ -192,8 +192,9 @@ pub struct PaperSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RigidDofsSpec {
-    /// A node is rigid where the signed distance (positive inside) is at least this many cells.
-    pub offset: f64,
+    /// A node is rigid where the signed distance (positive inside) is at least this many cells; when absent, what
+    /// [`crate::flow::default_offset`] gives.
+    pub offset: Option<f64>,
     /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves gaps
     /// alone.
     pub gap_fraction: f64,
@@ -245,7 +246,7 @@ impl Default for PaperSpec {
 
 impl Default for RigidDofsSpec {
     fn default() -> Self {
-        Self { offset: -0.1, gap_fraction: 1.0, gap_levels: None }
+        Self { offset: None, gap_fraction: 1.0, gap_levels: None }
     }
 }
 

@@ -257,16 +257,23 @@ pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f
     }
 }
 
-/// Levels that gaps may use beyond that of the surfaces where a case does not state them.
+/// Levels that gaps may use beyond that of the surfaces where a case does not state them: enough for any film in 2D, none
+/// in 3D, where they spoil the convergence of the solver.
 pub fn default_gap_levels(dimension: usize) -> u32 {
-    if dimension == 2 { 9 } else { 2 }
+    if dimension == 2 { 9 } else { 0 }
+}
+
+/// Offset of the rigid nodes in cells where a case does not state one. In 3D, where films are not resolved, a larger one
+/// makes up for the resistance of the film.
+pub fn default_offset(dimension: usize) -> f64 {
+    if dimension == 2 { -0.1 } else { -0.2 }
 }
 
 fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let flow = &case.flow;
     let formulation = match flow.formulation {
         Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
-            offset: flow.rigid_dofs.offset,
+            offset: flow.rigid_dofs.offset.unwrap_or(default_offset(D)),
             weak_pressures: WeakPressures::Aggregate,
         },
         Formulation::Paper => gluey_stokes::Formulation::Paper(PaperParams {

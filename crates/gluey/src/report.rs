@@ -104,19 +104,23 @@ where
     (trajectory.particle_count() > 1).then(|| trajectory.row(last).gap(0, 1))
 }
 
-/// `|D(t_end) - D(t')| / D(t')` of particles 1 and 2 with `t' = 2 t* - t_end` and `t*` the last time when their line
-/// of centres is at 90 degrees to the flow while `t'` is in the run. An exact encounter has none: it is its own
-/// mirror image in time.
+/// `|D(t* + s) - D(t* - s)| / D(t* - s)` of particles 1 and 2 at the end of the run: `t*` is the last time when their line
+/// of centres is at 90 degrees to the flow and `s = t_end - t*`, or a little less where `t* - s` would lie before the
+/// start. An exact encounter has none: it is its own mirror image in time.
 ///
-/// `None` for fewer than two particles, without such a time, and where the surfaces touch at `t'`.
+/// `None` for fewer than two particles, without such a time, where more than a twentieth of `s` would have to be cut, and
+/// where the surfaces touch at `t* - s`.
 fn reversibility_error<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
 where
     Dim<D>: Space<D>,
 {
     let end = *trajectory.times().last()?;
-    let crossing = last_crossing(trajectory).filter(|crossing| 2.0 * crossing >= end)?;
-    let mirrored = trajectory.gap_at(0, 1, 2.0 * crossing - end)?;
-    let error = (end_gap(trajectory)? - mirrored).abs() / mirrored;
+    let crossing = last_crossing(trajectory)?;
+    let after = end - crossing;
+    let reach = Some(after.min(crossing)).filter(|reach| *reach >= 0.95 * after)?;
+    let last = trajectory.gap_at(0, 1, (crossing + reach).min(end))?;
+    let mirrored = trajectory.gap_at(0, 1, (crossing - reach).max(0.0))?;
+    let error = (last - mirrored).abs() / mirrored;
     (mirrored > TOUCHING_OVER_A * trajectory.mean_radius()).then_some(error)
 }
 

@@ -163,9 +163,8 @@ where
         let smoothed = &nodes_of_cells_with(nodes, core);
         let mut cells = active_cells(discretisation, &space, viscosity);
         let touches = cells_touching(nodes, smoothed);
-        let holds_a_body = |c: &ActiveCell| {
-            nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some())
-        };
+        let holds_a_body =
+            |c: &ActiveCell| nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some());
         let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
         cells.retain(|c| touches[c.cell as usize]);
         let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed, penalty.as_ref())

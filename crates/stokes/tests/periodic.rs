@@ -3,9 +3,7 @@
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{
-    FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, WeakPressures,
-};
+use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, WeakPressures};
 
 const REFINEMENT: Refinement =
     Refinement { coarsest: 3, surface: 5, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };

@@ -50,6 +50,12 @@ impl Data {
         if self.quick {
             notes.push("Computed with --quick: coarse mesh and large time steps.".to_owned());
         }
+        if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
+            notes.push(
+                "Box periodic in *x*; rigid-dofs and exact: Couette flow on all sides, to *t* = 12."
+                    .to_owned(),
+            );
+        }
         let missing: Vec<&str> = figure
             .approaches()
             .into_iter()

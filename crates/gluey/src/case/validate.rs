@@ -198,7 +198,7 @@ fn check_mesh(case: &Case, key: &Key) -> Check {
 fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
     let key = Key::default().name("flow").name("rigid-dofs");
     let rigid = &case.flow.rigid_dofs;
-    between(rigid.offset, -1.0, 1.0, key.name("offset"))?;
+    between(rigid.offset.unwrap_or(0.0), -1.0, 1.0, key.name("offset"))?;
     if rigid.gap_fraction != 0.0 && !(0.1..=10.0).contains(&rigid.gap_fraction) {
         return out_of_range(rigid.gap_fraction, "from 0.1 to 10, or 0", key.name("gap_fraction"));
     }
