@@ -219,7 +219,7 @@ fn solvers(criterion: &mut Criterion) {
     );
 }
 
-/// The steps of the cases `pair-2d` and `pair-3d` with their default meshes.
+/// Steps of the cases `pair-2d` and `pair-3d`; `docs/benchmarks.md` names the meshes.
 fn steps(criterion: &mut Criterion) {
     let paper = Formulation::Paper(PaperParams::default());
     let params =
