@@ -19,10 +19,10 @@ pub struct Section {
     pub table: Option<Table>,
 }
 
-const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:50rem;margin:2rem auto;padding:0 1rem;\
+const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:66rem;margin:2rem auto;padding:0 1rem;\
 line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\
 table{border-collapse:collapse;margin:1rem 0;font-size:.9rem;display:block;overflow-x:auto}\
-th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd;font-variant-numeric:lining-nums}\
+th,td{padding:.2rem .5rem;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap;font-variant-numeric:lining-nums}\
 th{font-weight:normal;border-bottom:1px solid #111;vertical-align:bottom}td:first-child,th:first-child,td.t,th.t{text-align:left}\
 .bad{color:#b00020}.note{background:#fff4d6;padding:.6rem 1rem}";
 
