@@ -215,7 +215,7 @@ pub fn quick_settings(case: CaseName) -> QuickSettings {
         CaseName::Pair2d | CaseName::Trio2d => {
             QuickSettings { cells_per_radius: 6.4, step_factor: 2.0, latest_end: 16.0 }
         }
-        CaseName::Pair3d => QuickSettings { cells_per_radius: 3.2, step_factor: 3.0, latest_end: 16.85 },
+        CaseName::Pair3d => QuickSettings { cells_per_radius: 3.2, step_factor: 2.0, latest_end: 16.85 },
     }
 }
 
