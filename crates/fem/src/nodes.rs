@@ -28,7 +28,6 @@ pub struct NodeMap<const D: usize> {
     spacing: f64,
     lower: Vector<D>,
     periodic: [bool; D],
-    index: FxHashMap<u64, u32>,
     constraints: Vec<Constraint>,
     is_hanging: Vec<bool>,
 }
@@ -46,12 +45,12 @@ impl<const D: usize> NodeMap<D> {
             spacing: mesh.size(finest) / degree as f64,
             lower: mesh.domain().lower,
             periodic: mesh.periodic(),
-            index: FxHashMap::default(),
             constraints: Vec::new(),
             is_hanging: Vec::new(),
         };
+        let mut index = FxHashMap::default();
         for cell in mesh.cells() {
-            map.touch(cell, finest);
+            map.touch(cell, finest, &mut index);
         }
         map.is_hanging = vec![false; map.lattice.len()];
         map.constrain(mesh);
@@ -105,16 +104,6 @@ impl<const D: usize> NodeMap<D> {
         &self.constraints
     }
 
-    /// The node at a lattice point of spacing `size(max_level) / degree`, if there is one.
-    pub fn find(&self, lattice: &[u32; D]) -> Option<u32> {
-        self.index.get(&pack(lattice)).copied()
-    }
-
-    /// Lattice coordinates of a node, in units of `size(max_level) / degree`.
-    pub fn lattice(&self, node: usize) -> &[u32; D] {
-        &self.lattice[node]
-    }
-
     /// Sets every hanging node of a field with `N` interleaved components from its masters.
     pub fn distribute<T: Copy + std::ops::AddAssign + std::ops::Mul<Output = T>>(
         &self,
@@ -153,11 +142,12 @@ impl<const D: usize> NodeMap<D> {
         }
     }
 
-    fn touch(&mut self, cell: &Cell<D>, finest: u8) {
+    /// Appends the nodes of a cell; `index` finds those that other cells have touched before by their lattice points.
+    fn touch(&mut self, cell: &Cell<D>, finest: u8, index: &mut FxHashMap<u64, u32>) {
         for i in 0..self.nodes_per_cell {
             let point = self.wrap(lattice_point(cell, self.degree, i, finest));
             let next = self.lattice.len() as u32;
-            let node = *self.index.entry(pack(&point)).or_insert(next);
+            let node = *index.entry(pack(&point)).or_insert(next);
             if node == next {
                 self.lattice.push(point);
             }
