@@ -8,7 +8,7 @@ use gluey_linalg::{DirectIndefinite, IndefiniteParams, Ordering, Symbolic};
 use crate::assembly::{Unknowns, assemble_stokes};
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
-use crate::solver::{Preparation, SaddleSolver};
+use crate::solver::{Preparation, SaddleSolver, SolveReport};
 use crate::system::StokesSystem;
 
 /// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
@@ -57,7 +57,7 @@ where
         b: &[f64],
         x: &mut [f64],
         tolerance: f64,
-    ) -> Result<usize, StokesError> {
+    ) -> Result<SolveReport, StokesError> {
         let (Some(factor), Some(unknowns)) = (&mut self.factor, &self.unknowns) else {
             return Err(StokesError::NotPrepared);
         };
@@ -65,6 +65,10 @@ where
         factor.set_relative_tolerance(tolerance);
         let report = factor.solve(&self.b, &mut self.x)?;
         unknowns.scatter(&self.x, x);
-        Ok(report.refinements)
+        Ok(SolveReport {
+            iterations: report.refinements,
+            fine_operator_applications: (report.refinements + 1) as f64,
+            residuals: factor.residual_history().to_vec(),
+        })
     }
 }

@@ -102,6 +102,8 @@ where
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
     pub iteration_count: usize,
+    /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
+    pub fine_operator_applications: f64,
     /// Seconds in mesh and assembly, in the preparation of the solver, and in solves, as told by the caller's clock.
     pub phases: [f64; 3],
 }
@@ -196,7 +198,7 @@ where
         system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
         let mut x = self.initial_guess(&system, &discretisation);
         let tolerance = self.params.tolerance;
-        let iteration_count = self.solver.solve(&system, &b, &mut x, tolerance)?;
+        let report = self.solver.solve(&system, &b, &mut x, tolerance)?;
 
         let pressure = self.finish(&system, &discretisation, &x);
         let mut expanded = x[..system.velocity_dim()].to_vec();
@@ -212,7 +214,8 @@ where
             multiplier: Vec::new(),
             twists,
             solve_count: 1,
-            iteration_count,
+            iteration_count: report.iterations,
+            fine_operator_applications: report.fine_operator_applications,
             phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
         })
     }
@@ -254,15 +257,17 @@ where
         let mut x = self.initial_guess(&system, &discretisation);
         let mut multiplier = vec![0.0; nodal];
         let mut velocity = Vec::new();
-        let mut iteration_count = 0;
+        let (mut iteration_count, mut fine_operator_applications) = (0, 0.0);
         for step in 0..paper.uzawa_steps {
             let mut b = base.clone();
             if step > 0 {
                 subtract_multiplier(&system, &multiplier, &mut b);
             }
             let scale = reference / vector::norm(&b).max(f64::MIN_POSITIVE);
-            iteration_count +=
-                self.solver.solve(&system, &b, &mut x, self.params.tolerance * scale.min(1.0))?;
+            let tolerance = self.params.tolerance * scale.min(1.0);
+            let report = self.solver.solve(&system, &b, &mut x, tolerance)?;
+            iteration_count += report.iterations;
+            fine_operator_applications += report.fine_operator_applications;
             velocity = x[..nodal].to_vec();
             system.space.expand(&mut velocity);
             vector::axpy(1.0, &lift, &mut velocity);
@@ -279,6 +284,7 @@ where
             twists,
             solve_count: paper.uzawa_steps,
             iteration_count,
+            fine_operator_applications,
             phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
         })
     }

@@ -40,6 +40,16 @@ pub struct LevelOperator<const D: usize> {
     penalty: Option<Penalty<f32, D>>,
     work: Vec<f32>,
     penalty_work: Vec<f32>,
+    /// Fraction of the cells that are not rigid on which it acts.
+    share: f64,
+    applications: usize,
+}
+
+impl<const D: usize> LevelOperator<D> {
+    /// Applications since the last call, each counted as its share of the mesh.
+    pub fn take_applications(&mut self) -> f64 {
+        std::mem::take(&mut self.applications) as f64 * self.share
+    }
 }
 
 impl<const D: usize> LinOp<f32> for LevelOperator<D>
@@ -51,6 +61,7 @@ where
     }
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.applications += 1;
         self.work.copy_from_slice(x);
         self.space.expand(&mut self.work);
         y.fill(0.0);
@@ -166,6 +177,7 @@ where
         let holds_a_body =
             |c: &ActiveCell| nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some());
         let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
+        let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
         let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed, penalty.as_ref())
             .map_err(|reason| StokesError::Smoother { level: index, reason })?;
@@ -180,6 +192,8 @@ where
             penalty,
             work: vec![0.0; dim],
             penalty_work: vec![0.0; penalty_work],
+            share: cells.len() as f64 / cell_count.max(1) as f64,
+            applications: 0,
             space,
         };
         let lambda_max = match smoothed.contains(&true) {

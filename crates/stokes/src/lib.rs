@@ -45,7 +45,7 @@ pub use multigrid::MultigridSolver;
 pub use pressure::{PressureSpace, WeakPressures};
 pub use refine::Refinement;
 pub use solid::{PointMatrices, SolidRegion, SolidStress};
-pub use solver::{Preparation, SaddleSolver};
+pub use solver::{Preparation, SaddleSolver, SolveReport};
 pub use space::{SolidNodes, VelocitySpace};
 pub use system::{ActiveCell, Penalty, StokesSystem, SystemOperator};
 pub use transfer::Evaluator;

@@ -23,7 +23,7 @@ use crate::error::StokesError;
 use crate::level::{Level, Transfer};
 use crate::pressure::WeakPressures;
 use crate::solid::SolidStress;
-use crate::solver::{Preparation, SaddleSolver};
+use crate::solver::{Preparation, SaddleSolver, SolveReport};
 use crate::space::VelocitySpace;
 use crate::system::{Penalty, StokesSystem, SystemOperator, pressure_mass};
 
@@ -74,7 +74,7 @@ where
         b: &[f64],
         x: &mut [f64],
         tolerance: f64,
-    ) -> Result<usize, StokesError> {
+    ) -> Result<SolveReport, StokesError> {
         let (Some(cycle), Some(schur)) = (&mut self.cycle, &mut self.schur) else {
             return Err(StokesError::NotPrepared);
         };
@@ -87,11 +87,17 @@ where
             load: vec![0.0; system.velocity_dim()],
             pressure: vec![0.0; system.pressure.dim()],
         };
+        preconditioner.cycle.take_fine_applications();
         self.krylov.set_relative_tolerance(tolerance);
         let mut operator = MeanFree { operator: SystemOperator::new(system), system };
         let report =
             self.krylov.solve(&mut operator, &mut preconditioner, &b, x, Reference::RightHandSide)?;
-        Ok(report.iterations)
+        let applied_by_krylov = operator.operator.applications() as f64;
+        Ok(SolveReport {
+            iterations: report.iterations,
+            fine_operator_applications: applied_by_krylov + cycle.take_fine_applications(),
+            residuals: self.krylov.residual_history().to_vec(),
+        })
     }
 }
 
@@ -184,6 +190,8 @@ where
 {
     /// Coarsest first.
     levels: Vec<Level<D>>,
+    /// The first of the levels on the finest mesh.
+    first_fine: usize,
     /// `transfers[l]` joins level `l` to level `l + 1`.
     transfers: Vec<Transfer>,
     coarse: CoarseSolver,
@@ -229,7 +237,12 @@ where
         }
         let coarse_space = levels[0].operator.space.clone();
         let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
-        Ok(Self { levels, transfers, coarse })
+        Ok(Self { levels, first_fine: meshes.len() - 1, transfers, coarse })
+    }
+
+    /// Applications on the finest mesh since the last call, see [`SolveReport::fine_operator_applications`].
+    fn take_fine_applications(&mut self) -> f64 {
+        self.levels[self.first_fine..].iter_mut().map(|level| level.operator.take_applications()).sum()
     }
 
     fn run(&mut self, top: usize) {

@@ -20,6 +20,18 @@ pub struct Preparation<'a, const D: usize> {
     pub touched: Option<&'a [Option<u32>]>,
 }
 
+/// What a linear solve took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveReport {
+    /// Krylov iterations, or corrections by a direct solver.
+    pub iterations: usize,
+    /// Applications of the operator on the finest mesh, in `f64` or `f32`, by the Krylov method, by smoothers and for
+    /// residuals. One that leaves cells out counts as its share of the mesh's cells that are not rigid.
+    pub fine_operator_applications: f64,
+    /// Norm of the residual at the start and after each iteration; the last is the true one.
+    pub residuals: Vec<f64>,
+}
+
 /// Solves `[A, -B^T; -B, 0] x = b` for reduced vectors of a [`StokesSystem`].
 pub trait SaddleSolver<const D: usize>
 where
@@ -33,12 +45,12 @@ where
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError>;
 
-    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and returns the iterations.
+    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took.
     fn solve(
         &mut self,
         system: &StokesSystem<D>,
         b: &[f64],
         x: &mut [f64],
         tolerance: f64,
-    ) -> Result<usize, StokesError>;
+    ) -> Result<SolveReport, StokesError>;
 }

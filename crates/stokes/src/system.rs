@@ -167,6 +167,7 @@ where
     velocity: Vec<f64>,
     pressure: Vec<f64>,
     penalty: Vec<f64>,
+    applications: usize,
 }
 
 impl<'a, const D: usize> SystemOperator<'a, D>
@@ -180,8 +181,14 @@ where
             velocity: vec![0.0; system.velocity_dim()],
             pressure: vec![0.0; system.pressure.dim()],
             penalty: vec![0.0; penalty],
+            applications: 0,
             system,
         }
+    }
+
+    /// How often it was applied.
+    pub fn applications(&self) -> usize {
+        self.applications
     }
 }
 
@@ -194,7 +201,8 @@ where
     }
 
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        let Self { system, velocity, pressure, penalty } = self;
+        self.applications += 1;
+        let Self { system, velocity, pressure, penalty, .. } = self;
         let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
         velocity.copy_from_slice(&x[..split]);
         system.space.expand(velocity);

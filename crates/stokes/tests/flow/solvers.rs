@@ -1,12 +1,13 @@
 //! The linear solvers: they agree, they repeat themselves to the bit, and their effort does not grow.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_fem::TreeMesh;
+use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Flow, FlowSolver, Formulation, SolverKind};
 
 use crate::support::{
-    RIGID, SOLVERS, balls, bands, couette, doublet, mesh, no_clock, pair_at, paper, params, resolved_gaps,
-    solve, twist_distance,
+    RIGID, SOLVERS, balls, bands, bump, couette, doublet, graded, mesh, no_clock, pair_at, paper, params,
+    resolved_gaps, solve, twist_distance,
 };
 
 #[test]
@@ -31,6 +32,24 @@ where
         solve(params, mesh(&bands(level), balls), balls, &couette).iteration_count
     };
     levels.iter().map(count).collect()
+}
+
+/// Each iteration applies the operator once, and in its V-cycle as often as both sweeps and the residual between them
+/// need it; the initial and the true final residual are two more. Where the finest cells cover a part of the box only,
+/// so do the smoothing sweeps.
+#[test]
+fn applications_on_the_finest_mesh_are_counted() {
+    let count = |mesh: TreeMesh<2>| {
+        let start = |x: &Vector<2>| couette(x) + bump(x);
+        let flow = solve(params(RIGID, SolverKind::Multigrid, 1e-8), mesh, &[], &start);
+        let iterations = flow.iteration_count as f64;
+        (flow.fine_operator_applications - 2.0 - iterations) / iterations
+    };
+    let uniform = TreeMesh::uniform(Aabb::unit(), [1; 2], [false; 2], 5).unwrap();
+    let in_a_cycle = count(uniform);
+    assert!(in_a_cycle >= 3.0 && in_a_cycle.fract() == 0.0, "{in_a_cycle}");
+    let shared = count(graded(4)) / in_a_cycle;
+    assert!((0.4..0.9).contains(&shared), "{shared}");
 }
 
 /// Discs on a lattice of `n` by `n`, moved off the lattice so that no two meet the mesh in the same way.
