@@ -12,7 +12,8 @@ use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics};
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, PaperParams, Refinement, SolverKind, StokesError, WeakPressures,
+    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, Refinement, SolverKind, StokesError,
+    WeakPressures,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -57,8 +58,27 @@ impl From<MeshError> for FlowError {
 #[derive(Serialize, Deserialize)]
 struct WarmStart<const D: usize> {
     centers: Vec<Vector<D>>,
+    last: SavedFields,
+    before: Option<SavedFields>,
+}
+
+/// [`NodalFields`] as they are stored.
+#[derive(Serialize, Deserialize)]
+struct SavedFields {
     velocity: Vec<f64>,
     pressure: Vec<f64>,
+}
+
+impl From<NodalFields> for SavedFields {
+    fn from(NodalFields { velocity, pressure }: NodalFields) -> Self {
+        Self { velocity, pressure }
+    }
+}
+
+impl From<SavedFields> for NodalFields {
+    fn from(SavedFields { velocity, pressure }: SavedFields) -> Self {
+        Self { velocity, pressure }
+    }
 }
 
 /// Finite-element flow around the particles of a case.
@@ -193,9 +213,9 @@ where
     }
 
     fn checkpoint(&self) -> Vec<u8> {
-        let Some((velocity, pressure)) = self.solver.warm_start() else { return Vec::new() };
+        let Some((last, before)) = self.solver.warm_start() else { return Vec::new() };
         let centers = self.last_balls.iter().map(|b| *b.center()).collect();
-        let state = WarmStart { centers, velocity: velocity.to_vec(), pressure: pressure.to_vec() };
+        let state = WarmStart { centers, last: last.clone().into(), before: before.cloned().map(Into::into) };
         postcard::to_allocvec(&state).unwrap_or_default()
     }
 
@@ -211,7 +231,7 @@ where
         match self.mesh(&balls) {
             Ok(mesh) => {
                 self.last_balls = balls;
-                self.solver.set_warm_start(mesh, state.velocity, state.pressure)
+                self.solver.set_warm_start(mesh, state.last.into(), state.before.map(Into::into))
             }
             Err(_) => false,
         }

@@ -23,7 +23,7 @@ use crate::solid::{PointMatrices, SolidRegion, SolidStress};
 use crate::solver::{Preparation, SaddleSolver};
 use crate::space::VelocitySpace;
 use crate::system::{Penalty, StokesSystem};
-use crate::transfer::Evaluator;
+use crate::warm_start::{NodalFields, WarmStart};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,19 +116,8 @@ where
     params: FlowParams,
     solver: Box<dyn SaddleSolver<D> + Send>,
     matrices: PointMatrices<D>,
-    guess: Option<Guess<D>>,
+    warm_start: Option<WarmStart<D>>,
     clock: fn() -> f64,
-}
-
-/// The last flow's deviation from the undisturbed one, to start the next solve from.
-#[derive(Clone, Debug)]
-struct Guess<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    discretisation: Discretisation<D>,
-    velocity: Vec<f64>,
-    pressure: Vec<f64>,
 }
 
 impl<const D: usize> FlowSolver<D>
@@ -149,7 +138,7 @@ where
             SolverKind::Direct => Box::new(DirectSolver::default()),
             SolverKind::Multigrid => Box::new(MultigridSolver::default()),
         };
-        Ok(Self { params, solver, matrices: PointMatrices::new(quadrature), guess: None, clock })
+        Ok(Self { params, solver, matrices: PointMatrices::new(quadrature), warm_start: None, clock })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same function, which
@@ -196,11 +185,11 @@ where
         let mut lift = lifted(&system.space, undisturbed);
         let mut b = vec![0.0; system.dim()];
         system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
-        let mut x = self.initial_guess(&system, &discretisation);
+        let (mut x, before) = self.initial_guess(&system, &discretisation);
         let tolerance = self.params.tolerance;
         let report = self.solver.solve(&system, &b, &mut x, tolerance)?;
 
-        let pressure = self.finish(&system, &discretisation, &x);
+        let pressure = self.finish(&system, &discretisation, &x, before);
         let mut expanded = x[..system.velocity_dim()].to_vec();
         system.space.expand(&mut expanded);
         vector::axpy(1.0, &expanded, &mut lift);
@@ -254,7 +243,7 @@ where
         let mut base = vec![0.0; system.dim()];
         system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut base);
         let reference = vector::norm(&base);
-        let mut x = self.initial_guess(&system, &discretisation);
+        let (mut x, before) = self.initial_guess(&system, &discretisation);
         let mut multiplier = vec![0.0; nodal];
         let mut velocity = Vec::new();
         let (mut iteration_count, mut fine_operator_applications) = (0, 0.0);
@@ -273,7 +262,7 @@ where
             vector::axpy(1.0, &lift, &mut velocity);
             vector::axpy(paper.rho, &velocity, &mut multiplier);
         }
-        let pressure = self.finish(&system, &discretisation, &x);
+        let pressure = self.finish(&system, &discretisation, &x, before);
         let twists = region.twists(&discretisation, bodies, &self.matrices, &velocity);
         let end = (self.clock)();
         Ok(Flow {
@@ -289,57 +278,49 @@ where
         })
     }
 
-    /// Velocity and pressure at the nodes from which the next solve starts, where the solver is iterative.
-    pub fn warm_start(&self) -> Option<(&[f64], &[f64])> {
-        self.guess.as_ref().map(|g| (g.velocity.as_slice(), g.pressure.as_slice()))
+    /// The deviations from the undisturbed flow that the next solve starts from, where the solver is iterative: the last
+    /// one, and the one before on the same mesh.
+    pub fn warm_start(&self) -> Option<(&NodalFields, Option<&NodalFields>)> {
+        self.warm_start.as_ref().map(WarmStart::fields)
     }
 
     /// Restores what [`FlowSolver::warm_start`] gave, on the mesh it belongs to; `false` if the lengths do not fit.
-    pub fn set_warm_start(&mut self, mesh: TreeMesh<D>, velocity: Vec<f64>, pressure: Vec<f64>) -> bool {
-        let discretisation = Discretisation::new(mesh);
-        let fits = velocity.len() == discretisation.velocity.node_count() * D
-            && pressure.len() == discretisation.pressure.node_count();
+    pub fn set_warm_start(
+        &mut self,
+        mesh: TreeMesh<D>,
+        last: NodalFields,
+        before: Option<NodalFields>,
+    ) -> bool {
+        let restored = WarmStart::restore(mesh, last, before);
+        let fits = restored.is_some();
         if fits {
-            self.guess = Some(Guess { discretisation, velocity, pressure });
+            self.warm_start = restored;
         }
         fits
     }
 
-    /// The last flow on the new mesh, or zero.
-    fn initial_guess(&self, system: &StokesSystem<D>, discretisation: &Discretisation<D>) -> Vec<f64> {
-        let mut x = vec![0.0; system.dim()];
-        if self.params.solver == SolverKind::Direct {
-            return x;
+    /// What the solve starts from, and the last flow on its mesh; zero and nothing at the first step.
+    fn initial_guess(
+        &self,
+        system: &StokesSystem<D>,
+        discretisation: &Discretisation<D>,
+    ) -> (Vec<f64>, Option<NodalFields>) {
+        match &self.warm_start {
+            Some(warm) if self.params.solver == SolverKind::Multigrid => {
+                let last = warm.last_on(discretisation);
+                (warm.guess(&last, discretisation, system), Some(last))
+            }
+            _ => (vec![0.0; system.dim()], None),
         }
-        if let Some(guess) = &self.guess {
-            let (velocity, pressure) = x.split_at_mut(system.velocity_dim());
-            let from = Evaluator::new(&guess.discretisation.mesh);
-            from.transfer(
-                &guess.discretisation.velocity,
-                D,
-                &guess.velocity,
-                &discretisation.velocity,
-                velocity,
-            );
-            from.transfer(
-                &guess.discretisation.pressure,
-                1,
-                &guess.pressure,
-                &discretisation.pressure,
-                pressure,
-            );
-            system.space.project(velocity);
-            system.pressure.clear_fixed(pressure);
-        }
-        x
     }
 
-    /// Keeps the solution as the next guess and returns the nodal pressure.
+    /// Keeps the solution for the next guess and returns the nodal pressure.
     fn finish(
         &mut self,
         system: &StokesSystem<D>,
         discretisation: &Discretisation<D>,
         x: &[f64],
+        before: Option<NodalFields>,
     ) -> Vec<f64> {
         let split = system.velocity_dim();
         let mut pressure = x[split..].to_vec();
@@ -348,8 +329,10 @@ where
             let mut velocity = x[..split].to_vec();
             system.space.expand(&mut velocity);
             velocity.truncate(system.space.full_dim());
-            let (discretisation, pressure) = (discretisation.clone(), pressure.clone());
-            self.guess = Some(Guess { discretisation, velocity, pressure });
+            let last = NodalFields { velocity, pressure: pressure.clone() };
+            let smooth = matches!(self.params.formulation, Formulation::Paper(_));
+            let before = before.filter(|_| smooth);
+            self.warm_start = Some(WarmStart::new(discretisation.clone(), last, before));
         }
         pressure
     }

@@ -36,6 +36,7 @@ mod solver;
 mod space;
 mod system;
 mod transfer;
+mod warm_start;
 
 pub use direct::DirectSolver;
 pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
@@ -49,3 +50,4 @@ pub use solver::{Preparation, SaddleSolver, SolveReport};
 pub use space::{SolidNodes, VelocitySpace};
 pub use system::{ActiveCell, Penalty, StokesSystem, SystemOperator};
 pub use transfer::Evaluator;
+pub use warm_start::NodalFields;
