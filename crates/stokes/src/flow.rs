@@ -1,64 +1,22 @@
-//! The flow around rigid bodies: two formulations, one interface.
-//!
-//! `rigid-dofs`: every velocity node with `alpha >= offset h` gets the rigid motion of its body; viscosity is constant,
-//! force and torque on a free body vanish because they are the residual of its own unknowns.
-//!
-//! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian of
-//! eqs. 9 and 10: `K(eta) u^k - B^T p^k = -1/2 K(I eta_s) lambda^(k-1)`, `B u^k = 0`, `lambda^k = lambda^(k-1) + rho u^k`,
-//! where `K(eta)` is the matrix of `int 2 eta eps(u):eps(v)`. The bilinear form carries `2 eta_s` and the update steps with
-//! `eta_s`, so it converges for `0 < rho < 4`. Each prediction starts cold (`lambda = 0`) and makes a fixed number of steps:
-//! the softness this leaves is part of the formulation.
+//! The flow around rigid bodies: prediction after prediction, in one of two [`Formulation`]s.
+
+use std::sync::Arc;
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_levelset::{Ball, Body, Ramp};
+use gluey_levelset::Ball;
 use gluey_linalg::vector;
 
 use crate::direct::DirectSolver;
-use crate::discretisation::{Discretisation, solid_nodes};
+use crate::discretisation::Discretisation;
 use crate::error::StokesError;
+use crate::formulation::{Formulation, PaperParams};
 use crate::multigrid::MultigridSolver;
-use crate::pressure::WeakPressures;
-use crate::solid::{PointMatrices, SolidRegion, SolidStress};
-use crate::solver::{Preparation, SaddleSolver};
-use crate::space::VelocitySpace;
-use crate::system::{Penalty, StokesSystem};
+use crate::problem::{Problem, check_viscosity};
+use crate::solid::PointMatrices;
+use crate::solver::{SaddleSolver, SolveReport};
+use crate::system::StokesSystem;
 use crate::warm_start::{NodalFields, WarmStart};
-
-/// How rigidity is imposed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Formulation {
-    /// Elimination of the solid degrees of freedom.
-    RigidDofs {
-        /// Nodes with `alpha >= offset h` are rigid; slightly negative is best, see `docs/theory`.
-        offset: f64,
-        /// Treatment of the pressures in cut cells.
-        weak_pressures: WeakPressures,
-    },
-    /// Penalty and Uzawa multiplier of the paper.
-    Paper(PaperParams),
-}
-
-/// Parameters of the `paper` formulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PaperParams {
-    /// `r = eta_s / eta_f`.
-    pub viscosity_ratio: f64,
-    /// Thickness `e` of the ramp in cells.
-    pub ramp: f64,
-    /// Step `rho` of the multiplier update, `0 < rho < 4`.
-    pub rho: f64,
-    /// Number of solves a prediction, each followed by an update of the multiplier.
-    pub uzawa_steps: usize,
-    /// Gauss points a direction in cells near a surface.
-    pub quadrature: usize,
-}
-
-impl Default for PaperParams {
-    fn default() -> Self {
-        Self { viscosity_ratio: 1e3, ramp: 1.0, rho: 1.0, uzawa_steps: 1, quadrature: 4 }
-    }
-}
 
 /// Which linear solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,9 +73,26 @@ where
 {
     params: FlowParams,
     solver: Box<dyn SaddleSolver<D> + Send>,
-    matrices: PointMatrices<D>,
+    matrices: Arc<PointMatrices<D>>,
     warm_start: Option<WarmStart<D>>,
     clock: fn() -> f64,
+}
+
+/// What the solves of one prediction took and left.
+#[derive(Default)]
+struct Effort {
+    multiplier: Vec<f64>,
+    solve_count: usize,
+    iteration_count: usize,
+    fine_operator_applications: f64,
+}
+
+impl Effort {
+    fn add(&mut self, report: SolveReport) {
+        self.solve_count += 1;
+        self.iteration_count += report.iterations;
+        self.fine_operator_applications += report.fine_operator_applications;
+    }
 }
 
 impl<const D: usize> FlowSolver<D>
@@ -130,15 +105,12 @@ where
     /// [`StokesError::Parameter`] for values out of range.
     pub fn new(params: FlowParams, clock: fn() -> f64) -> Result<Self, StokesError> {
         check(&params)?;
-        let quadrature = match params.formulation {
-            Formulation::Paper(paper) => paper.quadrature,
-            Formulation::RigidDofs { .. } => 1,
-        };
         let solver: Box<dyn SaddleSolver<D> + Send> = match params.solver {
             SolverKind::Direct => Box::new(DirectSolver::default()),
             SolverKind::Multigrid => Box::new(MultigridSolver::default()),
         };
-        Ok(Self { params, solver, matrices: PointMatrices::new(quadrature), warm_start: None, clock })
+        let matrices = Arc::new(PointMatrices::new(params.formulation.quadrature()));
+        Ok(Self { params, solver, matrices, warm_start: None, clock })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same function, which
@@ -149,133 +121,78 @@ where
         bodies: &[Ball<D>],
         boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
     ) -> Result<Flow<D>, StokesError> {
-        let start = (self.clock)();
-        let discretisation = Discretisation::new(mesh);
-        let undisturbed = nodal_values(&discretisation, boundary);
-        match self.params.formulation {
-            Formulation::RigidDofs { offset, weak_pressures } => {
-                self.solve_rigid(discretisation, bodies, &undisturbed, offset, weak_pressures, start)
-            }
-            Formulation::Paper(paper) => self.solve_paper(discretisation, bodies, &undisturbed, paper, start),
-        }
+        self.solve_forced(mesh, bodies, boundary, None)
     }
 
-    fn solve_rigid(
+    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike: `-div(2 eta eps(u)) + grad p = f`.
+    pub fn solve_forced(
         &mut self,
-        discretisation: Discretisation<D>,
+        mesh: TreeMesh<D>,
         bodies: &[Ball<D>],
-        undisturbed: &[f64],
-        offset: f64,
-        weak_pressures: WeakPressures,
-        start: f64,
+        boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
+        force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
     ) -> Result<Flow<D>, StokesError> {
-        let h = discretisation.mesh.size(discretisation.mesh.max_level());
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, bodies, offset);
-        let space = VelocitySpace::new(discretisation.velocity.clone(), bodies, &solid);
-        check_resolved(&space, bodies, h)?;
-        let viscosity = self.params.viscosity;
-        let system = StokesSystem::new(&discretisation, space, viscosity, weak_pressures, None);
+        let FlowParams { viscosity, formulation, .. } = self.params;
+        let start = (self.clock)();
+        let problem = Problem::new(mesh, bodies, viscosity, formulation, &self.matrices)?;
         let prepared_from = (self.clock)();
-        let preparation = Preparation { bodies, offset, viscosity, touched: None };
-        self.solver.prepare(&discretisation, &system, &preparation)?;
+        problem.prepare(self.solver.as_mut())?;
         let solved_from = (self.clock)();
-
-        // The lift carries the undisturbed flow, with the twists that fit it best.
-        let nodal = system.space.full_dim();
-        let mut lift = lifted(&system.space, undisturbed);
-        let mut b = vec![0.0; system.dim()];
-        system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
-        let (mut x, before) = self.initial_guess(&system, &discretisation);
-        let tolerance = self.params.tolerance;
-        let report = self.solver.solve(&system, &b, &mut x, tolerance)?;
-
-        let pressure = self.finish(&system, &discretisation, &x, before);
-        let mut expanded = x[..system.velocity_dim()].to_vec();
-        system.space.expand(&mut expanded);
-        vector::axpy(1.0, &expanded, &mut lift);
-        let twists = (0..bodies.len()).map(|body| system.space.twist(&lift, body)).collect();
-        lift.truncate(nodal);
+        let lift = problem.lift(boundary);
+        let b = problem.right_hand_side(&lift, force);
+        let (mut x, before) = self.initial_guess(&problem.system, &problem.discretisation);
+        let effort = match formulation {
+            Formulation::RigidDofs { .. } => self.solve_once(&problem, &b, &mut x)?,
+            Formulation::Paper(paper) => self.solve_uzawa(&problem, &lift, &b, &mut x, paper)?,
+        };
+        let pressure = problem.pressure(&x);
+        let mut velocity = problem.velocity(&lift, &x);
+        let twists = problem.twists(&velocity);
+        velocity.truncate(problem.system.space.full_dim());
+        self.keep_for_next(&problem, &x, &pressure, before);
         let end = (self.clock)();
         Ok(Flow {
-            discretisation,
-            velocity: lift,
+            discretisation: problem.discretisation,
+            velocity,
             pressure,
-            multiplier: Vec::new(),
+            multiplier: effort.multiplier,
             twists,
-            solve_count: 1,
-            iteration_count: report.iterations,
-            fine_operator_applications: report.fine_operator_applications,
+            solve_count: effort.solve_count,
+            iteration_count: effort.iteration_count,
+            fine_operator_applications: effort.fine_operator_applications,
             phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
         })
     }
 
-    fn solve_paper(
-        &mut self,
-        discretisation: Discretisation<D>,
-        bodies: &[Ball<D>],
-        undisturbed: &[f64],
-        paper: PaperParams,
-        start: f64,
-    ) -> Result<Flow<D>, StokesError> {
-        let h = discretisation.mesh.size(discretisation.mesh.max_level());
-        let viscosity = self.params.viscosity;
-        let region = SolidRegion::new(&discretisation, bodies, Ramp::new(paper.ramp * h), &self.matrices);
-        for (body, ball) in bodies.iter().enumerate() {
-            if !region.holds(body) || ball.bounding_radius() < h {
-                return Err(StokesError::Unresolved { body, radius: ball.bounding_radius(), cell_size: h });
-            }
-        }
-        let solid_viscosity = viscosity * paper.viscosity_ratio;
-        let stress = SolidStress::new(&discretisation, &region, &self.matrices, solid_viscosity);
-        let touched = region.touched_nodes(&discretisation.velocity, bodies);
-        let nowhere = vec![None; discretisation.velocity.node_count()];
-        let space = VelocitySpace::new::<Ball<D>>(discretisation.velocity.clone(), &[], &nowhere);
-        let penalty = Penalty { factor: 1.0 - 1.0 / paper.viscosity_ratio, stress };
-        let system = StokesSystem::new(&discretisation, space, viscosity, WeakPressures::Keep, Some(penalty));
-        let prepared_from = (self.clock)();
-        let preparation = Preparation { bodies, offset: 0.0, viscosity, touched: Some(&touched) };
-        self.solver.prepare(&discretisation, &system, &preparation)?;
-        let solved_from = (self.clock)();
+    fn solve_once(&mut self, problem: &Problem<D>, b: &[f64], x: &mut [f64]) -> Result<Effort, StokesError> {
+        let mut effort = Effort::default();
+        effort.add(self.solver.solve(&problem.system, b, x, self.params.tolerance)?);
+        Ok(effort)
+    }
 
-        let nodal = system.space.full_dim();
-        let mut lift = undisturbed.to_vec();
-        system.space.expand(&mut lift);
-        let mut base = vec![0.0; system.dim()];
-        system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut base);
-        let reference = vector::norm(&base);
-        let (mut x, before) = self.initial_guess(&system, &discretisation);
-        let mut multiplier = vec![0.0; nodal];
-        let mut velocity = Vec::new();
-        let (mut iteration_count, mut fine_operator_applications) = (0, 0.0);
+    /// The augmented Lagrangian of the paper, from `lambda = 0`.
+    fn solve_uzawa(
+        &mut self,
+        problem: &Problem<D>,
+        lift: &[f64],
+        base: &[f64],
+        x: &mut [f64],
+        paper: PaperParams,
+    ) -> Result<Effort, StokesError> {
+        let reference = vector::norm(base);
+        let mut effort =
+            Effort { multiplier: vec![0.0; problem.system.space.full_dim()], ..Effort::default() };
         for step in 0..paper.uzawa_steps {
-            let mut b = base.clone();
+            let mut b = base.to_vec();
             if step > 0 {
-                subtract_multiplier(&system, &multiplier, &mut b);
+                subtract_multiplier(&problem.system, &effort.multiplier, &mut b);
             }
             let scale = reference / vector::norm(&b).max(f64::MIN_POSITIVE);
             let tolerance = self.params.tolerance * scale.min(1.0);
-            let report = self.solver.solve(&system, &b, &mut x, tolerance)?;
-            iteration_count += report.iterations;
-            fine_operator_applications += report.fine_operator_applications;
-            velocity = x[..nodal].to_vec();
-            system.space.expand(&mut velocity);
-            vector::axpy(1.0, &lift, &mut velocity);
-            vector::axpy(paper.rho, &velocity, &mut multiplier);
+            effort.add(self.solver.solve(&problem.system, &b, x, tolerance)?);
+            vector::axpy(paper.rho, &problem.velocity(lift, x), &mut effort.multiplier);
         }
-        let pressure = self.finish(&system, &discretisation, &x, before);
-        let twists = region.twists(&discretisation, bodies, &self.matrices, &velocity);
-        let end = (self.clock)();
-        Ok(Flow {
-            discretisation,
-            velocity,
-            pressure,
-            multiplier,
-            twists,
-            solve_count: paper.uzawa_steps,
-            iteration_count,
-            fine_operator_applications,
-            phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
-        })
+        Ok(effort)
     }
 
     /// The deviations from the undisturbed flow that the next solve starts from, where the solver is iterative: the last
@@ -314,27 +231,24 @@ where
         }
     }
 
-    /// Keeps the solution for the next guess and returns the nodal pressure.
-    fn finish(
+    /// Keeps the solution for the next guess, where the solver is iterative.
+    fn keep_for_next(
         &mut self,
-        system: &StokesSystem<D>,
-        discretisation: &Discretisation<D>,
+        problem: &Problem<D>,
         x: &[f64],
+        pressure: &[f64],
         before: Option<NodalFields>,
-    ) -> Vec<f64> {
-        let split = system.velocity_dim();
-        let mut pressure = x[split..].to_vec();
-        system.pressure.expand(&mut pressure);
+    ) {
         if self.params.solver == SolverKind::Multigrid {
-            let mut velocity = x[..split].to_vec();
-            system.space.expand(&mut velocity);
-            velocity.truncate(system.space.full_dim());
-            let last = NodalFields { velocity, pressure: pressure.clone() };
+            let space = &problem.system.space;
+            let mut velocity = x[..space.dim()].to_vec();
+            space.expand(&mut velocity);
+            velocity.truncate(space.full_dim());
+            let last = NodalFields { velocity, pressure: pressure.to_vec() };
             let smooth = matches!(self.params.formulation, Formulation::Paper(_));
             let before = before.filter(|_| smooth);
-            self.warm_start = Some(WarmStart::new(discretisation.clone(), last, before));
+            self.warm_start = Some(WarmStart::new(problem.discretisation.clone(), last, before));
         }
-        pressure
     }
 }
 
@@ -351,67 +265,11 @@ where
     }
 }
 
-/// The undisturbed flow as a field that fulfils all constraints.
-fn lifted<const D: usize>(space: &VelocitySpace<D>, undisturbed: &[f64]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
-    let mut twists = vec![0.0; space.dim()];
-    twists[..undisturbed.len()].copy_from_slice(undisturbed);
-    space.project(&mut twists);
-    let mut lift = undisturbed.to_vec();
-    lift.extend_from_slice(&twists[space.full_dim()..]);
-    space.expand(&mut lift);
-    lift
-}
-
-fn nodal_values<const D: usize>(
-    discretisation: &Discretisation<D>,
-    field: &dyn Fn(&Vector<D>) -> Vector<D>,
-) -> Vec<f64> {
-    let nodes = &discretisation.velocity;
-    (0..nodes.node_count()).flat_map(|n| field(&nodes.point(n)).data.0[0]).collect()
-}
-
-fn check_resolved<const D: usize>(
-    space: &VelocitySpace<D>,
-    bodies: &[Ball<D>],
-    cell_size: f64,
-) -> Result<(), StokesError>
-where
-    Dim<D>: Space<D>,
-{
-    match (0..bodies.len()).find(|&b| !space.is_active(b) || bodies[b].bounding_radius() < cell_size) {
-        Some(body) => {
-            Err(StokesError::Unresolved { body, radius: bodies[body].bounding_radius(), cell_size })
-        }
-        None => Ok(()),
-    }
-}
-
 fn check(params: &FlowParams) -> Result<(), StokesError> {
     let wrong = |name, value, wanted| Err(StokesError::Parameter { name, value, wanted });
-    if !(params.viscosity > 0.0 && params.viscosity.is_finite()) {
-        return wrong("viscosity", params.viscosity, "must be positive and finite");
-    }
+    check_viscosity(params.viscosity)?;
     if !(params.tolerance > 0.0 && params.tolerance < 1.0) {
         return wrong("tolerance", params.tolerance, "must lie between 0 and 1");
     }
-    match params.formulation {
-        Formulation::RigidDofs { offset, .. } if !(-1.0..=1.0).contains(&offset) => {
-            wrong("offset", offset, "must lie between -1 and 1 cells")
-        }
-        Formulation::Paper(p) if !(p.viscosity_ratio > 1.0 && p.viscosity_ratio.is_finite()) => {
-            wrong("viscosity_ratio", p.viscosity_ratio, "must be larger than 1 and finite")
-        }
-        Formulation::Paper(p) if !(p.rho > 0.0 && p.rho < 4.0) => {
-            wrong("rho", p.rho, "must lie between 0 and 4")
-        }
-        Formulation::Paper(p) if !(p.ramp > 0.0 && p.ramp.is_finite()) => {
-            wrong("ramp", p.ramp, "must be positive")
-        }
-        Formulation::Paper(p) if p.quadrature == 0 => wrong("quadrature", 0.0, "must be at least 1"),
-        Formulation::Paper(p) if p.uzawa_steps == 0 => wrong("uzawa_steps", 0.0, "must be at least 1"),
-        _ => Ok(()),
-    }
+    params.formulation.check()
 }

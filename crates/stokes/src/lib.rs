@@ -1,7 +1,7 @@
 //! Stokes flow around rigid bodies by a fictitious-domain Q2-Q1 finite-element method.
 //!
 //! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body and no
-//! force or torque on any. [`FlowSolver`] has the two formulations of rigidity and says what they are.
+//! force or torque on any. [`Formulation`] names the two ways to impose rigidity.
 //!
 //! ```
 //! use gluey_geom::{Aabb, Vector};
@@ -27,9 +27,11 @@ mod discretisation;
 mod element;
 mod error;
 mod flow;
+mod formulation;
 mod level;
 mod multigrid;
 mod pressure;
+mod problem;
 mod refine;
 mod solid;
 mod solver;
@@ -41,9 +43,11 @@ mod warm_start;
 pub use direct::DirectSolver;
 pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
 pub use error::StokesError;
-pub use flow::{Flow, FlowParams, FlowSolver, Formulation, PaperParams, SolverKind};
+pub use flow::{Flow, FlowParams, FlowSolver, SolverKind};
+pub use formulation::{Formulation, PaperParams};
 pub use multigrid::MultigridSolver;
 pub use pressure::{PressureSpace, WeakPressures};
+pub use problem::Problem;
 pub use refine::Refinement;
 pub use solid::{PointMatrices, SolidRegion, SolidStress};
 pub use solver::{Preparation, SaddleSolver, SolveReport};

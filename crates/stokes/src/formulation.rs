@@ -1,0 +1,81 @@
+//! How rigidity is imposed.
+//!
+//! `rigid-dofs`: every velocity node with `alpha >= offset h` gets the rigid motion of its body; viscosity is constant,
+//! force and torque on a free body vanish because they are the residual of its own unknowns.
+//!
+//! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian of
+//! eqs. 9 and 10: `K(eta) u^k - B^T p^k = -1/2 K(I eta_s) lambda^(k-1)`, `B u^k = 0`, `lambda^k = lambda^(k-1) + rho u^k`,
+//! where `K(eta)` is the matrix of `int 2 eta eps(u):eps(v)`. The bilinear form carries `2 eta_s` and the update steps with
+//! `eta_s`, so it converges for `0 < rho < 4`. Each prediction starts cold (`lambda = 0`) and makes a fixed number of steps:
+//! the softness this leaves is part of the formulation.
+
+use crate::error::StokesError;
+use crate::pressure::WeakPressures;
+
+/// How rigidity is imposed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Formulation {
+    /// Elimination of the solid degrees of freedom.
+    RigidDofs {
+        /// Nodes with `alpha >= offset h` are rigid; slightly negative is best, see `docs/theory`.
+        offset: f64,
+        /// Treatment of the pressures in cut cells.
+        weak_pressures: WeakPressures,
+    },
+    /// Penalty and Uzawa multiplier of the paper.
+    Paper(PaperParams),
+}
+
+/// Parameters of the `paper` formulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperParams {
+    /// `r = eta_s / eta_f`.
+    pub viscosity_ratio: f64,
+    /// Thickness `e` of the ramp in cells.
+    pub ramp: f64,
+    /// Step `rho` of the multiplier update, `0 < rho < 4`.
+    pub rho: f64,
+    /// Number of solves a prediction, each followed by an update of the multiplier.
+    pub uzawa_steps: usize,
+    /// Gauss points a direction in cells near a surface.
+    pub quadrature: usize,
+}
+
+impl Default for PaperParams {
+    fn default() -> Self {
+        Self { viscosity_ratio: 1e3, ramp: 1.0, rho: 1.0, uzawa_steps: 1, quadrature: 4 }
+    }
+}
+
+impl Formulation {
+    /// Gauss points a direction with which the solid is integrated.
+    pub fn quadrature(&self) -> usize {
+        match self {
+            Self::Paper(paper) => paper.quadrature,
+            Self::RigidDofs { .. } => 1,
+        }
+    }
+
+    /// # Errors
+    /// [`StokesError::Parameter`] for a value out of range.
+    pub fn check(&self) -> Result<(), StokesError> {
+        let wrong = |name, value, wanted| Err(StokesError::Parameter { name, value, wanted });
+        match *self {
+            Self::RigidDofs { offset, .. } if !(-1.0..=1.0).contains(&offset) => {
+                wrong("offset", offset, "must lie between -1 and 1 cells")
+            }
+            Self::Paper(p) if !(p.viscosity_ratio > 1.0 && p.viscosity_ratio.is_finite()) => {
+                wrong("viscosity_ratio", p.viscosity_ratio, "must be larger than 1 and finite")
+            }
+            Self::Paper(p) if !(p.rho > 0.0 && p.rho < 4.0) => {
+                wrong("rho", p.rho, "must lie between 0 and 4")
+            }
+            Self::Paper(p) if !(p.ramp > 0.0 && p.ramp.is_finite()) => {
+                wrong("ramp", p.ramp, "must be positive")
+            }
+            Self::Paper(p) if p.quadrature == 0 => wrong("quadrature", 0.0, "must be at least 1"),
+            Self::Paper(p) if p.uzawa_steps == 0 => wrong("uzawa_steps", 0.0, "must be at least 1"),
+            _ => Ok(()),
+        }
+    }
+}
