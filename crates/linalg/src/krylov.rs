@@ -1,5 +1,6 @@
 //! What the Krylov methods share: reference norms, reports and errors.
 
+mod basis;
 mod cg;
 mod fgmres;
 

@@ -15,7 +15,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything runs in one thread and sums in a fixed order: equal input gives equal bits.
+//! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order ([`parallel`]), so
+//! equal input gives equal bits for any number of threads.
 
 mod block;
 mod blocked;
@@ -23,6 +24,7 @@ mod chebyshev;
 mod direct;
 mod krylov;
 mod operator;
+pub mod parallel;
 mod scalar;
 mod sparse;
 mod spectrum;

@@ -1,13 +1,12 @@
-//! Vector kernels with a fixed order of summation.
+//! Vector kernels with a fixed order of summation, shared by threads where that pays (see [`crate::parallel`]).
 //!
-//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in
-//! vector registers; the sums of the blocks are added in `f64` from first to last. The order depends on the
-//! length alone, so equal inputs give equal bits.
+//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in vector registers; the
+//! sums of the blocks are added in `f64` in an order that depends on the length alone: equal inputs give equal bits.
 
-use crate::Scalar;
+use crate::{Scalar, parallel};
 
 /// Entries summed in the precision of the scalar before the sum goes over to `f64`.
-const BLOCK: usize = 1024;
+pub(crate) const BLOCK: usize = 1024;
 
 /// Independent partial sums in a block.
 const LANES: usize = 16;
@@ -15,20 +14,25 @@ const LANES: usize = 16;
 /// Scalar product `x . y`.
 pub fn dot<T: Scalar>(x: &[T], y: &[T]) -> f64 {
     debug_assert_eq!(x.len(), y.len());
-    x.chunks(BLOCK).zip(y.chunks(BLOCK)).map(|(x, y)| dot_block(x, y)).sum()
+    let [sum] = parallel::sum(x.len(), |piece| {
+        let (x, y) = (&x[piece.clone()], &y[piece]);
+        [x.chunks(BLOCK).zip(y.chunks(BLOCK)).map(|(x, y)| dot_block(x, y)).sum()]
+    });
+    sum
 }
 
-fn dot_block<T: Scalar>(x: &[T], y: &[T]) -> f64 {
+/// Scalar product of one block, in the precision of `y`.
+pub(crate) fn dot_block<S: Scalar, T: Scalar>(x: &[S], y: &[T]) -> f64 {
     let mut lanes = [T::ZERO; LANES];
     let (x_full, x_rest) = x.as_chunks::<LANES>();
     let (y_full, y_rest) = y.as_chunks::<LANES>();
     for (x, y) in x_full.iter().zip(y_full) {
         for lane in 0..LANES {
-            lanes[lane] += x[lane] * y[lane];
+            lanes[lane] += T::from_f64(x[lane].to_f64()) * y[lane];
         }
     }
     for (lane, (&x, &y)) in lanes.iter_mut().zip(x_rest.iter().zip(y_rest)) {
-        *lane += x * y;
+        *lane += T::from_f64(x.to_f64()) * y;
     }
     fold(lanes)
 }
@@ -54,9 +58,14 @@ pub fn norm<T: Scalar>(x: &[T]) -> f64 {
 /// `y += a x`.
 pub fn axpy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
     debug_assert_eq!(x.len(), y.len());
+    parallel::for_each(y, |first, y| axpy_block(a, &x[first..], y));
+}
+
+/// [`axpy`] in this thread, in the precision of `y`, which may be shorter than `x`.
+pub(crate) fn axpy_block<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
     let a = T::from_f64(a);
     for (y, &x) in y.iter_mut().zip(x) {
-        *y += a * x;
+        *y += a * T::from_f64(x.to_f64());
     }
 }
 
@@ -64,34 +73,49 @@ pub fn axpy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
 pub fn axpby<T: Scalar>(a: f64, x: &[T], b: f64, y: &mut [T]) {
     debug_assert_eq!(x.len(), y.len());
     let (a, b) = (T::from_f64(a), T::from_f64(b));
-    for (y, &x) in y.iter_mut().zip(x) {
-        *y = a * x + b * *y;
-    }
+    parallel::for_each(y, |first, y| {
+        for (y, &x) in y.iter_mut().zip(&x[first..]) {
+            *y = a * x + b * *y;
+        }
+    });
 }
 
 /// `x *= a`.
 pub fn scale<T: Scalar>(a: f64, x: &mut [T]) {
     let a = T::from_f64(a);
-    for x in x {
-        *x *= a;
-    }
+    parallel::for_each(x, |_, x| x.iter_mut().for_each(|x| *x *= a));
 }
 
-/// `y = a x`.
-pub fn scaled_copy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
+/// `y = a x`, multiplied in the precision of `x` and rounded to that of `y`.
+pub fn scaled_copy<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
     debug_assert_eq!(x.len(), y.len());
-    let a = T::from_f64(a);
-    for (y, &x) in y.iter_mut().zip(x) {
-        *y = a * x;
-    }
+    let a = S::from_f64(a);
+    parallel::for_each(y, |first, y| {
+        for (y, &x) in y.iter_mut().zip(&x[first..]) {
+            *y = T::from_f64((a * x).to_f64());
+        }
+    });
+}
+
+/// `y = x`.
+pub fn copy<T: Scalar>(x: &[T], y: &mut [T]) {
+    debug_assert_eq!(x.len(), y.len());
+    parallel::for_each(y, |first, y| y.copy_from_slice(&x[first..][..y.len()]));
+}
+
+/// `x = 0`.
+pub fn clear<T: Scalar>(x: &mut [T]) {
+    parallel::for_each(x, |_, x| x.fill(T::ZERO));
 }
 
 /// `r = b - r`, which turns `A x` held in `r` into the residual.
 pub fn residual_from_product<T: Scalar>(b: &[T], r: &mut [T]) {
     debug_assert_eq!(b.len(), r.len());
-    for (r, &b) in r.iter_mut().zip(b) {
-        *r = b - *r;
-    }
+    parallel::for_each(r, |first, r| {
+        for (r, &b) in r.iter_mut().zip(&b[first..]) {
+            *r = b - *r;
+        }
+    });
 }
 
 /// Whether every entry is finite.

@@ -35,6 +35,13 @@ fn iterative_methods_reuse_their_workspace() {
     });
     assert!(first > 0 && second == 0, "FGMRES: {first}, {second}");
 
+    let mut narrow = Fgmres::<f64, f32>::with_storage(FgmresParams::default());
+    let (first, second) = first_and_second(|| {
+        x.fill(0.0);
+        narrow.solve(&mut a, &mut jacobi, &b, &mut x, Reference::RightHandSide).expect("converges");
+    });
+    assert!(first > 0 && second == 0, "FGMRES in single precision: {first}, {second}");
+
     let mut cg = Cg::new(400, CgParams::default());
     let mut chebyshev = Chebyshev::new(400, 4, SpectralInterval { lower: 0.1, upper: 2.0 });
     let (first, second) = first_and_second(|| {

@@ -5,8 +5,8 @@ mod support;
 use std::sync::Arc;
 
 use gluey_linalg::{
-    Cg, CgParams, DirectSpd, Fgmres, FgmresParams, FnOp, Identity, Jacobi, KrylovError, KrylovReport,
-    Ordering, Reference, RefinementParams, SinglePrecision, SparseMatrix, Symbolic, vector,
+    Cg, CgParams, DirectSpd, Fgmres, FgmresParams, FnOp, Identity, Jacobi, KrylovError, KrylovReport, LinOp,
+    Ordering, Preconditioner, Reference, RefinementParams, SinglePrecision, SparseMatrix, Symbolic, vector,
 };
 use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 
@@ -246,4 +246,65 @@ fn wrong_lengths_are_refused() {
     let mut cg = Cg::new(8, CgParams::default());
     let error = cg.solve(&mut a, &mut Identity, &[1.0; 9], &mut [0.0; 9], Reference::RightHandSide);
     assert!(matches!(error, Err(KrylovError::DimensionMismatch { .. })));
+}
+
+/// A nonsymmetric operator with diagonal from 1 to `contrast`, and the preconditioner that takes out most of it.
+fn ill_conditioned(n: usize, contrast: f64) -> (impl LinOp<f64>, impl Preconditioner<f64>) {
+    let diagonal: Vec<f64> = (0..n).map(|i| contrast.powf(i as f64 / n as f64)).collect();
+    let inverse: Vec<f64> = (0..n).map(|i| 1.0 / (diagonal[i] * (1.0 + 0.4 * (i as f64).sin()))).collect();
+    let action = move |x: &[f64], y: &mut [f64]| {
+        for i in 0..n {
+            let after = x.get(i + 1).copied().unwrap_or(0.0);
+            let before = if i < 7 { 0.0 } else { x[i - 7] };
+            y[i] = diagonal[i] * (x[i] + 0.3 * after - 0.1 * before);
+        }
+    };
+    let inverse = move |r: &[f64], z: &mut [f64]| {
+        z.iter_mut().zip(r.iter().zip(&inverse)).for_each(|(z, (r, d))| *z = r * d);
+    };
+    (FnOp::new(n, action), FnOp::new(n, inverse))
+}
+
+#[test]
+fn vectors_in_single_precision_do_not_limit_the_residual() {
+    let n = 5000;
+    let (mut a, mut m) = ill_conditioned(n, 1e8);
+    let b = pseudo_random(3, n);
+    let mut work = vec![0.0; n];
+    for tolerance in [1e-6, 1e-10, 1e-13] {
+        let params = FgmresParams { relative_tolerance: tolerance, ..Default::default() };
+        let mut x = vec![0.0; n];
+        let wide = Fgmres::new(params)
+            .solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide)
+            .expect("converges");
+        x.fill(0.0);
+        let mut solver = Fgmres::<f64, f32>::with_storage(params);
+        let narrow = solver.solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
+        a.apply(&x, &mut work);
+        vector::residual_from_product(&b, &mut work);
+        assert!(vector::norm(&work) <= tolerance * vector::norm(&b));
+        assert!(narrow.iterations <= wide.iterations + 1, "{narrow:?} {wide:?}");
+        assert_eq!(solver.residual_history().last(), Some(&narrow.residual_norm));
+    }
+}
+
+#[test]
+fn solutions_have_the_same_bits_for_any_number_of_threads() {
+    let n = 100_000;
+    let solve = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let (mut a, mut m) = ill_conditioned(n, 1e4);
+            let b = pseudo_random(3, n);
+            let mut x = vec![0.0; n];
+            let mut solver = Fgmres::<f64, f32>::with_storage(FgmresParams::default());
+            let report =
+                solver.solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
+            (report, x, solver.residual_history().to_vec())
+        })
+    };
+    let one = solve(1);
+    for threads in [2, 4] {
+        assert!(solve(threads) == one);
+    }
 }

@@ -37,7 +37,7 @@ pub struct MultigridSolver<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    krylov: Fgmres<f64>,
+    krylov: Fgmres<f64, f32>,
     cycle: Option<VCycle<D>>,
     schur: Option<MassInverse>,
 }
@@ -48,7 +48,7 @@ where
 {
     fn default() -> Self {
         let params = FgmresParams { max_iterations: 200, restart: 60, ..FgmresParams::default() };
-        Self { krylov: Fgmres::new(params), cycle: None, schur: None }
+        Self { krylov: Fgmres::with_storage(params), cycle: None, schur: None }
     }
 }
 

@@ -1,10 +1,15 @@
 //! Flexible GMRES with restarts (Saad 1993, 10.1137/0914028).
 //!
 //! Right preconditioned, `A M_j^-1 y = b`, where the preconditioner may change from one iteration to the next: an
-//! inner iteration or a cycle in single precision is welcome. Modified Gram-Schmidt, Givens rotations.
+//! inner iteration or a cycle in single precision is welcome. Gram-Schmidt by groups, Givens rotations. Convergence is
+//! decided by the true residual, whatever the precision in which vectors are kept.
 
+use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
 use crate::{LinOp, Preconditioner, Scalar, vector};
+
+/// Share of the target norm that the rounding of the basis may make up.
+const ROUNDING_SHARE: f64 = 0.1;
 
 /// Tuning of [`Fgmres`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,25 +31,44 @@ impl Default for FgmresParams {
 }
 
 /// Flexible GMRES. Owns its workspace, which grows to what the longest cycle needed and is then reused.
+///
+/// `Fgmres<f64, f32>` keeps preconditioned vectors, and basis vectors once the residual is small enough for it, in single
+/// precision, see [`Fgmres::with_storage`]. It reaches the same true residual.
 #[derive(Clone, Debug)]
-pub struct Fgmres<T> {
+pub struct Fgmres<T, S = T> {
     params: FgmresParams,
     /// Orthonormal basis `v_0 .. v_k` of the Krylov space.
-    basis: Vec<Vec<T>>,
+    basis: Basis<T, S>,
     /// Preconditioned basis `z_j = M_j^-1 v_j`.
-    directions: Vec<Vec<T>>,
+    directions: Directions<S>,
+    /// The residual or the latest basis vector.
+    w: Vec<T>,
+    /// The latest direction.
+    z: Vec<T>,
     least_squares: LeastSquares,
     history: Vec<f64>,
 }
 
 impl<T: Scalar> Fgmres<T> {
-    /// A solver with an empty workspace.
+    /// A solver with an empty workspace that keeps its vectors in the precision of the problem.
     pub fn new(params: FgmresParams) -> Self {
+        Self::with_storage(params)
+    }
+}
+
+impl<T: Scalar, S: Scalar> Fgmres<T, S> {
+    /// A solver with an empty workspace that keeps vectors in `S` where that does not harm the residual.
+    ///
+    /// For a good preconditioner, with convergence in a few dozen iterations: rounded directions no longer span a Krylov
+    /// space, which delays convergence through hundreds of iterations, and an exact preconditioner takes two.
+    pub fn with_storage(params: FgmresParams) -> Self {
         let restart = params.restart.max(1);
         Self {
             params: FgmresParams { restart, ..params },
-            basis: Vec::with_capacity(restart + 1),
-            directions: Vec::with_capacity(restart),
+            basis: Basis::default(),
+            directions: Directions::default(),
+            w: Vec::new(),
+            z: Vec::new(),
             least_squares: LeastSquares::default(),
             history: Vec::with_capacity(params.max_iterations + 1),
         }
@@ -79,9 +103,10 @@ impl<T: Scalar> Fgmres<T> {
     ) -> Result<KrylovReport, KrylovError> {
         check_dimensions(a.dim(), b, x)?;
         self.history.clear();
-        self.grow_basis(0, b.len());
+        self.w.resize(b.len(), T::ZERO);
+        self.z.resize(b.len(), T::ZERO);
         let right_hand_side_norm = finite(vector::norm(b), 0)?;
-        let mut norm = finite(true_residual(a, b, x, &mut self.basis[0]), 0)?;
+        let mut norm = finite(true_residual(a, b, x, &mut self.w), 0)?;
         let FgmresParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
         self.history.push(norm);
@@ -100,7 +125,7 @@ impl<T: Scalar> Fgmres<T> {
         Ok(target.report(iterations, norm))
     }
 
-    /// Builds the Krylov space of the residual in `basis[0]` until its least-squares residual is small.
+    /// Builds the Krylov space of the residual in `w` until its least-squares residual is small.
     fn cycle(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
@@ -109,49 +134,54 @@ impl<T: Scalar> Fgmres<T> {
         target: &Target,
         iterations: &mut usize,
     ) -> Result<Cycle, KrylovError> {
-        vector::scale(1.0 / norm, &mut self.basis[0]);
+        self.basis.reset(self.w.len());
+        self.directions.reset(self.w.len());
         self.least_squares.reset(norm);
+        self.basis.push(1.0 / norm, &mut self.w, false);
         let mut steps = 0;
         while steps < self.params.restart && *iterations < self.params.max_iterations {
             *iterations += 1;
-            let (size_before, size_after) = self.arnoldi_step(a, m, steps);
-            finite(size_after, *iterations)?;
+            let left = finite(self.arnoldi_step(a, m), *iterations)?;
+            let column = self.least_squares.column_norm();
             let residual = finite(self.least_squares.close_column(), *iterations)?;
             self.history.push(residual);
             steps += 1;
-            let broke_down = size_after <= T::EPSILON * size_before;
+            let broke_down = left <= self.basis.epsilon() * column;
             if residual <= target.norm || broke_down {
                 return Ok(Cycle { steps, broke_down });
             }
-            vector::scale(1.0 / size_after, &mut self.basis[steps]);
+            let narrow = self.may_round(left, residual, target);
+            self.basis.push(1.0 / left, &mut self.w, narrow);
         }
         Ok(Cycle { steps, broke_down: false })
     }
 
-    /// `z_j = M^-1 v_j`, `w = A z_j` orthogonalised against the basis; returns the norm of `w` before and after.
+    /// `z = M^-1 v`, `w = A z` orthogonalised against the basis, for its last vector `v` in `w`; returns the norm of the
+    /// new `w`.
     fn arnoldi_step(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
         m: &mut (impl Preconditioner<T> + ?Sized),
-        j: usize,
-    ) -> (f64, f64) {
-        self.grow_basis(j + 1, a.dim());
-        let (basis, rest) = self.basis.split_at_mut(j + 1);
-        let (w, z) = (&mut rest[0], &mut self.directions[j]);
-        m.apply(&basis[j], z);
+    ) -> f64 {
+        let Self { basis, directions, least_squares, w, z, .. } = self;
+        m.apply(w, z);
+        directions.push(z);
         a.apply(z, w);
-        let before = vector::norm(w);
-        for v in basis.iter() {
-            let h = vector::dot(v, w);
-            vector::axpy(-h, v, w);
-            self.least_squares.push(h);
-        }
-        let after = vector::norm(w);
-        self.least_squares.push(after);
-        (before, after)
+        let left = basis.orthogonalise(w, |h| least_squares.push(h));
+        least_squares.push(left);
+        left
     }
 
-    /// `x += Z y`, unless that is not finite, and the true residual in `basis[0]`; returns its norm.
+    /// Whether the next basis vector may be narrow, when `left` is its norm before it is scaled.
+    ///
+    /// Rounding `v_j` to `e` relative changes the residual by `left y_j e`. The coefficient is at most the residual of
+    /// the step before over the least singular value of the Hessenberg matrix, for which the least pivot stands.
+    fn may_round(&self, left: f64, residual: f64, target: &Target) -> bool {
+        let coefficient = residual / self.least_squares.least_pivot();
+        S::EPSILON * left * coefficient <= ROUNDING_SHARE * target.norm
+    }
+
+    /// `x += Z y`, unless that is not finite, and the true residual in `w`; returns its norm.
     fn update(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
@@ -161,33 +191,13 @@ impl<T: Scalar> Fgmres<T> {
         iterations: usize,
     ) -> Result<f64, KrylovError> {
         let y = self.least_squares.solve(steps);
-        let mut size = 0.0;
-        for (&y, z) in y.iter().zip(&self.directions) {
-            size += y.abs() * vector::norm(z);
-        }
-        finite(size, iterations)?;
-        for (&y, z) in y.iter().zip(&self.directions) {
-            vector::axpy(y, z, x);
-        }
-        let norm = finite(true_residual(a, b, x, &mut self.basis[0]), iterations)?;
+        finite(self.directions.bound(y), iterations)?;
+        self.directions.add(y, x);
+        let norm = finite(true_residual(a, b, x, &mut self.w), iterations)?;
         if let Some(last) = self.history.last_mut() {
             *last = norm;
         }
         Ok(norm)
-    }
-
-    /// Makes room for `basis[index]` and the direction before it.
-    fn grow_basis(&mut self, index: usize, dim: usize) {
-        if self.basis.first().is_some_and(|v| v.len() != dim) {
-            self.basis.clear();
-            self.directions.clear();
-        }
-        while self.basis.len() <= index {
-            self.basis.push(vec![T::ZERO; dim]);
-        }
-        while self.directions.len() < index {
-            self.directions.push(vec![T::ZERO; dim]);
-        }
     }
 }
 
@@ -219,6 +229,17 @@ impl LeastSquares {
 
     fn push(&mut self, h: f64) {
         self.columns.push(h);
+    }
+
+    /// Norm of the open column.
+    fn column_norm(&self) -> f64 {
+        let column = &self.columns[Self::start(self.rotations.len())..];
+        column.iter().map(|h| h * h).sum::<f64>().sqrt()
+    }
+
+    /// Least diagonal entry of `R` in the closed columns.
+    fn least_pivot(&self) -> f64 {
+        (0..self.rotations.len()).map(|j| self.columns[Self::start(j) + j]).fold(f64::INFINITY, f64::min)
     }
 
     /// Start of the packed column `j` of `R`.
