@@ -13,7 +13,7 @@ use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 use gluey_linalg::{
-    Chebyshev, DirectSpd, Fgmres, FgmresParams, Guess, Jacobi, LinOp, Ordering, Preconditioner, Reference,
+    Chebyshev, DirectSpd, Fgmres, FgmresParams, Guess, Jacobi, Ordering, Preconditioner, Reference,
     RefinementParams, SparseMatrix, SpectralInterval, Symbolic, vector,
 };
 
@@ -49,6 +49,16 @@ where
     fn default() -> Self {
         let params = FgmresParams { max_iterations: 200, restart: 60, ..FgmresParams::default() };
         Self { krylov: Fgmres::with_storage(params), cycle: None, schur: None }
+    }
+}
+
+impl<const D: usize> MultigridSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Levels of the V-cycle it was prepared with.
+    pub fn level_count(&self) -> usize {
+        self.cycle.as_ref().map_or(0, |cycle| cycle.levels.len())
     }
 }
 
@@ -89,10 +99,10 @@ where
         };
         preconditioner.cycle.take_fine_applications();
         self.krylov.set_relative_tolerance(tolerance);
-        let mut operator = MeanFree { operator: SystemOperator::new(system), system };
+        let mut operator = SystemOperator::new(system);
         let report =
             self.krylov.solve(&mut operator, &mut preconditioner, &b, x, Reference::RightHandSide)?;
-        let applied_by_krylov = operator.operator.applications() as f64;
+        let applied_by_krylov = operator.applications() as f64;
         Ok(SolveReport {
             iterations: report.iterations,
             fine_operator_applications: applied_by_krylov + cycle.take_fine_applications(),
@@ -134,30 +144,6 @@ where
             *load = r - *load;
         }
         self.cycle.apply(&self.load, zu);
-    }
-}
-
-/// The Stokes operator with its divergences made to sum to zero, as the right-hand side is: where two bodies share cells
-/// without a free node the flow between them is not constrained, and constants are not quite in the kernel.
-struct MeanFree<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    operator: SystemOperator<'a, D>,
-    system: &'a StokesSystem<D>,
-}
-
-impl<const D: usize> LinOp<f64> for MeanFree<'_, D>
-where
-    Dim<D>: Space<D>,
-{
-    fn dim(&self) -> usize {
-        self.operator.dim()
-    }
-
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.operator.apply(x, y);
-        self.system.pressure.remove_mean(&mut y[self.system.velocity_dim()..]);
     }
 }
 

@@ -141,11 +141,14 @@ where
         }
     }
 
-    /// From nodal loads and unconstrained divergences to the reduced vector, in place.
+    /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made to sum to
+    /// zero: where two bodies share cells without a free node the flow between them is not constrained, and constants
+    /// would not quite be in the kernel.
     pub fn reduce(&self, y: &mut [f64]) {
         let (yu, yp) = y.split_at_mut(self.velocity_dim());
         self.space.reduce(yu);
         self.pressure.reduce(yp);
+        self.pressure.remove_mean(yp);
     }
 
     fn add_penalty(&self, x: &[f64], y: &mut [f64], work: &mut [f64]) {
