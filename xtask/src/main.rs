@@ -1,5 +1,6 @@
-//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask tidy`, `cargo xtask ci`.
+//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask bench-stokes`, `cargo xtask tidy`, `cargo xtask ci`.
 
+mod bench_stokes;
 mod ci;
 mod figures;
 mod reproduce;
@@ -24,6 +25,8 @@ struct Arguments {
 enum Task {
     /// Compute and draw the figures of Verdon et al. (2010).
     ReproduceFigures(ReproduceArguments),
+    /// Time one solve of the Stokes core and print one line of JSON.
+    BenchStokes(bench_stokes::Options),
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
     /// Formatting, lints and all tests.
@@ -49,6 +52,7 @@ struct ReproduceArguments {
 fn main() -> ExitCode {
     match Arguments::parse().task {
         Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
+        Task::BenchStokes(options) => bench_stokes(&options),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }
@@ -60,6 +64,18 @@ fn tidy() -> ExitCode {
             offences.iter().for_each(|offence| eprintln!("{offence}"));
             if offences.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
+        Err(error) => outcome(Err(error)),
+    }
+}
+
+fn bench_stokes(options: &bench_stokes::Options) -> ExitCode {
+    let line = bench_stokes::run(options).map(|report| serde_json::to_string(&report));
+    match line {
+        Ok(Ok(line)) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Ok(Err(error)) => outcome(Err(error)),
         Err(error) => outcome(Err(error)),
     }
 }

@@ -1,0 +1,198 @@
+//! `cargo xtask bench-stokes`: one timed solve of the Stokes core in a unit box, told in one line of JSON.
+//!
+//! All cases have the Couette velocity `u = (y - 1/2) e_x` on the whole boundary and viscosity 1 in the fluid; [`cases`]
+//! says what is inside. The guess is zero and the tolerance relative to the residual it leaves.
+
+mod cases;
+mod machine;
+mod options;
+mod report;
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+
+use gluey_fem::{MeshError, TreeMesh};
+use gluey_geom::{Aabb, Dim, Space, Twist};
+use gluey_levelset::Ball;
+use gluey_linalg::{LinOp, vector};
+use gluey_stokes::{
+    MultigridSolver, PointMatrices, Problem, Refinement, SaddleSolver, SolveReport, StokesError,
+    StokesSystem, SystemOperator,
+};
+
+use machine::{Stopwatch, Times};
+pub use options::Options;
+pub use report::Report;
+
+/// Viscosity of the fluid.
+const VISCOSITY: f64 = 1.0;
+/// Level of the coarsest cells of an adaptive mesh.
+const COARSEST_LEVEL: u8 = 3;
+/// Cells of each size around a particle in an adaptive mesh.
+const BAND: f64 = 2.0;
+/// Timed applications of the operator, of which the median counts.
+const OPERATOR_SAMPLES: usize = 15;
+
+/// Why there is no measurement.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The threads could not be started.
+    #[error("cannot start the threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The mesh cannot be built.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The flow could not be computed.
+    #[error(transparent)]
+    Stokes(#[from] StokesError),
+}
+
+/// Solves the case once, on as many threads as asked for.
+pub fn run(options: &Options) -> Result<Report, BenchError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build()?;
+    pool.install(|| match options.case.dimension() {
+        2 => measure::<2>(options),
+        _ => measure::<3>(options),
+    })
+}
+
+/// What a solve was and took.
+struct Solved<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    report: SolveReport,
+    times: Times,
+    residual_rel: f64,
+    twists: Vec<Twist<D>>,
+}
+
+fn measure<const D: usize>(options: &Options) -> Result<Report, BenchError>
+where
+    Dim<D>: Space<D>,
+{
+    progress(options, "mesh, operator and levels");
+    let (problem, mut solver, setup) = prepare::<D>(options)?;
+    progress(options, "solve");
+    let solved = solve(options, &problem, &mut solver)?;
+    // Before the arrays of the triad take their part.
+    let peak_rss_mb = machine::peak_rss_mb();
+    progress(options, "operator and triad");
+    let operator_cpu_s = operator_cpu_s(&problem.system);
+    let triad_gb_s = machine::triad_gb_s();
+    let dofs = problem.discretisation.dof_count();
+    let dofs_per_s = solved.times.cpu.map(|s| dofs as f64 / s);
+    Ok(Report {
+        case: options.case,
+        formulation: options.formulation,
+        n: options.cells_per_side(),
+        adaptive: options.adaptive,
+        tolerance: options.tolerance,
+        contrast: options.contrast_used(),
+        threads: options.threads.get(),
+        dofs,
+        cells: problem.discretisation.mesh.cell_count(),
+        levels: solver.level_count(),
+        setup_s: setup.wall,
+        setup_cpu_s: setup.cpu,
+        solve_s: solved.times.wall,
+        solve_cpu_s: solved.times.cpu,
+        iterations: solved.report.iterations,
+        fine_operator_applications: solved.report.fine_operator_applications,
+        residual_rel: solved.residual_rel,
+        dofs_per_s,
+        operator_dofs_per_s: operator_cpu_s.map(|s| dofs as f64 / s),
+        peak_rss_mb,
+        triad_gb_s,
+        dofs_per_triad_gb: dofs_per_s.map(|rate| rate / triad_gb_s),
+        velocities: solved.twists.iter().map(|t| t.velocity.as_slice().to_vec()).collect(),
+        spins: solved.twists.iter().map(|t| Dim::<D>::spin_slice(&t.spin).to_vec()).collect(),
+    })
+}
+
+/// Everything up to the first iteration, but for the right-hand side.
+fn prepare<const D: usize>(options: &Options) -> Result<(Problem<D>, MultigridSolver<D>, Times), BenchError>
+where
+    Dim<D>: Space<D>,
+{
+    let formulation = options.formulation(D);
+    let stopwatch = Stopwatch::start();
+    let matrices = Arc::new(PointMatrices::new(formulation.quadrature()));
+    let mesh = mesh(options, &options.case.balls_of_the_mesh())?;
+    let problem = Problem::new(mesh, &options.case.balls(), VISCOSITY, formulation, &matrices)?;
+    let mut solver = MultigridSolver::default();
+    problem.prepare(&mut solver)?;
+    Ok((problem, solver, stopwatch.stop()))
+}
+
+/// `n` cells a side everywhere, or where the particles are.
+fn mesh<const D: usize>(options: &Options, balls: &[Ball<D>]) -> Result<TreeMesh<D>, MeshError> {
+    let (roots, periodic) = ([1; D], [false; D]);
+    if !options.adaptive {
+        return TreeMesh::uniform(Aabb::unit(), roots, periodic, options.level());
+    }
+    Refinement {
+        coarsest: COARSEST_LEVEL.min(options.level()),
+        surface: options.level(),
+        band: BAND,
+        gap_fraction: 0.0,
+        gap_levels: 0,
+    }
+    .mesh(Aabb::unit(), roots, periodic, balls)
+}
+
+fn solve<const D: usize>(
+    options: &Options,
+    problem: &Problem<D>,
+    solver: &mut MultigridSolver<D>,
+) -> Result<Solved<D>, BenchError>
+where
+    Dim<D>: Space<D>,
+{
+    let lift = problem.lift(&cases::couette);
+    let b = problem.right_hand_side(&lift, options.case.force());
+    let mut x = vec![0.0; problem.system.dim()];
+    let stopwatch = Stopwatch::start();
+    let report = solver.solve(&problem.system, &b, &mut x, options.tolerance)?;
+    let times = stopwatch.stop();
+    let twists = problem.twists(&problem.velocity(&lift, &x));
+    Ok(Solved { report, times, residual_rel: residual_rel(&problem.system, &b, &x), twists })
+}
+
+/// `|b - A x| / |b|`, computed anew.
+fn residual_rel<const D: usize>(system: &StokesSystem<D>, b: &[f64], x: &[f64]) -> f64
+where
+    Dim<D>: Space<D>,
+{
+    let mut r = vec![0.0; b.len()];
+    SystemOperator::new(system).apply(x, &mut r);
+    vector::residual_from_product(b, &mut r);
+    vector::norm(&r) / vector::norm(b)
+}
+
+/// CPU seconds of one application of the Stokes operator in `f64`.
+fn operator_cpu_s<const D: usize>(system: &StokesSystem<D>) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let mut operator = SystemOperator::new(system);
+    let (mut x, mut y) = (vec![0.0; system.dim()], vec![0.0; system.dim()]);
+    vector::fill_pseudo_random(1, &mut x);
+    operator.apply(&x, &mut y);
+    let mut samples: Vec<f64> = (0..OPERATOR_SAMPLES)
+        .filter_map(|_| {
+            let stopwatch = Stopwatch::start();
+            operator.apply(&x, &mut y);
+            stopwatch.stop().cpu
+        })
+        .collect();
+    samples.sort_by(f64::total_cmp);
+    samples.get(samples.len() / 2).copied()
+}
+
+/// What goes on, for somebody who waits at a terminal.
+fn progress(options: &Options, what: &str) {
+    if std::io::stderr().is_terminal() {
+        eprintln!("{:?}, N = {}: {what}", options.case, options.cells_per_side());
+    }
+}

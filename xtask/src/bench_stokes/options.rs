@@ -1,0 +1,131 @@
+//! What the command line asks for.
+
+use std::num::NonZeroUsize;
+use std::str::FromStr;
+
+use clap::ValueEnum;
+use gluey_stokes::{Formulation, PaperParams, WeakPressures};
+use serde::Serialize;
+
+use super::cases::Case;
+
+/// The command line of `bench-stokes`.
+#[derive(clap::Args, Debug)]
+pub struct Options {
+    /// C2, C3: no particle; S2, S3: two; M3: twenty-seven. The digit is the dimension.
+    #[arg(long, value_name = "CASE", ignore_case = true)]
+    pub case: Case,
+    /// Cells per side of the uniform mesh, or of its finest level with --adaptive: a power of two.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    n: CellsPerSide,
+    /// How rigidity is imposed.
+    #[arg(long, value_name = "NAME", default_value = "rigid-dofs")]
+    pub formulation: FormulationName,
+    /// Residual to reach, relative to that of a zero guess.
+    #[arg(long = "tol", value_name = "T", default_value = "1e-8", value_parser = tolerance, allow_hyphen_values = true)]
+    pub tolerance: f64,
+    /// Viscosity of the particles over that of the fluid, in `paper`.
+    #[arg(long, value_name = "R", default_value = "1e3", allow_hyphen_values = true)]
+    contrast: f64,
+    /// Refine towards the particles only.
+    #[arg(long)]
+    pub adaptive: bool,
+    /// Threads for everything.
+    #[arg(long, value_name = "T", default_value = "1", allow_negative_numbers = true)]
+    pub threads: NonZeroUsize,
+}
+
+/// Names of the formulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum FormulationName {
+    /// Elimination of the solid degrees of freedom.
+    RigidDofs,
+    /// Penalty with a ramp of one cell, solved once.
+    Paper,
+}
+
+impl Options {
+    /// Cells per side at the finest level.
+    pub fn cells_per_side(&self) -> u64 {
+        1 << self.n.level
+    }
+
+    /// The finest level.
+    pub fn level(&self) -> u8 {
+        self.n.level
+    }
+
+    /// The formulation with its parameters in dimension `dimension`.
+    pub fn formulation(&self, dimension: usize) -> Formulation {
+        match self.formulation {
+            FormulationName::RigidDofs => Formulation::RigidDofs {
+                offset: gluey::flow::default_offset(dimension),
+                weak_pressures: WeakPressures::Aggregate,
+            },
+            FormulationName::Paper => Formulation::Paper(PaperParams {
+                viscosity_ratio: self.contrast,
+                ramp: 1.0,
+                uzawa_steps: 1,
+                ..PaperParams::default()
+            }),
+        }
+    }
+
+    /// The contrast, where it matters.
+    pub fn contrast_used(&self) -> Option<f64> {
+        (self.formulation == FormulationName::Paper).then_some(self.contrast)
+    }
+}
+
+/// A power of two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CellsPerSide {
+    level: u8,
+}
+
+/// A number of cells that no mesh of halved cells has.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("must be a power of two of at least 2, such as 64")]
+struct NotAPowerOfTwo;
+
+impl FromStr for CellsPerSide {
+    type Err = NotAPowerOfTwo;
+
+    fn from_str(text: &str) -> Result<Self, NotAPowerOfTwo> {
+        match text.parse::<u64>() {
+            Ok(n) if n.is_power_of_two() && n > 1 => Ok(Self { level: n.ilog2() as u8 }),
+            _ => Err(NotAPowerOfTwo),
+        }
+    }
+}
+
+/// A tolerance that no solve can have.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("must lie between 0 and 1")]
+struct BadTolerance;
+
+fn tolerance(text: &str) -> Result<f64, BadTolerance> {
+    text.parse().ok().filter(|t| *t > 0.0 && *t < 1.0).ok_or(BadTolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_per_side_are_powers_of_two() {
+        assert_eq!("64".parse(), Ok(CellsPerSide { level: 6 }));
+        for wrong in ["0", "1", "48", "-64", "64.0", "", "many", "18446744073709551616"] {
+            assert_eq!(wrong.parse::<CellsPerSide>(), Err(NotAPowerOfTwo), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn tolerances_lie_between_zero_and_one() {
+        assert_eq!(tolerance("1e-6"), Ok(1e-6));
+        for wrong in ["0", "1", "-1e-8", "NaN", "inf", "small"] {
+            assert_eq!(tolerance(wrong), Err(BadTolerance), "{wrong}");
+        }
+    }
+}
