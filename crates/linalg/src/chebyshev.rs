@@ -5,7 +5,7 @@
 //! at least `1/T_k(theta/delta)`, and modes below `lower` never grow. Nothing but `A`, `M` and vector updates is
 //! needed, so the result does not depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
 
-use crate::{LinOp, Preconditioner, Scalar, vector};
+use crate::{LinOp, Preconditioner, Scalar, parallel};
 
 /// Part of the spectrum of `M^-1 A` that is to be smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,52 +78,62 @@ impl<T: Scalar> Chebyshev<T> {
     ) {
         let SpectralInterval { lower, upper } = self.interval;
         let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
-        self.first_step(a, m, b, x, guess, theta);
+        let first = T::from_f64(1.0 / theta);
+        match guess {
+            Guess::Zero => self.step(m, b, x, |_, _, b| b, |z, _, _| (first * z, first * z)),
+            Guess::Given => {
+                a.apply(x, &mut self.z);
+                self.step(m, b, x, |_, ax, b| b - ax, |z, _, x| (first * z, x + first * z));
+            }
+        }
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
         for _ in 1..self.degree {
             a.apply(&self.d, &mut self.z);
-            vector::axpy(-1.0, &self.z, &mut self.r);
-            m.apply(&self.r, &mut self.z);
             let rho_next = 1.0 / (2.0 * sigma - rho);
-            self.step(2.0 * rho_next / delta, rho_next * rho, x);
+            let (new, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
+            let next = |z: T, d: T| new * z + old * d;
+            self.step(m, b, x, |r, ad, _| r - ad, |z, d, x| (next(z, d), x + next(z, d)));
             rho = rho_next;
         }
     }
 
-    /// `r = b - A x`, `d = M^-1 r / theta`, `x += d`.
-    fn first_step(
+    /// `r = residual(r, z, b)`, `z = M^-1 r`, `(d, x) = advance(z, d, x)`, in one pass where `M` is a diagonal.
+    fn step(
         &mut self,
-        a: &mut (impl LinOp<T> + ?Sized),
         m: &mut (impl Preconditioner<T> + ?Sized),
         b: &[T],
         x: &mut [T],
-        guess: Guess,
-        theta: f64,
+        residual: impl Fn(T, T, T) -> T + Sync,
+        advance: impl Fn(T, T, T) -> (T, T) + Sync,
     ) {
-        match guess {
-            Guess::Zero => {
-                self.r.copy_from_slice(b);
-                m.apply(&self.r, &mut self.z);
-                vector::scaled_copy(1.0 / theta, &self.z, &mut self.d);
-                x.copy_from_slice(&self.d);
-            }
-            Guess::Given => {
-                a.apply(x, &mut self.r);
-                vector::residual_from_product(b, &mut self.r);
-                m.apply(&self.r, &mut self.z);
-                vector::scaled_copy(1.0 / theta, &self.z, &mut self.d);
-                vector::axpy(1.0, &self.d, x);
-            }
+        let Self { r, d, z, .. } = self;
+        let split = m.diagonal().len();
+        let (r, r_rest) = r.split_at_mut(split);
+        let (d, d_rest) = d.split_at_mut(split);
+        let (z, z_rest) = z.split_at_mut(split);
+        let (b, b_rest) = b.split_at(split);
+        let (x, x_rest) = x.split_at_mut(split);
+        if !r_rest.is_empty() {
+            parallel::for_each(r_rest, |first, r| {
+                for (r, (&z, &b)) in r.iter_mut().zip(z_rest[first..].iter().zip(&b_rest[first..])) {
+                    *r = residual(*r, z, b);
+                }
+            });
+            m.apply_rest(r_rest, z_rest);
+            parallel::for_each_2(d_rest, x_rest, |first, d, x| {
+                for ((d, x), &z) in d.iter_mut().zip(x).zip(&z_rest[first..]) {
+                    (*d, *x) = advance(z, *d, *x);
+                }
+            });
         }
-    }
-
-    /// `d = a z + b d`, `x += d` in one pass.
-    fn step(&mut self, a: f64, b: f64, x: &mut [T]) {
-        let (a, b) = (T::from_f64(a), T::from_f64(b));
-        for ((d, &z), x) in self.d.iter_mut().zip(&self.z).zip(x) {
-            *d = a * z + b * *d;
-            *x += *d;
-        }
+        let diagonal = m.diagonal();
+        parallel::for_each_3(r, d, x, |first, r, d, x| {
+            let given = diagonal[first..].iter().zip(z[first..].iter().zip(&b[first..]));
+            for (((r, d), x), (&inverse, (&z, &b))) in r.iter_mut().zip(d).zip(x).zip(given) {
+                *r = residual(*r, z, b);
+                (*d, *x) = advance(inverse * *r, *d, *x);
+            }
+        });
     }
 }

@@ -15,6 +15,16 @@ pub trait LinOp<T> {
 pub trait Preconditioner<T> {
     /// `z = M^-1 r`. All of `z` is overwritten; nothing is allocated.
     fn apply(&mut self, r: &[T], z: &mut [T]);
+
+    /// `M^-1` on the leading unknowns that it multiplies one by one, which lets a smoother do so in passing.
+    fn diagonal(&self) -> &[T] {
+        &[]
+    }
+
+    /// `z = M^-1 r` on the unknowns after those of [`Preconditioner::diagonal`], which they must not depend on.
+    fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
+        self.apply(r, z);
+    }
 }
 
 impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
@@ -30,6 +40,14 @@ impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
 impl<T, M: Preconditioner<T> + ?Sized> Preconditioner<T> for &mut M {
     fn apply(&mut self, r: &[T], z: &mut [T]) {
         (**self).apply(r, z);
+    }
+
+    fn diagonal(&self) -> &[T] {
+        (**self).diagonal()
+    }
+
+    fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
+        (**self).apply_rest(r, z);
     }
 }
 
@@ -110,10 +128,14 @@ impl<T: Scalar> Jacobi<T> {
 
 impl<T: Scalar> Preconditioner<T> for Jacobi<T> {
     fn apply(&mut self, r: &[T], z: &mut [T]) {
-        for (z, (&r, &inverse)) in z.iter_mut().zip(r.iter().zip(&self.inverse)) {
-            *z = r * inverse;
-        }
+        vector::multiply(&self.inverse, r, z);
     }
+
+    fn diagonal(&self) -> &[T] {
+        &self.inverse
+    }
+
+    fn apply_rest(&mut self, _: &[T], _: &mut [T]) {}
 }
 
 /// A single-precision preconditioner seen from double precision.
@@ -147,13 +169,9 @@ impl<M: Preconditioner<f32>> Preconditioner<f64> for SinglePrecision<M> {
             z.fill(0.0);
             return;
         }
-        for (single, &double) in self.r.iter_mut().zip(r) {
-            *single = (double / norm) as f32;
-        }
+        vector::convert(1.0 / norm, r, &mut self.r);
         self.inner.apply(&self.r, &mut self.z);
-        for (double, &single) in z.iter_mut().zip(&self.z) {
-            *double = f64::from(single) * norm;
-        }
+        vector::convert(norm, &self.z, z);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{LinOp, Scalar};
+use crate::{LinOp, Scalar, parallel};
 
 /// Positions of the entries of a sparse matrix, row by row, columns ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -366,17 +366,21 @@ impl<T: Scalar> SparseMatrix<T> {
 
     /// `y = A x`.
     pub fn multiply(&self, x: &[T], y: &mut [T]) {
-        for (row, y) in y.iter_mut().enumerate() {
-            *y = self.row_product(row, x);
-        }
+        parallel::for_each(y, |first, y| {
+            for (row, y) in y.iter_mut().enumerate() {
+                *y = self.row_product(first + row, x);
+            }
+        });
     }
 
     /// `y += a A x`.
     pub fn multiply_add(&self, a: f64, x: &[T], y: &mut [T]) {
         let a = T::from_f64(a);
-        for (row, y) in y.iter_mut().enumerate() {
-            *y += a * self.row_product(row, x);
-        }
+        parallel::for_each(y, |first, y| {
+            for (row, y) in y.iter_mut().enumerate() {
+                *y += a * self.row_product(first + row, x);
+            }
+        });
     }
 
     /// `y += a A^T x`.

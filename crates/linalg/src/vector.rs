@@ -86,13 +86,33 @@ pub fn scale<T: Scalar>(a: f64, x: &mut [T]) {
     parallel::for_each(x, |_, x| x.iter_mut().for_each(|x| *x *= a));
 }
 
-/// `y = a x`, multiplied in the precision of `x` and rounded to that of `y`.
-pub fn scaled_copy<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
+/// `y = a x`.
+pub fn scaled_copy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
     debug_assert_eq!(x.len(), y.len());
-    let a = S::from_f64(a);
+    let a = T::from_f64(a);
     parallel::for_each(y, |first, y| {
         for (y, &x) in y.iter_mut().zip(&x[first..]) {
-            *y = T::from_f64((a * x).to_f64());
+            *y = a * x;
+        }
+    });
+}
+
+/// `y = a x` from one precision to another, multiplied in double precision.
+pub fn convert<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
+    debug_assert_eq!(x.len(), y.len());
+    parallel::for_each(y, |first, y| {
+        for (y, &x) in y.iter_mut().zip(&x[first..]) {
+            *y = T::from_f64(a * x.to_f64());
+        }
+    });
+}
+
+/// `z = x y`, entry by entry.
+pub fn multiply<T: Scalar>(x: &[T], y: &[T], z: &mut [T]) {
+    debug_assert!(x.len() == y.len() && y.len() == z.len());
+    parallel::for_each(z, |first, z| {
+        for (z, (&x, &y)) in z.iter_mut().zip(x[first..].iter().zip(&y[first..])) {
+            *z = x * y;
         }
     });
 }

@@ -148,3 +148,43 @@ fn an_indefinite_operator_has_no_estimate() {
     let error = estimate_lambda_max(&mut nan, &mut Identity, 5).expect_err("NaN");
     assert_eq!(error, KrylovError::NotFinite { iteration: 1 });
 }
+
+#[test]
+fn threads_and_fused_passes_change_no_bit() {
+    /// The diagonal with all or none of it offered for fusion, or all but the last hundred unknowns.
+    struct Offered(Vec<f32>, usize);
+    impl Preconditioner<f32> for Offered {
+        fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+            vector::multiply(&self.0, r, z);
+        }
+        fn diagonal(&self) -> &[f32] {
+            &self.0[..self.1]
+        }
+        fn apply_rest(&mut self, r: &[f32], z: &mut [f32]) {
+            vector::multiply(&self.0[self.1..], r, z);
+        }
+    }
+    let n = 70_000;
+    let smooth = |threads: usize, offered: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut a = FnOp::new(n, |x: &[f32], y: &mut [f32]| {
+                y[0] = 2.0 * x[0];
+                (1..n).for_each(|i| y[i] = (2.0 + (i % 5) as f32) * x[i] - x[i - 1]);
+            });
+            let inverse = (0..n).map(|i| 1.0 / (2.0 + (i % 5) as f32)).collect();
+            let b: Vec<f32> = (0..n).map(|i| (0.3 * i as f32).sin()).collect();
+            let mut x = vec![0.0; n];
+            let interval = SpectralInterval { lower: 0.4, upper: 1.6 };
+            let mut chebyshev = Chebyshev::new(n, 3, interval);
+            chebyshev.smooth(&mut a, &mut Offered(inverse, offered), &b, &mut x, Guess::Zero);
+            let mut m = Offered((0..n).map(|i| 1.0 / (2.0 + (i % 5) as f32)).collect(), offered);
+            chebyshev.smooth(&mut a, &mut m, &b, &mut x, Guess::Given);
+            x
+        })
+    };
+    let reference = smooth(1, 0);
+    for (threads, offered) in [(1, n), (1, n - 100), (2, n - 100), (3, 0), (4, n)] {
+        assert!(smooth(threads, offered) == reference);
+    }
+}
