@@ -3,6 +3,7 @@
 //! `cargo bench -p gluey-fem`; `docs/benchmarks.md` has a table of a run.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -31,9 +32,9 @@ fn meshes<const D: usize>(criterion: &mut Criterion, finest: u8) {
     group.bench_function("refine", |b| b.iter(|| graded::<D>(black_box(finest))));
     group.bench_function("number", |b| b.iter(|| NodeMap::new(black_box(&mesh), 2)));
     let coarse = mesh.coarsened(finest - 1);
-    let (fine_nodes, coarse_nodes) = (NodeMap::new(&mesh, 2), NodeMap::new(&coarse, 2));
+    let (fine_nodes, coarse_nodes) = (NodeMap::new(&mesh, 2), Arc::new(NodeMap::new(&coarse, 2)));
     group.bench_function("interpolate", |b| {
-        b.iter(|| Interpolation::new(black_box(&coarse), &coarse_nodes, &mesh, &fine_nodes));
+        b.iter(|| Interpolation::new(black_box(&coarse), coarse_nodes.clone(), &mesh, &fine_nodes));
     });
     group.finish();
 }

@@ -1,122 +1,313 @@
 //! Interpolation from the space of a coarse mesh to that of a finer one whose cells refine it.
+//!
+//! On a refined coarse cell the fine nodes form a grid of `2 degree + 1` points a direction, and interpolation is the
+//! tensor product of one matrix of `2 degree + 1` rows. A fine node belongs to the coarse cell that touches it first.
+//! Nodes are numbered in that order, so the nodes of a coarse cell are a range, and all that is stored of a fine node is
+//! its place in the grid.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use gluey_linalg::parallel;
+use rayon::prelude::*;
 
 use crate::element::{split, values_1d};
 use crate::nodes::NodeMap;
 use crate::tree::{Cell, TreeMesh};
 
-/// Sparse interpolation of nodal values, by rows: fine node = weighted sum of coarse nodes.
-///
-/// Rows of hanging fine nodes are empty: their values follow from their masters.
+/// Place of a hanging node: its value follows from its masters.
+const NOWHERE: u8 = u8::MAX;
+/// Most values in the grid of a cell, `5^3` nodes with three components.
+const GRID: usize = 375;
+
+/// Interpolation of nodal values between a mesh and the mesh coarsened by one level, and its transpose.
 #[derive(Clone, Debug)]
-pub struct Interpolation {
-    starts: Vec<u32>,
-    columns: Vec<u32>,
-    weights: Vec<f32>,
+pub struct Interpolation<const D: usize> {
+    coarse_nodes: Arc<NodeMap<D>>,
+    /// First fine node of each coarse cell, then their number.
+    first: Vec<u32>,
+    /// Place of each fine node in the grid of its coarse cell, or among its nodes where that is not refined.
+    place: Vec<u8>,
+    refined: Vec<bool>,
+    line: Line,
+    /// Loads on the nodes of each coarse cell, while threads share the restriction.
+    loads: Vec<f32>,
+    incidence: Incidence,
 }
 
-impl Interpolation {
+impl<const D: usize> Interpolation<D> {
     /// Interpolation between the spaces `coarse_nodes` on `coarse` and `fine_nodes` on `fine`.
     ///
     /// # Panics
     /// If `coarse` is not `fine`, [`TreeMesh::coarsened`] by one level.
-    pub fn new<const D: usize>(
+    pub fn new(
         coarse: &TreeMesh<D>,
-        coarse_nodes: &NodeMap<D>,
+        coarse_nodes: impl Into<Arc<NodeMap<D>>>,
         fine: &TreeMesh<D>,
         fine_nodes: &NodeMap<D>,
     ) -> Self {
-        let source = source_cells(coarse, fine, fine_nodes);
-        let mut new = Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() };
-        for (node, source) in source.iter().enumerate() {
-            if !fine_nodes.is_hanging(node) {
-                new.push_row(coarse_nodes, source);
+        let coarse_nodes = coarse_nodes.into();
+        let cell_count = coarse.cell_count();
+        let mut new = Self {
+            first: Vec::with_capacity(cell_count + 1),
+            place: Vec::with_capacity(fine_nodes.node_count()),
+            refined: Vec::with_capacity(cell_count),
+            line: Line::new(fine_nodes.degree()),
+            loads: Vec::new(),
+            incidence: Incidence::new(&coarse_nodes),
+            coarse_nodes,
+        };
+        for (c, cell) in fine.cells().iter().enumerate() {
+            let parent = coarse.cells().get(new.refined.len().wrapping_sub(1));
+            if parent.is_none_or(|parent| !is_child(cell, parent)) {
+                new.start_cell(coarse, cell);
             }
-            new.starts.push(new.columns.len() as u32);
+            new.place_nodes(cell, fine_nodes, fine_nodes.cell(c));
         }
+        assert_eq!(new.refined.len(), cell_count, "every coarse cell is one fine cell or holds its children");
+        new.first.push(new.place.len() as u32);
         new
+    }
+
+    fn start_cell(&mut self, coarse: &TreeMesh<D>, cell: &Cell<D>) {
+        let parent = &coarse.cells()[self.refined.len()];
+        let refined = is_child(cell, parent);
+        assert!(refined || parent == cell, "the coarse mesh is the fine one cut one level lower");
+        self.refined.push(refined);
+        self.first.push(self.place.len() as u32);
+    }
+
+    /// Places the nodes of a fine cell that no cell before it touches.
+    fn place_nodes(&mut self, cell: &Cell<D>, fine_nodes: &NodeMap<D>, nodes: &[u32]) {
+        let refined = self.refined.last().is_some_and(|&refined| refined);
+        let (degree, points) = (fine_nodes.degree(), self.line.points());
+        for (i, &node) in nodes.iter().enumerate() {
+            if (node as usize) < self.place.len() {
+                continue;
+            }
+            debug_assert_eq!(node as usize, self.place.len(), "nodes are numbered as cells touch them");
+            let index = split::<D>(i, degree + 1);
+            let along = |d: usize| index[d] + (cell.coords[d] & 1) as usize * degree;
+            let in_grid = || (0..D).rev().fold(0, |place, d| place * points + along(d));
+            let place = if refined { in_grid() } else { i };
+            self.place.push(if fine_nodes.is_hanging(node as usize) { NOWHERE } else { place as u8 });
+        }
     }
 
     /// Number of fine nodes.
     pub fn fine_count(&self) -> usize {
-        self.starts.len() - 1
+        self.place.len()
     }
 
-    /// `fine = P coarse` for fields with `components` interleaved components.
-    pub fn prolong(&self, components: usize, coarse: &[f32], fine: &mut [f32]) {
-        for (node, target) in fine.chunks_exact_mut(components).take(self.fine_count()).enumerate() {
-            target.fill(0.0);
-            for k in self.starts[node] as usize..self.starts[node + 1] as usize {
-                let source = &coarse[self.columns[k] as usize * components..][..components];
-                for c in 0..components {
-                    target[c] += self.weights[k] * source[c];
+    /// `fine = P coarse` for fields with `C <= 3` interleaved components; hanging nodes get zero.
+    pub fn prolong<const C: usize>(&self, coarse: &[f32], fine: &mut [f32]) {
+        self.prolong_cells::<C>(0..self.refined.len(), coarse, &mut fine[..self.fine_count() * C]);
+    }
+
+    /// `coarse = P^T fine` for fields with `C <= 3` interleaved components.
+    pub fn restrict<const C: usize>(&mut self, fine: &[f32], coarse: &mut [f32]) {
+        let coarse = &mut coarse[..self.coarse_nodes.node_count() * C];
+        if parallel::is_shared(fine.len()) {
+            self.restrict_shared::<C>(fine, coarse);
+        } else {
+            coarse.fill(0.0);
+            for cell in 0..self.refined.len() {
+                let load = self.restrict_cell::<C>(cell, fine);
+                for (load, &node) in load.chunks_exact(C).zip(self.coarse_nodes.cell(cell)) {
+                    add(load, &mut coarse[node as usize * C..][..C]);
                 }
             }
         }
     }
 
-    /// `coarse += P^T fine`.
-    pub fn restrict(&self, components: usize, fine: &[f32], coarse: &mut [f32]) {
-        for (node, source) in fine.chunks_exact(components).take(self.fine_count()).enumerate() {
-            for k in self.starts[node] as usize..self.starts[node + 1] as usize {
-                let target = &mut coarse[self.columns[k] as usize * components..][..components];
-                for c in 0..components {
-                    target[c] += self.weights[k] * source[c];
+    /// The nodes of a range of cells are a range of `fine`: cut both in two until they are not worth sharing.
+    fn prolong_cells<const C: usize>(&self, cells: Range<usize>, coarse: &[f32], fine: &mut [f32]) {
+        if cells.len() < 2 || !parallel::is_shared(fine.len()) {
+            return self.prolong_serially::<C>(cells, coarse, fine);
+        }
+        let middle = cells.start + cells.len() / 2;
+        let (left, right) = fine.split_at_mut((self.first[middle] - self.first[cells.start]) as usize * C);
+        rayon::join(
+            || self.prolong_cells::<C>(cells.start..middle, coarse, left),
+            || self.prolong_cells::<C>(middle..cells.end, coarse, right),
+        );
+    }
+
+    fn prolong_serially<const C: usize>(&self, cells: Range<usize>, coarse: &[f32], fine: &mut [f32]) {
+        let start = self.first[cells.start] as usize;
+        for cell in cells {
+            let range = self.first[cell] as usize..self.first[cell + 1] as usize;
+            let fine = &mut fine[(range.start - start) * C..(range.end - start) * C];
+            let mut grid = [0.0; GRID];
+            for (value, &node) in grid.chunks_exact_mut(C).zip(self.coarse_nodes.cell(cell)) {
+                value.copy_from_slice(&coarse[node as usize * C..][..C]);
+            }
+            let grid = if self.refined[cell] { self.expand::<C>(grid) } else { grid };
+            for (fine, &place) in fine.chunks_exact_mut(C).zip(&self.place[range]) {
+                match place {
+                    NOWHERE => fine.fill(0.0),
+                    _ => fine.copy_from_slice(&grid[place as usize * C..][..C]),
                 }
             }
         }
     }
 
-    fn push_row<const D: usize>(&mut self, coarse_nodes: &NodeMap<D>, source: &Source<D>) {
-        let degree = coarse_nodes.degree();
-        let values: [[f64; 3]; D] =
-            std::array::from_fn(|d| values_1d(degree, f64::from(source.quarter[d]) / (2 * degree) as f64));
-        for (i, &column) in coarse_nodes.cell(source.cell as usize).iter().enumerate() {
-            let index = split::<D>(i, degree + 1);
-            let weight: f64 = (0..D).map(|d| values[d][index[d]]).product();
-            if weight != 0.0 {
-                self.columns.push(column);
-                self.weights.push(weight as f32);
+    /// Loads on the nodes of one coarse cell from the fine nodes that belong to it.
+    fn restrict_cell<const C: usize>(&self, cell: usize, fine: &[f32]) -> [f32; GRID] {
+        let range = self.first[cell] as usize..self.first[cell + 1] as usize;
+        let mut grid = [0.0; GRID];
+        let fine = &fine[range.start * C..range.end * C];
+        for (fine, &place) in fine.chunks_exact(C).zip(&self.place[range]) {
+            if place != NOWHERE {
+                grid[place as usize * C..][..C].copy_from_slice(fine);
+            }
+        }
+        if self.refined[cell] { self.contract::<C>(grid) } else { grid }
+    }
+
+    /// Sums the loads on every node in the order of the cells, as they are without threads.
+    fn restrict_shared<const C: usize>(&mut self, fine: &[f32], coarse: &mut [f32]) {
+        let corners = self.coarse_nodes.nodes_per_cell() * C;
+        let mut loads = std::mem::take(&mut self.loads);
+        loads.resize(self.refined.len() * corners, 0.0);
+        loads.par_chunks_exact_mut(corners).enumerate().with_min_len(64).for_each(|(cell, load)| {
+            load.copy_from_slice(&self.restrict_cell::<C>(cell, fine)[..corners]);
+        });
+        coarse.par_chunks_exact_mut(C).enumerate().with_min_len(1024).for_each(|(node, sum)| {
+            sum.fill(0.0);
+            for &k in self.incidence.of(node) {
+                add(&loads[k as usize * C..][..C], sum);
+            }
+        });
+        self.loads = loads;
+    }
+
+    /// From the nodes of a refined coarse cell to its grid.
+    fn expand<const C: usize>(&self, mut grid: [f32; GRID]) -> [f32; GRID] {
+        let (nodes, points) = (self.line.nodes(), self.line.points());
+        for d in 0..D {
+            let (inner, outer) = (points.pow(d as u32) * C, nodes.pow((D - 1 - d) as u32));
+            let coarse = grid;
+            self.line.expand(inner, outer, &coarse, &mut grid);
+        }
+        grid
+    }
+
+    /// The transpose of [`Self::expand`].
+    fn contract<const C: usize>(&self, mut grid: [f32; GRID]) -> [f32; GRID] {
+        let (nodes, points) = (self.line.nodes(), self.line.points());
+        for d in (0..D).rev() {
+            let (inner, outer) = (points.pow(d as u32) * C, nodes.pow((D - 1 - d) as u32));
+            let fine = grid;
+            self.line.contract(inner, outer, &fine, &mut grid);
+        }
+        grid
+    }
+}
+
+fn is_child<const D: usize>(cell: &Cell<D>, parent: &Cell<D>) -> bool {
+    cell.level == parent.level + 1 && cell.coords.map(|x| x >> 1) == parent.coords
+}
+
+fn add(load: &[f32], sum: &mut [f32]) {
+    sum.iter_mut().zip(load).for_each(|(sum, load)| *sum += load);
+}
+
+/// Interpolation on a line: points `0, 2, ..` of the fine grid are coarse nodes, the others are weighted sums of them.
+#[derive(Clone, Debug)]
+struct Line {
+    degree: usize,
+    /// Weights of the points `1, 3, ..`.
+    weights: Vec<[f32; 3]>,
+}
+
+impl Line {
+    fn new(degree: usize) -> Self {
+        let at = |point: usize| values_1d(degree, point as f64 / (2 * degree) as f64).map(|w| w as f32);
+        Self { degree, weights: (0..degree).map(|k| at(2 * k + 1)).collect() }
+    }
+
+    /// Coarse nodes.
+    fn nodes(&self) -> usize {
+        self.degree + 1
+    }
+
+    /// Fine points.
+    fn points(&self) -> usize {
+        2 * self.degree + 1
+    }
+
+    /// From nodes to points along one direction of a grid with `inner` values before it and `outer` after it.
+    fn expand(&self, inner: usize, outer: usize, coarse: &[f32; GRID], fine: &mut [f32; GRID]) {
+        for line in 0..outer {
+            let from = &coarse[line * self.nodes() * inner..][..self.nodes() * inner];
+            let to = &mut fine[line * self.points() * inner..][..self.points() * inner];
+            for (k, node) in from.chunks_exact(inner).enumerate() {
+                to[2 * k * inner..][..inner].copy_from_slice(node);
+            }
+            for (k, weights) in self.weights.iter().enumerate() {
+                combine(weights, from, &mut to[(2 * k + 1) * inner..][..inner]);
+            }
+        }
+    }
+
+    /// The transpose of [`Line::expand`].
+    fn contract(&self, inner: usize, outer: usize, fine: &[f32; GRID], coarse: &mut [f32; GRID]) {
+        for line in 0..outer {
+            let from = &fine[line * self.points() * inner..][..self.points() * inner];
+            let to = &mut coarse[line * self.nodes() * inner..][..self.nodes() * inner];
+            for (k, node) in to.chunks_exact_mut(inner).enumerate() {
+                node.copy_from_slice(&from[2 * k * inner..][..inner]);
+                for (point, weights) in self.weights.iter().enumerate() {
+                    let between = &from[(2 * point + 1) * inner..][..inner];
+                    node.iter_mut().zip(between).for_each(|(node, value)| *node += weights[k] * value);
+                }
             }
         }
     }
 }
 
-/// Where a fine node lies: in a coarse cell, at `quarter / (2 degree)` of its width.
-#[derive(Clone, Copy)]
-struct Source<const D: usize> {
-    cell: u32,
-    quarter: [u8; D],
-}
-
-fn source_cells<const D: usize>(
-    coarse: &TreeMesh<D>,
-    fine: &TreeMesh<D>,
-    fine_nodes: &NodeMap<D>,
-) -> Vec<Source<D>> {
-    let mut source = vec![Source { cell: u32::MAX, quarter: [0; D] }; fine_nodes.node_count()];
-    let n = fine_nodes.degree() + 1;
-    for (c, cell) in fine.cells().iter().enumerate() {
-        let (found, child) = match coarse.find(cell) {
-            Some(found) => (found, None),
-            None => (parent_in(coarse, cell), Some(cell.coords.map(|x| x & 1))),
-        };
-        for (i, &node) in fine_nodes.cell(c).iter().enumerate() {
-            let index = split::<D>(i, n);
-            source[node as usize] = Source {
-                cell: found as u32,
-                quarter: std::array::from_fn(|d| match child {
-                    None => 2 * index[d] as u8,
-                    Some(half) => (index[d] + half[d] as usize * (n - 1)) as u8,
-                }),
-            };
+/// `sum = sum_k weights[k] rows[k]` for two or three rows.
+fn combine(weights: &[f32; 3], rows: &[f32], sum: &mut [f32]) {
+    let n = sum.len();
+    let (first, second, third) = (&rows[..n], &rows[n..2 * n], &rows[rows.len() - n..]);
+    for i in 0..n {
+        sum[i] = weights[0] * first[i] + weights[1] * second[i];
+    }
+    if rows.len() > 2 * n {
+        for i in 0..n {
+            sum[i] += weights[2] * third[i];
         }
     }
-    source
 }
 
-fn parent_in<const D: usize>(coarse: &TreeMesh<D>, cell: &Cell<D>) -> usize {
-    let parent = Cell { level: cell.level - 1, coords: cell.coords.map(|c| c >> 1) };
-    coarse.find(&parent).expect("a mesh cut one level lower holds the parent of every cell it lacks")
+/// The places where each node occurs in the lists of the cells, ascending.
+#[derive(Clone, Debug)]
+struct Incidence {
+    first: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl Incidence {
+    fn new<const D: usize>(nodes: &NodeMap<D>) -> Self {
+        let listed = || (0..nodes.cell_count()).flat_map(|cell| nodes.cell(cell));
+        let mut first = vec![0u32; nodes.node_count() + 1];
+        listed().for_each(|&node| first[node as usize + 1] += 1);
+        for node in 0..nodes.node_count() {
+            first[node + 1] += first[node];
+        }
+        let mut next = first.clone();
+        let mut places = vec![0; nodes.cell_count() * nodes.nodes_per_cell()];
+        for (place, &node) in listed().enumerate() {
+            places[next[node as usize] as usize] = place as u32;
+            next[node as usize] += 1;
+        }
+        Self { first, places }
+    }
+
+    fn of(&self, node: usize) -> &[u32] {
+        &self.places[self.first[node] as usize..self.first[node + 1] as usize]
+    }
 }
 
 #[cfg(test)]
@@ -124,31 +315,76 @@ mod tests {
     use super::*;
     use gluey_geom::{Aabb, Vector};
 
-    fn interpolation_is_exact_and_adjoint<const D: usize>() {
-        let fine = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, h, level| {
-            level < 2 || (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.3)).norm() <= h
+    fn meshes<const D: usize>(periodic: bool) -> [(TreeMesh<D>, NodeMap<D>); 2] {
+        let fine = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [periodic; D], 5, |lower, h, level| {
+            level < 4 || (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.3)).norm() <= 2.0 * h
         })
         .unwrap();
-        let coarse = fine.coarsened(3);
-        let (fine_nodes, coarse_nodes) = (NodeMap::new(&fine, 2), NodeMap::new(&coarse, 2));
-        let interpolation = Interpolation::new(&coarse, &coarse_nodes, &fine, &fine_nodes);
-        let f = |x: Vector<D>| (0..D).map(|d| 1.0 + x[d] * x[d] - 0.3 * x[d]).product::<f64>() as f32;
-        let u: Vec<f32> = (0..coarse_nodes.node_count()).map(|n| f(coarse_nodes.point(n))).collect();
-        let mut v = vec![0.0; fine_nodes.node_count()];
-        interpolation.prolong(1, &u, &mut v);
-        for n in (0..v.len()).filter(|&n| !fine_nodes.is_hanging(n)) {
-            assert!((v[n] - f(fine_nodes.point(n))).abs() < 1e-5);
+        [fine.coarsened(4), fine].map(|mesh| (mesh.clone(), NodeMap::new(&mesh, 2)))
+    }
+
+    fn interpolation_is_exact<const D: usize, const DEGREE: usize>() {
+        let [coarse, fine] = meshes::<D>(false).map(|m| (NodeMap::new(&m.0, DEGREE), m.0));
+        let interpolation = Interpolation::new(&coarse.1, coarse.0.clone(), &fine.1, &fine.0);
+        let f = |x: Vector<D>| {
+            (0..D).map(|d| 1.0 + x[d].powi(DEGREE as i32) - 0.3 * x[d]).product::<f64>() as f32
+        };
+        let u: Vec<f32> = (0..coarse.0.node_count()).map(|n| f(coarse.0.point(n))).collect();
+        let mut v = vec![f32::NAN; fine.0.node_count()];
+        interpolation.prolong::<1>(&u, &mut v);
+        for n in 0..v.len() {
+            let expected = if fine.0.is_hanging(n) { 0.0 } else { f(fine.0.point(n)) };
+            assert!((v[n] - expected).abs() < 1e-5);
         }
-        let load: Vec<f32> = (0..v.len()).map(|n| (n as f32).sin()).collect();
-        let mut collected = vec![0.0; u.len()];
-        interpolation.restrict(1, &load, &mut collected);
-        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(x, y)| f64::from(x * y)).sum::<f64>();
-        assert!((dot(&load, &v) - dot(&collected, &u)).abs() < 1e-3);
     }
 
     #[test]
-    fn interpolation_reproduces_quadratics() {
-        interpolation_is_exact_and_adjoint::<2>();
-        interpolation_is_exact_and_adjoint::<3>();
+    fn interpolation_reproduces_polynomials() {
+        interpolation_is_exact::<2, 1>();
+        interpolation_is_exact::<2, 2>();
+        interpolation_is_exact::<3, 1>();
+        interpolation_is_exact::<3, 2>();
+    }
+
+    fn restriction_is_the_transpose<const D: usize>(periodic: bool) {
+        let [(coarse, coarse_nodes), (fine, fine_nodes)] = meshes::<D>(periodic);
+        let mut interpolation = Interpolation::new(&coarse, coarse_nodes.clone(), &fine, &fine_nodes);
+        let wave = |n: usize, k: f32| (0..n * D).map(|i| (k * i as f32).sin()).collect::<Vec<f32>>();
+        let (u, load) = (wave(coarse_nodes.node_count(), 0.7), wave(fine_nodes.node_count(), 1.1));
+        let (mut v, mut collected) = (load.clone(), u.clone());
+        interpolation.prolong::<D>(&u, &mut v);
+        interpolation.restrict::<D>(&load, &mut collected);
+        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(&x, &y)| f64::from(x) * f64::from(y)).sum();
+        let (one, other): (f64, f64) = (dot(&load, &v), dot(&collected, &u));
+        assert!((one - other).abs() < 1e-5 * (v.len() as f64).sqrt(), "{one} {other}");
+    }
+
+    #[test]
+    fn restriction_is_the_transpose_of_prolongation() {
+        for periodic in [false, true] {
+            restriction_is_the_transpose::<2>(periodic);
+            restriction_is_the_transpose::<3>(periodic);
+        }
+    }
+
+    #[test]
+    fn threads_change_no_bit() {
+        let [(coarse, coarse_nodes), (fine, fine_nodes)] = meshes::<3>(false);
+        let interpolation = Interpolation::new(&coarse, coarse_nodes.clone(), &fine, &fine_nodes);
+        assert!(fine_nodes.node_count() * 3 > 100_000, "long enough to be shared");
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut interpolation = interpolation.clone();
+            pool.install(|| {
+                let u: Vec<f32> =
+                    (0..coarse_nodes.node_count() * 3).map(|i| (0.7 * i as f32).sin()).collect();
+                let (mut v, mut back) = (vec![0.0; fine_nodes.node_count() * 3], vec![0.0; u.len()]);
+                interpolation.prolong::<3>(&u, &mut v);
+                interpolation.restrict::<3>(&v, &mut back);
+                (v, back)
+            })
+        };
+        let one = run(1);
+        assert!(run(2) == one && run(4) == one);
     }
 }

@@ -93,12 +93,12 @@ fn transfers_between_levels_fit<const D: usize>(seed: u64) {
     let fine = random::<D>(seed, 5, false);
     let coarse = fine.coarsened(fine.max_level() - 1);
     let (to, from) = (NodeMap::new(&fine, 2), NodeMap::new(&coarse, 2));
-    let transfer = Interpolation::new(&coarse, &from, &fine, &to);
+    let mut transfer = Interpolation::new(&coarse, from.clone(), &fine, &to);
     assert_eq!(transfer.fine_count(), to.node_count());
 
     let quadratic: Vec<f32> = (0..from.node_count()).map(|n| polynomial(&from.point(n), 2) as f32).collect();
     let mut moved = vec![0f32; to.node_count()];
-    transfer.prolong(1, &quadratic, &mut moved);
+    transfer.prolong::<1>(&quadratic, &mut moved);
     for n in (0..to.node_count()).filter(|&n| !to.is_hanging(n)) {
         let error = f64::from(moved[n]) - polynomial(&to.point(n), 2);
         assert!(error.abs() < 1e-5, "node {n}: {error:e}");
@@ -108,8 +108,8 @@ fn transfers_between_levels_fit<const D: usize>(seed: u64) {
     fill_pseudo_random(seed + 1, &mut x);
     fill_pseudo_random(seed + 2, &mut y);
     let (mut up, mut down) = (vec![0f32; y.len()], vec![0f32; x.len()]);
-    transfer.prolong(D, &x, &mut up);
-    transfer.restrict(D, &y, &mut down);
+    transfer.prolong::<D>(&x, &mut up);
+    transfer.restrict::<D>(&y, &mut down);
     let scale = dot(&up, &up).sqrt() * dot(&y, &y).sqrt();
     assert!((dot(&up, &y) - dot(&x, &down)).abs() < 1e-6 * scale);
 }

@@ -1,27 +1,29 @@
 //! A mesh with its velocity and pressure nodes, and how its cells meet the bodies.
 
+use std::sync::Arc;
+
 use gluey_fem::{NodeMap, TreeMesh};
 
 use gluey_levelset::{LevelSet, nearest};
 
 use crate::space::SolidNodes;
 
-/// A mesh with the nodes of the Q2-Q1 pair.
+/// A mesh with the nodes of the Q2-Q1 pair. Cheap to clone: clones share all of it.
 #[derive(Clone, Debug)]
 pub struct Discretisation<const D: usize> {
     /// The mesh.
-    pub mesh: TreeMesh<D>,
+    pub mesh: Arc<TreeMesh<D>>,
     /// Nodes of the velocity, degree 2.
-    pub velocity: NodeMap<D>,
+    pub velocity: Arc<NodeMap<D>>,
     /// Nodes of the pressure, degree 1.
-    pub pressure: NodeMap<D>,
+    pub pressure: Arc<NodeMap<D>>,
 }
 
 impl<const D: usize> Discretisation<D> {
     /// Numbers the nodes of `mesh`.
     pub fn new(mesh: TreeMesh<D>) -> Self {
-        let (velocity, pressure) = (NodeMap::new(&mesh, 2), NodeMap::new(&mesh, 1));
-        Self { mesh, velocity, pressure }
+        let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
+        Self { velocity: nodes(2), pressure: nodes(1), mesh: Arc::new(mesh) }
     }
 
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.

@@ -4,7 +4,7 @@ use gluey_fem::kernel::{CellBatches, CubeKernel};
 use gluey_fem::{Interpolation, NodeMap, Reference};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, invert_spd,
+    Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, invert_spd, vector,
 };
 
 use crate::discretisation::Discretisation;
@@ -62,14 +62,14 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.applications += 1;
-        self.work.copy_from_slice(x);
+        vector::copy(x, &mut self.work);
         self.space.expand(&mut self.work);
-        y.fill(0.0);
+        vector::clear(y);
         self.kernel.viscous(&self.batches, &self.work, y);
         if let Some(penalty) = &self.penalty {
             self.penalty_work.fill(0.0);
             penalty.stress.apply(self.space.nodes(), &self.work, &mut self.penalty_work);
-            gluey_linalg::vector::axpy(penalty.factor, &self.penalty_work, y);
+            vector::axpy(penalty.factor, &self.penalty_work, y);
         }
         self.space.reduce(y);
     }
@@ -86,11 +86,16 @@ struct BlockDiagonal {
 impl Preconditioner<f32> for BlockDiagonal {
     fn apply(&mut self, r: &[f32], z: &mut [f32]) {
         let split = self.nodal.len();
-        for (z, (r, d)) in z.iter_mut().zip(r.iter().zip(&self.nodal)) {
-            *z = r * d;
-        }
+        vector::multiply(&self.nodal, &r[..split], &mut z[..split]);
+        self.apply_rest(&r[split..], &mut z[split..]);
+    }
+
+    fn diagonal(&self) -> &[f32] {
+        &self.nodal
+    }
+
+    fn apply_rest(&mut self, r: &[f32], z: &mut [f32]) {
         let n = self.rigid;
-        let (r, z) = (&r[split..], &mut z[split..]);
         for (body, block) in self.twists.chunks_exact(n * n).enumerate() {
             for (i, row) in block.chunks_exact(n).enumerate() {
                 z[body * n + i] = row.iter().zip(&r[body * n..]).map(|(m, r)| m * r).sum();
@@ -101,11 +106,11 @@ impl Preconditioner<f32> for BlockDiagonal {
 
 /// How a level hangs on the next coarser one.
 #[derive(Clone, Debug)]
-pub enum Transfer {
+pub enum Transfer<const D: usize> {
     /// The coarser level has the same mesh, with rigid bodies.
     SameMesh,
     /// The coarser level has a coarser mesh.
-    Mesh(Interpolation),
+    Mesh(Interpolation<D>),
 }
 
 /// One level of the multigrid.
@@ -227,37 +232,29 @@ where
     }
 
     /// Restricts the residual of this level to the right-hand side of the coarser one.
-    pub fn restrict(&mut self, transfer: &Transfer, coarse: &VelocitySpace<D>, coarse_b: &mut [f32]) {
+    pub fn restrict(&mut self, transfer: &mut Transfer<D>, coarse: &VelocitySpace<D>, coarse_b: &mut [f32]) {
         self.operator.apply(&self.x, &mut self.r);
-        for (r, b) in self.r.iter_mut().zip(&self.b) {
-            *r = b - *r;
-        }
+        vector::residual_from_product(&self.b, &mut self.r);
         self.operator.space.spread(&mut self.r);
         match transfer {
             Transfer::SameMesh => {
-                let nodal = coarse.full_dim();
-                coarse_b[..nodal].copy_from_slice(&self.r[..nodal]);
+                vector::copy(&self.r[..coarse.full_dim()], &mut coarse_b[..coarse.full_dim()])
             }
-            Transfer::Mesh(interpolation) => {
-                coarse_b.fill(0.0);
-                interpolation.restrict(D, &self.r, coarse_b);
-            }
+            Transfer::Mesh(interpolation) => interpolation.restrict::<D>(&self.r, coarse_b),
         }
         coarse.reduce(coarse_b);
     }
 
     /// Adds the correction `coarse_x` of the coarser level, whose entries it expands in place.
-    pub fn correct(&mut self, transfer: &Transfer, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
+    pub fn correct(&mut self, transfer: &Transfer<D>, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
         coarse.expand(coarse_x);
         let nodal = self.operator.space.full_dim();
         match transfer {
-            Transfer::SameMesh => self.r[..nodal].copy_from_slice(&coarse_x[..nodal]),
-            Transfer::Mesh(interpolation) => interpolation.prolong(D, coarse_x, &mut self.r[..nodal]),
+            Transfer::SameMesh => vector::copy(&coarse_x[..nodal], &mut self.r[..nodal]),
+            Transfer::Mesh(interpolation) => interpolation.prolong::<D>(coarse_x, &mut self.r[..nodal]),
         }
         self.operator.space.project(&mut self.r);
-        for (x, r) in self.x.iter_mut().zip(&self.r) {
-            *x += r;
-        }
+        vector::axpy(1.0, &self.r, &mut self.x);
     }
 }
 
@@ -306,7 +303,7 @@ where
     if let Some(penalty) = penalty {
         let mut added = vec![0f32; space.full_dim()];
         penalty.stress.add_diagonal(nodes, &reference, &mut added);
-        gluey_linalg::vector::axpy(penalty.factor, &added, &mut nodal);
+        vector::axpy(penalty.factor, &added, &mut nodal);
     }
     // The squares keep the sum positive: weights of hanging nodes may be negative.
     nodes.collect(D, |w| (w * w) as f32, &mut nodal);

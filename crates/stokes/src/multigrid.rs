@@ -137,12 +137,10 @@ where
         vector::scale(-1.0, zp);
         self.pressure.copy_from_slice(zp);
         self.system.pressure.expand(&mut self.pressure);
-        self.load.fill(0.0);
+        vector::clear(&mut self.load);
         self.system.subtract_gradient(&self.pressure, &mut self.load);
         self.system.space.reduce(&mut self.load);
-        for (load, r) in self.load.iter_mut().zip(ru) {
-            *load = r - *load;
-        }
+        vector::residual_from_product(ru, &mut self.load);
         self.cycle.apply(&self.load, zu);
     }
 }
@@ -179,7 +177,7 @@ where
     /// The first of the levels on the finest mesh.
     first_fine: usize,
     /// `transfers[l]` joins level `l` to level `l + 1`.
-    transfers: Vec<Transfer>,
+    transfers: Vec<Transfer<D>>,
     coarse: CoarseSolver,
 }
 
@@ -204,11 +202,11 @@ where
             let space = rigid_space(mesh, preparation, is_finest);
             levels.push(Level::rigid(mesh, space, preparation.viscosity, index)?);
         }
-        let mut transfers: Vec<Transfer> = meshes
+        let mut transfers: Vec<Transfer<D>> = meshes
             .windows(2)
             .map(|pair| {
                 let (coarse, fine) = (&pair[0], &pair[1]);
-                Transfer::Mesh(Interpolation::new(&coarse.mesh, &coarse.velocity, &fine.mesh, &fine.velocity))
+                Transfer::Mesh(Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity))
             })
             .collect();
         if let Some(penalty) = &system.penalty {
@@ -240,7 +238,7 @@ where
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
         fine.smooth_from_zero();
-        fine.restrict(&self.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
+        fine.restrict(&mut self.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
         self.run(top - 1);
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
@@ -262,13 +260,9 @@ where
             return;
         }
         let top = self.levels.len() - 1;
-        for (single, &double) in self.levels[top].b.iter_mut().zip(r) {
-            *single = (double / norm) as f32;
-        }
+        vector::convert(1.0 / norm, r, &mut self.levels[top].b);
         self.run(top);
-        for (double, &single) in z.iter_mut().zip(&self.levels[top].x) {
-            *double = f64::from(single) * norm;
-        }
+        vector::convert(norm, &self.levels[top].x, z);
     }
 }
 
@@ -283,7 +277,7 @@ where
 {
     let bodies: &[Ball<D>] = preparation.bodies;
     match preparation.touched {
-        Some(touched) if is_finest => VelocitySpace::new(mesh.velocity.clone(), bodies, &touched.to_vec()),
+        Some(touched) if is_finest => VelocitySpace::new(mesh.velocity.clone(), bodies, touched),
         _ => {
             let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, preparation.offset);
             VelocitySpace::new(mesh.velocity.clone(), bodies, &solid)

@@ -7,6 +7,8 @@
 //! narrower than a cell, where no such node exists, weak nodes stay unknowns of their own: the lubrication pressure lives
 //! there.
 
+use std::sync::Arc;
+
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space};
 
@@ -26,7 +28,7 @@ pub enum WeakPressures {
 /// The reduced pressure space of one mesh. Vectors have an entry a node; those of nodes that are not free are zero.
 #[derive(Clone, Debug)]
 pub struct PressureSpace<const D: usize> {
-    nodes: NodeMap<D>,
+    nodes: Arc<NodeMap<D>>,
     free: Vec<bool>,
     free_count: usize,
     constraints: Vec<Constraint>,

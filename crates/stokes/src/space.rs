@@ -6,6 +6,8 @@
 //! reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose: it turns nodal loads into loads on
 //! free nodes, forces and (scaled) torques.
 
+use std::sync::Arc;
+
 use gluey_fem::NodeMap;
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Body;
@@ -25,7 +27,7 @@ struct RigidNode<const D: usize> {
 /// The reduced velocity space of one mesh.
 #[derive(Clone, Debug)]
 pub struct VelocitySpace<const D: usize> {
-    nodes: NodeMap<D>,
+    nodes: Arc<NodeMap<D>>,
     boundary: Vec<u32>,
     rigid: Vec<RigidNode<D>>,
     body_of: SolidNodes,
@@ -40,7 +42,8 @@ where
 {
     /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define a rigid
     /// motion is left out: its nodes stay free, see [`VelocitySpace::is_active`].
-    pub fn new<B: Body<D>>(nodes: NodeMap<D>, bodies: &[B], solid: &SolidNodes) -> Self {
+    pub fn new<B: Body<D>>(nodes: impl Into<Arc<NodeMap<D>>>, bodies: &[B], solid: &[Option<u32>]) -> Self {
+        let nodes = nodes.into();
         let boundary = (0..nodes.node_count() as u32).filter(|&n| nodes.is_on_boundary(n as usize)).collect();
         let rigid = rigid_nodes(&nodes, bodies, solid);
         let mut space = Self {
@@ -191,7 +194,7 @@ where
 fn rigid_nodes<const D: usize, B: Body<D>>(
     nodes: &NodeMap<D>,
     bodies: &[B],
-    solid: &SolidNodes,
+    solid: &[Option<u32>],
 ) -> Vec<RigidNode<D>> {
     let usable = |n: &usize| !nodes.is_on_boundary(*n) && !nodes.is_hanging(*n);
     let rigid = |n: usize| {
@@ -302,7 +305,7 @@ mod tests {
         })
         .unwrap();
         let nodes = NodeMap::new(&mesh, 2);
-        let solid = (0..nodes.node_count())
+        let solid: SolidNodes = (0..nodes.node_count())
             .map(|n| nearest(&balls, &nodes.point(n)).filter(|b| b.1 >= 0.0).map(|b| b.0 as u32))
             .collect();
         VelocitySpace::new(nodes, &balls, &solid)

@@ -7,7 +7,7 @@
 use gluey_fem::Reference;
 use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Scalar};
+use gluey_linalg::{LinOp, Scalar, vector};
 
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::pressure::{PressureSpace, WeakPressures};
@@ -136,9 +136,7 @@ where
         self.kernel.stokes(&self.batches, &u[..nodal], p, &mut yu[..nodal], yp);
         self.add_penalty(&u[..nodal], &mut yu[..nodal], &mut work[..nodal]);
         self.reduce(&mut y);
-        for (b, y) in b.iter_mut().zip(&y) {
-            *b -= y;
-        }
+        vector::axpy(-1.0, &y, b);
     }
 
     /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made to sum to
@@ -155,7 +153,7 @@ where
         if let Some(penalty) = &self.penalty {
             work.fill(0.0);
             penalty.stress.apply(self.space.nodes(), x, work);
-            gluey_linalg::vector::axpy(penalty.factor, work, y);
+            vector::axpy(penalty.factor, work, y);
         }
     }
 }
@@ -207,11 +205,11 @@ where
         self.applications += 1;
         let Self { system, velocity, pressure, penalty, .. } = self;
         let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
-        velocity.copy_from_slice(&x[..split]);
+        vector::copy(&x[..split], velocity);
         system.space.expand(velocity);
-        pressure.copy_from_slice(&x[split..]);
+        vector::copy(&x[split..], pressure);
         system.pressure.expand(pressure);
-        y.fill(0.0);
+        vector::clear(y);
         let (yu, yp) = y.split_at_mut(split);
         system.kernel.stokes(&system.batches, &velocity[..nodal], pressure, &mut yu[..nodal], yp);
         system.add_penalty(&velocity[..nodal], &mut yu[..nodal], penalty);
