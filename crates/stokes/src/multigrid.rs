@@ -206,7 +206,12 @@ where
             .windows(2)
             .map(|pair| {
                 let (coarse, fine) = (&pair[0], &pair[1]);
-                Transfer::Mesh(Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity))
+                Transfer::Mesh(Interpolation::new(
+                    &coarse.mesh,
+                    coarse.velocity.clone(),
+                    &fine.mesh,
+                    &fine.velocity,
+                ))
             })
             .collect();
         if let Some(penalty) = &system.penalty {

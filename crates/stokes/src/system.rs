@@ -4,10 +4,12 @@
 //! [`VelocitySpace`] and the pressure nodes. Cells that move as one body are left out: they have no strain. Pressure
 //! nodes that see no cell with a free node are dropped.
 
+use std::sync::Arc;
+
 use gluey_fem::Reference;
 use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Scalar, vector};
+use gluey_linalg::{LinOp, Pattern, Scalar, SparseError, SparseMatrix, vector};
 
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::pressure::{PressureSpace, WeakPressures};
@@ -223,7 +225,7 @@ pub fn pressure_mass<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
     viscosity: f64,
-) -> Result<gluey_linalg::SparseMatrix, gluey_linalg::SparseError>
+) -> Result<SparseMatrix, SparseError>
 where
     Dim<D>: Space<D>,
 {
@@ -241,7 +243,13 @@ where
         });
     }
     let expansion = crate::assembly::pressure_expansion(system);
-    let mut triplets = Vec::new();
+    let unknowns = |c: &ActiveCell| {
+        let nodes = discretisation.pressure.cell(c.cell as usize).iter();
+        nodes.flat_map(|&q| expansion.of(q as usize)).map(|term| term.0 as usize).collect::<Vec<_>>()
+    };
+    let groups: Vec<Vec<usize>> = system.cells.iter().map(unknowns).collect();
+    let mut mass = SparseMatrix::zeros(Arc::new(Pattern::from_groups(system.pressure.dim(), &groups)?));
+    drop(groups);
     for c in &system.cells {
         let nodes = discretisation.pressure.cell(c.cell as usize);
         let scale = c.volume / mean[c.cell as usize];
@@ -250,15 +258,16 @@ where
                 let value = scale * reference.pressure_mass[i * m + j];
                 for &(r, wr) in expansion.of(row as usize) {
                     for &(c, wc) in expansion.of(column as usize) {
-                        triplets.push((r as usize, c as usize, wr * wc * value));
+                        mass.add(r as usize, c as usize, wr * wc * value)?;
                     }
                 }
             }
         }
     }
-    let dim = system.pressure.dim();
-    triplets.extend((0..dim).filter(|&q| !system.pressure.is_free(q)).map(|q| (q, q, 1.0)));
-    gluey_linalg::SparseMatrix::from_triplets(dim, dim, &triplets)
+    for q in (0..system.pressure.dim()).filter(|&q| !system.pressure.is_free(q)) {
+        mass.add(q, q, 1.0)?;
+    }
+    Ok(mass)
 }
 
 #[cfg(test)]
