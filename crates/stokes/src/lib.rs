@@ -33,6 +33,7 @@ mod multigrid;
 mod pressure;
 mod problem;
 mod refine;
+mod schur;
 mod solid;
 mod solver;
 mod space;

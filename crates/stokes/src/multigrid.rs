@@ -1,7 +1,8 @@
 //! Krylov solution of the Stokes system with a multigrid preconditioner.
 //!
 //! FGMRES (Saad 1993) on `[A, -B^T; -B, 0]` with the block triangular preconditioner `z_p = -S^-1 r_p`,
-//! `z_u = V (r_u + B^T z_p)`: `S` is the pressure mass matrix over the viscosity, `V` one `f32` V-cycle on the velocity.
+//! `z_u = V (r_u + B^T z_p)`: `S` is close to the Schur complement (see [`crate::schur`]), `V` one `f32` V-cycle on the
+//! velocity.
 //! The levels are the tree's own: level `l` is the mesh cut at depth `l`. On every level the solid nodes of that level
 //! are eliminated; a coarse correction enters as the rigid motion that fits it best. In the `paper` formulation the
 //! finest level is the penalised operator, and below it, on the same mesh, lies a level that moves every node the solid
@@ -13,8 +14,7 @@ use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 use gluey_linalg::{
-    Chebyshev, DirectSpd, Fgmres, FgmresParams, Guess, Jacobi, Ordering, Preconditioner, Reference,
-    RefinementParams, SparseMatrix, SpectralInterval, Symbolic, vector,
+    DirectSpd, Fgmres, FgmresParams, Ordering, Preconditioner, Reference, RefinementParams, Symbolic, vector,
 };
 
 use crate::assembly::{Unknowns, assemble_viscous};
@@ -22,15 +22,14 @@ use crate::discretisation::{Discretisation, solid_nodes};
 use crate::error::StokesError;
 use crate::level::{Level, Transfer};
 use crate::pressure::WeakPressures;
+use crate::schur::SchurInverse;
 use crate::solid::SolidStress;
 use crate::solver::{Preparation, SaddleSolver, SolveReport};
 use crate::space::VelocitySpace;
-use crate::system::{Penalty, StokesSystem, SystemOperator, pressure_mass};
+use crate::system::{Penalty, StokesSystem, SystemOperator};
 
 /// Depth of the coarsest mesh.
 const COARSEST_LEVEL: u8 = 2;
-/// Chebyshev steps for a pressure mass matrix.
-const MASS_STEPS: usize = 8;
 
 /// FGMRES with a multigrid preconditioner.
 pub struct MultigridSolver<const D: usize>
@@ -39,7 +38,7 @@ where
 {
     krylov: Fgmres<f64, f32>,
     cycle: Option<VCycle<D>>,
-    schur: Option<MassInverse>,
+    schur: Option<SchurInverse>,
 }
 
 impl<const D: usize> Default for MultigridSolver<D>
@@ -73,8 +72,7 @@ where
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError> {
         self.cycle = Some(VCycle::new(discretisation, system, preparation)?);
-        let mass = pressure_mass(discretisation, system, preparation.viscosity)?;
-        self.schur = Some(MassInverse::new::<D>(mass)?);
+        self.schur = Some(SchurInverse::new(discretisation, system, preparation.viscosity)?);
         Ok(())
     }
 
@@ -118,7 +116,7 @@ where
 {
     system: &'a StokesSystem<D>,
     cycle: &'a mut VCycle<D>,
-    schur: &'a mut MassInverse,
+    schur: &'a mut SchurInverse,
     load: Vec<f64>,
     pressure: Vec<f64>,
 }
@@ -142,28 +140,6 @@ where
         self.system.space.reduce(&mut self.load);
         vector::residual_from_product(ru, &mut self.load);
         self.cycle.apply(&self.load, zu);
-    }
-}
-
-/// Approximate inverse of the weighted pressure mass matrix.
-struct MassInverse {
-    mass: SparseMatrix,
-    jacobi: Jacobi<f64>,
-    chebyshev: Chebyshev<f64>,
-}
-
-impl MassInverse {
-    fn new<const D: usize>(mass: SparseMatrix) -> Result<Self, StokesError> {
-        let jacobi = Jacobi::new(&mass.diagonal())
-            .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
-        // Bounds of every cell's mass matrix relative to its diagonal, hence of their sum.
-        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: 1.5f64.powi(D as i32) };
-        let chebyshev = Chebyshev::new(mass.pattern().row_count(), MASS_STEPS, interval);
-        Ok(Self { mass, jacobi, chebyshev })
-    }
-
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
     }
 }
 

@@ -1,0 +1,55 @@
+//! Approximate inverse of the pressure Schur complement `S = B A^-1 B^T`.
+//!
+//! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so `S <= M / (2 eta)` with the
+//! pressure mass matrix `M`, and most pressures come close to equality. Hence `S^-1` is taken to be `2 eta M^-1`: the
+//! eigenvalues then gather at one, where those of the velocity block are. `M^-1` is Chebyshev iteration on the matrix scaled by
+//! its diagonal (Wathen and Rees 2009).
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Chebyshev, Guess, Jacobi, SparseMatrix, SpectralInterval, estimate_lambda_max};
+
+use crate::discretisation::Discretisation;
+use crate::error::StokesError;
+use crate::system::{StokesSystem, pressure_mass};
+
+/// Chebyshev steps.
+const STEPS: usize = 8;
+/// Lanczos steps for the largest eigenvalue. The bound `(3/2)^D` of a cell does not hold for its matrix in the unknowns:
+/// the pressures that an aggregate or a hanging node takes from others add up.
+const LANCZOS_STEPS: usize = 15;
+/// Factor by which that estimate is raised.
+const SAFETY: f64 = 1.1;
+
+/// `2 eta M^-1`, up to Chebyshev's error.
+pub struct SchurInverse {
+    /// `M / (2 eta)`.
+    mass: SparseMatrix,
+    jacobi: Jacobi<f64>,
+    chebyshev: Chebyshev<f64>,
+}
+
+impl SchurInverse {
+    /// For the pressures of `system`.
+    pub fn new<const D: usize>(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        viscosity: f64,
+    ) -> Result<Self, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let mut mass = pressure_mass(discretisation, system, viscosity)?;
+        mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
+        let mut jacobi = Jacobi::new(&mass.diagonal())
+            .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
+        let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
+        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
+        let chebyshev = Chebyshev::new(mass.pattern().row_count(), STEPS, interval);
+        Ok(Self { mass, jacobi, chebyshev })
+    }
+
+    /// `z` close to `S^-1 r`.
+    pub fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
+    }
+}
