@@ -25,8 +25,11 @@ const RIGID_SMOOTHING: Smoothing = Smoothing { degree: 3, ratio: 10.0 };
 /// measured on two spheres, a/h = 3.2, r = 1e3: 86 iterations with (3, 10), 41 with (6, 30), 32 with (10, 80), 32 with
 /// (15, 200).
 const PENALISED_SMOOTHING: Smoothing = Smoothing { degree: 10, ratio: 80.0 };
-/// Factor by which the estimate of the largest eigenvalue is raised.
-const SMOOTHER_SAFETY: f64 = 1.15;
+/// Factor by which [`cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not sums over cells: they
+/// add 2 % at most where measured.
+const RIGID_SAFETY: f64 = 1.05;
+/// Factor by which the estimate of the largest eigenvalue on the penalised level is raised.
+const PENALISED_SAFETY: f64 = 1.15;
 /// Lanczos steps for that estimate.
 const LANCZOS_STEPS: usize = 10;
 
@@ -201,13 +204,14 @@ where
             applications: 0,
             space,
         };
-        let lambda_max = match smoothed.contains(&true) {
-            true => estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?,
-            // Nothing to smooth: any interval will do.
-            false => 1.0,
+        let (lambda_max, safety, smoothing) = match operator.penalty.is_some() && smoothed.contains(&true) {
+            true => {
+                let estimate = estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
+                (estimate, PENALISED_SAFETY, PENALISED_SMOOTHING)
+            }
+            false => (cell_lambda_max::<D>(), RIGID_SAFETY, RIGID_SMOOTHING),
         };
-        let smoothing = if operator.penalty.is_some() { PENALISED_SMOOTHING } else { RIGID_SMOOTHING };
-        let interval = SpectralInterval::upper_part(lambda_max, smoothing.ratio, SMOOTHER_SAFETY);
+        let interval = SpectralInterval::upper_part(lambda_max, smoothing.ratio, safety);
         let zeros = || vec![0.0; dim];
         Ok(Self {
             operator,
@@ -256,6 +260,16 @@ where
         self.operator.space.project(&mut self.r);
         vector::axpy(1.0, &self.r, &mut self.x);
     }
+}
+
+/// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds that of sums over
+/// cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 % (3D) too large.
+fn cell_lambda_max<const D: usize>() -> f64 {
+    let n = Reference::<D>::VELOCITY;
+    let viscous = Reference::<D>::new().viscous;
+    let scale = |i: usize| viscous[i * (n + 1)].sqrt();
+    let scaled = nalgebra::DMatrix::from_fn(n, n, |i, j| viscous[i * n + j] / (scale(i) * scale(j)));
+    scaled.symmetric_eigenvalues().max()
 }
 
 /// The nodes of all cells that have a marked node.
@@ -365,4 +379,46 @@ where
         inverses.extend(block.iter().map(|&m| m as f32));
     }
     Ok(inverses)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretisation::solid_nodes;
+    use gluey_fem::TreeMesh;
+    use gluey_geom::{Aabb, Vector};
+    use gluey_levelset::Ball;
+
+    /// With hanging nodes, bodies and cells that two bodies share.
+    fn eigenvalues_stay_below_the_interval<const D: usize>(gap: f64)
+    where
+        Dim<D>: Space<D>,
+    {
+        let centres = [-1.0, 1.0].map(|side| {
+            let mut centre = Vector::<D>::repeat(0.47);
+            centre[0] += side * (0.2 + 0.5 * gap);
+            centre
+        });
+        let balls = centres.map(|centre| Ball::new(centre, 0.2));
+        let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 5, |lower, h, level| {
+            level < 3 || centres.iter().any(|c| ((lower - c).norm() - 0.2).abs() < 2.0 * h)
+        })
+        .unwrap();
+        let discretisation = Discretisation::new(mesh);
+        assert!(!discretisation.velocity.constraints().is_empty());
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, -0.1);
+        let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
+        let mut level = Level::rigid(&discretisation, space, 1.7, 0).unwrap();
+        let largest = estimate_lambda_max(&mut level.operator, &mut level.diagonal, 40).unwrap();
+        let upper = level.chebyshev.interval().upper;
+        assert!(largest < upper && upper < 1.2 * largest, "{largest} {upper}");
+    }
+
+    #[test]
+    fn the_bound_of_a_cell_holds_on_the_mesh() {
+        for gap in [0.001, 0.02, 0.1] {
+            eigenvalues_stay_below_the_interval::<2>(gap);
+            eigenvalues_stay_below_the_interval::<3>(gap);
+        }
+    }
 }

@@ -12,7 +12,6 @@ use std::sync::Arc;
 
 use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
-use gluey_levelset::Ball;
 use gluey_linalg::{
     DirectSpd, Fgmres, FgmresParams, Ordering, Preconditioner, Reference, RefinementParams, Symbolic, vector,
 };
@@ -175,7 +174,10 @@ where
         let mut levels = Vec::with_capacity(meshes.len() + 1);
         for (index, mesh) in meshes.iter().enumerate() {
             let is_finest = index + 1 == meshes.len();
-            let space = rigid_space(mesh, preparation, is_finest);
+            let space = match is_finest {
+                true => finest_rigid_space(system, preparation),
+                false => rigid_space(mesh, preparation),
+            };
             levels.push(Level::rigid(mesh, space, preparation.viscosity, index)?);
         }
         let mut transfers: Vec<Transfer<D>> = meshes
@@ -248,21 +250,25 @@ where
 }
 
 /// Velocities of one level with the bodies' nodes on it eliminated.
-fn rigid_space<const D: usize>(
-    mesh: &Discretisation<D>,
+fn rigid_space<const D: usize>(mesh: &Discretisation<D>, preparation: &Preparation<'_, D>) -> VelocitySpace<D>
+where
+    Dim<D>: Space<D>,
+{
+    let solid = solid_nodes(&mesh.mesh, &mesh.velocity, preparation.bodies, preparation.offset);
+    VelocitySpace::new(mesh.velocity.clone(), preparation.bodies, &solid)
+}
+
+/// The same on the finest mesh: the space of the system, or that in which all nodes the penalised solid touches are rigid.
+fn finest_rigid_space<const D: usize>(
+    system: &StokesSystem<D>,
     preparation: &Preparation<'_, D>,
-    is_finest: bool,
 ) -> VelocitySpace<D>
 where
     Dim<D>: Space<D>,
 {
-    let bodies: &[Ball<D>] = preparation.bodies;
     match preparation.touched {
-        Some(touched) if is_finest => VelocitySpace::new(mesh.velocity.clone(), bodies, touched),
-        _ => {
-            let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, preparation.offset);
-            VelocitySpace::new(mesh.velocity.clone(), bodies, &solid)
-        }
+        Some(touched) => VelocitySpace::new(system.space.shared_nodes(), preparation.bodies, touched),
+        None => system.space.clone(),
     }
 }
 

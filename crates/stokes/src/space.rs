@@ -16,6 +16,8 @@ use gluey_linalg::Scalar;
 /// Which body, if any, each node moves with.
 pub type SolidNodes = Vec<Option<u32>>;
 
+const NO_BODY: u32 = u32::MAX;
+
 /// A node that moves with a body, with its arm in units of the body's radius.
 #[derive(Clone, Debug)]
 struct RigidNode<const D: usize> {
@@ -30,7 +32,8 @@ pub struct VelocitySpace<const D: usize> {
     nodes: Arc<NodeMap<D>>,
     boundary: Vec<u32>,
     rigid: Vec<RigidNode<D>>,
-    body_of: SolidNodes,
+    /// Body of each node, or [`NO_BODY`].
+    body_of: Vec<u32>,
     radius: Vec<f64>,
     /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough nodes.
     fit: Vec<Option<Vec<f64>>>,
@@ -47,7 +50,7 @@ where
         let boundary = (0..nodes.node_count() as u32).filter(|&n| nodes.is_on_boundary(n as usize)).collect();
         let rigid = rigid_nodes(&nodes, bodies, solid);
         let mut space = Self {
-            body_of: vec![None; nodes.node_count()],
+            body_of: vec![NO_BODY; nodes.node_count()],
             nodes,
             boundary,
             radius: bodies.iter().map(|b| b.bounding_radius()).collect(),
@@ -57,7 +60,7 @@ where
         let fit = &space.fit;
         space.rigid.retain(|r| fit[r.body as usize].is_some());
         for r in &space.rigid {
-            space.body_of[r.node as usize] = Some(r.body);
+            space.body_of[r.node as usize] = r.body;
         }
         space
     }
@@ -65,6 +68,11 @@ where
     /// The nodes.
     pub fn nodes(&self) -> &NodeMap<D> {
         &self.nodes
+    }
+
+    /// The nodes, to share them with another space.
+    pub fn shared_nodes(&self) -> Arc<NodeMap<D>> {
+        self.nodes.clone()
     }
 
     /// Number of bodies, active or not.
@@ -89,12 +97,12 @@ where
 
     /// The body a node moves with.
     pub fn body_of(&self, node: usize) -> Option<u32> {
-        self.body_of[node]
+        Some(self.body_of[node]).filter(|&body| body != NO_BODY)
     }
 
     /// Whether the velocity of a node is an unknown of its own.
     pub fn is_free(&self, node: usize) -> bool {
-        self.body_of[node].is_none() && !self.nodes.is_on_boundary(node) && !self.nodes.is_hanging(node)
+        self.body_of[node] == NO_BODY && !self.nodes.is_on_boundary(node) && !self.nodes.is_hanging(node)
     }
 
     /// `u = T x` in place: sets the nodal velocities of rigid and hanging nodes; those of the boundary stay as they are.
