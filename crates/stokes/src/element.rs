@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Space};
 use crate::discretisation::Discretisation;
 use crate::system::StokesSystem;
 
-/// The fluid of a direct solve is so compressible, relative to its viscosity: enough to make pressures that no
-/// velocity sees harmless, too little to matter.
+/// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures that no
+/// velocity sees harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
 /// The matrices of the active cells.

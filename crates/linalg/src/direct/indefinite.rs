@@ -15,7 +15,7 @@ use faer::Conj;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::IntranodeLbltRef;
 
-use super::refinement::Refinement;
+use super::refinement::{Refinement, rounding_norm};
 use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
 use crate::{Preconditioner, SparseMatrix, vector};
 
@@ -151,6 +151,11 @@ impl DirectIndefinite {
     /// Norms of the true residual in the last solve, the first before refinement.
     pub fn residual_history(&self) -> &[f64] {
         self.refinement.history()
+    }
+
+    /// Norm of the residual `b - A x` that rounding alone leaves: no solver in this precision does better.
+    pub fn rounding_norm(&self, b: &[f64], x: &[f64]) -> f64 {
+        rounding_norm(&self.matrix, b, x)
     }
 
     /// Changes the tolerance of later solves.

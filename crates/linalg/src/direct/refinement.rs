@@ -103,7 +103,7 @@ impl Refinement {
 }
 
 /// Norm of the residual that rounding alone leaves.
-fn rounding_norm(a: &SparseMatrix, b: &[f64], x: &[f64]) -> f64 {
+pub(super) fn rounding_norm(a: &SparseMatrix, b: &[f64], x: &[f64]) -> f64 {
     let pattern = a.pattern();
     let mut sum = 0.0;
     for (row, b) in b.iter().enumerate() {

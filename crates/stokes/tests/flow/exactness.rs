@@ -2,12 +2,15 @@
 
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Formulation, SolverKind};
+use gluey_stokes::Formulation;
 
 use crate::support::{
     RIGID, SOLVERS, bands, bump, couette, graded, mesh, nodal_error, paper, params, solve, strain_inside,
     twist_distance,
 };
+
+/// Size of the wrong start; tolerances are relative to the residual it leaves.
+const DETOUR: f64 = 0.01;
 
 fn couette_flow_is_found<const D: usize>()
 where
@@ -16,14 +19,14 @@ where
     for formulation in [RIGID, paper(1e3, 1)] {
         for solver in SOLVERS {
             let mesh = graded::<D>(3 - (D as u8 - 2));
-            let start = |x: &Vector<D>| couette(x) + bump(x);
+            let start = |x: &Vector<D>| couette(x) + bump(x) * DETOUR;
             let flow = solve(params(formulation, solver, 1e-13), mesh, &[], &start);
             assert!(!flow.discretisation.velocity.constraints().is_empty());
-            assert!(nodal_error(&flow, &start) > 0.1, "the start is no solution");
+            assert!(nodal_error(&flow, &start) > 1e-3, "the start is no solution");
             let error = nodal_error(&flow, &couette);
             assert!(error < 1e-10, "{D}D, {solver:?}: {error:e}");
             let pressure = flow.pressure.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
-            assert!(pressure < 1e-8, "{D}D, {solver:?}: pressure {pressure:e}");
+            assert!(pressure < 1e-10, "{D}D, {solver:?}: pressure {pressure:e}");
         }
     }
 }
@@ -56,25 +59,24 @@ fn an_empty_box_keeps_its_undisturbed_flow() {
     undisturbed_flow_stays::<3>();
 }
 
-/// `u = y (1 - y) e_x`, `p = -2 x`. The direct solver's fluid is compressible by
-/// `1e-9 p`, and what that adds up to leaves at the corner whose pressure it fixes.
+/// `u = y (1 - y) e_x`, `p = -2 x`. A residual at a pressure node is its error times the volume of a cell, so the same
+/// tolerance leaves more of the pressure in 3D.
 fn poiseuille_flow_is_found<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
     let poiseuille = |x: &Vector<D>| couette::<D>(&Vector::from_fn(|_, _| 0.5 + x[1] * (1.0 - x[1])));
-    for (solver, tolerance, pressure) in
-        [(SolverKind::Direct, 1e-6, 1e-3), (SolverKind::Multigrid, 1e-10, 1e-8)]
-    {
-        let start = |x: &Vector<D>| poiseuille(x) + bump(x);
+    let tolerance = 1e-10 * 10f64.powi(D as i32 - 2);
+    for solver in SOLVERS {
+        let start = |x: &Vector<D>| poiseuille(x) + bump(x) * DETOUR;
         let flow = solve(params(RIGID, solver, 1e-13), graded::<D>(2), &[], &start);
         let error = nodal_error(&flow, &poiseuille);
-        assert!(error < tolerance, "{D}D, {solver:?}: {error:e}");
+        assert!(error < 1e-10, "{D}D, {solver:?}: {error:e}");
         let nodes = &flow.discretisation.pressure;
         let first = flow.pressure[0] + 2.0 * nodes.point(0)[0];
         for (n, p) in flow.pressure.iter().enumerate() {
             let error = p + 2.0 * nodes.point(n)[0] - first;
-            assert!(error.abs() < pressure, "{D}D, {solver:?}, node {n}: {error:e}");
+            assert!(error.abs() < tolerance, "{D}D, {solver:?}, node {n}: {error:e}");
         }
     }
 }
