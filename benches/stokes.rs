@@ -1,4 +1,4 @@
-//! Timings of the Stokes core: operator, linear solves, one Uzawa step, and the flow of a whole time step.
+//! Timings of the Stokes core: operator, V-cycle, linear solves, one Uzawa step, and the flow of a whole time step.
 //!
 //! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
 
@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, Ramp};
-use gluey_linalg::LinOp;
+use gluey_linalg::{LinOp, Preconditioner};
 use gluey_stokes::{
     DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver, PaperParams, Penalty,
     PointMatrices, Preparation, Refinement, SaddleSolver, SolidRegion, SolidStress, SolverKind, StokesSystem,
@@ -140,6 +140,22 @@ where
     group.finish();
 }
 
+/// One V-cycle on the velocities; throughput in unknowns.
+fn cycle<const D: usize>(criterion: &mut Criterion, name: &str, problem: &Problem<D>)
+where
+    Dim<D>: Space<D>,
+{
+    let mut group = criterion.benchmark_group(format!("cycle-{D}d"));
+    group.throughput(Throughput::Elements(problem.dofs()));
+    let mut solver = MultigridSolver::default();
+    problem.prepare(&mut solver);
+    let cycle = solver.velocity_cycle().expect("the solver is prepared");
+    let r = &problem.b[..problem.system.velocity_dim()];
+    let mut z = vec![0.0; r.len()];
+    group.bench_function(BenchmarkId::new(name, problem.dofs()), |b| b.iter(|| cycle.apply(r, &mut z)));
+    group.finish();
+}
+
 /// Set-up of a solver, and a solve from zero to the tolerance; throughput in unknowns.
 fn solver<const D: usize, S: SaddleSolver<D> + Default>(
     criterion: &mut Criterion,
@@ -204,6 +220,13 @@ fn operators(criterion: &mut Criterion) {
     operator(criterion, "paper", &Problem::penalised(pair_3d(), 6));
 }
 
+fn cycles(criterion: &mut Criterion) {
+    cycle(criterion, "rigid-dofs", &Problem::rigid(pair_2d(), 8));
+    cycle(criterion, "paper", &Problem::penalised(pair_2d(), 7));
+    cycle(criterion, "rigid-dofs", &Problem::rigid(pair_3d(), 6));
+    cycle(criterion, "paper", &Problem::penalised(pair_3d(), 6));
+}
+
 fn solvers(criterion: &mut Criterion) {
     let (rigid, soft) = (Problem::rigid(pair_2d(), 8), Problem::penalised(pair_2d(), 7));
     solver::<2, DirectSolver>(criterion, "rigid-dofs-direct", &rigid);
@@ -236,6 +259,6 @@ criterion_group! {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))
         .measurement_time(Duration::from_secs(1));
-    targets = operators, solvers, steps
+    targets = operators, cycles, solvers, steps
 }
 criterion_main!(benches);

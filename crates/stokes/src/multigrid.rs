@@ -54,6 +54,11 @@ impl<const D: usize> MultigridSolver<D>
 where
     Dim<D>: Space<D>,
 {
+    /// One V-cycle on the velocity block, for reduced velocities; `None` before the solver was prepared.
+    pub fn velocity_cycle(&mut self) -> Option<&mut impl Preconditioner<f64>> {
+        self.cycle.as_mut()
+    }
+
     /// Levels of the V-cycle it was prepared with.
     pub fn level_count(&self) -> usize {
         self.cycle.as_ref().map_or(0, |cycle| cycle.levels.len())
@@ -309,3 +314,6 @@ impl CoarseSolver {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,9 @@
 
 mod errors;
 mod exactness;
+mod forces;
 mod formulations;
+mod operators;
 mod orders;
 mod pairs;
 mod single;
