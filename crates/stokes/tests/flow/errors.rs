@@ -1,6 +1,6 @@
 //! What cannot be computed is answered with a typed error that says why.
 
-use gluey_fem::MeshError;
+use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::KrylovError;
@@ -9,7 +9,8 @@ use gluey_stokes::{
 };
 
 use crate::support::{
-    RADIUS, RIGID, SOLVERS, balls, bands, couette, mesh, no_clock, paper, params, try_solve,
+    RADIUS, RIGID, SOLVERS, balls, bands, bump, couette, mesh, no_clock, pair_at, paper, params, try_solve,
+    twist_distance,
 };
 
 fn one_disc() -> Vec<Ball<2>> {
@@ -67,6 +68,7 @@ fn parameters_out_of_range_are_named() {
         ("offset", rigid(-1.01)),
         ("offset", rigid(f64::NAN)),
         ("viscosity_ratio", soft(PaperParams { viscosity_ratio: 1.0, ..usual })),
+        ("viscosity_ratio", soft(PaperParams { viscosity_ratio: -5.0, ..usual })),
         ("viscosity_ratio", soft(PaperParams { viscosity_ratio: f64::NAN, ..usual })),
         ("rho", soft(PaperParams { rho: 0.0, ..usual })),
         ("rho", soft(PaperParams { rho: 4.0, ..usual })),
@@ -124,5 +126,37 @@ fn a_mesh_beyond_the_finest_lattice_is_refused() {
         let refinement = Refinement { gap_fraction: 1.0, gap_levels, ..bands(surface) };
         let refused = refinement.mesh(Aabb::unit(), [1; 2], [false; 2], &one_disc());
         assert!(matches!(refused, Err(MeshError::TooFine { .. })), "{:?}", refused.map(|m| m.cell_count()));
+    }
+}
+
+/// Discs that touch, and discs that overlap a little: cells and even nodes belong to both.
+#[test]
+fn touching_bodies_that_share_cells_are_no_obstacle() {
+    for gap in [0.0, -0.05] {
+        let pair = pair_at(Vector::<2>::new(0.503, 0.497), gap, 30.0);
+        for formulation in [RIGID, paper(1e3, 1)] {
+            let [direct, multigrid] = SOLVERS.map(|solver| {
+                try_solve(params(formulation, solver, 1e-10), mesh(&bands(6), &pair), &pair, &couette)
+                    .unwrap()
+                    .twists
+            });
+            assert!(twist_distance(&direct, &multigrid) < 1e-7, "{formulation:?}, gap {gap}");
+            assert!(direct.iter().all(|t| t.velocity.amax() < 0.1), "{direct:?}");
+        }
+    }
+}
+
+/// The coarsest mesh that a tree has may be fine, and a tree may have but one.
+#[test]
+fn meshes_that_cannot_be_coarsened_are_solved_on() {
+    for (roots, level) in [([3, 3], 0), ([3, 3], 1), ([7, 7], 0), ([1, 1], 1)] {
+        let [direct, multigrid] = SOLVERS.map(|solver| {
+            let mesh = TreeMesh::uniform(Aabb::unit(), roots, [false; 2], level).unwrap();
+            let start = |x: &Vector<2>| couette(x) + bump(x);
+            try_solve(params(RIGID, solver, 1e-10), mesh, &[], &start).unwrap()
+        });
+        let difference = direct.velocity.iter().zip(&multigrid.velocity).map(|(a, b)| (a - b).abs());
+        let difference = difference.fold(0.0, f64::max);
+        assert!(difference < 1e-8, "{roots:?}, level {level}: {difference:e}");
     }
 }

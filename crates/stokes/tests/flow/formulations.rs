@@ -1,8 +1,11 @@
 //! How the penalised formulation tends to rigidity, and what both say of one flow.
 
-use gluey_geom::Vector;
-use gluey_levelset::Ball;
-use gluey_stokes::{Flow, Formulation, PaperParams, SolverKind};
+use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_levelset::{Ball, Ramp};
+use gluey_stokes::{
+    DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices, Preparation, SaddleSolver,
+    SolidRegion, SolverKind, StokesSystem, VelocitySpace, WeakPressures,
+};
 
 use crate::support::{
     RIGID, bands, couette, mesh, pair_at, pair_motion, paper, params, solve, strain_inside, twist_distance,
@@ -34,12 +37,63 @@ fn the_strain_inside_falls_as_the_viscosity_ratio_rises() {
     }
 }
 
-/// Slower than the strain: the ramp's outermost layer becomes part of the solid as it stiffens.
+/// Slower than the strain: the ramp's outermost layer becomes part of the solid as it stiffens. Where no ramp moves the
+/// surface, motions converge as fast, see below.
 #[test]
 fn motions_tend_to_a_limit_as_the_viscosity_ratio_rises() {
     let motions = [1e2, 1e3, 1e4, 1e5].map(|r| flow(paper(r, 1)).twists);
     let steps: Vec<f64> = motions.windows(2).map(|m| twist_distance(&m[0], &m[1])).collect();
     assert!(steps.windows(2).all(|s| s[1] < 0.6 * s[0]), "{steps:?}");
+}
+
+/// Flow around bodies that are the cells whose centre lies inside, eliminated: every node of these cells is rigid.
+fn twists_of_rigid_cells<const D: usize>(balls: &[Ball<D>], level: u8) -> Vec<Twist<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = Discretisation::new(mesh(&bands(level), balls));
+    let region = SolidRegion::new(&discretisation, balls, Ramp::new(STEP), &PointMatrices::new(1));
+    let solid = region.touched_nodes(&discretisation.velocity, balls);
+    let space = VelocitySpace::new(discretisation.velocity.clone(), balls, &solid);
+    let system = StokesSystem::new(&discretisation, space, 1.0, WeakPressures::Keep, None);
+    let nodes = &discretisation.velocity;
+    let mut lift: Vec<f64> =
+        (0..nodes.node_count()).flat_map(|n| couette(&nodes.point(n)).data.0[0]).collect();
+    lift.resize(system.velocity_dim(), 0.0);
+    system.space.expand(&mut lift);
+    let (mut b, mut x) = (vec![0.0; system.dim()], vec![0.0; system.dim()]);
+    system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
+    let preparation = Preparation { bodies: balls, offset: 0.0, viscosity: 1.0, touched: None };
+    let mut solver = DirectSolver::default();
+    solver.prepare(&discretisation, &system, &preparation).unwrap();
+    solver.solve(&system, &b, &mut x, 1e-12).unwrap();
+    (0..balls.len()).map(|body| system.space.twist(&x, body)).collect()
+}
+
+/// A ramp so thin that the solid fraction at a cell's centre, the only quadrature point, is 0 or 1.
+const STEP: f64 = 1e-12;
+
+fn penalised_cells_become_rigid<const D: usize>(balls: &[Ball<D>], level: u8)
+where
+    Dim<D>: Space<D>,
+{
+    let rigid = twists_of_rigid_cells(balls, level);
+    let cell = 0.5f64.powi(level.into());
+    let errors = [1e2, 1e3, 1e4].map(|viscosity_ratio| {
+        let ramp = STEP / cell;
+        let cells = PaperParams { viscosity_ratio, ramp, quadrature: 1, ..PaperParams::default() };
+        let params = params(Formulation::Paper(cells), SolverKind::Direct, 1e-12);
+        twist_distance(&solve(params, mesh(&bands(level), balls), balls, &couette).twists, &rigid)
+    });
+    let ratios = [errors[0] / errors[1], errors[1] / errors[2]];
+    assert!((7.0..11.0).contains(&ratios[0]) && (9.0..11.0).contains(&ratios[1]), "{D}D: {errors:?}");
+}
+
+/// With the same cells solid in both, the penalised motion tends to that of the eliminated bodies as `1/r`.
+#[test]
+fn penalised_cells_move_as_rigid_ones_up_to_the_inverse_of_the_viscosity_ratio() {
+    penalised_cells_become_rigid(&pair(), 6);
+    penalised_cells_become_rigid(&[Ball::new(Vector::<3>::new(0.45, 0.56, 0.52), 0.2)], 4);
 }
 
 /// A step of size `rho` leaves `1 - rho / 2` of the strain, since the form carries `2 eta_s` and the multiplier `eta_s`.

@@ -23,6 +23,21 @@ fn direct_and_multigrid_agree() {
     }
 }
 
+/// The two discs that nearly touch, on cells far larger than their gap.
+#[test]
+fn direct_and_multigrid_agree_on_the_doublet() {
+    for formulation in [RIGID, paper(1e3, 1)] {
+        let uniform = || TreeMesh::uniform(Aabb::unit(), [1; 2], [false; 2], 6).unwrap();
+        let [direct, multigrid] =
+            SOLVERS.map(|s| solve(params(formulation, s, 3e-12), uniform(), &doublet(), &couette));
+        let difference = twist_distance(&direct.twists, &multigrid.twists);
+        assert!(difference < 1e-8, "{formulation:?}: twists {difference:e}");
+        let fields = direct.velocity.iter().zip(&multigrid.velocity);
+        let difference = fields.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+        assert!(difference < 1e-8, "{formulation:?}: nodes {difference:e}");
+    }
+}
+
 fn iterations<const D: usize>(formulation: Formulation, balls: &[Ball<D>], levels: &[u8]) -> Vec<usize>
 where
     Dim<D>: Space<D>,
