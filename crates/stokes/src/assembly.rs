@@ -187,7 +187,22 @@ pub fn assemble_viscous<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let unknowns = Unknowns::new(system.velocity_dim(), |k| keeps_velocity(&system.space, k));
+    assemble_viscous_on(discretisation, system, |_| true)
+}
+
+/// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all twists.
+pub fn assemble_viscous_on<const D: usize>(
+    discretisation: &Discretisation<D>,
+    system: &StokesSystem<D>,
+    keep: impl Fn(usize) -> bool,
+) -> Result<Assembled, SparseError>
+where
+    Dim<D>: Space<D>,
+{
+    let nodal = system.space.full_dim();
+    let unknowns = Unknowns::new(system.velocity_dim(), |k| {
+        keeps_velocity(&system.space, k) && (k >= nodal || keep(k / D))
+    });
     let velocity = velocity_expansion(&system.space).renumbered(0, &unknowns);
     let forms = |cell: usize, local: &mut CellForms| {
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
@@ -217,13 +232,17 @@ where
 {
     let numbering = Blocks::new(system, &unknowns);
     let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
-    for cell in &system.cells {
+    let mut cells = Vec::with_capacity(system.cells.len());
+    for (index, cell) in system.cells.iter().enumerate() {
         forms(cell.cell as usize, &mut local);
-        groups.push(local.terms.iter().map(|term| numbering.of[term.0 as usize] as usize));
+        if !local.terms.is_empty() {
+            groups.push(local.terms.iter().map(|term| numbering.of[term.0 as usize] as usize));
+            cells.push((index, cell));
+        }
     }
     let blocks = BlockPattern::new(numbering.first, groups)?;
     let mut reduction = Reduction::new(unknowns.positions.len(), elements.size());
-    let mut cells = system.cells.iter().enumerate();
+    let mut cells = cells.into_iter();
     let matrix = blocks.sum(|group, target| {
         let Some((index, cell)) = cells.next() else { return };
         forms(cell.cell as usize, &mut local);

@@ -1,7 +1,7 @@
 //! Why a flow could not be computed.
 
 use gluey_fem::MeshError;
-use gluey_linalg::{DirectError, KrylovError, SparseError};
+use gluey_linalg::{BlockError, DirectError, KrylovError, SparseError};
 
 /// Failure of a Stokes solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -35,6 +35,9 @@ pub enum StokesError {
     /// A matrix could not be assembled.
     #[error(transparent)]
     Assembly(#[from] SparseError),
+    /// The matrix of a cell is not positive definite.
+    #[error(transparent)]
+    Cell(#[from] BlockError),
     /// The direct solver failed.
     #[error(transparent)]
     Direct(#[from] DirectError),

@@ -3,14 +3,12 @@
 use gluey_fem::kernel::{CellBatches, CubeKernel};
 use gluey_fem::{Interpolation, NodeMap, Reference};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{
-    Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, invert_spd, vector,
-};
+use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, invert_spd, vector};
 
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, Penalty, active_cells, batches};
+use crate::system::{ActiveCell, active_cells, batches};
 
 /// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue it damps.
 #[derive(Clone, Copy, Debug)]
@@ -19,19 +17,11 @@ struct Smoothing {
     ratio: f64,
 }
 
-/// On levels with rigid bodies. Degrees from 2 to 6 cost the same in all.
-const RIGID_SMOOTHING: Smoothing = Smoothing { degree: 3, ratio: 10.0 };
-/// On the penalised level the smoother also has to reduce the strain inside the bodies, which no coarser level sees:
-/// measured on two spheres, a/h = 3.2, r = 1e3: 86 iterations with (3, 10), 41 with (6, 30), 32 with (10, 80), 32 with
-/// (15, 200).
-const PENALISED_SMOOTHING: Smoothing = Smoothing { degree: 10, ratio: 80.0 };
+/// Degrees from 2 to 6 cost the same in all.
+const SMOOTHING: Smoothing = Smoothing { degree: 3, ratio: 10.0 };
 /// Factor by which [`cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not sums over cells: they
 /// add 2 % at most where measured.
-const RIGID_SAFETY: f64 = 1.05;
-/// Factor by which the estimate of the largest eigenvalue on the penalised level is raised.
-const PENALISED_SAFETY: f64 = 1.15;
-/// Lanczos steps for that estimate.
-const LANCZOS_STEPS: usize = 10;
+const SAFETY: f64 = 1.05;
 
 /// The viscous operator `T^T A T` of one level.
 #[derive(Clone, Debug)]
@@ -40,9 +30,7 @@ pub struct LevelOperator<const D: usize> {
     pub space: VelocitySpace<D>,
     kernel: CubeKernel<f32, D>,
     batches: CellBatches<f32>,
-    penalty: Option<Penalty<f32, D>>,
     work: Vec<f32>,
-    penalty_work: Vec<f32>,
     /// Fraction of the cells that are not rigid on which it acts.
     share: f64,
     applications: usize,
@@ -69,11 +57,6 @@ where
         self.space.expand(&mut self.work);
         vector::clear(y);
         self.kernel.viscous(&self.batches, &self.work, y);
-        if let Some(penalty) = &self.penalty {
-            self.penalty_work.fill(0.0);
-            penalty.stress.apply(self.space.nodes(), &self.work, &mut self.penalty_work);
-            vector::axpy(penalty.factor, &self.penalty_work, y);
-        }
         self.space.reduce(y);
     }
 }
@@ -105,15 +88,6 @@ impl Preconditioner<f32> for BlockDiagonal {
             }
         }
     }
-}
-
-/// How a level hangs on the next coarser one.
-#[derive(Clone, Debug)]
-pub enum Transfer<const D: usize> {
-    /// The coarser level has the same mesh, with rigid bodies.
-    SameMesh,
-    /// The coarser level has a coarser mesh.
-    Mesh(Interpolation<D>),
 }
 
 /// One level of the multigrid.
@@ -153,29 +127,15 @@ where
         for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
             nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
         }
-        Self::new(discretisation, space, viscosity, &finest, None, index)
+        Self::new(discretisation, space, viscosity, &finest, index)
     }
 
-    /// The penalised level, which smooths around the solid only: elsewhere the rigid level on the same mesh has the same
-    /// operator.
-    pub fn penalised(
-        discretisation: &Discretisation<D>,
-        space: VelocitySpace<D>,
-        viscosity: f64,
-        penalty: Penalty<f32, D>,
-        touched: &[Option<u32>],
-        index: usize,
-    ) -> Result<Self, StokesError> {
-        let solid: Vec<bool> = touched.iter().map(Option::is_some).collect();
-        Self::new(discretisation, space, viscosity, &solid, Some(penalty), index)
-    }
-
+    /// A level that smooths around the nodes of `core`.
     fn new(
         discretisation: &Discretisation<D>,
         space: VelocitySpace<D>,
         viscosity: f64,
         core: &[bool],
-        penalty: Option<Penalty<f32, D>>,
         index: usize,
     ) -> Result<Self, StokesError> {
         let nodes = &discretisation.velocity;
@@ -187,36 +147,26 @@ where
         let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
-        let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed, penalty.as_ref())
+        let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed)
             .map_err(|reason| StokesError::Smoother { level: index, reason })?;
         if !smooths_twists {
             diagonal.twists.fill(0.0);
         }
         let dim = space.dim();
-        let penalty_work = if penalty.is_some() { dim } else { 0 };
-        let mut operator = LevelOperator {
+        let operator = LevelOperator {
             kernel: CubeKernel::default(),
             batches: batches(discretisation, &cells),
-            penalty,
             work: vec![0.0; dim],
-            penalty_work: vec![0.0; penalty_work],
             share: cells.len() as f64 / cell_count.max(1) as f64,
             applications: 0,
             space,
         };
-        let (lambda_max, safety, smoothing) = match operator.penalty.is_some() && smoothed.contains(&true) {
-            true => {
-                let estimate = estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
-                (estimate, PENALISED_SAFETY, PENALISED_SMOOTHING)
-            }
-            false => (cell_lambda_max::<D>(), RIGID_SAFETY, RIGID_SMOOTHING),
-        };
-        let interval = SpectralInterval::upper_part(lambda_max, smoothing.ratio, safety);
+        let interval = SpectralInterval::upper_part(cell_lambda_max::<D>(), SMOOTHING.ratio, SAFETY);
         let zeros = || vec![0.0; dim];
         Ok(Self {
             operator,
             diagonal,
-            chebyshev: Chebyshev::new(dim, smoothing.degree, interval),
+            chebyshev: Chebyshev::new(dim, SMOOTHING.degree, interval),
             b: zeros(),
             x: zeros(),
             r: zeros(),
@@ -236,27 +186,24 @@ where
     }
 
     /// Restricts the residual of this level to the right-hand side of the coarser one.
-    pub fn restrict(&mut self, transfer: &mut Transfer<D>, coarse: &VelocitySpace<D>, coarse_b: &mut [f32]) {
+    pub fn restrict(
+        &mut self,
+        transfer: &mut Interpolation<D>,
+        coarse: &VelocitySpace<D>,
+        coarse_b: &mut [f32],
+    ) {
         self.operator.apply(&self.x, &mut self.r);
         vector::residual_from_product(&self.b, &mut self.r);
         self.operator.space.spread(&mut self.r);
-        match transfer {
-            Transfer::SameMesh => {
-                vector::copy(&self.r[..coarse.full_dim()], &mut coarse_b[..coarse.full_dim()])
-            }
-            Transfer::Mesh(interpolation) => interpolation.restrict::<D>(&self.r, coarse_b),
-        }
+        transfer.restrict::<D>(&self.r, coarse_b);
         coarse.reduce(coarse_b);
     }
 
     /// Adds the correction `coarse_x` of the coarser level, whose entries it expands in place.
-    pub fn correct(&mut self, transfer: &Transfer<D>, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
+    pub fn correct(&mut self, transfer: &Interpolation<D>, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
         coarse.expand(coarse_x);
         let nodal = self.operator.space.full_dim();
-        match transfer {
-            Transfer::SameMesh => vector::copy(&coarse_x[..nodal], &mut self.r[..nodal]),
-            Transfer::Mesh(interpolation) => interpolation.prolong::<D>(coarse_x, &mut self.r[..nodal]),
-        }
+        transfer.prolong::<D>(coarse_x, &mut self.r[..nodal]);
         self.operator.space.project(&mut self.r);
         vector::axpy(1.0, &self.r, &mut self.x);
     }
@@ -273,7 +220,7 @@ fn cell_lambda_max<const D: usize>() -> f64 {
 }
 
 /// The nodes of all cells that have a marked node.
-fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+pub fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
     let mut around = vec![false; nodes.node_count()];
     for cell in 0..nodes.cell_count() {
         if nodes.cell(cell).iter().any(|&n| marked[n as usize]) {
@@ -284,7 +231,7 @@ fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> V
 }
 
 /// The cells with a marked node, or with a hanging node that hangs on one: those whose stress acts on marked nodes.
-fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+pub fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
     let mut acting = marked.to_vec();
     for constraint in nodes.constraints() {
         acting[constraint.node as usize] |= constraint.masters.iter().any(|m| marked[m.0 as usize]);
@@ -297,7 +244,6 @@ fn block_diagonal<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     smoothed: &[bool],
-    penalty: Option<&Penalty<f32, D>>,
 ) -> Result<BlockDiagonal, String>
 where
     Dim<D>: Space<D>,
@@ -313,11 +259,6 @@ where
                     (cell.viscous * reference.viscous[(i * D + c) * (n + 1)]) as f32;
             }
         }
-    }
-    if let Some(penalty) = penalty {
-        let mut added = vec![0f32; space.full_dim()];
-        penalty.stress.add_diagonal(nodes, &reference, &mut added);
-        vector::axpy(penalty.factor, &added, &mut nodal);
     }
     // The squares keep the sum positive: weights of hanging nodes may be negative.
     nodes.collect(D, |w| (w * w) as f32, &mut nodal);
@@ -388,6 +329,7 @@ mod tests {
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
+    use gluey_linalg::estimate_lambda_max;
 
     /// With hanging nodes, bodies and cells that two bodies share.
     fn eigenvalues_stay_below_the_interval<const D: usize>(gap: f64)

@@ -22,6 +22,7 @@
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
 mod assembly;
+mod cell_schur;
 mod direct;
 mod discretisation;
 mod element;
@@ -35,6 +36,7 @@ mod problem;
 mod refine;
 mod schur;
 mod solid;
+mod solid_block;
 mod solver;
 mod space;
 mod system;

@@ -5,8 +5,8 @@
 //! velocity.
 //! The levels are the tree's own: level `l` is the mesh cut at depth `l`. On every level the solid nodes of that level
 //! are eliminated; a coarse correction enters as the rigid motion that fits it best. In the `paper` formulation the
-//! finest level is the penalised operator, and below it, on the same mesh, lies a level that moves every node the solid
-//! touches rigidly: what the penalty makes stiff is invisible to all coarser levels.
+//! finest level moves every node the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and
+//! left to a [`SolidBlock`].
 
 use std::sync::Arc;
 
@@ -19,13 +19,13 @@ use gluey_linalg::{
 use crate::assembly::{Unknowns, assemble_viscous};
 use crate::discretisation::{Discretisation, solid_nodes};
 use crate::error::StokesError;
-use crate::level::{Level, Transfer};
+use crate::level::Level;
 use crate::pressure::WeakPressures;
 use crate::schur::SchurInverse;
-use crate::solid::SolidStress;
+use crate::solid_block::SolidBlock;
 use crate::solver::{Preparation, SaddleSolver, SolveReport};
 use crate::space::VelocitySpace;
-use crate::system::{Penalty, StokesSystem, SystemOperator};
+use crate::system::{StokesSystem, SystemOperator};
 
 /// Depth of the coarsest mesh.
 const COARSEST_LEVEL: u8 = 2;
@@ -154,11 +154,11 @@ where
 {
     /// Coarsest first.
     levels: Vec<Level<D>>,
-    /// The first of the levels on the finest mesh.
-    first_fine: usize,
     /// `transfers[l]` joins level `l` to level `l + 1`.
-    transfers: Vec<Transfer<D>>,
+    transfers: Vec<Interpolation<D>>,
     coarse: CoarseSolver,
+    /// The penalised solid, in that formulation.
+    solid: Option<SolidBlock<D>>,
 }
 
 impl<const D: usize> VCycle<D>
@@ -185,36 +185,27 @@ where
             };
             levels.push(Level::rigid(mesh, space, preparation.viscosity, index)?);
         }
-        let mut transfers: Vec<Transfer<D>> = meshes
+        let transfers = meshes
             .windows(2)
             .map(|pair| {
                 let (coarse, fine) = (&pair[0], &pair[1]);
-                Transfer::Mesh(Interpolation::new(
-                    &coarse.mesh,
-                    coarse.velocity.clone(),
-                    &fine.mesh,
-                    &fine.velocity,
-                ))
+                Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity)
             })
             .collect();
-        if let Some(penalty) = &system.penalty {
-            let stress: SolidStress<f32, D> = penalty.stress.convert();
-            let penalty = Penalty { factor: penalty.factor, stress };
-            let index = levels.len();
-            let space = system.space.clone();
-            let touched = preparation.touched.unwrap_or_default();
-            let viscosity = preparation.viscosity;
-            levels.push(Level::penalised(discretisation, space, viscosity, penalty, touched, index)?);
-            transfers.push(Transfer::SameMesh);
-        }
+        let finest = &levels[levels.len() - 1].operator.space;
+        let solid = match preparation.touched {
+            Some(touched) => Some(SolidBlock::new(discretisation, system, touched, finest)?),
+            None => None,
+        };
         let coarse_space = levels[0].operator.space.clone();
         let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
-        Ok(Self { levels, first_fine: meshes.len() - 1, transfers, coarse })
+        Ok(Self { levels, transfers, coarse, solid })
     }
 
     /// Applications on the finest mesh since the last call, see [`SolveReport::fine_operator_applications`].
     fn take_fine_applications(&mut self) -> f64 {
-        self.levels[self.first_fine..].iter_mut().map(|level| level.operator.take_applications()).sum()
+        let levels = self.levels.last_mut().map_or(0.0, |level| level.operator.take_applications());
+        levels + self.solid.as_mut().map_or(0.0, SolidBlock::take_applications)
     }
 
     fn run(&mut self, top: usize) {
@@ -237,11 +228,12 @@ where
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for VCycle<D>
+impl<const D: usize> VCycle<D>
 where
     Dim<D>: Space<D>,
 {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+    /// `z = V r` on the reduced vectors of the finest rigid level.
+    fn cycle(&mut self, r: &[f64], z: &mut [f64]) {
         let norm = vector::norm(r);
         if norm == 0.0 {
             z.fill(0.0);
@@ -251,6 +243,25 @@ where
         vector::convert(1.0 / norm, r, &mut self.levels[top].b);
         self.run(top);
         vector::convert(norm, &self.levels[top].x, z);
+    }
+
+    /// The nodal velocities `u` with which the finest rigid level answers the nodal load `f`.
+    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f64]) {
+        let top = self.levels.len() - 1;
+        self.levels[top].operator.space.reduce(f);
+        self.cycle(f, u);
+        self.levels[top].operator.space.expand(u);
+    }
+}
+
+impl<const D: usize> Preconditioner<f64> for VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let Some(mut solid) = self.solid.take() else { return self.cycle(r, z) };
+        solid.apply(r, z, |f, u| self.rigid_velocities(f, u));
+        self.solid = Some(solid);
     }
 }
 

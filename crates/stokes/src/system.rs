@@ -9,9 +9,11 @@ use std::sync::Arc;
 use gluey_fem::Reference;
 use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Pattern, Scalar, SparseError, SparseMatrix, vector};
+use gluey_linalg::{LinOp, Pattern, Scalar, SparseMatrix, vector};
 
+use crate::cell_schur::PressureMatrices;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
+use crate::error::StokesError;
 use crate::pressure::{PressureSpace, WeakPressures};
 use crate::solid::SolidStress;
 use crate::space::VelocitySpace;
@@ -219,29 +221,18 @@ where
     }
 }
 
-/// The pressure mass matrix of the active cells, each weighted by the inverse of its mean viscosity, on free pressure
-/// nodes; other rows hold a one.
+/// The pressure mass matrix of the active cells over their viscosity, on free pressure nodes; other rows hold a one. Where
+/// a solid is penalised, twice the Schur complements of the cells take the place of their mass matrices.
 pub fn pressure_mass<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
     viscosity: f64,
-) -> Result<SparseMatrix, SparseError>
+) -> Result<SparseMatrix, StokesError>
 where
     Dim<D>: Space<D>,
 {
-    let reference = Reference::<D>::new();
     let m = Reference::<D>::PRESSURE;
-    let mut mean = vec![viscosity; discretisation.mesh.cell_count()];
-    if let Some(penalty) = &system.penalty {
-        penalty.stress.for_each_cell(|cell, scale, matrix| {
-            let h = discretisation.cell_size(cell as usize).powi(D as i32 - 2);
-            let added = match matrix {
-                None => scale / h,
-                Some(own) => own[0] / (reference.viscous[0] * h),
-            };
-            mean[cell as usize] += penalty.factor * added;
-        });
-    }
+    let matrices = PressureMatrices::new(discretisation, system, viscosity)?;
     let expansion = crate::assembly::pressure_expansion(system);
     let unknowns = |c: &ActiveCell| {
         let nodes = discretisation.pressure.cell(c.cell as usize).iter();
@@ -252,10 +243,10 @@ where
     drop(groups);
     for c in &system.cells {
         let nodes = discretisation.pressure.cell(c.cell as usize);
-        let scale = c.volume / mean[c.cell as usize];
+        let (scale, matrix) = matrices.of(c);
         for (i, &row) in nodes.iter().enumerate() {
             for (j, &column) in nodes.iter().enumerate() {
-                let value = scale * reference.pressure_mass[i * m + j];
+                let value = scale * matrix[i * m + j];
                 for &(r, wr) in expansion.of(row as usize) {
                     for &(c, wc) in expansion.of(column as usize) {
                         mass.add(r as usize, c as usize, wr * wc * value)?;

@@ -10,6 +10,7 @@ mod formulations;
 mod operators;
 mod orders;
 mod pairs;
+mod penalised;
 mod single;
 mod solvers;
 mod support;

@@ -137,7 +137,7 @@ fn the_last_flows_are_a_good_start_for_the_next() {
     for formulation in [RIGID, paper(1e3, 1)] {
         let centers = |x: f64| balls(&[Vector::<2>::new(x, 0.52), Vector::<2>::new(0.7, 0.47)]);
         let at = |step: i32| centers(0.3 + 0.0005 * f64::from(step));
-        let parameters = params(formulation, SolverKind::Multigrid, 1e-9);
+        let parameters = params(formulation, SolverKind::Multigrid, 1e-10);
         let run = |solver: &mut FlowSolver<2>, step: i32| {
             solver.solve(mesh(&bands(7), &at(step)), &at(step), &couette).unwrap()
         };

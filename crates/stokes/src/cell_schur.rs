@@ -1,0 +1,171 @@
+//! Schur complements of single cells, `S_c = B_c A_c^+ B_c^T`.
+//!
+//! With `A = sum R_c^T A_c R_c` and `p^T S p = max_v 2 p^T B v - v^T A v` the sum of the cells' own maxima bounds the
+//! Schur complement of the whole system from above, `S <= sum S_c`, whatever the viscosity does inside the cells. A
+//! mass matrix over some mean of the viscosity does not know how much of a cut cell can still flow.
+
+use gluey_fem::Reference;
+use gluey_fem::element::split;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{BlockError, DenseCholesky, vector};
+
+use crate::discretisation::Discretisation;
+use crate::system::{ActiveCell, StokesSystem};
+
+/// Matrices on the pressures of single cells whose sum is close to twice the Schur complement.
+pub struct PressureMatrices {
+    /// That of the unit cube at viscosity one.
+    unit: Vec<f64>,
+    /// Viscosity of each cell.
+    viscosity: Vec<f64>,
+    /// Those of cut cells.
+    own: Vec<Option<Vec<f64>>>,
+}
+
+impl PressureMatrices {
+    /// Mass matrices over the viscosity, or, where a solid is penalised, Schur complements of the cells.
+    ///
+    /// # Errors
+    /// [`BlockError`] if the viscosity of a cut cell is not positive.
+    pub fn new<const D: usize>(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        viscosity: f64,
+    ) -> Result<Self, BlockError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let cell_count = discretisation.mesh.cell_count();
+        let mut new = Self {
+            unit: Reference::<D>::new().pressure_mass,
+            viscosity: vec![viscosity; cell_count],
+            own: vec![None; cell_count],
+        };
+        let Some(penalty) = &system.penalty else { return Ok(new) };
+        let schur = CellSchur::<D>::new()?;
+        new.unit = schur.unit.iter().map(|s| 2.0 * s).collect();
+        let mut failed = Ok(());
+        penalty.stress.for_each_cell(|cell, scale, own| {
+            let (h, cell) = (discretisation.cell_size(cell as usize), cell as usize);
+            let (stiffness, scale) = (h.powi(D as i32 - 2), penalty.factor * scale);
+            match own.map(|own| schur.of(viscosity * stiffness, h.powi(D as i32 - 1), scale, own)) {
+                None => new.viscosity[cell] += scale / stiffness,
+                Some(Ok(matrix)) => new.own[cell] = Some(matrix.iter().map(|s| 2.0 * s).collect()),
+                Some(Err(error)) => failed = Err(error),
+            }
+        });
+        failed.map(|()| new)
+    }
+
+    /// Matrix of a cell, and the factor it is to be multiplied by.
+    pub fn of(&self, cell: &ActiveCell) -> (f64, &[f64]) {
+        let index = cell.cell as usize;
+        match &self.own[index] {
+            Some(own) => (1.0, own),
+            None => (cell.volume / self.viscosity[index], &self.unit),
+        }
+    }
+}
+
+/// Computes the Schur complements of cells.
+struct CellSchur<const D: usize> {
+    reference: Reference<D>,
+    /// `sum r r^T` over rigid motions `r`, which make up the kernel of every `A_c`.
+    rigid: Vec<f64>,
+    /// The Schur complement of the unit cube at viscosity one.
+    unit: Vec<f64>,
+}
+
+impl<const D: usize> CellSchur<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new() -> Result<Self, BlockError> {
+        let (reference, rigid) = (Reference::<D>::new(), rigid_projector::<D>());
+        let mut new = Self { unit: Vec::new(), reference, rigid };
+        new.unit = new.of(1.0, 1.0, 0.0, &[])?;
+        Ok(new)
+    }
+
+    /// That of a cell with the matrices `A_c = viscous K + scale own` and `B_c = divergence B`, row by row.
+    fn of(&self, viscous: f64, divergence: f64, scale: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
+        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.
+        let fluid = self.reference.viscous.iter().zip(&self.rigid);
+        let mut matrix: Vec<f64> = fluid.map(|(k, r)| viscous * (k + r)).collect();
+        matrix.iter_mut().zip(own).for_each(|(a, k)| *a += scale * k);
+        let factor = DenseCholesky::new(n, matrix)?;
+        let mut schur = Vec::with_capacity(m * m);
+        for load in self.reference.divergence.chunks_exact(n) {
+            let mut v = load.to_vec();
+            factor.solve_in_place(&mut v);
+            let rows = self.reference.divergence.chunks_exact(n);
+            schur.extend(rows.map(|row| divergence * divergence * vector::dot(row, &v)));
+        }
+        Ok(schur)
+    }
+}
+
+/// `sum r r^T` over translations and rotations of the unit cube about its centre.
+fn rigid_projector<const D: usize>() -> Vec<f64> {
+    let n = Reference::<D>::VELOCITY;
+    let x = |k: usize, d: usize| 0.5 * split::<D>(k / D, 3)[d] as f64 - 0.5;
+    let along = |c: usize, d: usize| if c == d { 1.0 } else { 0.0 };
+    let mut sum = vec![0.0; n * n];
+    let mut add = |motion: &dyn Fn(usize) -> f64| {
+        for i in 0..n {
+            for j in 0..n {
+                sum[i * n + j] += motion(i) * motion(j);
+            }
+        }
+    };
+    for d in 0..D {
+        add(&|k| along(k % D, d));
+        for e in 0..d {
+            add(&|k| along(k % D, d) * x(k, e) - along(k % D, e) * x(k, d));
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A constant pressure drives the expansion `v = x / (2 eta)`: `2 int div v - 2 eta int eps:eps = D V / (2 eta)`.
+    fn constants_have_the_exact_value<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let schur = CellSchur::<D>::new().unwrap();
+        let sum: f64 = schur.unit.iter().sum();
+        assert!((sum - 0.5 * D as f64).abs() < 1e-10, "{sum}");
+    }
+
+    #[test]
+    fn a_constant_pressure_expands_a_cell() {
+        constants_have_the_exact_value::<2>();
+        constants_have_the_exact_value::<3>();
+    }
+
+    /// A uniform viscosity given as a matrix of the cell's own is one in the scale.
+    fn viscosities_add_up<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let schur = CellSchur::<D>::new().unwrap();
+        let (eta, h) = (40.0, 0.25f64);
+        let own = Reference::<D>::new().viscous;
+        let stiffness = h.powi(D as i32 - 2);
+        let found = schur.of(stiffness, h.powi(D as i32 - 1), (eta - 1.0) * stiffness, &own).unwrap();
+        for (a, b) in found.iter().zip(&schur.unit) {
+            assert!((a - h.powi(D as i32) / eta * b).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_schur_complement_scales_with_volume_over_viscosity() {
+        viscosities_add_up::<2>();
+        viscosities_add_up::<3>();
+    }
+}
