@@ -100,7 +100,7 @@ where
         self.solve(z);
     }
 
-    /// Applications since the last call, of the layer and of the block, each as its share of the mesh.
+    /// Applications of the layer since the last call, each as its share of the mesh. Solves with the factor do not count.
     pub fn take_applications(&mut self) -> f64 {
         std::mem::take(&mut self.applications) as f64 * self.layer.share
     }
