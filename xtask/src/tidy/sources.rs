@@ -8,6 +8,8 @@ use super::TidyError;
 const FOLDERS: [&str; 4] = ["crates", "xtask", "tests", "benches"];
 /// Folders whose files are tests, examples or timings as a whole.
 const TEST_FOLDERS: [&str; 3] = ["/tests/", "/benches/", "/examples/"];
+/// Name of the unit tests of a module in a file of their own.
+const TEST_FILE: &str = "/tests.rs";
 
 /// One source file.
 #[derive(Debug)]
@@ -25,7 +27,8 @@ impl Source {
     pub fn new(path: String, text: &str) -> Self {
         let lines: Vec<String> = text.lines().map(str::to_owned).collect();
         let rooted = format!("/{path}");
-        let tests_from = if TEST_FOLDERS.iter().any(|folder| rooted.contains(folder)) {
+        let is_test = rooted.ends_with(TEST_FILE) || TEST_FOLDERS.iter().any(|f| rooted.contains(f));
+        let tests_from = if is_test {
             0
         } else {
             lines.iter().position(|line| line.trim() == "#[cfg(test)]").unwrap_or(lines.len())
@@ -85,6 +88,8 @@ mod tests {
         let source = Source::new("crates/a/src/lib.rs".into(), text);
         assert_eq!(source.code().collect::<Vec<_>>(), [(2, "fn a() {}")]);
         assert_eq!(source.all_code().count(), 3);
-        assert_eq!(Source::new("crates/a/tests/b.rs".into(), text).code().count(), 0);
+        for path in ["crates/a/tests/b.rs", "crates/a/src/b/tests.rs"] {
+            assert_eq!(Source::new(path.into(), text).code().count(), 0);
+        }
     }
 }
