@@ -7,10 +7,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
-use gluey_fem::{Interpolation, NodeMap, TreeMesh};
+use gluey_fem::cells::{CellData, CellOperator, CellScalar, Workspace};
+use gluey_fem::{Chunks, Interpolation, NodeMap, TreeMesh};
 use gluey_geom::{Aabb, Vector};
-use gluey_linalg::Scalar;
 
 /// A mesh refined towards the centre of the box.
 fn graded<const D: usize>(finest: u8) -> TreeMesh<D> {
@@ -39,34 +38,41 @@ fn meshes<const D: usize>(criterion: &mut Criterion, finest: u8) {
     group.finish();
 }
 
-/// The viscous kernel on all cells of a uniform mesh; throughput in velocity unknowns.
-fn kernel<T: Scalar, const D: usize>(criterion: &mut Criterion, level: u8) {
+/// The viscous and the Stokes operator on all cells of a uniform mesh, every `varying`-th with a viscosity given at `4^D`
+/// points; throughput in unknowns.
+fn operator<T: CellScalar, const D: usize>(criterion: &mut Criterion, level: u8, varying: usize) {
+    const QUADRATURE: usize = 4;
     let mesh = uniform::<D>(level);
     let (velocity, pressure) = (NodeMap::new(&mesh, 2), NodeMap::new(&mesh, 1));
-    let cells = (0..mesh.cell_count()).map(|c| CellData {
-        velocity: velocity.cell(c),
-        pressure: pressure.cell(c),
-        viscous: 1.0,
-        divergence: 1.0,
+    let chunks = Arc::new(Chunks::new(&velocity, &pressure));
+    let eta = vec![1.0; QUADRATURE.pow(D as u32)];
+    let cells = (0..mesh.cell_count()).map(|cell| {
+        let points = if cell % varying == varying - 1 { eta.as_slice() } else { &[] };
+        CellData { cell, viscous: 1.0, divergence: 1.0, points }
     });
-    let (kernel, batches) = (CubeKernel::<T, D>::default(), CellBatches::<T>::new(cells));
-    let dim = velocity.node_count() * D;
-    let x: Vec<T> = (0..dim).map(|i| T::from_f64((0.7 * i as f64).sin())).collect();
-    let mut y = vec![T::ZERO; dim];
-    let mut group = criterion.benchmark_group(format!("kernel-{D}d-{dim}-dofs"));
-    group.throughput(Throughput::Elements(dim as u64));
-    let precision = 8 * size_of::<T>();
-    group.bench_function(format!("f{precision}"), |b| b.iter(|| kernel.viscous(&batches, &x, &mut y)));
+    let operator = CellOperator::<T, D>::new(&chunks, &velocity, cells, QUADRATURE, &[], 0);
+    let wave = |dim: usize| (0..dim).map(|i| T::from_f64((0.7 * i as f64).sin())).collect::<Vec<T>>();
+    let (x, p) = (wave(operator.velocity_dim()), wave(operator.pressure_dim()));
+    let (mut y, mut q, mut work) = (x.clone(), p.clone(), Workspace::default());
+    let kind = if varying == usize::MAX { "constant" } else { "variable" };
+    let name = format!("cells-{D}d-f{}-{kind}", 8 * size_of::<T>());
+    let mut group = criterion.benchmark_group(name);
+    group.throughput(Throughput::Elements(x.len() as u64));
+    group.bench_function("viscous", |b| b.iter(|| operator.viscous(&x, &mut y, &mut work)));
+    group.throughput(Throughput::Elements((x.len() + p.len()) as u64));
+    group.bench_function("stokes", |b| b.iter(|| operator.stokes(&x, &p, &mut y, &mut q, &mut work)));
     group.finish();
 }
 
 fn all(criterion: &mut Criterion) {
     meshes::<2>(criterion, 9);
     meshes::<3>(criterion, 7);
-    kernel::<f32, 2>(criterion, 8);
-    kernel::<f64, 2>(criterion, 8);
-    kernel::<f32, 3>(criterion, 5);
-    kernel::<f64, 3>(criterion, 5);
+    for varying in [usize::MAX, 10] {
+        operator::<f32, 2>(criterion, 8, varying);
+        operator::<f64, 2>(criterion, 8, varying);
+        operator::<f32, 3>(criterion, 5, varying);
+        operator::<f64, 3>(criterion, 5, varying);
+    }
 }
 
 criterion_group! {

@@ -13,13 +13,15 @@
 //!
 //! Not for curved boundaries or unstructured meshes: the domain is a box, particles are immersed.
 
+pub mod cells;
+mod chunks;
 pub mod element;
 mod interpolation;
-pub mod kernel;
 mod nodes;
 mod reference;
 mod tree;
 
+pub use chunks::{CHUNK_CELLS, Chunks};
 pub use interpolation::Interpolation;
 pub use nodes::{Constraint, NodeMap};
 pub use reference::{Reference, add_viscous};

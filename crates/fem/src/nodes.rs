@@ -82,6 +82,11 @@ impl<const D: usize> NodeMap<D> {
         &self.cell_nodes[cell * self.nodes_per_cell..(cell + 1) * self.nodes_per_cell]
     }
 
+    /// Node numbers of successive cells.
+    pub fn cells(&self, cells: std::ops::Range<usize>) -> &[u32] {
+        &self.cell_nodes[cells.start * self.nodes_per_cell..cells.end * self.nodes_per_cell]
+    }
+
     /// Position of a node.
     pub fn point(&self, node: usize) -> Vector<D> {
         let x = &self.lattice[node];

@@ -3,17 +3,19 @@
 //! On a cell of size `h` the viscous matrix scales with `h^(D-2)`, the divergence with `h^(D-1)` and the pressure
 //! mass with `h^D`. Velocity degrees of freedom are numbered `node * D + component`.
 
+use std::sync::OnceLock;
+
 use crate::element::{gauss_cube, gradient, node_count, value};
 
-/// Dense element matrices on the unit cube, row-major.
-#[derive(Clone, Debug)]
+/// Dense element matrices on the unit cube, row-major. They are integrated once and then shared.
+#[derive(Clone, Copy, Debug)]
 pub struct Reference<const D: usize> {
     /// `K[(i,a),(j,b)] = int 2 eps(phi_j e_b) : eps(phi_i e_a)`, square of size `D 3^D`.
-    pub viscous: Vec<f64>,
+    pub viscous: &'static [f64],
     /// `B[q,(j,b)] = int psi_q d_b phi_j`, `2^D` rows of `D 3^D`.
-    pub divergence: Vec<f64>,
+    pub divergence: &'static [f64],
     /// `M[q,r] = int psi_q psi_r`, square of size `2^D`.
-    pub pressure_mass: Vec<f64>,
+    pub pressure_mass: &'static [f64],
 }
 
 impl<const D: usize> Default for Reference<D> {
@@ -28,9 +30,25 @@ impl<const D: usize> Reference<D> {
     /// Pressure degrees of freedom of a cell, `2^D`.
     pub const PRESSURE: usize = node_count::<D>(1);
 
-    /// Integrates the matrices exactly (three Gauss points a direction).
+    /// The matrices, integrated exactly (three Gauss points a direction).
     pub fn new() -> Self {
-        let (n, m) = (Self::VELOCITY, Self::PRESSURE);
+        static OF_DIMENSION: [OnceLock<Matrices>; 4] = [const { OnceLock::new() }; 4];
+        let Matrices { viscous, divergence, pressure_mass } = OF_DIMENSION[D].get_or_init(Matrices::new::<D>);
+        Self { viscous, divergence, pressure_mass }
+    }
+}
+
+/// The matrices of one dimension.
+#[derive(Debug)]
+struct Matrices {
+    viscous: Vec<f64>,
+    divergence: Vec<f64>,
+    pressure_mass: Vec<f64>,
+}
+
+impl Matrices {
+    fn new<const D: usize>() -> Self {
+        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
         let mut new =
             Self { viscous: vec![0.0; n * n], divergence: vec![0.0; m * n], pressure_mass: vec![0.0; m * m] };
         for (x, weight) in gauss_cube::<D>(3) {
@@ -40,8 +58,8 @@ impl<const D: usize> Reference<D> {
         new
     }
 
-    fn add_pressure_terms(&mut self, x: &[f64; D], weight: f64) {
-        let (n, m) = (Self::VELOCITY, Self::PRESSURE);
+    fn add_pressure_terms<const D: usize>(&mut self, x: &[f64; D], weight: f64) {
+        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
         let psi: Vec<f64> = (0..m).map(|q| value::<D>(1, q, x)).collect();
         let slopes: Vec<[f64; D]> = (0..n / D).map(|j| gradient::<D>(2, j, x)).collect();
         for q in 0..m {

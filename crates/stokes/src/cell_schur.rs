@@ -37,7 +37,7 @@ impl PressureMatrices {
     {
         let cell_count = discretisation.mesh.cell_count();
         let mut new = Self {
-            unit: Reference::<D>::new().pressure_mass,
+            unit: Reference::<D>::new().pressure_mass.to_vec(),
             viscosity: vec![viscosity; cell_count],
             own: vec![None; cell_count],
         };
@@ -157,7 +157,7 @@ mod tests {
         let (eta, h) = (40.0, 0.25f64);
         let own = Reference::<D>::new().viscous;
         let stiffness = h.powi(D as i32 - 2);
-        let found = schur.of(stiffness, h.powi(D as i32 - 1), (eta - 1.0) * stiffness, &own).unwrap();
+        let found = schur.of(stiffness, h.powi(D as i32 - 1), (eta - 1.0) * stiffness, own).unwrap();
         for (a, b) in found.iter().zip(&schur.unit) {
             assert!((a - h.powi(D as i32) / eta * b).abs() < 1e-9);
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::{NodeMap, TreeMesh};
+use gluey_fem::{Chunks, NodeMap, TreeMesh};
 
 use gluey_levelset::{LevelSet, nearest};
 
@@ -17,13 +17,17 @@ pub struct Discretisation<const D: usize> {
     pub velocity: Arc<NodeMap<D>>,
     /// Nodes of the pressure, degree 1.
     pub pressure: Arc<NodeMap<D>>,
+    /// How operators cut the mesh.
+    pub chunks: Arc<Chunks<D>>,
 }
 
 impl<const D: usize> Discretisation<D> {
     /// Numbers the nodes of `mesh`.
     pub fn new(mesh: TreeMesh<D>) -> Self {
         let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
-        Self { velocity: nodes(2), pressure: nodes(1), mesh: Arc::new(mesh) }
+        let (velocity, pressure) = (nodes(2), nodes(1));
+        let chunks = Arc::new(Chunks::new(&velocity, &pressure));
+        Self { mesh: Arc::new(mesh), velocity, pressure, chunks }
     }
 
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.

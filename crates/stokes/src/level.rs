@@ -1,6 +1,6 @@
 //! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
 
-use gluey_fem::kernel::{CellBatches, CubeKernel};
+use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{Interpolation, NodeMap, Reference};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, invert_spd, vector};
@@ -8,7 +8,7 @@ use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, in
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, active_cells, batches};
+use crate::system::{ActiveCell, active_cells, cell_operator};
 
 /// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue it damps.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +28,8 @@ const SAFETY: f64 = 1.05;
 pub struct LevelOperator<const D: usize> {
     /// Reduced velocities.
     pub space: VelocitySpace<D>,
-    kernel: CubeKernel<f32, D>,
-    batches: CellBatches<f32>,
-    work: Vec<f32>,
+    operator: CellOperator<f32, D>,
+    work: Workspace<f32>,
     /// Fraction of the cells that are not rigid on which it acts.
     share: f64,
     applications: usize,
@@ -53,11 +52,7 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.applications += 1;
-        vector::copy(x, &mut self.work);
-        self.space.expand(&mut self.work);
-        vector::clear(y);
-        self.kernel.viscous(&self.batches, &self.work, y);
-        self.space.reduce(y);
+        self.operator.viscous(x, y, &mut self.work);
     }
 }
 
@@ -154,9 +149,8 @@ where
         }
         let dim = space.dim();
         let operator = LevelOperator {
-            kernel: CubeKernel::default(),
-            batches: batches(discretisation, &cells),
-            work: vec![0.0; dim],
+            operator: cell_operator(discretisation, &space, &cells, None),
+            work: Workspace::default(),
             share: cells.len() as f64 / cell_count.max(1) as f64,
             applications: 0,
             space,
@@ -305,7 +299,7 @@ where
                 }
             }
             let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
-            let viscous = nalgebra::DMatrix::from_row_slice(n, n, &reference.viscous);
+            let viscous = nalgebra::DMatrix::from_row_slice(n, n, reference.viscous);
             let product = motion.transpose() * (viscous * &motion) * cell.viscous;
             blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
         }

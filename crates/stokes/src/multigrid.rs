@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use gluey_fem::Interpolation;
+use gluey_fem::cells::Workspace;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     DirectSpd, Fgmres, FgmresParams, Ordering, Preconditioner, Reference, RefinementParams, Symbolic, vector,
@@ -98,6 +99,7 @@ where
             schur,
             load: vec![0.0; system.velocity_dim()],
             pressure: vec![0.0; system.pressure.dim()],
+            work: Workspace::default(),
         };
         preconditioner.cycle.take_fine_applications();
         self.krylov.set_relative_tolerance(tolerance);
@@ -123,6 +125,7 @@ where
     schur: &'a mut SchurInverse,
     load: Vec<f64>,
     pressure: Vec<f64>,
+    work: Workspace<f64>,
 }
 
 impl<const D: usize> Preconditioner<f64> for BlockTriangular<'_, D>
@@ -139,9 +142,7 @@ where
         vector::scale(-1.0, zp);
         self.pressure.copy_from_slice(zp);
         self.system.pressure.expand(&mut self.pressure);
-        vector::clear(&mut self.load);
-        self.system.subtract_gradient(&self.pressure, &mut self.load);
-        self.system.space.reduce(&mut self.load);
+        self.system.gradient(&self.pressure, &mut self.load, &mut self.work);
         vector::residual_from_product(ru, &mut self.load);
         self.cycle.apply(&self.load, zu);
     }

@@ -1,33 +1,36 @@
 //! The viscous stress of the penalised solid, `K(I eta_s)`.
 //!
 //! The mixing law `eta = I eta_s + (1 - I) eta_f` makes the viscous operator of the mixture the sum
-//! `K(eta) = K(eta_f) + (1 - 1/r) K(I eta_s)`, so one solid operator serves the penalty and, as in eq. 9 of Verdon et
-//! al. 2010, the multiplier. Cells wholly inside (`I = 1`) are scaled cubes; cells with a ramp keep their own matrices,
-//! integrated with enough Gauss points to see the surface.
+//! `K(eta) = K(eta_f) + (1 - 1/r) K(I eta_s)`, so one solid serves the penalty and, as in eq. 9 of Verdon et al. 2010, the
+//! multiplier. Cells wholly inside (`I = 1`) are scaled cubes; those with a ramp keep `I` at enough Gauss points to see
+//! the surface.
 
-use gluey_fem::element::{gauss_cube, node_count, value};
-use gluey_fem::kernel::{CellBatches, CellData, CubeKernel, multiply_symmetric};
-use gluey_fem::{NodeMap, Reference};
+use std::sync::Arc;
+
+use gluey_fem::cells::{CellData, CellOperator, Workspace};
+use gluey_fem::element::{gauss_cube, value};
+use gluey_fem::{Chunks, NodeMap, Reference};
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
 use gluey_levelset::{Ball, Body, Ramp, nearest};
-use gluey_linalg::Scalar;
 
 use crate::discretisation::Discretisation;
 
 /// Element matrices of every quadrature point, for cells with a viscosity that varies inside.
 #[derive(Clone, Debug)]
 pub struct PointMatrices<const D: usize> {
+    /// Points a direction.
+    line: usize,
     points: Vec<([f64; D], f64)>,
     /// One matrix a point, the weight included.
-    viscous: Vec<Vec<f64>>,
+    viscous: Arc<Vec<Vec<f64>>>,
     /// Values of the velocity shape functions at each point.
     shapes: Vec<Vec<f64>>,
 }
 
 impl<const D: usize> PointMatrices<D> {
     /// Prepares the tensor-product Gauss rule with `points` points a direction.
-    pub fn new(points: usize) -> Self {
-        let points = gauss_cube::<D>(points);
+    pub fn new(line: usize) -> Self {
+        let points = gauss_cube::<D>(line);
         let n = Reference::<D>::VELOCITY;
         let matrix = |(x, weight): &([f64; D], f64)| {
             let mut matrix = vec![0.0; n * n];
@@ -36,42 +39,64 @@ impl<const D: usize> PointMatrices<D> {
         };
         let shape = |(x, _): &([f64; D], f64)| (0..n / D).map(|i| value::<D>(2, i, x)).collect();
         Self {
-            viscous: points.iter().map(matrix).collect(),
+            line,
+            viscous: Arc::new(points.iter().map(matrix).collect()),
             shapes: points.iter().map(shape).collect(),
             points,
         }
     }
 }
 
-/// A cell that the surface or its ramp crosses.
-#[derive(Clone, Debug)]
-struct CutCell<T> {
-    cell: u32,
-    matrix: Vec<T>,
-}
-
-/// Solid fraction `I` at the quadrature points of a cell, and the body it belongs to.
+/// Solid fraction `I` in a cell, and the body it belongs to.
 #[derive(Clone, Debug)]
 struct SolidCell {
     cell: u32,
     body: u32,
+    /// At the quadrature points; empty for a cell wholly inside.
     fraction: Vec<f64>,
+}
+
+impl SolidCell {
+    fn fraction(&self, point: usize) -> f64 {
+        self.fraction.get(point).map_or(1.0, |&f| f)
+    }
 }
 
 /// The operator `K(I eta_s)` on the velocity nodes of a mesh.
 #[derive(Clone, Debug)]
-pub struct SolidStress<T, const D: usize> {
-    interior: Vec<u32>,
-    interior_scale: Vec<f64>,
-    interior_batches: CellBatches<T>,
-    cut: Vec<CutCell<T>>,
-    kernel: CubeKernel<T, D>,
+pub struct SolidStress<const D: usize> {
+    chunks: Arc<Chunks<D>>,
+    cells: Arc<Vec<SolidCell>>,
+    /// `eta_s h^(D-2)` of each cell.
+    scales: Arc<Vec<f64>>,
+    line: usize,
+    matrices: Arc<Vec<Vec<f64>>>,
+}
+
+/// What the solid adds to the viscosities of cells.
+pub struct SolidViscosities {
+    uniform: Vec<f64>,
+    /// Where the viscosities at the points of a cell start; `u32::MAX` for none.
+    start: Vec<u32>,
+    points: Vec<f64>,
+    point_count: usize,
+}
+
+impl SolidViscosities {
+    /// The viscosity times `h^(D-2)` that the solid adds in all of a cell, and at its quadrature points if it varies.
+    pub fn of(&self, cell: usize) -> (f64, &[f64]) {
+        let points = match self.start[cell] {
+            u32::MAX => &[],
+            start => &self.points[start as usize..][..self.point_count],
+        };
+        (self.uniform[cell], points)
+    }
 }
 
 /// Where the solid is on a mesh.
 #[derive(Clone, Debug)]
 pub struct SolidRegion<const D: usize> {
-    cells: Vec<SolidCell>,
+    cells: Arc<Vec<SolidCell>>,
 }
 
 impl<const D: usize> SolidRegion<D>
@@ -98,12 +123,15 @@ where
                 let x = lower + Vector::from_fn(|d, _| h * x[d]);
                 nearest(bodies, &x).map_or(0.0, |b| ramp.fraction(b.1))
             };
-            let fraction: Vec<f64> = matrices.points.iter().map(|p| at(&p.0)).collect();
+            let mut fraction: Vec<f64> = matrices.points.iter().map(|p| at(&p.0)).collect();
             if fraction.iter().any(|&f| f > 0.0) {
+                if fraction.iter().all(|&f| f == 1.0) {
+                    fraction = Vec::new();
+                }
                 cells.push(SolidCell { cell: cell as u32, body: body as u32, fraction });
             }
         }
-        Self { cells }
+        Self { cells: Arc::new(cells) }
     }
 
     /// Whether a body has any cell.
@@ -114,7 +142,7 @@ where
     /// The nodes of all cells with any solid in them, each with the body nearest to it.
     pub fn touched_nodes(&self, nodes: &NodeMap<D>, bodies: &[Ball<D>]) -> Vec<Option<u32>> {
         let mut touched = vec![None; nodes.node_count()];
-        for solid in &self.cells {
+        for solid in self.cells.iter() {
             for &node in nodes.cell(solid.cell as usize) {
                 let body = nearest(bodies, &nodes.point(node as usize)).map(|b| b.0 as u32);
                 touched[node as usize] = body;
@@ -133,7 +161,7 @@ where
         velocity: &[f64],
     ) -> Vec<Twist<D>> {
         let mut moments = vec![Moments::<D>::new(); bodies.len()];
-        for solid in &self.cells {
+        for solid in self.cells.iter() {
             let cell = solid.cell as usize;
             let c = &discretisation.mesh.cells()[cell];
             let (lower, h) = (discretisation.mesh.lower_corner(c), discretisation.cell_size(cell));
@@ -147,7 +175,7 @@ where
                 }
                 let position = lower + Vector::from_fn(|d, _| h * x[d]);
                 let Some((body, _)) = nearest(bodies, &position) else { continue };
-                let weight = weight * h.powi(D as i32) * solid.fraction[q];
+                let weight = weight * h.powi(D as i32) * solid.fraction(q);
                 moments[body].add(weight, &bodies[body].arm(&position), &u);
             }
         }
@@ -224,106 +252,82 @@ where
     spin
 }
 
-impl<T: Scalar, const D: usize> SolidStress<T, D> {
-    /// Integrates `K(I eta_s)` for `eta_s = solid_viscosity`.
+impl<const D: usize> SolidStress<D> {
+    /// Gauss points a direction.
+    pub fn quadrature(&self) -> usize {
+        self.line
+    }
+
+    /// `factor I eta_s h^(D-2)` in the cells of a mesh.
+    pub fn viscosities(&self, factor: f64, cell_count: usize) -> SolidViscosities {
+        let mut new = SolidViscosities {
+            uniform: vec![0.0; cell_count],
+            start: vec![u32::MAX; cell_count],
+            points: Vec::new(),
+            point_count: self.matrices.len(),
+        };
+        for (solid, scale) in self.cells.iter().zip(self.scales.iter()) {
+            let scale = factor * scale;
+            if solid.fraction.is_empty() {
+                new.uniform[solid.cell as usize] = scale;
+            } else {
+                new.start[solid.cell as usize] = new.points.len() as u32;
+                new.points.extend(solid.fraction.iter().map(|f| scale * f));
+            }
+        }
+        new
+    }
+
+    /// Takes `K(I eta_s)` for `eta_s = solid_viscosity`.
     pub fn new(
         discretisation: &Discretisation<D>,
         region: &SolidRegion<D>,
         matrices: &PointMatrices<D>,
         solid_viscosity: f64,
     ) -> Self {
-        let scale = |cell: u32| solid_viscosity * discretisation.cell_size(cell as usize).powi(D as i32 - 2);
-        let (inside, cut): (Vec<&SolidCell>, Vec<&SolidCell>) =
-            region.cells.iter().partition(|c| c.fraction.iter().all(|&f| f == 1.0));
-        let interior: Vec<u32> = inside.iter().map(|c| c.cell).collect();
-        let interior_scale: Vec<f64> = interior.iter().map(|&c| scale(c)).collect();
-        let data = interior.iter().zip(&interior_scale).map(|(&c, &viscous)| CellData {
-            velocity: discretisation.velocity.cell(c as usize),
-            pressure: discretisation.pressure.cell(c as usize),
-            viscous,
-            divergence: 0.0,
-        });
-        let interior_batches = CellBatches::new(data);
-        let cut = cut.iter().map(|c| cut_cell(c, scale(c.cell), matrices)).collect();
-        Self { interior, interior_scale, interior_batches, cut, kernel: CubeKernel::default() }
-    }
-
-    /// `y += K(I eta_s) x` for nodal velocities.
-    pub fn apply(&self, nodes: &NodeMap<D>, x: &[T], y: &mut [T]) {
-        self.kernel.viscous(&self.interior_batches, x, y);
-        let n = Reference::<D>::VELOCITY;
-        let (mut local, mut image) = ([T::ZERO; 81], [T::ZERO; 81]);
-        for cut in &self.cut {
-            let nodes = nodes.cell(cut.cell as usize);
-            for (i, &node) in nodes.iter().enumerate() {
-                local[i * D..][..D].copy_from_slice(&x[node as usize * D..][..D]);
-            }
-            multiply_symmetric(&cut.matrix, &local[..n], &mut image[..n]);
-            for (i, &node) in nodes.iter().enumerate() {
-                for c in 0..D {
-                    y[node as usize * D + c] += image[i * D + c];
-                }
-            }
-        }
-    }
-
-    /// Adds the diagonal of `K(I eta_s)` to nodal values.
-    pub fn add_diagonal(&self, nodes: &NodeMap<D>, reference: &Reference<D>, diagonal: &mut [T]) {
-        let n = Reference::<D>::VELOCITY;
-        for (cell, scale) in self.interior.iter().zip(&self.interior_scale) {
-            for (i, &node) in nodes.cell(*cell as usize).iter().enumerate() {
-                for c in 0..D {
-                    let k = (i * D + c) * (n + 1);
-                    diagonal[node as usize * D + c] += T::from_f64(scale * reference.viscous[k]);
-                }
-            }
-        }
-        for cut in &self.cut {
-            for (i, &node) in nodes.cell(cut.cell as usize).iter().enumerate() {
-                for c in 0..D {
-                    diagonal[node as usize * D + c] += cut.matrix[(i * D + c) * (n + 1)];
-                }
-            }
-        }
-    }
-
-    /// The same operator in another precision.
-    pub fn convert<S: Scalar>(&self) -> SolidStress<S, D> {
-        let cast = |cut: &CutCell<T>| CutCell {
-            cell: cut.cell,
-            matrix: cut.matrix.iter().map(|k| S::from_f64(k.to_f64())).collect(),
-        };
-        SolidStress {
-            interior: self.interior.clone(),
-            interior_scale: self.interior_scale.clone(),
-            interior_batches: self.interior_batches.convert(),
-            cut: self.cut.iter().map(cast).collect(),
-            kernel: CubeKernel::default(),
+        let scale =
+            |c: &SolidCell| solid_viscosity * discretisation.cell_size(c.cell as usize).powi(D as i32 - 2);
+        Self {
+            chunks: discretisation.chunks.clone(),
+            scales: Arc::new(region.cells.iter().map(scale).collect()),
+            cells: region.cells.clone(),
+            line: matrices.line,
+            matrices: matrices.viscous.clone(),
         }
     }
 
     /// Calls `visit(cell, scale, matrix)` for every solid cell: interior ones have the matrix `scale * K`, cut ones
-    /// their own.
-    pub fn for_each_cell(&self, mut visit: impl FnMut(u32, f64, Option<&[T]>)) {
-        for (cell, scale) in self.interior.iter().zip(&self.interior_scale) {
-            visit(*cell, *scale, None);
-        }
-        for cut in &self.cut {
-            visit(cut.cell, 1.0, Some(&cut.matrix));
+    /// their own, which is integrated for the visit.
+    pub fn for_each_cell(&self, mut visit: impl FnMut(u32, f64, Option<&[f64]>)) {
+        for (solid, &scale) in self.cells.iter().zip(self.scales.iter()) {
+            match solid.fraction.is_empty() {
+                true => visit(solid.cell, scale, None),
+                false => visit(solid.cell, 1.0, Some(&self.cut_matrix(solid, scale))),
+            }
         }
     }
-}
 
-fn cut_cell<T: Scalar, const D: usize>(
-    solid: &SolidCell,
-    scale: f64,
-    matrices: &PointMatrices<D>,
-) -> CutCell<T> {
-    let mut sum = vec![0.0; (D * node_count::<D>(2)).pow(2)];
-    for (&fraction, matrix) in solid.fraction.iter().zip(&matrices.viscous) {
-        if fraction > 0.0 {
-            gluey_linalg::vector::axpy(scale * fraction, matrix, &mut sum);
+    fn cut_matrix(&self, solid: &SolidCell, scale: f64) -> Vec<f64> {
+        let mut sum = vec![0.0; Reference::<D>::VELOCITY.pow(2)];
+        for (&fraction, matrix) in solid.fraction.iter().zip(self.matrices.iter()) {
+            if fraction > 0.0 {
+                gluey_linalg::vector::axpy(scale * fraction, matrix, &mut sum);
+            }
         }
+        sum
     }
-    CutCell { cell: solid.cell, matrix: sum.iter().map(|&k| T::from_f64(k)).collect() }
+
+    /// `y += K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes moved to
+    /// their masters.
+    pub fn apply(&self, nodes: &NodeMap<D>, x: &[f64], y: &mut [f64]) {
+        let viscosities = self.viscosities(1.0, nodes.cell_count());
+        let data = self.cells.iter().map(|solid| {
+            let (viscous, points) = viscosities.of(solid.cell as usize);
+            CellData { cell: solid.cell as usize, viscous, divergence: 0.0, points }
+        });
+        let operator = CellOperator::<f64, D>::new(&self.chunks, nodes, data, self.line, &[], 0);
+        let mut load = vec![0.0; operator.velocity_dim()];
+        operator.viscous_of_field(x, &mut load, &mut Workspace::default());
+        gluey_linalg::vector::axpy(1.0, &load, &mut y[..load.len()]);
+    }
 }

@@ -12,8 +12,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::kernel::{CellBatches, CellData, CubeKernel, multiply_symmetric};
-use gluey_fem::{NodeMap, Reference};
+use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectSpd, Ordering, Preconditioner, RefinementParams, Symbolic, vector};
 
@@ -22,7 +21,7 @@ use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::error::StokesError;
 use crate::level::{cells_touching, nodes_of_cells_with};
 use crate::space::VelocitySpace;
-use crate::system::StokesSystem;
+use crate::system::{StokesSystem, cell_operator};
 
 /// The factorised block with the layer of cells that couples it to the rest.
 pub struct SolidBlock<const D: usize>
@@ -116,19 +115,19 @@ where
     /// The reduced load of the velocity on free nodes.
     fn apply_layer(&mut self) {
         let nodal = self.space.full_dim();
-        self.load.fill(0.0);
-        self.layer.apply(self.space.nodes(), &self.velocity, &mut self.load);
-        self.space.reduce(&mut self.load[..nodal]);
+        let Layer { operator, work, .. } = &mut self.layer;
+        let (load, twists) = self.load.split_at_mut(nodal);
+        operator.viscous_of_field(&self.velocity, load, work);
+        twists.fill(0.0);
         self.applications += 1;
     }
 }
 
-/// The cells that act on the block's nodes and do not move as one body.
+/// The cells that act on the block's nodes and do not move as one body. Those of them with solid in them are strained by
+/// rigid motions, since bodies meet there.
 struct Layer<const D: usize> {
-    kernel: CubeKernel<f64, D>,
-    fluid: CellBatches<f64>,
-    /// Cells with solid in them that are strained by rigid motions, since bodies meet in them, and their matrices.
-    bridges: Vec<(u32, Vec<f64>)>,
+    operator: CellOperator<f64, D>,
+    work: Workspace<f64>,
     /// Fraction of all cells.
     share: f64,
 }
@@ -148,55 +147,12 @@ where
         let strained = |cell: usize| {
             cell_kind(nodes.cell(cell).iter().map(|&n| rigid.body_of(n as usize))) != CellKind::Rigid
         };
-        let couples = |cell: usize| acts[cell] && strained(cell);
-        let cells: Vec<CellData> = system
-            .cells
-            .iter()
-            .filter(|c| couples(c.cell as usize))
-            .map(|c| CellData {
-                velocity: nodes.cell(c.cell as usize),
-                pressure: discretisation.pressure.cell(c.cell as usize),
-                viscous: c.viscous,
-                divergence: 0.0,
-            })
-            .collect();
-        let share = cells.len() as f64 / system.cells.len().max(1) as f64;
-        let fluid = CellBatches::new(cells.into_iter());
-        Self { kernel: CubeKernel::default(), fluid, bridges: bridges(system, strained), share }
-    }
-
-    /// `y += A x`.
-    fn apply(&self, nodes: &NodeMap<D>, x: &[f64], y: &mut [f64]) {
-        self.kernel.viscous(&self.fluid, x, y);
-        let n = Reference::<D>::VELOCITY;
-        let (mut local, mut image) = ([0.0; 81], [0.0; 81]);
-        for (cell, matrix) in &self.bridges {
-            let nodes = nodes.cell(*cell as usize);
-            for (i, &node) in nodes.iter().enumerate() {
-                local[i * D..][..D].copy_from_slice(&x[node as usize * D..][..D]);
-            }
-            multiply_symmetric(matrix, &local[..n], &mut image[..n]);
-            for (i, &node) in nodes.iter().enumerate() {
-                for c in 0..D {
-                    y[node as usize * D + c] += image[i * D + c];
-                }
-            }
+        let mut cells = system.cells.clone();
+        cells.retain(|c| acts[c.cell as usize] && strained(c.cell as usize));
+        Self {
+            share: cells.len() as f64 / system.cells.len().max(1) as f64,
+            operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),
+            work: Workspace::default(),
         }
     }
-}
-
-fn bridges<const D: usize>(system: &StokesSystem<D>, strained: impl Fn(usize) -> bool) -> Vec<(u32, Vec<f64>)>
-where
-    Dim<D>: Space<D>,
-{
-    let mut bridges = Vec::new();
-    let Some(penalty) = &system.penalty else { return bridges };
-    let uniform = Reference::<D>::new().viscous;
-    penalty.stress.for_each_cell(|cell, scale, own| {
-        if strained(cell as usize) {
-            let scale = scale * penalty.factor;
-            bridges.push((cell, own.unwrap_or(&uniform).iter().map(|k| scale * k).collect()));
-        }
-    });
-    bridges
 }

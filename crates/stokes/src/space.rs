@@ -9,6 +9,7 @@
 use std::sync::Arc;
 
 use gluey_fem::NodeMap;
+use gluey_fem::cells::Tie;
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
@@ -185,6 +186,13 @@ where
     /// coefficients a component.
     pub fn rigid_rows(&self) -> impl Iterator<Item = (u32, u32, Vec<f64>)> + '_ {
         self.rigid.iter().map(|r| (r.node, r.body, rigid_matrix(&r.arm)))
+    }
+
+    /// The rigid nodes, for the operators.
+    pub fn ties(&self) -> Vec<Tie<f64, D>> {
+        let tie =
+            |r: &RigidNode<D>| Tie { node: r.node, body: r.body, arm: std::array::from_fn(|d| r.arm[d]) };
+        self.rigid.iter().map(tie).collect()
     }
 
     fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {

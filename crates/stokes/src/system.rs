@@ -7,9 +7,9 @@
 use std::sync::Arc;
 
 use gluey_fem::Reference;
-use gluey_fem::kernel::{CellBatches, CellData, CubeKernel};
+use gluey_fem::cells::{CellData, CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Pattern, Scalar, SparseMatrix, vector};
+use gluey_linalg::{LinOp, Pattern, SparseMatrix, vector};
 
 use crate::cell_schur::PressureMatrices;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
@@ -20,11 +20,11 @@ use crate::space::VelocitySpace;
 
 /// The viscous stress of the penalised solid and the factor it enters the operator with.
 #[derive(Clone, Debug)]
-pub struct Penalty<T, const D: usize> {
+pub struct Penalty<const D: usize> {
     /// `1 - 1/r`.
     pub factor: f64,
     /// `K(I eta_s)`.
-    pub stress: SolidStress<T, D>,
+    pub stress: SolidStress<D>,
 }
 
 /// Operator of the Stokes problem on a mesh, matrix-free.
@@ -37,9 +37,8 @@ pub struct StokesSystem<const D: usize> {
     /// Cells that are not rigid, with the scales of their matrices.
     pub cells: Vec<ActiveCell>,
     /// The penalised solid, in that formulation.
-    pub penalty: Option<Penalty<f64, D>>,
-    kernel: CubeKernel<f64, D>,
-    batches: CellBatches<f64>,
+    pub penalty: Option<Penalty<D>>,
+    operator: CellOperator<f64, D>,
 }
 
 /// A cell that is not rigid.
@@ -79,17 +78,25 @@ where
     (0..discretisation.mesh.cell_count()).filter(|&c| kind(c) != CellKind::Rigid).map(active).collect()
 }
 
-/// Packs cells for the kernel.
-pub fn batches<T: Scalar, const D: usize>(
+/// The operator of these cells, with the penalised solid in one pass with the fluid.
+pub fn cell_operator<T: CellScalar, const D: usize>(
     discretisation: &Discretisation<D>,
+    space: &VelocitySpace<D>,
     cells: &[ActiveCell],
-) -> CellBatches<T> {
-    CellBatches::new(cells.iter().map(|c| CellData {
-        velocity: discretisation.velocity.cell(c.cell as usize),
-        pressure: discretisation.pressure.cell(c.cell as usize),
-        viscous: c.viscous,
-        divergence: c.divergence,
-    }))
+    penalty: Option<&Penalty<D>>,
+) -> CellOperator<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    let solid = penalty.map(|p| p.stress.viscosities(p.factor, discretisation.mesh.cell_count()));
+    let data = cells.iter().map(|c| {
+        let (interior, points) = solid.as_ref().map_or((0.0, &[][..]), |s| s.of(c.cell as usize));
+        let viscous = c.viscous + interior;
+        CellData { cell: c.cell as usize, viscous, divergence: c.divergence, points }
+    });
+    let quadrature = penalty.map_or(1, |p| p.stress.quadrature());
+    let ties = space.ties();
+    CellOperator::new(&discretisation.chunks, space.nodes(), data, quadrature, &ties, space.body_count())
 }
 
 impl<const D: usize> StokesSystem<D>
@@ -102,13 +109,12 @@ where
         space: VelocitySpace<D>,
         viscosity: f64,
         weak: WeakPressures,
-        penalty: Option<Penalty<f64, D>>,
+        penalty: Option<Penalty<D>>,
     ) -> Self {
         let cells = active_cells(discretisation, &space, viscosity);
         Self {
             pressure: PressureSpace::new(discretisation, &space, &cells, weak),
-            kernel: CubeKernel::default(),
-            batches: batches(discretisation, &cells),
+            operator: cell_operator(discretisation, &space, &cells, penalty.as_ref()),
             space,
             cells,
             penalty,
@@ -125,21 +131,18 @@ where
         self.space.dim()
     }
 
-    /// `y -= B^T p` for nodal loads and pressures.
-    pub fn subtract_gradient(&self, p: &[f64], y: &mut [f64]) {
-        self.kernel.gradient(&self.batches, p, y);
+    /// `y = -B^T p` for nodal pressures, reduced.
+    pub fn gradient(&self, p: &[f64], y: &mut [f64], work: &mut Workspace<f64>) {
+        self.operator.gradient(p, y, work);
     }
 
     /// `b -= [A, -B^T; -B, 0] (u, p)` for a nodal velocity field that already fulfils all constraints (it may carry
     /// boundary values), with the result in reduced form.
     pub fn residual(&self, u: &[f64], p: &[f64], b: &mut [f64]) {
-        let (nodal, split) = (self.space.full_dim(), self.velocity_dim());
         let mut y = vec![0.0; self.dim()];
-        let mut work = vec![0.0; split];
-        let (yu, yp) = y.split_at_mut(split);
-        self.kernel.stokes(&self.batches, &u[..nodal], p, &mut yu[..nodal], yp);
-        self.add_penalty(&u[..nodal], &mut yu[..nodal], &mut work[..nodal]);
-        self.reduce(&mut y);
+        let (yu, yp) = y.split_at_mut(self.velocity_dim());
+        self.operator.stokes_of_field(u, p, yu, yp, &mut Workspace::default());
+        self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);
     }
 
@@ -149,16 +152,12 @@ where
     pub fn reduce(&self, y: &mut [f64]) {
         let (yu, yp) = y.split_at_mut(self.velocity_dim());
         self.space.reduce(yu);
-        self.pressure.reduce(yp);
-        self.pressure.remove_mean(yp);
+        self.reduce_pressures(yp);
     }
 
-    fn add_penalty(&self, x: &[f64], y: &mut [f64], work: &mut [f64]) {
-        if let Some(penalty) = &self.penalty {
-            work.fill(0.0);
-            penalty.stress.apply(self.space.nodes(), x, work);
-            vector::axpy(penalty.factor, work, y);
-        }
+    fn reduce_pressures(&self, q: &mut [f64]) {
+        self.pressure.reduce(q);
+        self.pressure.remove_mean(q);
     }
 }
 
@@ -169,9 +168,8 @@ where
     Dim<D>: Space<D>,
 {
     system: &'a StokesSystem<D>,
-    velocity: Vec<f64>,
     pressure: Vec<f64>,
-    penalty: Vec<f64>,
+    work: Workspace<f64>,
     applications: usize,
 }
 
@@ -181,11 +179,9 @@ where
 {
     /// The operator of `system`.
     pub fn new(system: &'a StokesSystem<D>) -> Self {
-        let penalty = if system.penalty.is_some() { system.space.full_dim() } else { 0 };
         Self {
-            velocity: vec![0.0; system.velocity_dim()],
             pressure: vec![0.0; system.pressure.dim()],
-            penalty: vec![0.0; penalty],
+            work: Workspace::default(),
             applications: 0,
             system,
         }
@@ -207,17 +203,13 @@ where
 
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
-        let Self { system, velocity, pressure, penalty, .. } = self;
-        let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
-        vector::copy(&x[..split], velocity);
-        system.space.expand(velocity);
-        vector::copy(&x[split..], pressure);
+        let Self { system, pressure, work, .. } = self;
+        let (u, p) = x.split_at(system.velocity_dim());
+        let (yu, yp) = y.split_at_mut(system.velocity_dim());
+        vector::copy(p, pressure);
         system.pressure.expand(pressure);
-        vector::clear(y);
-        let (yu, yp) = y.split_at_mut(split);
-        system.kernel.stokes(&system.batches, &velocity[..nodal], pressure, &mut yu[..nodal], yp);
-        system.add_penalty(&velocity[..nodal], &mut yu[..nodal], penalty);
-        system.reduce(y);
+        system.operator.stokes(u, pressure, yu, yp, work);
+        system.reduce_pressures(yp);
     }
 }
 

@@ -1,0 +1,182 @@
+//! The Stokes operator on cubic cells, matrix-free, in the reduced unknowns of a mesh.
+//!
+//! A chunk of cells is worked off in a buffer that stays in the cache: its nodal velocities and pressures are read, rigid
+//! and hanging nodes set, cells taken as many at a time as a vector has lanes ([`lanes`]), their matrices applied in
+//! Legendre products ([`legendre`]), a viscosity that varies inside by quadrature ([`points`]), and the loads of hanging
+//! and rigid nodes moved to where they belong before the owned nodes are written. No vector is passed over twice.
+//!
+//! Kernels are compiled for AVX-512, AVX2 and portably, and chosen at run time. Chunks run in parallel on the current
+//! rayon pool; the results have the same bits for any number of threads.
+
+mod kernel;
+mod lanes;
+mod legendre;
+mod points;
+mod run;
+#[cfg(test)]
+mod tests;
+mod ties;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::sync::Arc;
+
+use crate::chunks::{Chunks, Lists, Slots};
+use crate::element::node_count;
+use crate::nodes::NodeMap;
+pub use lanes::CellScalar;
+use legendre::Coefficients;
+use points::PointRule;
+pub use run::Workspace;
+pub use ties::Tie;
+
+/// Cells are padded to multiples of this, the largest number of lanes.
+const GROUP: usize = 16;
+
+/// What the operator has on one cell: the viscous matrix `viscous K + K(eta)` and the divergence `divergence B`.
+#[derive(Clone, Copy, Debug)]
+pub struct CellData<'a> {
+    /// Index in the mesh.
+    pub cell: usize,
+    /// `eta h^(D-2)`.
+    pub viscous: f64,
+    /// `h^(D-1)`, or zero where the cell takes no part in the divergence.
+    pub divergence: f64,
+    /// More of `eta h^(D-2)` at each quadrature point, x fastest; empty where there is none.
+    pub points: &'a [f64],
+}
+
+/// Cells of a chunk in the list of all cells: first those of uniform viscosity, then the others from a new group on.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    uniform: (u32, u32),
+    varying: (u32, u32),
+    /// First group of viscosities at points.
+    first_points: u32,
+}
+
+/// The operator `[A, -B^T; -B, 0]` on some cells of a mesh, for vectors that hold the nodal velocities (`D` interleaved
+/// components) and then the twist of each body, and nodal pressures.
+#[derive(Clone, Debug)]
+pub struct CellOperator<T, const D: usize> {
+    chunks: Arc<Chunks<D>>,
+    coefficients: Coefficients<T>,
+    rule: PointRule<T>,
+    spans: Vec<Span>,
+    /// Slots of the nodes of all cells, padded with slots that no node has.
+    slots: Vec<u16>,
+    viscous: Vec<T>,
+    divergence: Vec<T>,
+    /// Viscosities at quadrature points, times weights: groups of cells, point by point.
+    points: Vec<T>,
+    /// Tied nodes of the cells of each chunk; `node` is a slot, `body` the place in the list of bodies of the chunk.
+    ties: Lists<Tie<T, D>>,
+    bodies: Lists<u32>,
+    body_count: usize,
+}
+
+impl<T: CellScalar, const D: usize> CellOperator<T, D> {
+    /// Unknowns of a body.
+    const TWIST: usize = D + D * (D - 1) / 2;
+
+    /// The operator on `cells`, in the order of the mesh, whose nodes in `ties` move with `body_count` bodies.
+    /// Viscosities that vary in a cell are given at `quadrature` Gauss points a direction.
+    pub fn new<'a>(
+        chunks: &Arc<Chunks<D>>,
+        nodes: &NodeMap<D>,
+        cells: impl Iterator<Item = CellData<'a>>,
+        quadrature: usize,
+        ties: &[Tie<f64, D>],
+        body_count: usize,
+    ) -> Self {
+        let mut new = Self {
+            chunks: chunks.clone(),
+            coefficients: Coefficients::new::<D>(),
+            rule: PointRule::new::<D>(quadrature),
+            spans: Vec::with_capacity(chunks.count()),
+            slots: Vec::new(),
+            viscous: Vec::new(),
+            divergence: Vec::new(),
+            points: Vec::new(),
+            ties: Lists::default(),
+            bodies: Lists::default(),
+            body_count,
+        };
+        let mut tie_of = vec![u32::MAX; nodes.node_count()];
+        for (k, tie) in ties.iter().enumerate() {
+            tie_of[tie.node as usize] = k as u32;
+        }
+        let mut slots = Slots::new(nodes.node_count());
+        let mut cells = cells.peekable();
+        let mut of_chunk = Vec::new();
+        for chunk in 0..chunks.count() {
+            let range = chunks.cells(chunk);
+            of_chunk.clear();
+            while let Some(cell) = cells.next_if(|c| range.contains(&c.cell)) {
+                of_chunk.push(cell);
+            }
+            slots.set(&chunks.velocity, chunk);
+            new.push_chunk(chunk, nodes, &of_chunk, &slots);
+            new.push_ties(chunk, if of_chunk.is_empty() { &[] } else { ties }, &tie_of);
+        }
+        debug_assert!(cells.next().is_none(), "cells come in the order of the mesh");
+        new
+    }
+
+    fn push_chunk(&mut self, chunk: usize, nodes: &NodeMap<D>, cells: &[CellData<'_>], slots: &Slots) {
+        let first_points = (self.points.len() / (GROUP * self.rule.weights.len())) as u32;
+        let padding = self.chunks.slot_count(chunk) as u16;
+        let mut push = |varying: bool| {
+            let start = self.viscous.len() as u32;
+            for cell in cells.iter().filter(|c| c.points.is_empty() != varying) {
+                self.slots.extend(nodes.cell(cell.cell).iter().map(|&n| slots.of(n)));
+                self.viscous.push(T::from_f64(cell.viscous));
+                self.divergence.push(T::from_f64(cell.divergence));
+            }
+            let end = self.viscous.len();
+            let padded = end.next_multiple_of(GROUP);
+            self.slots.resize(padded * node_count::<D>(2), padding);
+            self.viscous.resize(padded, T::ZERO);
+            self.divergence.resize(padded, T::ZERO);
+            (start, end as u32)
+        };
+        let span = Span { uniform: push(false), varying: push(true), first_points };
+        self.spans.push(span);
+        let varying: Vec<&[f64]> = cells.iter().map(|c| c.points).filter(|p| !p.is_empty()).collect();
+        for group in varying.chunks(GROUP) {
+            for (q, &weight) in self.rule.weights.iter().enumerate() {
+                let at = |lane: usize| group.get(lane).map_or(0.0, |points| weight * points[q]);
+                self.points.extend((0..GROUP).map(|lane| T::from_f64(at(lane))));
+            }
+        }
+    }
+
+    /// Ties of the nodes that a chunk owns or borrows.
+    fn push_ties(&mut self, chunk: usize, ties: &[Tie<f64, D>], tie_of: &[u32]) {
+        let shares = &self.chunks.velocity;
+        let nodes = shares.owned(chunk).chain(shares.borrowed.of(chunk).iter().map(|&n| n as usize));
+        let tied: Vec<(u16, Tie<f64, D>)> = nodes
+            .enumerate()
+            .filter_map(|(slot, node)| ties.get(tie_of[node] as usize).map(|&tie| (slot as u16, tie)))
+            .collect();
+        let mut bodies: Vec<u32> = tied.iter().map(|t| t.1.body).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        self.ties.push(tied.iter().map(|(slot, tie)| Tie {
+            node: u32::from(*slot),
+            body: bodies.partition_point(|&b| b < tie.body) as u32,
+            arm: tie.arm.map(T::from_f64),
+        }));
+        self.bodies.push(bodies);
+    }
+
+    /// Length of a velocity vector.
+    pub fn velocity_dim(&self) -> usize {
+        self.chunks.velocity.node_count() * D + self.body_count * Self::TWIST
+    }
+
+    /// Length of a pressure vector.
+    pub fn pressure_dim(&self) -> usize {
+        self.chunks.pressure.node_count()
+    }
+}

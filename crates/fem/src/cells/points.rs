@@ -1,0 +1,172 @@
+//! Viscosity that varies inside a cell, by quadrature.
+//!
+//! `int 2 eta eps(v) : eps(u)` is the sum over the points of a tensor-product rule of `2 eta_q eps(v)_q : eps(u)_q`. Each
+//! of the strains is a triquadratic in Legendre products; its values at the points come one direction after another,
+//! with points that mirror each other in pairs.
+
+use gluey_linalg::Scalar;
+
+use super::lanes::Lanes;
+use super::legendre::{DERIVATIVE, UNKNOWNS, VELOCITY};
+use crate::element::{gauss, gauss_cube, node_count, split};
+
+/// Gauss points with the values of the Legendre polynomials.
+#[derive(Clone, Debug)]
+pub(super) struct PointRule<T> {
+    /// Points a direction.
+    count: usize,
+    /// `c_1 P_1 / c_0` and `c_2 P_2 / c_0` at the points of the lower half.
+    lower: Vec<[T; 2]>,
+    /// Weights of all points, `c_0^2` a direction included.
+    pub(super) weights: Vec<f64>,
+    /// Derivatives: `c_{l+1} P_{l+1}' = slope[l] c_l P_l`.
+    slope: [T; 2],
+}
+
+impl<T: Scalar> PointRule<T> {
+    pub(super) fn new<const D: usize>(count: usize) -> Self {
+        let lower = gauss(count).into_iter().take(count.div_ceil(2)).enumerate().map(|(q, (x, _))| {
+            // The middle point is at zero but for a rounding.
+            let t = if 2 * q + 1 == count { 0.0 } else { 2.0 * x - 1.0 };
+            let [constant, linear, quadratic] = VELOCITY;
+            [linear * t / constant, quadratic * 0.5 * (3.0 * t * t - 1.0) / constant].map(T::from_f64)
+        });
+        Self {
+            count,
+            lower: lower.collect(),
+            weights: gauss_cube::<D>(count).iter().map(|p| p.1 * VELOCITY[0].powi(2 * D as i32)).collect(),
+            slope: [0, 1].map(|l| T::from_f64(DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l])),
+        }
+    }
+
+    /// Numbers in a workspace for vectors of `lanes`.
+    pub(super) fn workspace_len(&self, lanes: usize) -> usize {
+        2 * self.count.max(3).pow(3) * lanes
+    }
+
+    /// `r += K(eta) u`; `eta` holds viscosities times weights, one group of lanes after another `step` numbers apart.
+    #[inline(always)]
+    pub(super) fn add_viscous<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        eta: &[T],
+        step: usize,
+        u: &[V; UNKNOWNS],
+        r: &mut [V; UNKNOWNS],
+        work: &mut [T],
+    ) {
+        let n = node_count::<D>(2);
+        for b in 0..D {
+            for a in 0..=b {
+                let mut strain = [V::splat(T::ZERO); 27];
+                for k in 0..n {
+                    let l = split::<D>(k, 3);
+                    if l[b] < 2 {
+                        strain[k] = u[a * n + k + stride(b)].mul(V::splat(self.slope[l[b]]));
+                    }
+                    if a < b && l[a] < 2 {
+                        strain[k] = u[b * n + k + stride(a)].mul_add(V::splat(self.slope[l[a]]), strain[k]);
+                    }
+                }
+                let factor = V::splat(if a == b { T::ONE + T::ONE } else { T::ONE });
+                self.weigh::<V, D>(&mut strain, factor, eta, step, work);
+                for k in 0..n {
+                    let l = split::<D>(k, 3);
+                    if l[b] < 2 {
+                        let r = &mut r[a * n + k + stride(b)];
+                        *r = strain[k].mul_add(V::splat(self.slope[l[b]]), *r);
+                    }
+                    if a < b && l[a] < 2 {
+                        let r = &mut r[b * n + k + stride(a)];
+                        *r = strain[k].mul_add(V::splat(self.slope[l[a]]), *r);
+                    }
+                }
+            }
+        }
+    }
+
+    /// From the coefficients of a field to its moments with `factor * eta`.
+    #[inline(always)]
+    fn weigh<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        field: &mut [V; 27],
+        factor: V,
+        eta: &[T],
+        step: usize,
+        work: &mut [T],
+    ) {
+        let half = work.len() / 2;
+        let (mut from, mut to) = work.split_at_mut(half);
+        for (k, value) in field[..node_count::<D>(2)].iter().enumerate() {
+            put(from, k, *value);
+        }
+        for d in 0..D {
+            self.evaluate::<V>(from, to, node_count::<D>(2) / stride(d + 1), self.count.pow(d as u32));
+            (from, to) = (to, from);
+        }
+        for q in 0..self.count.pow(D as u32) {
+            put(from, q, get::<V>(from, q).mul(factor).mul(V::load(&eta[q * step..])));
+        }
+        for d in (0..D).rev() {
+            self.collect::<V>(from, to, node_count::<D>(2) / stride(d + 1), self.count.pow(d as u32));
+            (from, to) = (to, from);
+        }
+        for (k, value) in field[..node_count::<D>(2)].iter_mut().enumerate() {
+            *value = get(from, k);
+        }
+    }
+
+    /// From coefficients to values at the points of one direction: `outer x 3 x inner` to `outer x count x inner`.
+    #[inline(always)]
+    fn evaluate<V: Lanes<Scalar = T>>(&self, from: &[T], to: &mut [T], outer: usize, inner: usize) {
+        for block in 0..outer {
+            for i in 0..inner {
+                let a = [0, 1, 2].map(|l| get::<V>(from, (3 * block + l) * inner + i));
+                let at = |q: usize| (self.count * block + q) * inner + i;
+                for (q, &[odd, even]) in self.lower.iter().enumerate() {
+                    let even = a[2].mul_add(V::splat(even), a[0]);
+                    let odd = a[1].mul(V::splat(odd));
+                    put(to, at(self.count - 1 - q), even.sub(odd));
+                    put(to, at(q), even.add(odd));
+                }
+            }
+        }
+    }
+
+    /// The transpose of `evaluate`.
+    #[inline(always)]
+    fn collect<V: Lanes<Scalar = T>>(&self, from: &[T], to: &mut [T], outer: usize, inner: usize) {
+        for block in 0..outer {
+            for i in 0..inner {
+                let mut a = [V::splat(T::ZERO); 3];
+                let at = |q: usize| get::<V>(from, (self.count * block + q) * inner + i);
+                for (q, &[odd, even]) in self.lower.iter().enumerate() {
+                    let is_middle = 2 * q + 1 == self.count;
+                    let (lower, upper) =
+                        (at(q), if is_middle { V::splat(T::ZERO) } else { at(self.count - 1 - q) });
+                    let (sum, difference) = (lower.add(upper), lower.sub(upper));
+                    a[0] = a[0].add(sum);
+                    a[1] = difference.mul_add(V::splat(odd), a[1]);
+                    a[2] = sum.mul_add(V::splat(even), a[2]);
+                }
+                for (l, a) in a.into_iter().enumerate() {
+                    put(to, (3 * block + l) * inner + i, a);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+const fn stride(direction: usize) -> usize {
+    [1, 3, 9, 27][direction]
+}
+
+#[inline(always)]
+fn get<V: Lanes>(from: &[V::Scalar], k: usize) -> V {
+    V::load(&from[k * V::COUNT..])
+}
+
+#[inline(always)]
+fn put<V: Lanes>(to: &mut [V::Scalar], k: usize, value: V) {
+    value.store(&mut to[k * V::COUNT..]);
+}

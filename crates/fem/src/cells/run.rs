@@ -1,0 +1,470 @@
+//! How a [`CellOperator`] runs over its chunks.
+
+use std::ops::Range;
+
+use gluey_linalg::Scalar;
+
+use super::kernel::Registers;
+use super::lanes::{CellScalar, Lanes, Nodes, Portable};
+use super::{CellOperator, GROUP};
+use crate::chunks::Shares;
+
+/// The buffers of one thread.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Buffers<T> {
+    x: Vec<T>,
+    y: Vec<T>,
+    points: Vec<T>,
+}
+
+/// What a [`CellOperator`] works in: buffers for every thread, and contributions to nodes of other chunks.
+#[derive(Clone, Debug, Default)]
+pub struct Workspace<T> {
+    buffers: Vec<Buffers<T>>,
+    velocity: Vec<T>,
+    pressure: Vec<T>,
+    twists: Vec<T>,
+}
+
+/// What is applied to which fields.
+#[derive(Clone, Copy)]
+pub(super) struct Input<'a, T> {
+    /// Velocities and twists; empty for none.
+    x: &'a [T],
+    /// Nodal pressures; empty for none.
+    p: &'a [T],
+    /// Whether rigid and hanging nodes are to be set first.
+    expand: bool,
+}
+
+/// Results of some chunks: of the nodes they own, of those they borrow, and of the bodies they touch.
+pub(super) struct Output<'a, T> {
+    chunks: Range<usize>,
+    y: &'a mut [T],
+    q: &'a mut [T],
+    borrowed_y: &'a mut [T],
+    borrowed_q: &'a mut [T],
+    twists: &'a mut [T],
+}
+
+impl<T: CellScalar, const D: usize> CellOperator<T, D> {
+    /// `y = A x`.
+    pub fn viscous(&self, x: &[T], y: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<true, false>(Input { x, p: &[], expand: true }, y, &mut [], work);
+    }
+
+    /// `y = A u` for a nodal velocity field that is already right on rigid and hanging nodes.
+    pub fn viscous_of_field(&self, u: &[T], y: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<true, false>(Input { x: u, p: &[], expand: false }, y, &mut [], work);
+    }
+
+    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal.
+    pub fn stokes(&self, x: &[T], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<true, true>(Input { x, p, expand: true }, y, q, work);
+    }
+
+    /// The same for a nodal velocity field that is already right on rigid and hanging nodes.
+    pub fn stokes_of_field(&self, u: &[T], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<true, true>(Input { x: u, p, expand: false }, y, q, work);
+    }
+
+    /// `y = -B^T p`.
+    pub fn gradient(&self, p: &[T], y: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<false, true>(Input { x: &[], p, expand: false }, y, &mut [], work);
+    }
+
+    fn apply<const VISCOUS: bool, const PRESSURE: bool>(
+        &self,
+        input: Input<'_, T>,
+        y: &mut [T],
+        q: &mut [T],
+        work: &mut Workspace<T>,
+    ) {
+        work.fit(self, !q.is_empty());
+        let kernel = |output: Output<'_, T>, buffers: &mut Buffers<T>| {
+            self.dispatch::<VISCOUS, PRESSURE>(input, output, buffers);
+        };
+        self.apply_kernel(y, q, work, &kernel);
+    }
+
+    /// Runs a kernel on all chunks and adds up what they share.
+    fn apply_kernel(
+        &self,
+        y: &mut [T],
+        q: &mut [T],
+        work: &mut Workspace<T>,
+        kernel: &(impl Fn(Output<'_, T>, &mut Buffers<T>) + Sync),
+    ) {
+        let shares = &self.chunks.velocity;
+        let (y, twists) = y.split_at_mut(shares.node_count() * D);
+        let Workspace { buffers, velocity, pressure, twists: of_chunks } = work;
+        let count = self.chunks.count();
+        let output = Output {
+            chunks: 0..count,
+            y: &mut *y,
+            q: &mut *q,
+            borrowed_y: velocity,
+            borrowed_q: pressure,
+            twists: of_chunks,
+        };
+        self.in_parallel(output, buffers, kernel);
+        add_returned::<T, D>(shares, 0..count, y, velocity, buffers.len());
+        if !q.is_empty() {
+            add_returned::<T, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
+        }
+        twists.fill(T::ZERO);
+        for (&body, load) in self.bodies.items().iter().zip(of_chunks.chunks_exact(Self::TWIST)) {
+            let sum = &mut twists[body as usize * Self::TWIST..][..Self::TWIST];
+            sum.iter_mut().zip(load).for_each(|(sum, &load)| *sum += load);
+        }
+    }
+
+    /// Halves the chunks until each part has buffers of its own.
+    fn in_parallel(
+        &self,
+        output: Output<'_, T>,
+        buffers: &mut [Buffers<T>],
+        run: &(impl Fn(Output<'_, T>, &mut Buffers<T>) + Sync),
+    ) {
+        if let [one] = buffers {
+            return run(output, one);
+        }
+        let (first, second) = buffers.split_at_mut(buffers.len() / 2);
+        let middle = output.chunks.start + output.chunks.len() * first.len() / (first.len() + second.len());
+        let (left, right) = self.split(output, middle);
+        rayon::join(|| self.in_parallel(left, first, run), || self.in_parallel(right, second, run));
+    }
+
+    fn split<'a>(&self, output: Output<'a, T>, chunk: usize) -> (Output<'a, T>, Output<'a, T>) {
+        let start = output.chunks.start;
+        let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
+        let nodes = |shares: &Shares| shares.owned(chunk).start - shares.owned(start).start;
+        let borrowed =
+            |shares: &Shares| shares.borrowed.range(chunk).start - shares.borrowed.range(start).start;
+        let bodies = self.bodies.range(chunk).start - self.bodies.range(start).start;
+        let (y, y2) = output.y.split_at_mut(nodes(velocity) * D);
+        let (q, q2) = output.q.split_at_mut(nodes(pressure).min(output.q.len()));
+        let (borrowed_y, borrowed_y2) = output.borrowed_y.split_at_mut(borrowed(velocity) * D);
+        let (borrowed_q, borrowed_q2) =
+            output.borrowed_q.split_at_mut(borrowed(pressure).min(output.borrowed_q.len()));
+        let (twists, twists2) = output.twists.split_at_mut(bodies * Self::TWIST);
+        let left = Output { chunks: start..chunk, y, q, borrowed_y, borrowed_q, twists };
+        let right = Output {
+            chunks: chunk..output.chunks.end,
+            y: y2,
+            q: q2,
+            borrowed_y: borrowed_y2,
+            borrowed_q: borrowed_q2,
+            twists: twists2,
+        };
+        (left, right)
+    }
+
+    /// Runs the kernel compiled for the widest vectors this processor has.
+    pub(super) fn dispatch<const VISCOUS: bool, const PRESSURE: bool>(
+        &self,
+        input: Input<'_, T>,
+        output: Output<'_, T>,
+        buffers: &mut Buffers<T>,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+                // SAFETY: the instructions the function is compiled for were detected just above; its code is the safe
+                // generic `run`. The test `vector_and_portable_kernels_agree` compares all three.
+                return unsafe { run_avx512::<T, D, VISCOUS, PRESSURE>(self, input, output, buffers) };
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                // SAFETY: as above.
+                return unsafe { run_avx2::<T, D, VISCOUS, PRESSURE>(self, input, output, buffers) };
+            }
+        }
+        self.run::<Portable<T>, VISCOUS, PRESSURE>(input, output, buffers);
+    }
+
+    /// Works off some chunks.
+    #[inline(always)]
+    pub(super) fn run<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool>(
+        &self,
+        input: Input<'_, T>,
+        output: Output<'_, T>,
+        buffers: &mut Buffers<T>,
+    ) {
+        let Output { chunks, mut y, mut q, mut borrowed_y, mut borrowed_q, mut twists } = output;
+        let registers = &mut Registers::new();
+        let (x_buffer, y_buffer) = (nodes_in(&mut buffers.x), nodes_in(&mut buffers.y));
+        for chunk in chunks {
+            let span = &self.spans[chunk];
+            let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
+            let output = Output {
+                chunks: chunk..chunk + 1,
+                y: first_part(&mut y, velocity.owned(chunk).len() * D),
+                q: first_part(&mut q, pressure.owned(chunk).len()),
+                borrowed_y: first_part(&mut borrowed_y, velocity.borrowed.range(chunk).len() * D),
+                borrowed_q: first_part(&mut borrowed_q, pressure.borrowed.range(chunk).len()),
+                twists: first_part(&mut twists, self.bodies.range(chunk).len() * Self::TWIST),
+            };
+            if span.uniform.0 == span.uniform.1 && span.varying.0 == span.varying.1 {
+                output.clear();
+                continue;
+            }
+            self.read::<VISCOUS, PRESSURE>(chunk, input, x_buffer);
+            y_buffer[..=self.chunks.slot_count(chunk)].fill([T::ZERO; 4]);
+            for first in (span.uniform.0..span.uniform.1).step_by(V::COUNT) {
+                self.cells::<V, VISCOUS, PRESSURE, false>(
+                    first as usize,
+                    &[],
+                    x_buffer,
+                    y_buffer,
+                    registers,
+                    &mut [],
+                );
+            }
+            if VISCOUS {
+                for first in (span.varying.0..span.varying.1).step_by(V::COUNT) {
+                    let eta = self.points_of(span.first_points, (first - span.varying.0) as usize);
+                    self.cells::<V, VISCOUS, PRESSURE, true>(
+                        first as usize,
+                        eta,
+                        x_buffer,
+                        y_buffer,
+                        registers,
+                        &mut buffers.points,
+                    );
+                }
+            } else {
+                for first in (span.varying.0..span.varying.1).step_by(V::COUNT) {
+                    self.cells::<V, VISCOUS, PRESSURE, false>(
+                        first as usize,
+                        &[],
+                        x_buffer,
+                        y_buffer,
+                        registers,
+                        &mut [],
+                    );
+                }
+            }
+            self.write(chunk, y_buffer, output);
+        }
+    }
+
+    /// Viscosities at points from the given cell with a varying one on.
+    #[inline(always)]
+    fn points_of(&self, first_group: u32, cell: usize) -> &[T] {
+        let points = GROUP * self.rule.weights.len();
+        &self.points[(first_group as usize + cell / GROUP) * points + cell % GROUP..]
+    }
+
+    /// Reads the unknowns of a chunk.
+    #[inline(always)]
+    fn read<const VISCOUS: bool, const PRESSURE: bool>(
+        &self,
+        chunk: usize,
+        input: Input<'_, T>,
+        buffer: &mut Nodes<T>,
+    ) {
+        let chunks = &*self.chunks;
+        if VISCOUS {
+            let (own, borrowed) = (chunks.velocity.owned(chunk), chunks.velocity.borrowed.of(chunk));
+            let (x, _) = input.x[..chunks.velocity.node_count() * D].as_chunks::<D>();
+            let (owned_buffer, rest) = buffer.split_at_mut(own.len());
+            for (node, x) in owned_buffer.iter_mut().zip(&x[own]) {
+                set_velocity(node, x);
+            }
+            for (node, &from) in rest.iter_mut().zip(borrowed) {
+                set_velocity(node, &x[from as usize]);
+            }
+            if input.expand {
+                self.expand(chunk, &input.x[chunks.velocity.node_count() * D..], buffer);
+            }
+        }
+        if PRESSURE {
+            let own = chunks.pressure.owned(chunk);
+            for (&slot, &p) in chunks.pressure_slots[own.clone()].iter().zip(&input.p[own]) {
+                buffer[slot as usize][D] = p;
+            }
+            let borrowed = chunks.pressure.borrowed.range(chunk);
+            let slots = &chunks.borrowed_pressure_slots[borrowed];
+            for (&slot, &q) in slots.iter().zip(chunks.pressure.borrowed.of(chunk)) {
+                buffer[slot as usize][D] = input.p[q as usize];
+            }
+        }
+        buffer[chunks.slot_count(chunk)] = [T::ZERO; 4];
+    }
+
+    /// Sets rigid nodes, then hanging ones.
+    #[inline(always)]
+    fn expand(&self, chunk: usize, twists: &[T], buffer: &mut Nodes<T>) {
+        let bodies = self.bodies.of(chunk);
+        for tie in self.ties.of(chunk) {
+            let twist = &twists[bodies[tie.body as usize] as usize * Self::TWIST..][..Self::TWIST];
+            tie.set_velocity(twist, &mut buffer[tie.node as u16 as usize]);
+        }
+        self.chunks.for_each_hanging(chunk, |slot, masters, weights| {
+            let mut sum = [T::ZERO; D];
+            for (&master, &weight) in masters.iter().zip(weights) {
+                let (weight, master) = (T::from_f64(weight), &buffer[master as usize]);
+                (0..D).for_each(|c| sum[c] += weight * master[c]);
+            }
+            buffer[slot as usize][..D].copy_from_slice(&sum);
+        });
+    }
+
+    /// Moves the loads of a chunk to its unknowns and writes them.
+    #[inline(always)]
+    fn write(&self, chunk: usize, buffer: &mut Nodes<T>, output: Output<'_, T>) {
+        let chunks = &*self.chunks;
+        self.chunks.for_each_hanging(chunk, |slot, masters, weights| {
+            let load = take_velocity::<T, D>(&mut buffer[slot as usize]);
+            for (&master, &weight) in masters.iter().zip(weights) {
+                let (weight, master) = (T::from_f64(weight), &mut buffer[master as usize]);
+                (0..D).for_each(|c| master[c] += weight * load[c]);
+            }
+        });
+        output.twists.fill(T::ZERO);
+        for tie in self.ties.of(chunk) {
+            let force = take_velocity::<T, D>(&mut buffer[tie.node as u16 as usize]);
+            tie.add_moment(&force, &mut output.twists[tie.body as usize * Self::TWIST..][..Self::TWIST]);
+        }
+        for &slot in chunks.boundary.of(chunk) {
+            take_velocity::<T, D>(&mut buffer[slot as usize]);
+        }
+        let (own, borrowed) = (output.y.as_chunks_mut::<D>().0, output.borrowed_y.as_chunks_mut::<D>().0);
+        let (owned_buffer, rest) = buffer.split_at(own.len());
+        own.iter_mut().zip(owned_buffer).for_each(|(y, node)| *y = velocity_of(node));
+        borrowed.iter_mut().zip(rest).for_each(|(y, node)| *y = velocity_of(node));
+        if !output.q.is_empty() || !output.borrowed_q.is_empty() {
+            for (q, &slot) in output.q.iter_mut().zip(&chunks.pressure_slots[chunks.pressure.owned(chunk)]) {
+                *q = buffer[slot as usize][D];
+            }
+            let slots = &chunks.borrowed_pressure_slots[chunks.pressure.borrowed.range(chunk)];
+            for (q, &slot) in output.borrowed_q.iter_mut().zip(slots) {
+                *q = buffer[slot as usize][D];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn take_velocity<T: Scalar, const D: usize>(node: &mut [T; 4]) -> [T; D] {
+    std::array::from_fn(|c| std::mem::replace(&mut node[c], T::ZERO))
+}
+
+#[inline(always)]
+fn velocity_of<T: Scalar, const D: usize>(node: &[T; 4]) -> [T; D] {
+    std::array::from_fn(|c| node[c])
+}
+
+#[inline(always)]
+fn set_velocity<T: Scalar, const D: usize>(node: &mut [T; 4], u: &[T; D]) {
+    *node = std::array::from_fn(|c| if c < D { u[c] } else { T::ZERO });
+}
+
+/// Cuts off the first `count` entries, or what there is.
+fn first_part<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let count = count.min(rest.len());
+    let (first, second) = std::mem::take(rest).split_at_mut(count);
+    *rest = second;
+    first
+}
+
+/// Adds to the nodes of each chunk what the chunks that borrow them have left, in their order.
+fn add_returned<T: Scalar, const C: usize>(
+    shares: &Shares,
+    chunks: Range<usize>,
+    y: &mut [T],
+    borrowed: &[T],
+    part_count: usize,
+) {
+    let first = shares.owned(chunks.start).start;
+    if part_count > 1 && chunks.len() > 1 {
+        let middle = chunks.start + chunks.len() / 2;
+        let (left, right) = y.split_at_mut((shares.owned(middle).start - first) * C);
+        rayon::join(
+            || add_returned::<T, C>(shares, chunks.start..middle, left, borrowed, part_count / 2),
+            || add_returned::<T, C>(shares, middle..chunks.end, right, borrowed, part_count.div_ceil(2)),
+        );
+        return;
+    }
+    let all = shares.returned.range(chunks.start).start..shares.returned.range(chunks.end - 1).end;
+    for &position in &shares.returned.items()[all] {
+        let node = shares.borrowed.items()[position as usize] as usize - first;
+        let (sum, add) = (&mut y[node * C..][..C], &borrowed[position as usize * C..][..C]);
+        (0..C).for_each(|c| sum[c] += add[c]);
+    }
+}
+
+impl<T: Scalar> Output<'_, T> {
+    fn clear(self) {
+        for part in [self.y, self.q, self.borrowed_y, self.borrowed_q, self.twists] {
+            part.fill(T::ZERO);
+        }
+    }
+}
+
+impl<T: CellScalar> Workspace<T> {
+    /// Makes room for an operator on the current pool of threads; a second time nothing is allocated.
+    fn fit<const D: usize>(&mut self, operator: &CellOperator<T, D>, divergence: bool) {
+        let chunks = &operator.chunks;
+        let threads = rayon::current_num_threads().clamp(1, chunks.count());
+        self.buffers.resize_with(threads, || Buffers {
+            x: vec![T::ZERO; BUFFER],
+            y: vec![T::ZERO; BUFFER],
+            points: vec![T::ZERO; operator.rule.workspace_len(GROUP)],
+        });
+        self.velocity.resize(chunks.velocity.borrowed.items().len() * D, T::ZERO);
+        if divergence {
+            self.pressure.resize(chunks.pressure.borrowed.items().len(), T::ZERO);
+        }
+        self.twists.resize(operator.bodies.items().len() * CellOperator::<T, D>::TWIST, T::ZERO);
+    }
+}
+
+/// Alignment of a buffer, in bytes: no node crosses a line of the cache.
+const ALIGNMENT: usize = 64;
+/// Numbers of a buffer. Pages that no chunk reaches are never touched, so they take no memory.
+const BUFFER: usize = (4 << 16) + ALIGNMENT / 4;
+
+fn nodes_in<T>(buffer: &mut [T]) -> &mut Nodes<T> {
+    let offset = buffer.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT / 4);
+    let (nodes, _) = buffer[offset..].as_chunks_mut::<4>();
+    (&mut nodes[..1 << 16]).try_into().expect("the buffer is longer than all slots")
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+pub(super) fn run_avx2<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool>(
+    operator: &CellOperator<T, D>,
+    input: Input<'_, T>,
+    output: Output<'_, T>,
+    buffers: &mut Buffers<T>,
+) {
+    operator.run::<T::Avx2, VISCOUS, PRESSURE>(input, output, buffers);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
+fn run_avx512<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool>(
+    operator: &CellOperator<T, D>,
+    input: Input<'_, T>,
+    output: Output<'_, T>,
+    buffers: &mut Buffers<T>,
+) {
+    operator.run::<T::Avx512, VISCOUS, PRESSURE>(input, output, buffers);
+}
+
+/// `(y, q)` of the Stokes operator by a given kernel.
+#[cfg(test)]
+pub(super) fn with<T: CellScalar, const D: usize>(
+    operator: &CellOperator<T, D>,
+    x: &[T],
+    p: &[T],
+    kernel: &(impl Fn(Input<'_, T>, Output<'_, T>, &mut Buffers<T>) + Sync),
+) -> Vec<T> {
+    let (mut y, mut q, mut work) = (vec![T::ZERO; x.len()], vec![T::ZERO; p.len()], Workspace::default());
+    work.fit(operator, true);
+    let input = Input { x, p, expand: true };
+    operator.apply_kernel(&mut y, &mut q, &mut work, &|output, buffers| kernel(input, output, buffers));
+    y.extend(q);
+    y
+}

@@ -1,0 +1,49 @@
+//! Nodes that move with bodies.
+
+use gluey_linalg::Scalar;
+
+/// A node that moves with a body: `u = U + w x arm`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tie<T, const D: usize> {
+    /// The node.
+    pub node: u32,
+    /// The body.
+    pub body: u32,
+    /// From the reference point of the body to the node, in the unit of length that the spin is scaled with.
+    pub arm: [T; D],
+}
+
+impl<T: Scalar, const D: usize> Tie<T, D> {
+    /// `u = U + w x arm`.
+    #[inline(always)]
+    pub(super) fn set_velocity(&self, twist: &[T], u: &mut [T; 4]) {
+        let (a, w) = (&self.arm, &twist[D..]);
+        u[..D].copy_from_slice(&twist[..D]);
+        if D == 2 {
+            u[0] += -(w[0] * a[1]);
+            u[1] += w[0] * a[0];
+        } else {
+            for c in 0..D {
+                let (i, j) = ((c + 1) % D, (c + 2) % D);
+                u[c] += w[i] * a[j] - w[j] * a[i];
+            }
+        }
+    }
+
+    /// Adds the force and its moment `arm x f`.
+    #[inline(always)]
+    pub(super) fn add_moment(&self, f: &[T; D], load: &mut [T]) {
+        let a = &self.arm;
+        for c in 0..D {
+            load[c] += f[c];
+        }
+        if D == 2 {
+            load[2] += a[0] * f[1] - a[1] * f[0];
+        } else {
+            for k in 0..D {
+                let (i, j) = ((k + 1) % D, (k + 2) % D);
+                load[D + k] += a[i] * f[j] - a[j] * f[i];
+            }
+        }
+    }
+}
