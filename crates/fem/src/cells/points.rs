@@ -10,6 +10,11 @@ use super::lanes::Lanes;
 use super::legendre::{DERIVATIVE, UNKNOWNS, VELOCITY};
 use crate::element::{gauss, gauss_cube, node_count, split};
 
+/// Points a direction for which there is a kernel of its own.
+const USUAL: usize = 4;
+/// Stands for any other number of points.
+const ANY: usize = 0;
+
 /// Gauss points with the values of the Legendre polynomials.
 #[derive(Clone, Debug)]
 pub(super) struct PointRule<T> {
@@ -41,12 +46,28 @@ impl<T: Scalar> PointRule<T> {
 
     /// Numbers in a workspace for vectors of `lanes`.
     pub(super) fn workspace_len(&self, lanes: usize) -> usize {
-        2 * self.count.max(3).pow(3) * lanes
+        2 * buffer_len(self.count) * lanes
     }
 
     /// `r += K(eta) u`; `eta` holds viscosities times weights, one group of lanes after another `step` numbers apart.
     #[inline(always)]
     pub(super) fn add_viscous<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        eta: &[T],
+        step: usize,
+        u: &[V; UNKNOWNS],
+        r: &mut [V; UNKNOWNS],
+        work: &mut [T],
+    ) {
+        match self.count {
+            USUAL => self.add_strains::<V, D, USUAL>(eta, step, u, r, work),
+            _ => self.add_strains::<V, D, ANY>(eta, step, u, r, work),
+        }
+    }
+
+    /// `add_viscous` for `N` points a direction.
+    #[inline(always)]
+    fn add_strains<V: Lanes<Scalar = T>, const D: usize, const N: usize>(
         &self,
         eta: &[T],
         step: usize,
@@ -68,7 +89,7 @@ impl<T: Scalar> PointRule<T> {
                     }
                 }
                 let factor = V::splat(if a == b { T::ONE + T::ONE } else { T::ONE });
-                self.weigh::<V, D>(&mut strain, factor, eta, step, work);
+                self.weigh::<V, D, N>(&mut strain, factor, eta, step, work);
                 for k in 0..n {
                     let l = split::<D>(k, 3);
                     if l[b] < 2 {
@@ -86,7 +107,7 @@ impl<T: Scalar> PointRule<T> {
 
     /// From the coefficients of a field to its moments with `factor * eta`.
     #[inline(always)]
-    fn weigh<V: Lanes<Scalar = T>, const D: usize>(
+    fn weigh<V: Lanes<Scalar = T>, const D: usize, const N: usize>(
         &self,
         field: &mut [V; 27],
         factor: V,
@@ -94,20 +115,19 @@ impl<T: Scalar> PointRule<T> {
         step: usize,
         work: &mut [T],
     ) {
-        let half = work.len() / 2;
-        let (mut from, mut to) = work.split_at_mut(half);
+        let count = self.count::<N>();
+        let half = buffer_len(count) * V::COUNT;
+        let (mut from, mut to) = work[..2 * half].split_at_mut(half);
         for (k, value) in field[..node_count::<D>(2)].iter().enumerate() {
-            put(from, k, *value);
+            put(from, k, value.mul(factor));
         }
-        for d in 0..D {
-            self.evaluate::<V>(from, to, node_count::<D>(2) / stride(d + 1), self.count.pow(d as u32));
+        for d in 0..D - 1 {
+            self.evaluate::<V, N>(from, to, stride(D - 1 - d), count.pow(d as u32));
             (from, to) = (to, from);
         }
-        for q in 0..self.count.pow(D as u32) {
-            put(from, q, get::<V>(from, q).mul(factor).mul(V::load(&eta[q * step..])));
-        }
-        for d in (0..D).rev() {
-            self.collect::<V>(from, to, node_count::<D>(2) / stride(d + 1), self.count.pow(d as u32));
+        self.weigh_lines::<V, N>(from, count.pow(D as u32 - 1), eta, step);
+        for d in (0..D - 1).rev() {
+            self.collect::<V, N>(from, to, stride(D - 1 - d), count.pow(d as u32));
             (from, to) = (to, from);
         }
         for (k, value) in field[..node_count::<D>(2)].iter_mut().enumerate() {
@@ -115,44 +135,120 @@ impl<T: Scalar> PointRule<T> {
         }
     }
 
+    #[inline(always)]
+    fn count<const N: usize>(&self) -> usize {
+        if N == ANY { self.count } else { N }
+    }
+
+    #[inline(always)]
+    fn lower<const N: usize>(&self) -> &[[T; 2]] {
+        &self.lower[..self.count::<N>().div_ceil(2)]
+    }
+
     /// From coefficients to values at the points of one direction: `outer x 3 x inner` to `outer x count x inner`.
     #[inline(always)]
-    fn evaluate<V: Lanes<Scalar = T>>(&self, from: &[T], to: &mut [T], outer: usize, inner: usize) {
+    fn evaluate<V: Lanes<Scalar = T>, const N: usize>(
+        &self,
+        from: &[T],
+        to: &mut [T],
+        outer: usize,
+        inner: usize,
+    ) {
+        let count = self.count::<N>();
         for block in 0..outer {
             for i in 0..inner {
-                let a = [0, 1, 2].map(|l| get::<V>(from, (3 * block + l) * inner + i));
-                let at = |q: usize| (self.count * block + q) * inner + i;
-                for (q, &[odd, even]) in self.lower.iter().enumerate() {
-                    let even = a[2].mul_add(V::splat(even), a[0]);
-                    let odd = a[1].mul(V::splat(odd));
-                    put(to, at(self.count - 1 - q), even.sub(odd));
-                    put(to, at(q), even.add(odd));
+                let a = get_line::<V>(from, 3 * block * inner + i, inner);
+                let at = |q: usize| (count * block + q) * inner + i;
+                for (q, &[odd, even]) in self.lower::<N>().iter().enumerate() {
+                    let (lower, upper) = pair(a, odd, even);
+                    put(to, at(count - 1 - q), upper);
+                    put(to, at(q), lower);
                 }
             }
         }
     }
 
+    /// In the last direction: to values at the points, times `eta`, and back.
+    #[inline(always)]
+    fn weigh_lines<V: Lanes<Scalar = T>, const N: usize>(
+        &self,
+        lines: &mut [T],
+        inner: usize,
+        eta: &[T],
+        step: usize,
+    ) {
+        let count = self.count::<N>();
+        for i in 0..inner {
+            let a = get_line::<V>(lines, i, inner);
+            let mut sum = [V::splat(T::ZERO); 3];
+            let eta = |q: usize| V::load(&eta[(q * inner + i) * step..]);
+            for (q, &[odd, even]) in self.lower::<N>().iter().enumerate() {
+                let (lower, upper) = pair(a, odd, even);
+                let mirrored =
+                    if 2 * q + 1 == count { V::splat(T::ZERO) } else { upper.mul(eta(count - 1 - q)) };
+                add_pair(lower.mul(eta(q)), mirrored, odd, even, &mut sum);
+            }
+            put_line(lines, i, inner, sum);
+        }
+    }
+
     /// The transpose of `evaluate`.
     #[inline(always)]
-    fn collect<V: Lanes<Scalar = T>>(&self, from: &[T], to: &mut [T], outer: usize, inner: usize) {
+    fn collect<V: Lanes<Scalar = T>, const N: usize>(
+        &self,
+        from: &[T],
+        to: &mut [T],
+        outer: usize,
+        inner: usize,
+    ) {
+        let count = self.count::<N>();
         for block in 0..outer {
             for i in 0..inner {
-                let mut a = [V::splat(T::ZERO); 3];
-                let at = |q: usize| get::<V>(from, (self.count * block + q) * inner + i);
-                for (q, &[odd, even]) in self.lower.iter().enumerate() {
-                    let is_middle = 2 * q + 1 == self.count;
-                    let (lower, upper) =
-                        (at(q), if is_middle { V::splat(T::ZERO) } else { at(self.count - 1 - q) });
-                    let (sum, difference) = (lower.add(upper), lower.sub(upper));
-                    a[0] = a[0].add(sum);
-                    a[1] = difference.mul_add(V::splat(odd), a[1]);
-                    a[2] = sum.mul_add(V::splat(even), a[2]);
+                let mut sum = [V::splat(T::ZERO); 3];
+                let at = |q: usize| (count * block + q) * inner + i;
+                for (q, &[odd, even]) in self.lower::<N>().iter().enumerate() {
+                    let mirrored =
+                        if 2 * q + 1 == count { V::splat(T::ZERO) } else { get(from, at(count - 1 - q)) };
+                    add_pair(get(from, at(q)), mirrored, odd, even, &mut sum);
                 }
-                for (l, a) in a.into_iter().enumerate() {
-                    put(to, (3 * block + l) * inner + i, a);
-                }
+                put_line(to, 3 * block * inner + i, inner, sum);
             }
         }
+    }
+}
+
+/// Vectors in a buffer for all stages but the last.
+const fn buffer_len(count: usize) -> usize {
+    let count = if count < 3 { 3 } else { count };
+    3 * count * count
+}
+
+/// Values at a point of the lower half and at its mirror image.
+#[inline(always)]
+fn pair<V: Lanes>(a: [V; 3], odd: V::Scalar, even: V::Scalar) -> (V, V) {
+    let even = a[2].mul_add(V::splat(even), a[0]);
+    let odd = a[1].mul(V::splat(odd));
+    (even.add(odd), even.sub(odd))
+}
+
+/// The transpose of [`pair`].
+#[inline(always)]
+fn add_pair<V: Lanes>(lower: V, upper: V, odd: V::Scalar, even: V::Scalar, a: &mut [V; 3]) {
+    let (sum, difference) = (lower.add(upper), lower.sub(upper));
+    a[0] = a[0].add(sum);
+    a[1] = difference.mul_add(V::splat(odd), a[1]);
+    a[2] = sum.mul_add(V::splat(even), a[2]);
+}
+
+#[inline(always)]
+fn get_line<V: Lanes>(from: &[V::Scalar], start: usize, stride: usize) -> [V; 3] {
+    [get(from, start), get(from, start + stride), get(from, start + 2 * stride)]
+}
+
+#[inline(always)]
+fn put_line<V: Lanes>(to: &mut [V::Scalar], start: usize, stride: usize, a: [V; 3]) {
+    for (l, a) in a.into_iter().enumerate() {
+        put(to, start + l * stride, a);
     }
 }
 
