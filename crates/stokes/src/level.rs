@@ -17,8 +17,12 @@ struct Smoothing {
     ratio: f64,
 }
 
-/// Degrees from 2 to 6 cost the same in all.
-const SMOOTHING: Smoothing = Smoothing { degree: 3, ratio: 10.0 };
+/// On the finest mesh. Iterations (applications of the operator) on two discs N = 256, nine discs N = 64, two spheres
+/// N = 32: (3, 10) 20 (142), 20 (142), 17 (121); (3, 4) 19 (135), 20 (142), 14 (100); (2, 4) 22 (112), 23 (117), 17 (87);
+/// (1, 3) 28 (86), 31 (95), 23 (71), but the outer operator and the pressures cost more than a smoothing step.
+const FINEST_SMOOTHING: Smoothing = Smoothing { degree: 2, ratio: 4.0 };
+/// On coarser meshes, where a step costs little: one iteration less on two discs N = 256 and nine discs.
+const COARSER_SMOOTHING: Smoothing = Smoothing { degree: 3, ratio: 4.0 };
 /// Factor by which [`cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not sums over cells: they
 /// add 2 % at most where measured.
 const SAFETY: f64 = 1.05;
@@ -115,14 +119,15 @@ where
         discretisation: &Discretisation<D>,
         space: VelocitySpace<D>,
         viscosity: f64,
-        index: usize,
+        (index, is_finest): (usize, bool),
     ) -> Result<Self, StokesError> {
         let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
         let mut finest = vec![false; nodes.node_count()];
         for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
             nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
         }
-        Self::new(discretisation, space, viscosity, &finest, index)
+        let smoothing = if is_finest { FINEST_SMOOTHING } else { COARSER_SMOOTHING };
+        Self::new(discretisation, space, viscosity, &finest, (index, smoothing))
     }
 
     /// A level that smooths around the nodes of `core`.
@@ -131,7 +136,7 @@ where
         space: VelocitySpace<D>,
         viscosity: f64,
         core: &[bool],
-        index: usize,
+        (index, smoothing): (usize, Smoothing),
     ) -> Result<Self, StokesError> {
         let nodes = &discretisation.velocity;
         let smoothed = &nodes_of_cells_with(nodes, core);
@@ -155,12 +160,12 @@ where
             applications: 0,
             space,
         };
-        let interval = SpectralInterval::upper_part(cell_lambda_max::<D>(), SMOOTHING.ratio, SAFETY);
+        let interval = SpectralInterval::upper_part(cell_lambda_max::<D>(), smoothing.ratio, SAFETY);
         let zeros = || vec![0.0; dim];
         Ok(Self {
             operator,
             diagonal,
-            chebyshev: Chebyshev::new(dim, SMOOTHING.degree, interval),
+            chebyshev: Chebyshev::new(dim, smoothing.degree, interval),
             b: zeros(),
             x: zeros(),
             r: zeros(),
@@ -344,7 +349,7 @@ mod tests {
         assert!(!discretisation.velocity.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, -0.1);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
-        let mut level = Level::rigid(&discretisation, space, 1.7, 0).unwrap();
+        let mut level = Level::rigid(&discretisation, space, 1.7, (0, true)).unwrap();
         let largest = estimate_lambda_max(&mut level.operator, &mut level.diagonal, 40).unwrap();
         let upper = level.chebyshev.interval().upper;
         assert!(largest < upper && upper < 1.2 * largest, "{largest} {upper}");

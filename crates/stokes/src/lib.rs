@@ -29,6 +29,7 @@ mod element;
 mod error;
 mod flow;
 mod formulation;
+mod gap;
 mod level;
 mod multigrid;
 mod pressure;

@@ -184,7 +184,7 @@ where
                 true => finest_rigid_space(system, preparation),
                 false => rigid_space(mesh, preparation),
             };
-            levels.push(Level::rigid(mesh, space, preparation.viscosity, index)?);
+            levels.push(Level::rigid(mesh, space, preparation.viscosity, (index, is_finest))?);
         }
         let transfers = meshes
             .windows(2)

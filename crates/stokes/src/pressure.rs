@@ -32,6 +32,7 @@ pub struct PressureSpace<const D: usize> {
     free: Vec<bool>,
     free_count: usize,
     constraints: Vec<Constraint>,
+    weak: Vec<u32>,
 }
 
 impl<const D: usize> PressureSpace<D>
@@ -53,14 +54,16 @@ where
             .collect();
         let mut free = seen(&nodes, &fluid);
         // Aggregates first: hanging nodes may hang on them.
+        let inside = inside(discretisation, space, &fluid, &free);
         let mut constraints = match weak {
             WeakPressures::Keep => Vec::new(),
-            WeakPressures::Aggregate => aggregates(discretisation, space, &fluid, &free),
+            WeakPressures::Aggregate => aggregates(discretisation, &fluid, &free, &inside),
         };
         constraints.iter().for_each(|c| free[c.node as usize] = false);
         constraints.extend_from_slice(nodes.constraints());
         let free_count = free.iter().filter(|&&f| f).count();
-        Self { nodes, free, free_count, constraints }
+        let weak = (0..free.len() as u32).filter(|&q| free[q as usize] && inside[q as usize]).collect();
+        Self { nodes, free, free_count, constraints, weak }
     }
 
     /// The nodes.
@@ -76,6 +79,11 @@ where
     /// Whether the pressure of a node is an unknown.
     pub fn is_free(&self, node: usize) -> bool {
         self.free[node]
+    }
+
+    /// The unknowns inside bodies.
+    pub fn weak(&self) -> &[u32] {
+        &self.weak
     }
 
     /// The nodes whose pressure follows from others, in an order in which each can be resolved from those before.
@@ -138,17 +146,16 @@ fn seen<const D: usize>(nodes: &NodeMap<D>, fluid: &[usize]) -> Vec<bool> {
     free
 }
 
-/// Constraints of the weak nodes that have outer nodes in a common fluid cell.
-fn aggregates<const D: usize>(
+/// The free nodes inside bodies.
+fn inside<const D: usize>(
     discretisation: &Discretisation<D>,
     space: &VelocitySpace<D>,
     fluid: &[usize],
     free: &[bool],
-) -> Vec<Constraint>
+) -> Vec<bool>
 where
     Dim<D>: Space<D>,
 {
-    let corners = discretisation.pressure.nodes_per_cell();
     let mut inside = vec![false; free.len()];
     for &cell in fluid {
         let velocity = discretisation.velocity.cell(cell);
@@ -157,6 +164,17 @@ where
             inside[q as usize] = free[q as usize] && space.body_of(at_corner as usize).is_some();
         }
     }
+    inside
+}
+
+/// Constraints of the weak nodes that have outer nodes in a common fluid cell.
+fn aggregates<const D: usize>(
+    discretisation: &Discretisation<D>,
+    fluid: &[usize],
+    free: &[bool],
+    inside: &[bool],
+) -> Vec<Constraint> {
+    let corners = discretisation.pressure.nodes_per_cell();
     let mut outer: Vec<Vec<u32>> = vec![Vec::new(); free.len()];
     for &cell in fluid {
         let nodes = discretisation.pressure.cell(cell);

@@ -3,13 +3,15 @@
 //! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so `S <= M / (2 eta)` with the
 //! pressure mass matrix `M`, and most pressures come close to equality. Hence `S^-1` is taken to be `2 eta M^-1`: the
 //! eigenvalues then gather at one, where those of the velocity block are. `M^-1` is Chebyshev iteration on the matrix scaled by
-//! its diagonal (Wathen and Rees 2009).
+//! its diagonal (Wathen and Rees 2009). Where that estimate fails, in gaps narrower than a cell, the inverses of small exact
+//! Schur complements are added, see [`crate::gap`].
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, SparseMatrix, SpectralInterval, estimate_lambda_max};
 
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
+use crate::gap::GapInverse;
 use crate::system::{StokesSystem, pressure_mass};
 
 /// Chebyshev steps.
@@ -20,12 +22,13 @@ const LANCZOS_STEPS: usize = 15;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
 
-/// `2 eta M^-1`, up to Chebyshev's error.
+/// `2 eta M^-1`, up to Chebyshev's error, and the gaps.
 pub struct SchurInverse {
     /// `M / (2 eta)`.
     mass: SparseMatrix,
     jacobi: Jacobi<f64>,
     chebyshev: Chebyshev<f64>,
+    gaps: GapInverse,
 }
 
 impl SchurInverse {
@@ -40,16 +43,18 @@ impl SchurInverse {
     {
         let mut mass = pressure_mass(discretisation, system, viscosity)?;
         mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
+        let gaps = GapInverse::new(discretisation, system, &mass)?;
         let mut jacobi = Jacobi::new(&mass.diagonal())
             .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
         let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
         let chebyshev = Chebyshev::new(mass.pattern().row_count(), STEPS, interval);
-        Ok(Self { mass, jacobi, chebyshev })
+        Ok(Self { mass, jacobi, chebyshev, gaps })
     }
 
     /// `z` close to `S^-1 r`.
     pub fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
+        self.gaps.add(r, z);
     }
 }

@@ -81,20 +81,37 @@ fn lattice(n: usize) -> Vec<Ball<2>> {
 fn iterations_do_not_grow_with_resolution_or_the_number_of_discs() {
     let apart = pair_at(Vector::<2>::new(0.503, 0.497), 1.0, 30.0);
     let counts = iterations(RIGID, &apart, &[6, 7, 8, 9]);
-    assert!(counts.iter().all(|&c| (15..=25).contains(&c)), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 22), "{counts:?}");
     let counts = [2, 3, 5].map(|n| iterations(RIGID, &lattice(n), &[7])[0]);
-    assert!(counts.iter().all(|&c| c <= 30), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 25), "{counts:?}");
 }
 
-/// Bounds, not constancy: measured are 22, 46, 25, 33 for discs that nearly touch on cells larger than the gap, and 21,
-/// 26, 37 for spheres.
+/// Discs that touch, with a film much thinner than a cell: the pressures in it have their own preconditioner.
 #[test]
-fn iterations_stay_bounded_near_contact_and_in_3d() {
+fn iterations_do_not_grow_where_discs_touch() {
+    let touching = balls(&[Vector::<2>::new(0.451, 0.51), Vector::<2>::new(0.549, 0.49)]);
+    let counts = iterations(RIGID, &touching, &[6, 7, 8]);
+    assert!(counts.iter().all(|&c| c <= 24), "{counts:?}");
     let counts = iterations(RIGID, &doublet(), &[6, 7, 8, 9]);
-    assert!(counts.iter().all(|&c| c <= 55), "{counts:?}");
-    let spheres = balls(&[Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)]);
-    let counts = iterations(RIGID, &spheres, &[5, 6, 7]);
-    assert!(counts.iter().all(|&c| c <= 42), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 29), "{counts:?}");
+}
+
+#[test]
+fn iterations_do_not_grow_with_resolution_or_the_number_of_spheres() {
+    for x in [[0.3, 0.525], [0.45, 0.51]] {
+        let spheres =
+            balls(&[Vector::<3>::new(x[0], x[1], 0.5), Vector::<3>::new(1.0 - x[0], 1.0 - x[1], 0.5)]);
+        let counts = iterations(RIGID, &spheres, &[5, 6]);
+        assert!(counts.iter().all(|&c| c <= 22), "{counts:?}");
+    }
+    let center = |k: usize| {
+        let place = [k % 3, k / 3 % 3, k / 9].map(|i| (1.0 + 2.0 * i as f64) / 6.0);
+        Vector::from_fn(|d, _| place[d] + 0.03 * (7.3 * k as f64 + 2.9 * d as f64).sin())
+    };
+    let lattice: Vec<Ball<3>> = (0..27).map(|k| Ball::new(center(k), 0.1)).collect();
+    let uniform = TreeMesh::uniform(Aabb::unit(), [1; 3], [false; 3], 4).unwrap();
+    let flow = solve(params(RIGID, SolverKind::Multigrid, 1e-8), uniform, &lattice, &couette);
+    assert!(flow.iteration_count <= 24, "{}", flow.iteration_count);
 }
 
 /// Everything a flow is made of, as bits.
