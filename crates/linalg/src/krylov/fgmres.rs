@@ -8,9 +8,6 @@ use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
 use crate::{LinOp, Preconditioner, Scalar, vector};
 
-/// Share of the target norm that the rounding of the basis may make up.
-const ROUNDING_SHARE: f64 = 0.1;
-
 /// Tuning of [`Fgmres`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FgmresParams {
@@ -32,13 +29,13 @@ impl Default for FgmresParams {
 
 /// Flexible GMRES. Owns its workspace, which grows to what the longest cycle needed and is then reused.
 ///
-/// `Fgmres<f64, f32>` keeps preconditioned vectors, and basis vectors once the residual is small enough for it, in single
-/// precision, see [`Fgmres::with_storage`]. It reaches the same true residual.
+/// `Fgmres<f64, f32>` keeps preconditioned vectors in single precision, see [`Fgmres::with_storage`]. It reaches the same
+/// true residual.
 #[derive(Clone, Debug)]
 pub struct Fgmres<T, S = T> {
     params: FgmresParams,
     /// Orthonormal basis `v_0 .. v_k` of the Krylov space.
-    basis: Basis<T, S>,
+    basis: Basis<T>,
     /// Preconditioned basis `z_j = M_j^-1 v_j`.
     directions: Directions<S>,
     /// The residual or the latest basis vector.
@@ -57,7 +54,7 @@ impl<T: Scalar> Fgmres<T> {
 }
 
 impl<T: Scalar, S: Scalar> Fgmres<T, S> {
-    /// A solver with an empty workspace that keeps vectors in `S` where that does not harm the residual.
+    /// A solver with an empty workspace that keeps preconditioned vectors in `S`.
     ///
     /// For a good preconditioner, with convergence in a few dozen iterations: rounded directions no longer span a Krylov
     /// space, which delays convergence through hundreds of iterations, and an exact preconditioner takes two.
@@ -137,7 +134,7 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
         self.basis.reset(self.w.len());
         self.directions.reset(self.w.len());
         self.least_squares.reset(norm);
-        self.basis.push(1.0 / norm, &mut self.w, false);
+        self.basis.push(1.0 / norm, &mut self.w);
         let mut steps = 0;
         while steps < self.params.restart && *iterations < self.params.max_iterations {
             *iterations += 1;
@@ -146,12 +143,11 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
             let residual = finite(self.least_squares.close_column(), *iterations)?;
             self.history.push(residual);
             steps += 1;
-            let broke_down = left <= self.basis.epsilon() * column;
+            let broke_down = left <= T::EPSILON * column;
             if residual <= target.norm || broke_down {
                 return Ok(Cycle { steps, broke_down });
             }
-            let narrow = self.may_round(left, residual, target);
-            self.basis.push(1.0 / left, &mut self.w, narrow);
+            self.basis.push(1.0 / left, &mut self.w);
         }
         Ok(Cycle { steps, broke_down: false })
     }
@@ -170,15 +166,6 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
         let left = basis.orthogonalise(w, |h| least_squares.push(h));
         least_squares.push(left);
         left
-    }
-
-    /// Whether the next basis vector may be narrow, when `left` is its norm before it is scaled.
-    ///
-    /// Rounding `v_j` to `e` relative changes the residual by `left y_j e`. The coefficient is at most the residual of
-    /// the step before over the least singular value of the Hessenberg matrix, for which the least pivot stands.
-    fn may_round(&self, left: f64, residual: f64, target: &Target) -> bool {
-        let coefficient = residual / self.least_squares.least_pivot();
-        S::EPSILON * left * coefficient <= ROUNDING_SHARE * target.norm
     }
 
     /// `x += Z y`, unless that is not finite, and the true residual in `w`; returns its norm.
@@ -235,11 +222,6 @@ impl LeastSquares {
     fn column_norm(&self) -> f64 {
         let column = &self.columns[Self::start(self.rotations.len())..];
         column.iter().map(|h| h * h).sum::<f64>().sqrt()
-    }
-
-    /// Least diagonal entry of `R` in the closed columns.
-    fn least_pivot(&self) -> f64 {
-        (0..self.rotations.len()).map(|j| self.columns[Self::start(j) + j]).fold(f64::INFINITY, f64::min)
     }
 
     /// Start of the packed column `j` of `R`.
