@@ -16,6 +16,8 @@ use crate::system::{StokesSystem, SystemOperator};
 
 /// Corrections at most; two or three are enough for any tolerance that rounding allows.
 const MAX_CORRECTIONS: usize = 12;
+/// Corrections between two computations of the true residual, from which the recurrence departs near rounding error.
+const RESTART: usize = 4;
 
 /// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
 /// approximate minimum degree. The symbolic part is kept as long as the pattern of the matrix stands.
@@ -35,7 +37,7 @@ impl Default for DirectSolver {
     fn default() -> Self {
         let params = FgmresParams {
             max_iterations: MAX_CORRECTIONS,
-            restart: MAX_CORRECTIONS,
+            restart: RESTART,
             ..FgmresParams::default()
         };
         Self { factor: None, unknowns: None, krylov: Fgmres::new(params), b: Vec::new(), x: Vec::new() }
