@@ -35,11 +35,8 @@ pub struct DirectSolver {
 
 impl Default for DirectSolver {
     fn default() -> Self {
-        let params = FgmresParams {
-            max_iterations: MAX_CORRECTIONS,
-            restart: RESTART,
-            ..FgmresParams::default()
-        };
+        let params =
+            FgmresParams { max_iterations: MAX_CORRECTIONS, restart: RESTART, ..FgmresParams::default() };
         Self { factor: None, unknowns: None, krylov: Fgmres::new(params), b: Vec::new(), x: Vec::new() }
     }
 }
