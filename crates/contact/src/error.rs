@@ -51,23 +51,90 @@ pub enum ContactError {
         quantity: Quantity,
     },
     /// Two centres so close that the line through them has no direction.
-    #[error("the centres of particles {} and {} coincide", pair.first, pair.second)]
+    #[error("the centres of {pair} coincide")]
     Coincident {
         /// The particles.
         pair: PairKey,
     },
     /// A remembered contact of a particle that is not there.
-    #[error("a remembered contact joins particles {} and {}, but there are only {count} particles", pair.first, pair.second)]
+    #[error("a remembered contact joins {pair}, but there are only {count} particles")]
     UnknownParticle {
         /// The contact.
         pair: PairKey,
         /// Number of particles.
         count: usize,
     },
-    /// The projection did not converge: too few iterations, or contacts that contradict each other.
+    /// A remembered contact with a wall that is not there.
+    #[error("a remembered contact joins {pair}, but there are only {count} walls")]
+    UnknownWall {
+        /// The contact.
+        pair: PairKey,
+        /// Number of walls.
+        count: usize,
+    },
+    /// A remembered contact whose particles are far apart.
+    #[error(
+        "the gap of {pair}, which were in contact, is now {gap}: positions must not be wrapped into the period"
+    )]
+    Wrapped {
+        /// The contact.
+        pair: PairKey,
+        /// Gap at the beginning of the step.
+        gap: f64,
+    },
+    /// A wall whose normal is no unit vector, or that is not finite.
+    #[error("wall {wall} needs a normal of length 1, a finite offset and a finite speed")]
+    BadWall {
+        /// Index of the wall.
+        wall: usize,
+    },
+    /// A period that is zero, negative, not finite, or tiny beside the positions.
+    #[error(
+        "the period {period} in direction {direction} must be positive, and at least 1e-8 of all positions"
+    )]
+    BadPeriod {
+        /// Direction, from 0.
+        direction: usize,
+        /// Its period.
+        period: f64,
+    },
+    /// A particle that would meet its own images.
+    #[error(
+        "particle {particle} of radius {radius} is too large for the period {period} in direction {direction}: \
+         its diameter must not exceed half a period"
+    )]
+    ParticleTooLarge {
+        /// Index of the particle.
+        particle: usize,
+        /// Its radius.
+        radius: f64,
+        /// Direction, from 0.
+        direction: usize,
+        /// Its period.
+        period: f64,
+    },
+    /// A particle that crosses half a period in a step, so that contacts could not be told from those of its images.
+    #[error(
+        "particle {particle} moves by {displacement} against the others in a step: more than half the period {period}"
+    )]
+    TooFast {
+        /// Index of the particle.
+        particle: usize,
+        /// Displacement less the mean motion.
+        displacement: f64,
+        /// The period.
+        period: f64,
+    },
+    /// Contacts that no velocities can satisfy, such as a particle between walls that are too near.
+    #[error("no velocities keep these contacts from overlapping: {}", Names(pairs))]
+    Contradictory {
+        /// The contacts, sorted.
+        pairs: Vec<PairKey>,
+    },
+    /// The projection did not converge in so many iterations.
     #[error(
         "the contact projection stands at a residual of {residual:e} (tolerance {tolerance:e}) after {iterations} \
-         iterations; worst contact: particles {} and {}", worst.first, worst.second
+         iterations; worst contact: {worst}"
     )]
     NotConverged {
         /// `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
@@ -82,7 +149,7 @@ pub enum ContactError {
         worst: PairKey,
     },
     /// Re-linearisation did not close a gap.
-    #[error("the gap {gap:e} of particles {} and {} is still off after {passes} linearisations", pair.first, pair.second)]
+    #[error("the gap {gap:e} of {pair} is still off after {passes} linearisations")]
     GapNotClosed {
         /// The pair that is farthest off.
         pair: PairKey,
@@ -111,5 +178,21 @@ impl std::fmt::Display for Quantity {
             Self::Velocity => "velocity",
             Self::Drift => "drift",
         })
+    }
+}
+
+/// The first few contacts of a list.
+struct Names<'a>(&'a [PairKey]);
+
+impl std::fmt::Display for Names<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const SHOWN: usize = 6;
+        for (k, pair) in self.0.iter().take(SHOWN).enumerate() {
+            write!(f, "{}{pair}", if k == 0 { "" } else { "; " })?;
+        }
+        match self.0.len().checked_sub(SHOWN) {
+            Some(more) if more > 0 => write!(f, "; and {more} more"),
+            _ => Ok(()),
+        }
     }
 }

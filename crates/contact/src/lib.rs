@@ -37,22 +37,27 @@
 //!
 //! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
 
-mod broadphase;
-mod constraints;
+pub mod broadphase;
+mod domain;
 mod error;
 mod graph;
+mod islands;
+mod key;
 mod memory;
 mod mobility;
 mod model;
 mod pair_contact;
 mod params;
+mod project;
 mod push_apart;
+mod rows;
 pub mod solver;
 
+pub use domain::{Domain, Wall};
 pub use error::{ContactError, Quantity};
-pub use graph::PairKey;
+pub use key::{PairKey, Partner};
 pub use memory::{ContactState, PairState};
-pub use mobility::{Mobility, StokesDrag};
+pub use mobility::{Mobility, StokesDrag, WithFixed};
 pub use model::{Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
 pub use pair_contact::PairContact;
 pub use params::{ContactParams, Memory, SolverKind, Strategy, UnknownStrategy};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactParams, Memory, PairKey};
+use crate::{ContactParams, Memory, PairKey, StepGeometry, Strategy};
 
 /// One pair's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,38 +39,40 @@ impl ContactState {
     }
 }
 
-impl Memory {
+impl ContactParams {
     /// Weights of this step's and the last step's force in the impulse of a step.
-    fn weights(self, rate: f64, dt: f64) -> (f64, f64) {
-        match self {
-            Self::Paper => (dt, 0.0),
-            Self::Consistent => (rate, dt - rate),
+    fn weights<const D: usize>(&self, step: &StepGeometry<'_, D>) -> (f64, f64) {
+        match self.memory {
+            Memory::Paper => (step.dt, 0.0),
+            Memory::Consistent => (step.rate, step.dt - step.rate),
         }
     }
 
-    /// Smallest force a remembered gluey pair admits: `-inf` keeps it closed.
-    pub(crate) fn floor(self, state: &PairState, rate: f64, dt: f64) -> f64 {
-        match self {
-            Self::Paper if state.gamma < 0.0 => f64::NEG_INFINITY,
-            Self::Paper => 0.0,
-            Self::Consistent => {
-                let (now, last) = self.weights(rate, dt);
-                (state.gamma - last * state.lambda) / now
+    /// Smallest force a contact with the memory `gamma`, `last` admits: `-inf` keeps it closed.
+    pub(crate) fn floor<const D: usize>(&self, gamma: f64, last: f64, step: &StepGeometry<'_, D>) -> f64 {
+        match (self.strategy, self.memory) {
+            (Strategy::Gluey, Memory::Paper) if gamma < 0.0 => f64::NEG_INFINITY,
+            (Strategy::Gluey, Memory::Consistent) => {
+                let (now, before) = self.weights(step);
+                (gamma - before * last) / now
             }
+            _ => 0.0,
         }
     }
 
     /// Gamma after a step with the force `lambda` (Verdon et al. 2010, eq. 30).
-    pub(crate) fn update(
-        self,
-        state: &PairState,
+    pub(crate) fn update<const D: usize>(
+        &self,
+        gamma: f64,
+        last: f64,
         lambda: f64,
-        rate: f64,
-        dt: f64,
-        params: &ContactParams,
+        step: &StepGeometry<'_, D>,
     ) -> f64 {
-        let (now, last) = self.weights(rate, dt);
-        let gamma = state.gamma - now * lambda - last * state.lambda;
-        gamma.max(params.gamma_min.unwrap_or(f64::NEG_INFINITY)).min(0.0)
+        if self.strategy != Strategy::Gluey {
+            return 0.0;
+        }
+        let (now, before) = self.weights(step);
+        let gamma = gamma - now * lambda - before * last;
+        gamma.max(self.gamma_min.unwrap_or(f64::NEG_INFINITY)).min(0.0)
     }
 }

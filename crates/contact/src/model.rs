@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Twist, Vector};
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactError, ContactState, PairKey, Quantity};
+use crate::{ContactError, ContactState, Domain, PairKey, Quantity, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry a particle.
 #[derive(Clone, Copy, Debug)]
@@ -70,11 +70,12 @@ pub struct WorstPair {
 /// Effort and outcome of one correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactReport {
-    /// Iterations of the projection over all linearisations (sweeps of the velocity correction).
+    /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the velocity
+    /// correction).
     pub iterations: usize,
-    /// Linearisations.
+    /// Linearisations of the island that took most.
     pub passes: usize,
-    /// Residual of the last projection, `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
+    /// Largest residual of the last projections, `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
     pub residual: f64,
     /// Pairs that took part.
     pub pair_count: usize,
@@ -88,6 +89,7 @@ pub struct ContactReport {
 pub(crate) fn validate<const D: usize>(
     step: &StepGeometry<'_, D>,
     twists: &[Twist<D>],
+    domain: &Domain<D>,
 ) -> Result<(), ContactError>
 where
     Dim<D>: Space<D>,
@@ -121,6 +123,32 @@ where
             if !vector.iter().all(|x| x.is_finite()) {
                 return Err(ContactError::NotFinite { particle, quantity });
             }
+        }
+    }
+    validate_domain(step, domain)
+}
+
+/// Positions may be so many periods away from the origin: images are counted in `i32`.
+const FARTHEST_PERIOD: f64 = 1e8;
+
+fn validate_domain<const D: usize>(
+    step: &StepGeometry<'_, D>,
+    domain: &Domain<D>,
+) -> Result<(), ContactError> {
+    for (wall, Wall { normal, offset, speed }) in domain.walls.iter().enumerate() {
+        let is_unit = (normal.norm() - 1.0).abs() <= 1e-12;
+        if !(is_unit && offset.is_finite() && speed.is_finite()) {
+            return Err(ContactError::BadWall { wall });
+        }
+    }
+    for (direction, period) in (0..D).filter_map(|d| domain.periods[d].map(|period| (d, period))) {
+        let farthest = step.positions.iter().map(|x| x[direction].abs()).fold(0.0, f64::max);
+        if !(period > 0.0 && period.is_finite() && farthest < FARTHEST_PERIOD * period) {
+            return Err(ContactError::BadPeriod { direction, period });
+        }
+        if let Some(particle) = step.radii.iter().position(|radius| 4.0 * radius > period) {
+            let radius = step.radii[particle];
+            return Err(ContactError::ParticleTooLarge { particle, radius, direction, period });
         }
     }
     Ok(())

@@ -1,34 +1,82 @@
 //! The contact step: find pairs, project, re-linearise, remember.
 
 use gluey_geom::{Dim, Space, Twist, Vector};
+use rayon::prelude::*;
 
-use crate::constraints::{Constraint, ContactOperator, Workspace};
-use crate::graph::{self, Search};
+use crate::graph::{Graph, Link};
+use crate::islands::{Islands, Places};
 use crate::model::validate;
-use crate::push_apart::{PushParams, push_apart};
-use crate::solver::{ActiveSet, Projection, ProjectionSolver, SolveReport, Uzawa};
+use crate::project::{Failure, Setting, Work};
+use crate::push_apart::{PushParams, Pushed, Unsettled, push_apart};
+use crate::rows::{Row, closes};
+use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
 use crate::{
-    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Mobility, PairKey,
-    PairState, SolverKind, StepGeometry, StokesDrag, Strategy, WorstPair,
+    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, Mobility,
+    PairState, Partner, SolverKind, StepGeometry, StokesDrag, Strategy, WorstPair,
 };
 
-/// Contacts between discs or spheres, by one of the [`Strategy`]s.
+/// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
 ///
-/// Results do not depend on the numbering of the particles, bit for bit.
+/// Results do not depend on the numbering of the particles nor on the number of threads, bit for bit.
+#[derive(Debug)]
 pub struct PairContact<const D: usize, M = StokesDrag> {
     params: ContactParams,
     mobility: M,
-    solver: Box<dyn ProjectionSolver>,
+    domain: Domain<D>,
     state: ContactState,
     contacts: Vec<Contact>,
-    search: Search,
-    workspace: Workspace<D>,
-    /// Pairs of the current step, in the order of space.
-    constraints: Vec<Constraint<D>>,
+    graph: Graph<D>,
+    islands: Islands<D>,
+    work: Work<D>,
+    buffers: Buffers<D>,
+}
+
+/// Vectors of a step, kept from step to step.
+#[derive(Debug)]
+struct Buffers<const D: usize> {
+    /// Displacements without contact, by particle.
+    free: Vec<Vector<D>>,
+    /// Rows of this step in the order of space.
+    rows: Vec<Row<D>>,
+    /// One entry a link: whether it takes part, its memory, its force.
+    takes_part: Vec<Part>,
+    memory: Vec<PairMemory>,
     forces: Vec<f64>,
-    floors: Vec<f64>,
-    free_gaps: Vec<f64>,
-    ranks: Vec<u32>,
+    /// One entry a place.
+    weights: Vec<f64>,
+    changes: Vec<Vector<D>>,
+    displacements: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Default for Buffers<D> {
+    fn default() -> Self {
+        Self {
+            free: Vec::new(),
+            rows: Vec::new(),
+            takes_part: Vec::new(),
+            memory: Vec::new(),
+            forces: Vec::new(),
+            weights: Vec::new(),
+            changes: Vec::new(),
+            displacements: Vec::new(),
+        }
+    }
+}
+
+/// Whether a link takes part in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Part {
+    No,
+    /// Not yet solved for.
+    Fresh,
+    Yes,
+}
+
+/// Memory of a link before the step.
+#[derive(Clone, Copy, Debug, Default)]
+struct PairMemory {
+    gamma: f64,
+    lambda: f64,
 }
 
 impl<const D: usize> PairContact<D> {
@@ -41,24 +89,36 @@ impl<const D: usize> PairContact<D> {
 impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// The model with another metric of the projection.
     pub fn with_mobility(params: ContactParams, mobility: M) -> Self {
-        let solver: Box<dyn ProjectionSolver> = match params.solver {
-            SolverKind::Uzawa => Box::new(Uzawa::default()),
-            SolverKind::ActiveSet => Box::new(ActiveSet::default()),
-        };
         Self {
             params,
             mobility,
-            solver,
+            domain: Domain::default(),
             state: ContactState::default(),
             contacts: Vec::new(),
-            search: Search::default(),
-            workspace: Workspace::default(),
-            constraints: Vec::new(),
-            forces: Vec::new(),
-            floors: Vec::new(),
-            free_gaps: Vec::new(),
-            ranks: Vec::new(),
+            graph: Graph::default(),
+            islands: Islands::default(),
+            work: Work::default(),
+            buffers: Buffers::default(),
         }
+    }
+
+    /// The same within walls and periodic directions.
+    pub fn within(mut self, domain: Domain<D>) -> Self {
+        self.set_domain(domain);
+        self
+    }
+
+    /// Changes the walls or periods, as for walls that move.
+    pub fn set_domain(&mut self, domain: Domain<D>) {
+        if domain.periods != self.domain.periods {
+            self.graph = Graph::default();
+        }
+        self.domain = domain;
+    }
+
+    /// The walls and periods.
+    pub fn domain(&self) -> &Domain<D> {
+        &self.domain
     }
 
     /// The parameters.
@@ -76,22 +136,14 @@ where
         step: &StepGeometry<'_, D>,
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError> {
-        validate(step, twists)?;
+        validate(step, twists, &self.domain)?;
         if self.params.strategy == Strategy::None {
             return Ok(ContactReport::default());
         }
-        let predicted: Vec<Vector<D>> = twists.iter().map(|twist| twist.velocity).collect();
-        let mut correction = Correction::new(step, &predicted, self.tolerance(step, &predicted));
-        self.begin(step, &correction.displacements)?;
-        let report = match self.params.strategy {
-            Strategy::VelocityCorrection => self.push(&mut correction)?,
-            _ => self.project(&mut correction)?,
-        };
-        self.remember(&correction);
-        for (twist, velocity) in twists.iter_mut().zip(&correction.velocities) {
-            twist.velocity = *velocity;
-        }
-        Ok(report)
+        let mut buffers = std::mem::take(&mut self.buffers);
+        let outcome = self.step(step, twists, &mut buffers);
+        self.buffers = buffers;
+        outcome
     }
 
     fn contacts(&self) -> &[Contact] {
@@ -115,40 +167,55 @@ where
     }
 }
 
-/// Velocities on their way from predicted to corrected.
-struct Correction<'a, const D: usize> {
-    step: &'a StepGeometry<'a, D>,
-    predicted: &'a [Vector<D>],
-    velocities: Vec<Vector<D>>,
-    /// `c v + drift`.
-    displacements: Vec<Vector<D>>,
-    /// Residual to reach; unit: length.
-    tolerance: f64,
+/// Whether the search went far enough.
+enum Reach {
+    Enough,
+    TooShort,
 }
 
-impl<'a, const D: usize> Correction<'a, D> {
-    fn new(step: &'a StepGeometry<'a, D>, predicted: &'a [Vector<D>], tolerance: f64) -> Self {
-        let velocities = predicted.to_vec();
-        let displacements = displacements(step, predicted);
-        Self { step, predicted, velocities, displacements, tolerance }
-    }
-
-    fn displace(&mut self) {
-        for i in 0..self.velocities.len() {
-            self.displacements[i] = self.velocities[i] * self.step.rate + self.step.drift[i];
+impl<const D: usize, M: Mobility<D>> PairContact<D, M>
+where
+    Dim<D>: Space<D>,
+{
+    fn step(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        twists: &mut [Twist<D>],
+        buffers: &mut Buffers<D>,
+    ) -> Result<ContactReport, ContactError> {
+        let moves = twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.rate + drift);
+        buffers.free.clear();
+        buffers.free.extend(moves);
+        let tolerance = self.tolerance(step, &buffers.free);
+        self.graph.margin = 0.5 * self.margin();
+        self.graph.begin(step, &self.domain, &buffers.free)?;
+        let report = loop {
+            self.begin(step, buffers)?;
+            let (reach, report) = match self.params.strategy {
+                Strategy::VelocityCorrection => self.push(step, tolerance, buffers)?,
+                _ => self.project(step, tolerance, buffers)?,
+            };
+            if let Reach::Enough = reach {
+                break report;
+            }
+            let mut needed = buffers.free.clone();
+            for (place, &particle) in self.graph.order.iter().enumerate() {
+                needed[particle as usize] = buffers.displacements[place];
+            }
+            self.graph.widen(step, &self.domain, &buffers.free, &needed)?;
+        };
+        let report = self.summary(report, buffers);
+        self.remember(step, tolerance, buffers);
+        for (change, &particle) in buffers.changes.iter().zip(&self.graph.order) {
+            twists[particle as usize].velocity += change;
         }
+        Ok(report)
     }
-}
 
-fn displacements<const D: usize>(step: &StepGeometry<'_, D>, velocities: &[Vector<D>]) -> Vec<Vector<D>> {
-    velocities.iter().zip(step.drift).map(|(velocity, drift)| velocity * step.rate + drift).collect()
-}
-
-impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// The relative tolerance times a length, but never below what positions can resolve.
-    fn tolerance(&self, step: &StepGeometry<'_, D>, predicted: &[Vector<D>]) -> f64 {
+    fn tolerance(&self, step: &StepGeometry<'_, D>, free: &[Vector<D>]) -> f64 {
         let radius = step.radii.iter().copied().fold(f64::INFINITY, f64::min);
-        let farthest = displacements(step, predicted).iter().map(|s| s.norm()).fold(0.0, f64::max);
+        let farthest = free.iter().map(|s| s.norm()).fold(0.0, f64::max);
         let extent = step.positions.iter().map(|x| x.amax()).fold(0.0, f64::max);
         (self.params.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest))
     }
@@ -162,225 +229,257 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
         }
     }
 
-    /// Sets up the pairs that remember and those that could close.
-    fn begin(&mut self, step: &StepGeometry<'_, D>, displacements: &[Vector<D>]) -> Result<(), ContactError> {
-        let count = step.positions.len();
-        let last = self.state.pairs.iter().map(|state| state.pair).max_by_key(|pair| pair.second);
-        if let Some(pair) = last.filter(|pair| pair.second as usize >= count) {
-            return Err(ContactError::UnknownParticle { pair, count });
+    fn solver(&self) -> &'static dyn ProjectionSolver {
+        match self.params.solver {
+            SolverKind::Uzawa => &Uzawa,
+            SolverKind::Accelerated => &Accelerated,
+            SolverKind::ActiveSet => &ActiveSet,
         }
-        self.workspace.resize(count);
-        self.search.begin();
-        self.ranks = graph::ranks(step.positions);
-        self.constraints.clear();
-        self.forces.clear();
-        let mut pairs = self.near_pairs(step, displacements);
-        pairs.extend(self.state.pairs.iter().map(|state| state.pair));
-        self.admit(step, pairs);
+    }
+
+    /// Sets up the pairs that remember and those that would close.
+    fn begin(&mut self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> Result<(), ContactError> {
+        let graph = &mut self.graph;
+        buffers.weights.clear();
+        let mobility = |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.rate;
+        buffers.weights.extend(graph.order.iter().map(mobility));
+        buffers.changes.clear();
+        buffers.changes.resize(graph.count(), Vector::zeros());
+        buffers.displacements.clone_from(&graph.free);
+
+        buffers.memory.clear();
+        buffers.forces.clear();
+        buffers.takes_part.clear();
+        for state in &self.state.pairs {
+            let link = check_known(state, step, &self.domain).map(|()| graph.recall(state.pair))?;
+            let size = buffers.memory.len().max(graph.links.len());
+            buffers.memory.resize(size, PairMemory::default());
+            buffers.takes_part.resize(size, Part::No);
+            buffers.memory[link] = PairMemory { gamma: state.gamma, lambda: state.lambda };
+            buffers.takes_part[link] = Part::Fresh;
+        }
+        buffers.memory.resize(graph.links.len(), PairMemory::default());
+        buffers.takes_part.resize(graph.links.len(), Part::No);
+        buffers.forces.extend(buffers.memory.iter().map(|memory| memory.lambda));
+        self.admit(step, buffers);
         Ok(())
     }
 
-    /// Pairs whose gap could close under `displacements`.
-    fn near_pairs(&mut self, step: &StepGeometry<'_, D>, displacements: &[Vector<D>]) -> Vec<PairKey> {
-        let margin = self.margin();
-        let candidates = self.search.candidates(step.positions, step.radii, displacements, margin);
-        let near = |pair: &&PairKey| {
-            Constraint::<D>::new(**pair, &self.ranks, step.radii).could_close(
-                step.positions,
-                displacements,
-                margin,
-            )
+    /// Lets links that `displacements` close take part; whether there are any.
+    fn admit(&self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> bool {
+        let (graph, margin) = (&self.graph, 0.5 * self.margin());
+        let Buffers { takes_part, displacements, weights, .. } = buffers;
+        let movable = |place: u32| weights.get(place as usize).is_some_and(|weight| *weight > 0.0);
+        let admit = |(part, link): (&mut Part, &Link)| {
+            let closing = *part == Part::No
+                && closes(link, graph, &self.domain, step.dt, displacements, margin)
+                && (movable(link.head) || movable(link.tail));
+            if closing {
+                *part = Part::Fresh;
+            }
+            closing
         };
-        candidates.iter().filter(near).copied().collect()
+        takes_part
+            .par_iter_mut()
+            .zip(&graph.links)
+            .with_min_len(4096)
+            .map(admit)
+            .reduce(|| false, |a, b| a | b)
     }
 
-    /// Adds pairs to the constraints, which stay in the order of space, each with the force it ended the last step with.
-    fn admit(&mut self, step: &StepGeometry<'_, D>, pairs: Vec<PairKey>) {
-        let ranks = &self.ranks;
-        let mut entries: Vec<(Constraint<D>, f64)> =
-            self.constraints.drain(..).zip(self.forces.drain(..)).collect();
-        let added = pairs.into_iter().map(|pair| Constraint::new(pair, ranks, step.radii));
-        entries.extend(added.map(|constraint| (constraint, self.state.get(constraint.pair).lambda)));
-        // Stable, so that of two entries for a pair the one already there survives.
-        entries.sort_by_key(|(constraint, _)| (ranks[constraint.tail], ranks[constraint.head]));
-        entries.dedup_by_key(|(constraint, _)| constraint.pair);
-        (self.constraints, self.forces) = entries.into_iter().unzip();
-        self.floors.clear();
-        for constraint in &self.constraints {
-            let state = self.state.get(constraint.pair);
-            self.floors.push(match self.params.strategy {
-                Strategy::Gluey => self.params.memory.floor(&state, step.rate, step.dt),
-                _ => 0.0,
-            });
+    /// Lists the links that take part, in the order of space.
+    fn list_rows(&self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> Result<(), ContactError> {
+        buffers.rows.clear();
+        for (link, part) in buffers.takes_part.iter().enumerate() {
+            if *part != Part::No {
+                buffers.rows.push(Row::new(link, &self.graph, &self.domain, step)?);
+            }
+        }
+        buffers.rows.sort_unstable_by_key(|row| row.rank);
+        Ok(())
+    }
+
+    /// The projection on the pairs that are admitted, until no other closes.
+    fn project(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        tolerance: f64,
+        buffers: &mut Buffers<D>,
+    ) -> Result<(Reach, ContactReport), ContactError> {
+        let mut report = ContactReport::default();
+        loop {
+            self.list_rows(step, buffers)?;
+            self.solve_islands(step, tolerance, buffers, &mut report)?;
+            buffers
+                .takes_part
+                .iter_mut()
+                .filter(|part| **part == Part::Fresh)
+                .for_each(|part| *part = Part::Yes);
+            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
+                return Ok((Reach::TooShort, report));
+            }
+            if !self.admit(step, buffers) {
+                return Ok((Reach::Enough, report));
+            }
         }
     }
 
-    /// Admits pairs that the corrected velocities bring together; `false` if there are none.
-    fn admit_new(&mut self, correction: &Correction<'_, D>) -> bool {
-        let step = correction.step;
-        let mut pairs = self.near_pairs(step, &correction.displacements);
-        let mut known: Vec<PairKey> = self.constraints.iter().map(|constraint| constraint.pair).collect();
-        known.sort_unstable();
-        pairs.retain(|pair| known.binary_search(pair).is_err());
-        let closes = |pair: &PairKey| {
-            let constraint = Constraint::<D>::new(*pair, &self.ranks, step.radii);
-            let separation = constraint.difference(step.positions);
-            let distance = separation.norm();
-            let approach = constraint.difference(&correction.displacements).dot(&separation) / distance;
-            distance - constraint.rest + approach < 0.5 * self.margin() * constraint.rest
+    fn solve_islands(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        tolerance: f64,
+        buffers: &mut Buffers<D>,
+        report: &mut ContactReport,
+    ) -> Result<(), ContactError> {
+        let solver = self.solver();
+        let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
+        let places = Places { positions: &self.graph.positions, free: &self.graph.free, weights };
+        let is_fresh = |row: &Row<D>| takes_part[row.link as usize] == Part::Fresh;
+        self.islands.part(rows, &places, M::COUPLED, is_fresh);
+        self.work.prepare(&self.islands, solver, |row| {
+            let PairMemory { gamma, lambda } = memory[row.link as usize];
+            (forces[row.link as usize], self.params.floor(gamma, lambda, step))
+        });
+        let setting = Setting {
+            step,
+            params: &self.params,
+            mobility: &self.mobility,
+            solver,
+            tolerance,
+            order: &self.graph.order,
         };
-        if !pairs.iter().any(closes) {
-            return false;
+        self.work.solve(&self.islands, &setting);
+
+        for (island, outcome) in
+            self.islands.islands.iter().zip(&self.work.outcomes).filter(|(i, _)| i.is_fresh)
+        {
+            let effort =
+                outcome.as_ref().map_err(|failure| self.explain(failure, island.rows.start, tolerance))?;
+            report.iterations = report.iterations.max(effort.iterations);
+            report.passes = report.passes.max(effort.passes);
+            report.residual = report.residual.max(effort.residual);
+            for k in island.rows.clone() {
+                forces[self.islands.rows[k].link as usize] = self.work.forces[k];
+            }
+            for k in island.slots.clone().skip(1) {
+                let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
+                changes[place] = self.work.changes[k];
+                displacements[place] = slot.free + changes[place] * step.rate;
+            }
         }
-        self.admit(step, pairs);
-        true
+        Ok(())
+    }
+
+    /// The error that the failure of an island means; its first row is `start`.
+    fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
+        let key = |row: usize| self.graph.key(&self.graph.links[self.islands.rows[row].link as usize]);
+        match failure {
+            Failure::Gap { row, gap, passes } => {
+                ContactError::GapNotClosed { pair: key(*row), gap: *gap, passes: *passes }
+            }
+            Failure::Solve(failure) => match &failure.contradiction {
+                Some(rows) => {
+                    let mut pairs: Vec<_> = rows.iter().map(|k| key(start + k)).collect();
+                    pairs.sort_unstable();
+                    ContactError::Contradictory { pairs }
+                }
+                None => ContactError::NotConverged {
+                    residual: failure.report.residual,
+                    tolerance,
+                    iterations: failure.report.iterations,
+                    history: failure.history.clone(),
+                    worst: key(start + failure.worst),
+                },
+            },
+        }
     }
 
     /// The velocity correction: no projection.
-    fn push(&mut self, correction: &mut Correction<'_, D>) -> Result<ContactReport, ContactError> {
+    fn push(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        tolerance: f64,
+        buffers: &mut Buffers<D>,
+    ) -> Result<(Reach, ContactReport), ContactError> {
         let params = PushParams {
             threshold: self.params.threshold,
-            tolerance: correction.tolerance,
+            tolerance,
             sweep_limit: self.params.iteration_limit,
         };
         let mut report = ContactReport::default();
-        self.forces.fill(0.0);
+        // Pushes have no memory: every pair starts without a force.
+        buffers.forces.fill(0.0);
         loop {
-            let (sweeps, residual) = push_apart(
-                correction.step,
-                &mut self.constraints,
-                &mut correction.displacements,
-                &mut self.forces,
-                &params,
-            )?;
+            self.list_rows(step, buffers)?;
+            let mut forces: Vec<f64> =
+                buffers.rows.iter().map(|row| buffers.forces[row.link as usize]).collect();
+            let mut pushed = Pushed {
+                positions: &self.graph.positions,
+                radii: &self.graph.radii,
+                weights: &buffers.weights,
+                displacements: &mut buffers.displacements,
+            };
+            let settled = push_apart(&buffers.rows, &mut pushed, &mut forces, &params);
+            let (sweeps, residual) =
+                settled.map_err(|unsettled| self.unsettled(unsettled, &buffers.rows, &params))?;
+            for (row, force) in buffers.rows.iter().zip(forces) {
+                buffers.forces[row.link as usize] = force;
+                buffers.takes_part[row.link as usize] = Part::Yes;
+            }
             report.iterations += sweeps;
             report.passes += 1;
             report.residual = residual;
-            if !self.admit_new(correction) {
+            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
+                return Ok((Reach::TooShort, report));
+            }
+            if !self.admit(step, buffers) {
                 break;
             }
         }
-        for i in 0..correction.velocities.len() {
-            let moved = correction.displacements[i] - correction.step.drift[i];
-            correction.velocities[i] = moved / correction.step.rate;
+        let moves = buffers.displacements.iter().zip(&self.graph.free);
+        for (change, (end, free)) in buffers.changes.iter_mut().zip(moves) {
+            *change = (end - free) / step.rate;
         }
-        Ok(self.summary(report, correction))
+        Ok((Reach::Enough, report))
     }
 
-    /// The projection, with as many linearisations as the gaps need.
-    fn project(&mut self, correction: &mut Correction<'_, D>) -> Result<ContactReport, ContactError> {
-        let mut report = ContactReport::default();
-        // The first linearisation is the paper's: about the particles where they are.
-        let mut base = vec![Vector::zeros(); correction.predicted.len()];
-        while report.passes < self.params.pass_limit {
-            report.passes += 1;
-            self.linearise(correction, &base)?;
-            let solve = self.solve(correction)?;
-            report.iterations += solve.iterations;
-            report.residual = solve.residual;
-            if self.admit_new(correction) {
-                continue;
-            }
-            if !self.params.exact_gap || self.farthest_off(correction).is_none() {
-                return Ok(self.summary(report, correction));
-            }
-            base.copy_from_slice(&correction.displacements);
+    fn unsettled(&self, unsettled: Unsettled, rows: &[Row<D>], params: &PushParams) -> ContactError {
+        ContactError::NotConverged {
+            residual: unsettled.residual,
+            tolerance: params.tolerance,
+            iterations: params.sweep_limit,
+            history: unsettled.history,
+            worst: self.graph.key(&self.graph.links[rows[unsettled.worst].link as usize]),
         }
-        let (pair, gap) = self.farthest_off(correction).unwrap_or((PairKey::new(0, 0), 0.0));
-        Err(ContactError::GapNotClosed { pair, gap, passes: report.passes })
     }
 
-    /// Writes the gaps at the end of the step as linear functions of the velocities, about the displacements `base`.
-    ///
-    /// The gaps are exact at `base`, the normals those of the beginning of the step throughout: contact forces belong to
-    /// `u^n`, which multi-step schemes extrapolate. Normals of the end of the step converge faster (by `phi^2/2` a pass
-    /// here, `phi` the rotation of the pair in the step), but make the encounter of two spheres first order in dt.
-    fn linearise(&mut self, correction: &Correction<'_, D>, base: &[Vector<D>]) -> Result<(), ContactError> {
-        let step = correction.step;
-        let free = displacements(step, correction.predicted);
-        self.free_gaps.clear();
-        for constraint in &mut self.constraints {
-            constraint.point_along(&constraint.difference(step.positions))?;
-            let beyond = constraint.difference(&free) - constraint.difference(base);
-            let gap = constraint.gap(step.positions, base);
-            self.free_gaps.push(gap + constraint.normal.dot(&beyond));
-        }
-        Ok(())
-    }
-
-    fn solve(&mut self, correction: &mut Correction<'_, D>) -> Result<SolveReport, ContactError> {
-        let mut operator = ContactOperator {
-            constraints: &self.constraints,
-            step: correction.step,
-            mobility: &self.mobility,
-            workspace: &mut self.workspace,
-        };
-        let mut problem = Projection {
-            operator: &mut operator,
-            free_gaps: &self.free_gaps,
-            floors: &self.floors,
-            tolerance: correction.tolerance,
-            iteration_limit: self.params.iteration_limit,
-        };
-        let solved = self.solver.solve(&mut problem, &mut self.forces);
-        let report = solved.map_err(|failure| ContactError::NotConverged {
-            residual: failure.report.residual,
-            tolerance: correction.tolerance,
-            iterations: failure.report.iterations,
-            history: failure.history,
-            worst: self.constraints[failure.worst].pair,
-        })?;
-        let changes = operator.velocities(&self.forces);
-        for i in 0..changes.len() {
-            correction.velocities[i] = correction.predicted[i] + changes[i];
-        }
-        correction.displace();
-        Ok(report)
-    }
-
-    /// The pair whose gap at the end of the step is farthest from what it should be, beyond the tolerance.
-    fn farthest_off(&self, correction: &Correction<'_, D>) -> Option<(PairKey, f64)> {
-        let mut farthest = None;
-        let mut largest = 2.0 * correction.tolerance;
-        for (k, constraint) in self.constraints.iter().enumerate() {
-            let gap = constraint.gap(correction.step.positions, &correction.displacements);
-            let compliance = correction.step.rate
-                * (1.0 / correction.step.radii[constraint.tail]
-                    + 1.0 / correction.step.radii[constraint.head]);
-            let off = gap.min(compliance * (self.forces[k] - self.floors[k])).abs();
-            if off > largest {
-                (farthest, largest) = (Some((constraint.pair, gap)), off);
-            }
-        }
-        farthest
-    }
-
-    fn summary(&self, report: ContactReport, correction: &Correction<'_, D>) -> ContactReport {
+    fn summary(&self, report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
         let mut worst: Option<WorstPair> = None;
-        for constraint in &self.constraints {
-            let gap = constraint.gap(correction.step.positions, &correction.displacements);
+        let mut active_count = 0;
+        for row in &buffers.rows {
+            let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
             if worst.is_none_or(|worst| gap < worst.gap) {
-                worst = Some(WorstPair { pair: constraint.pair, gap });
+                worst = Some(WorstPair { pair: self.graph.key(&self.graph.links[row.link as usize]), gap });
             }
+            active_count += usize::from(buffers.forces[row.link as usize] != 0.0);
         }
-        let active_count = self.forces.iter().filter(|force| **force != 0.0).count();
-        ContactReport { pair_count: self.constraints.len(), active_count, worst, ..report }
+        ContactReport { pair_count: buffers.rows.len(), active_count, worst, ..report }
     }
 
     /// Updates gamma and lists the contacts.
-    fn remember(&mut self, correction: &Correction<'_, D>) {
-        let step = correction.step;
+    fn remember(&mut self, step: &StepGeometry<'_, D>, tolerance: f64, buffers: &Buffers<D>) {
         self.contacts.clear();
-        for (constraint, &lambda) in self.constraints.iter().zip(&self.forces) {
-            let old = self.state.get(constraint.pair);
-            let gamma = match self.params.strategy {
-                Strategy::Gluey => self.params.memory.update(&old, lambda, step.rate, step.dt, &self.params),
-                _ => 0.0,
-            };
-            let negligible = f64::EPSILON * constraint.rest.powi(2);
-            if gamma < 0.0 || (step.rate * lambda).abs() > negligible {
-                let gap = constraint.gap(step.positions, &correction.displacements);
-                self.contacts.push(Contact { pair: constraint.pair, lambda, gamma, gap });
+        for row in &buffers.rows {
+            let link = row.link as usize;
+            let (PairMemory { gamma, lambda: last }, lambda) = (buffers.memory[link], buffers.forces[link]);
+            let gamma = self.params.update(gamma, last, lambda, step);
+            // A force that moves the pair by less than the tolerance is rounding noise.
+            let moved = [row.head, row.tail]
+                .map(|place| buffers.weights.get(place as usize).unwrap_or(&0.0) * lambda);
+            if gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance {
+                let pair = self.graph.key(&self.graph.links[link]);
+                let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
+                self.contacts.push(Contact { pair, lambda, gamma, gap });
             }
         }
         self.contacts.sort_unstable_by_key(|contact| contact.pair);
@@ -390,5 +489,31 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
             gamma: contact.gamma,
             lambda: contact.lambda,
         }));
+    }
+}
+
+/// Whether a remembered contact still can be one.
+fn check_known<const D: usize>(
+    state: &PairState,
+    step: &StepGeometry<'_, D>,
+    domain: &Domain<D>,
+) -> Result<(), ContactError> {
+    let PairState { pair, .. } = *state;
+    let count = step.positions.len();
+    let (first, second) = pair.particles();
+    if first.max(second.unwrap_or(0)) >= count {
+        return Err(ContactError::UnknownParticle { pair, count });
+    }
+    match pair.second {
+        Partner::Wall(wall) if wall as usize >= domain.walls.len() => {
+            Err(ContactError::UnknownWall { pair, count: domain.walls.len() })
+        }
+        Partner::Wall(_) => Ok(()),
+        Partner::Particle { index, image } => {
+            let separation = step.positions[index as usize] + domain.shift(&image) - step.positions[first];
+            let gap = separation.norm() - step.radii[first] - step.radii[index as usize];
+            let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+            if gap > 0.5 * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
+        }
     }
 }

@@ -77,6 +77,8 @@ pub enum SolverKind {
     /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
     #[default]
     Uzawa,
+    /// Accelerated projected gradients (Nesterov, with restarts). For many contacts and few digits.
+    Accelerated,
     /// Conjugate gradients on the active set (MPRGP; Dostal 2009). For many contacts.
     ActiveSet,
 }

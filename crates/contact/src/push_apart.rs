@@ -6,13 +6,12 @@
 
 use gluey_geom::Vector;
 
-use crate::constraints::Constraint;
+use crate::rows::{GROUND, Row};
 use crate::solver::ResidualHistory;
-use crate::{ContactError, StepGeometry};
 
 /// When the pushing ends.
 pub(crate) struct PushParams {
-    /// Gap to keep, relative to the mean radius of a pair.
+    /// Gap to keep, relative to the mean radius of a pair (to half the radius, for a wall).
     pub threshold: f64,
     /// Shortfall that is left, in units of length.
     pub tolerance: f64,
@@ -20,59 +19,68 @@ pub(crate) struct PushParams {
     pub sweep_limit: usize,
 }
 
-/// Pushes until all gaps under `displacements` are at the threshold; adds to `forces` what the pushes amount to.
+/// Particles that are pushed.
+pub(crate) struct Pushed<'a, const D: usize> {
+    pub positions: &'a [Vector<D>],
+    pub radii: &'a [f64],
+    /// `c` times the mobility of each place.
+    pub weights: &'a [f64],
+    pub displacements: &'a mut [Vector<D>],
+}
+
+/// Pushing did not end.
+pub(crate) struct Unsettled {
+    pub residual: f64,
+    pub history: ResidualHistory,
+    /// Row with the largest shortfall.
+    pub worst: usize,
+}
+
+/// Pushes until all gaps are at the threshold; adds to `forces` what the pushes amount to.
 /// Returns the number of sweeps and the largest shortfall left.
 pub(crate) fn push_apart<const D: usize>(
-    step: &StepGeometry<'_, D>,
-    constraints: &mut [Constraint<D>],
-    displacements: &mut [Vector<D>],
+    rows: &[Row<D>],
+    pushed: &mut Pushed<'_, D>,
     forces: &mut [f64],
     params: &PushParams,
-) -> Result<(usize, f64), ContactError> {
-    let mut history = Vec::new();
+) -> Result<(usize, f64), Unsettled> {
+    let mut history = ResidualHistory::default();
     let mut worst = (0, 0.0);
     for sweep in 1..=params.sweep_limit {
         worst = (0, 0.0);
-        for (k, (constraint, force)) in constraints.iter_mut().zip(&mut *forces).enumerate() {
-            let shortfall = push(step, constraint, displacements, force, params.threshold)?;
+        for (k, (row, force)) in rows.iter().zip(&mut *forces).enumerate() {
+            let shortfall = push(row, pushed, force, params.threshold);
             if shortfall > worst.1 {
                 worst = (k, shortfall);
             }
         }
         if sweep.is_power_of_two() {
-            history.push((sweep, worst.1));
+            history.entries.push((sweep, worst.1));
         }
         if worst.1 <= params.tolerance {
             return Ok((sweep, worst.1));
         }
     }
-    Err(ContactError::NotConverged {
-        residual: worst.1,
-        tolerance: params.tolerance,
-        iterations: params.sweep_limit,
-        history: ResidualHistory { entries: history },
-        worst: constraints[worst.0].pair,
-    })
+    Err(Unsettled { residual: worst.1, history, worst: worst.0 })
 }
 
 /// Pushes one pair; returns by how much its gap was too small.
-fn push<const D: usize>(
-    step: &StepGeometry<'_, D>,
-    constraint: &mut Constraint<D>,
-    displacements: &mut [Vector<D>],
-    force: &mut f64,
-    threshold: f64,
-) -> Result<f64, ContactError> {
-    let separation = constraint.separation(step.positions, displacements);
-    let shortfall = 0.5 * threshold * constraint.rest - (separation.norm() - constraint.rest);
+fn push<const D: usize>(row: &Row<D>, pushed: &mut Pushed<'_, D>, force: &mut f64, threshold: f64) -> f64 {
+    let (head, tail) = (row.head as usize, row.tail as usize);
+    let separation = row.separation(pushed.positions, pushed.displacements);
+    let size = if row.tail == GROUND { pushed.radii[head] } else { row.rest };
+    let shortfall = 0.5 * threshold * size - row.gap_at(&separation);
     if shortfall <= 0.0 {
-        return Ok(0.0);
+        return 0.0;
     }
-    constraint.point_along(&separation)?;
-    let compliance = 1.0 / step.radii[constraint.tail] + 1.0 / step.radii[constraint.head];
-    let impulse = constraint.normal * (shortfall / compliance);
-    displacements[constraint.head] += impulse / step.radii[constraint.head];
-    displacements[constraint.tail] -= impulse / step.radii[constraint.tail];
-    *force += shortfall / (compliance * step.rate);
-    Ok(shortfall)
+    // Centres that have come to coincide are pushed back the way they came.
+    let normal = if row.is_flat { row.normal } else { separation.try_normalize(0.0).unwrap_or(row.normal) };
+    let behind = if row.tail == GROUND { 0.0 } else { pushed.weights[tail] };
+    let impulse = shortfall / (pushed.weights[head] + behind);
+    pushed.displacements[head] += normal * (impulse * pushed.weights[head]);
+    if behind > 0.0 {
+        pushed.displacements[tail] -= normal * (impulse * behind);
+    }
+    *force += impulse;
+    shortfall
 }

@@ -117,7 +117,12 @@ fn contradictory_contacts_end_with_an_error() {
             input.state.pairs =
                 pairs.iter().map(|&pair| PairState { pair, gamma: -1.0, lambda: 0.0 }).collect();
         });
-        assert!(matches!(error, ContactError::NotConverged { .. }), "{error}");
+        assert_eq!(
+            error,
+            ContactError::Contradictory {
+                pairs: vec![PairKey::new(0, 1), PairKey::new(0, 2), PairKey::new(1, 2)]
+            }
+        );
     }
 }
 

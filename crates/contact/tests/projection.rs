@@ -11,7 +11,13 @@ use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 const RATE: f64 = 0.15;
-const SOLVERS: [SolverKind; 2] = [SolverKind::Uzawa, SolverKind::ActiveSet];
+const SOLVERS: [SolverKind; 3] = [SolverKind::Uzawa, SolverKind::Accelerated, SolverKind::ActiveSet];
+
+/// The two particles of a pair.
+fn ends(pair: PairKey) -> (usize, usize) {
+    let (i, j) = pair.particles();
+    (i, j.expect("no walls here"))
+}
 
 /// Particles near contact with random velocities, some pairs glued.
 struct Packing<const D: usize> {
@@ -96,7 +102,7 @@ where
         let mut new = vec![0; order.len()];
         order.iter().enumerate().for_each(|(k, &i)| new[i] = k);
         let mut glued: Vec<_> =
-            self.glued.iter().map(|p| PairKey::new(new[p.indices().0], new[p.indices().1])).collect();
+            self.glued.iter().map(|pair| ends(*pair)).map(|(i, j)| PairKey::new(new[i], new[j])).collect();
         glued.sort_unstable();
         Self {
             positions: pick(&self.positions),
@@ -121,7 +127,7 @@ where
     let mut balance: Vec<Vector<D>> =
         (0..velocities.len()).map(|i| (velocities[i] - packing.predicted[i]) * packing.radii[i]).collect();
     for (pair, normal, known, glued) in packing.rows() {
-        let (i, j) = pair.indices();
+        let (i, j) = ends(pair);
         let gap = known + RATE * normal.dot(&(velocities[j] - velocities[i]));
         let found = contact.contacts().iter().find(|contact| contact.pair == pair);
         let lambda = found.map_or(0.0, |contact| contact.lambda);
@@ -149,14 +155,16 @@ where
         if seed % 2 == 0 {
             packing.glued.clear();
         }
-        let [one, other] = SOLVERS.map(|solver| {
+        let [one, others @ ..] = SOLVERS.map(|solver| {
             let (velocities, contact) = packing.solve(params(solver));
             assert_optimal(&packing, &velocities, &contact);
             assert!(contact.contacts().len() > side);
             velocities
         });
-        let difference = one.iter().zip(&other).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        assert!(difference < 1e-10, "seed {seed}: the solvers differ by {difference:e}");
+        for other in others {
+            let difference = one.iter().zip(&other).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(difference < 1e-10, "seed {seed}: the solvers differ by {difference:e}");
+        }
     }
 }
 
@@ -177,7 +185,7 @@ where
     let size = D * packing.positions.len();
     let (mut at_row, mut at_column, mut values, mut right) = (vec![], vec![], vec![], vec![]);
     for (row, (pair, normal, known, _)) in rows.iter().enumerate() {
-        let (i, j) = pair.indices();
+        let (i, j) = ends(*pair);
         for d in 0..D {
             at_row.extend([row, row]);
             at_column.extend([D * i + d, D * j + d]);
@@ -301,7 +309,7 @@ where
             let (velocities, _) = packing.solve(law);
             let end = |i: usize| packing.positions[i] + (velocities[i] * RATE + packing.drift[i]);
             for (pair, _, _, glued) in packing.rows() {
-                let (i, j) = pair.indices();
+                let (i, j) = ends(pair);
                 let gap = (end(j) - end(i)).norm() - packing.radii[i] - packing.radii[j];
                 assert!(gap > -1e-12, "{strategy} {pair:?}: {gap:e}");
                 assert!(!(glued && strategy == Strategy::Gluey) || gap < 1e-12, "{pair:?}: {gap:e}");
@@ -320,8 +328,14 @@ fn many_exact_gaps_at_once() {
 struct Coupled;
 
 impl<const D: usize> Mobility<D> for Coupled {
+    const COUPLED: bool = true;
+
+    fn own(&self, _particle: usize, radius: f64) -> f64 {
+        1.0 / radius + 0.3
+    }
+
     fn apply(&self, radii: &[f64], forces: &[Vector<D>], velocities: &mut [Vector<D>]) {
-        StokesDrag.apply(radii, forces, velocities);
+        Mobility::<D>::apply(&StokesDrag, radii, forces, velocities);
         let total: Vector<D> = forces.iter().sum();
         velocities.iter_mut().for_each(|velocity| *velocity += total * 0.3);
     }

@@ -92,9 +92,8 @@ fn a_floor_of_gamma_releases_earlier() {
 struct Heavier(f64);
 
 impl<const D: usize> Mobility<D> for Heavier {
-    fn apply(&self, radii: &[f64], forces: &[Vector<D>], velocities: &mut [Vector<D>]) {
-        StokesDrag.apply(radii, forces, velocities);
-        velocities.iter_mut().for_each(|velocity| *velocity /= self.0);
+    fn own(&self, _particle: usize, radius: f64) -> f64 {
+        1.0 / (self.0 * radius)
     }
 }
 

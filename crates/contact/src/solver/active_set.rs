@@ -5,9 +5,10 @@
 //! gradient step changes the active set; when the forces at the floor are worse than the others, a step frees them.
 //! The rate of convergence depends on the spectrum of `A` only, and the operator may be singular.
 
+use super::contradiction::WATCH_VECTOR_COUNT;
 use super::{
-    Projection, ProjectionSolver, ResidualHistory, SolveFailure, SolveReport, dot, gaps_under,
-    largest_eigenvalue, residual,
+    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, dot, gaps_under,
+    largest_eigenvalue, residual, split,
 };
 
 /// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they bound the
@@ -17,70 +18,69 @@ const REFRESH: usize = 50;
 const NULL: f64 = 1e-13;
 
 /// The solver for many contacts.
-#[derive(Clone, Debug, Default)]
-pub struct ActiveSet {
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ActiveSet;
+
+/// Vectors of one solve.
+struct State<'a> {
     /// `w`, the gradient of the dual function.
-    gaps: Vec<f64>,
+    gaps: &'a mut [f64],
     /// Gradient of the forces above their floor.
-    free: Vec<f64>,
+    free: &'a mut [f64],
     /// Gradient of the forces at their floor that want to leave it.
-    chopped: Vec<f64>,
-    direction: Vec<f64>,
+    chopped: &'a mut [f64],
+    direction: &'a mut [f64],
     /// `A direction`.
-    image: Vec<f64>,
+    image: &'a mut [f64],
 }
 
 impl ProjectionSolver for ActiveSet {
+    fn scratch_count(&self) -> usize {
+        5 + WATCH_VECTOR_COUNT
+    }
+
     fn solve(
-        &mut self,
+        &self,
         problem: &mut Projection<'_>,
         forces: &mut [f64],
+        scratch: &mut [f64],
     ) -> Result<SolveReport, SolveFailure> {
-        self.resize(forces.len());
-        let norm = largest_eigenvalue(problem.operator, forces.len());
-        let mut history = ResidualHistory::default();
-        self.begin(problem, forces);
+        let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
+        let norm = largest_eigenvalue(problem.operator, ray, mapped);
+        let mut watch = Watch::new([mark, ray, mapped], forces);
+        let mut state = State { gaps, free, chopped, direction, image };
+        let mut course = Course::new();
+        state.begin(problem, forces);
         let mut fresh = true;
-        let mut iteration = 0;
         loop {
-            iteration += 1;
-            let (worst, residual) = residual(&self.gaps, forces, problem.floors, norm);
-            history.record(iteration, residual);
-            let report = SolveReport { iterations: iteration, residual };
-            if residual <= problem.tolerance && fresh {
-                return Ok(report);
+            course.note(residual(state.gaps, forces, problem.floors, norm));
+            if course.residual <= problem.tolerance && fresh {
+                return Ok(course.report());
             }
-            if iteration >= problem.iteration_limit || !residual.is_finite() {
-                history.close(iteration, residual);
-                return Err(SolveFailure { report, history, worst });
+            let contradiction = watch.look(course.iteration, problem, forces, norm);
+            if contradiction.is_some() || course.is_lost(problem.iteration_limit) {
+                return Err(course.failure(contradiction));
             }
-            fresh = residual <= problem.tolerance || iteration % (REFRESH + 2 * forces.len()) == 0;
+            fresh = course.residual <= problem.tolerance
+                || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
             if fresh {
-                self.begin(problem, forces);
+                state.begin(problem, forces);
             } else {
-                self.iterate(problem, forces, norm);
+                state.iterate(problem, forces, norm);
             }
         }
     }
 }
 
-impl ActiveSet {
-    fn resize(&mut self, count: usize) {
-        for buffer in
-            [&mut self.gaps, &mut self.free, &mut self.chopped, &mut self.direction, &mut self.image]
-        {
-            buffer.resize(count, 0.0);
-        }
-    }
-
+impl State<'_> {
     /// Starts conjugate gradients anew from `forces`.
     fn begin(&mut self, problem: &mut Projection<'_>, forces: &mut [f64]) {
         for (force, floor) in forces.iter_mut().zip(problem.floors) {
             *force = force.max(*floor);
         }
-        gaps_under(problem, forces, &mut self.gaps);
+        gaps_under(problem, forces, self.gaps);
         self.split(forces, problem.floors);
-        self.direction.copy_from_slice(&self.free);
+        self.direction.copy_from_slice(self.free);
     }
 
     /// Parts the gradient into its free and chopped components.
@@ -93,7 +93,7 @@ impl ActiveSet {
     }
 
     fn iterate(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
-        if dot(&self.chopped, &self.chopped) <= self.reduced(forces, problem.floors, norm) {
+        if dot(self.chopped, self.chopped) <= self.reduced(forces, problem.floors, norm) {
             self.conjugate_step(problem, forces, norm);
         } else {
             self.release_step(problem, forces, norm);
@@ -103,17 +103,17 @@ impl ActiveSet {
     /// Product of the free gradient with its part that a step `1/norm` can still follow.
     fn reduced(&self, forces: &[f64], floors: &[f64], norm: f64) -> f64 {
         let room = forces.iter().zip(floors).map(|(force, floor)| norm * (force - floor));
-        room.zip(&self.free).map(|(room, free)| room.min(*free) * free).sum()
+        room.zip(&*self.free).map(|(room, free)| room.min(*free) * free).sum()
     }
 
     fn conjugate_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
-        problem.operator.apply(&self.direction, &mut self.image);
-        let curvature = dot(&self.direction, &self.image);
-        if curvature <= NULL * norm * dot(&self.direction, &self.direction) {
+        problem.operator.apply(self.direction, self.image);
+        let curvature = dot(self.direction, self.image);
+        if curvature <= NULL * norm * dot(self.direction, self.direction) {
             self.gradient_step(problem, forces, norm);
             return;
         }
-        let length = dot(&self.gaps, &self.direction) / curvature;
+        let length = dot(self.gaps, self.direction) / curvature;
         let feasible = self.feasible_length(forces, problem.floors);
         self.advance(forces, length.min(feasible));
         if length > feasible {
@@ -122,8 +122,8 @@ impl ActiveSet {
             return;
         }
         self.split(forces, problem.floors);
-        let beta = dot(&self.free, &self.image) / curvature;
-        for (direction, free) in self.direction.iter_mut().zip(&self.free) {
+        let beta = dot(self.free, self.image) / curvature;
+        for (direction, free) in self.direction.iter_mut().zip(&*self.free) {
             *direction = free - beta * *direction;
         }
     }
@@ -149,7 +149,7 @@ impl ActiveSet {
 
     /// Projected step along the free gradient: forces may meet their floors.
     fn gradient_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
-        for (force, free) in forces.iter_mut().zip(&self.free) {
+        for (force, free) in forces.iter_mut().zip(&*self.free) {
             *force -= free / norm;
         }
         self.begin(problem, forces);
@@ -157,12 +157,12 @@ impl ActiveSet {
 
     /// Step along the chopped gradient: forces leave their floors.
     fn release_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
-        self.direction.copy_from_slice(&self.chopped);
-        problem.operator.apply(&self.direction, &mut self.image);
-        let square = dot(&self.direction, &self.direction);
-        let curvature = dot(&self.direction, &self.image).max(NULL * norm * square);
-        self.advance(forces, dot(&self.gaps, &self.direction) / curvature);
+        self.direction.copy_from_slice(self.chopped);
+        problem.operator.apply(self.direction, self.image);
+        let square = dot(self.direction, self.direction);
+        let curvature = dot(self.direction, self.image).max(NULL * norm * square);
+        self.advance(forces, dot(self.gaps, self.direction) / curvature);
         self.split(forces, problem.floors);
-        self.direction.copy_from_slice(&self.free);
+        self.direction.copy_from_slice(self.free);
     }
 }

@@ -7,14 +7,25 @@
 //!
 //! `w` are the gaps at the end of the step (length), `lambda` forces over `6 pi eta` (length^2/time). A contact that
 //! must stay closed has `floor = -inf`, which leaves `w = 0`.
+//!
+//! | solver | where |
+//! |---|---|
+//! | [`Uzawa`] | one or two contacts; the paper's |
+//! | [`Accelerated`] | many contacts, few digits |
+//! | [`ActiveSet`] | many contacts, many digits |
 
+mod accelerated;
 mod active_set;
+mod contradiction;
 mod spectrum;
 mod uzawa;
 
+pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
+
+use contradiction::Watch;
 
 /// The symmetric positive semidefinite operator `A`.
 pub trait GapOperator {
@@ -37,19 +48,24 @@ pub struct Projection<'a> {
 }
 
 /// Finds contact forces; the initial `forces` are a guess.
-pub trait ProjectionSolver: Send {
-    /// Solves `problem`; on failure `forces` is what was reached.
+pub trait ProjectionSolver: Send + Sync {
+    /// How many vectors of the size of the problem [`ProjectionSolver::solve`] works on.
+    fn scratch_count(&self) -> usize;
+
+    /// Solves `problem`; on failure `forces` is what was reached. `scratch` holds [`ProjectionSolver::scratch_count`]
+    /// vectors of any content. Nothing is allocated on the way to a solution.
     fn solve(
-        &mut self,
+        &self,
         problem: &mut Projection<'_>,
         forces: &mut [f64],
+        scratch: &mut [f64],
     ) -> Result<SolveReport, SolveFailure>;
 }
 
 /// Effort and accuracy of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolveReport {
-    /// Applications of the operator.
+    /// Applications of the operator, those for its norm not counted.
     pub iterations: usize,
     /// `max |min(w, ||A|| (lambda - floor))|`; unit: length.
     pub residual: f64,
@@ -64,6 +80,8 @@ pub struct SolveFailure {
     pub history: ResidualHistory,
     /// Contact with the largest residual.
     pub worst: usize,
+    /// Contacts that contradict each other, if that is why.
+    pub contradiction: Option<Vec<usize>>,
 }
 
 /// Residuals at iterations 1, 2, 4, 8, ... and at the last one.
@@ -73,27 +91,59 @@ pub struct ResidualHistory {
     pub entries: Vec<(usize, f64)>,
 }
 
-impl ResidualHistory {
-    fn record(&mut self, iteration: usize, residual: f64) {
-        if iteration.is_power_of_two() {
-            self.entries.push((iteration, residual));
+/// Most iterations a history can tell are `2^40`.
+const HISTORY_LENGTH: usize = 40;
+
+/// Follows a solve: when to stop, and what to tell if that is too early.
+struct Course {
+    history: [f64; HISTORY_LENGTH],
+    iteration: usize,
+    residual: f64,
+    worst: usize,
+}
+
+impl Course {
+    fn new() -> Self {
+        Self { history: [0.0; HISTORY_LENGTH], iteration: 0, residual: f64::INFINITY, worst: 0 }
+    }
+
+    /// Notes the residual of the next iteration.
+    fn note(&mut self, (worst, residual): (usize, f64)) {
+        self.iteration += 1;
+        (self.worst, self.residual) = (worst, residual);
+        if self.iteration.is_power_of_two() {
+            self.history[(self.iteration.ilog2() as usize).min(HISTORY_LENGTH - 1)] = residual;
         }
     }
 
-    fn close(&mut self, iteration: usize, residual: f64) {
-        if self.entries.last().is_none_or(|last| last.0 != iteration) {
-            self.entries.push((iteration, residual));
+    /// Whether to give up.
+    fn is_lost(&self, limit: usize) -> bool {
+        self.iteration >= limit || !self.residual.is_finite()
+    }
+
+    fn report(&self) -> SolveReport {
+        SolveReport { iterations: self.iteration, residual: self.residual }
+    }
+
+    fn failure(&self, contradiction: Option<Vec<usize>>) -> SolveFailure {
+        let powers = 0..=self.iteration.max(1).ilog2() as usize;
+        let mut entries: Vec<(usize, f64)> =
+            powers.map(|power| (1 << power, self.history[power.min(HISTORY_LENGTH - 1)])).collect();
+        if !self.iteration.is_power_of_two() {
+            entries.push((self.iteration, self.residual));
         }
+        let history = ResidualHistory { entries };
+        SolveFailure { report: self.report(), history, worst: self.worst, contradiction }
     }
 }
 
 /// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as largest.
 fn residual(gaps: &[f64], forces: &[f64], floors: &[f64], norm: f64) -> (usize, f64) {
     let mut worst = (0, 0.0);
-    for k in 0..gaps.len() {
-        let slack = norm * (forces[k] - floors[k]);
-        let here = if gaps[k] < slack { gaps[k].abs() } else { slack.abs() };
-        let here = if gaps[k].is_nan() { f64::INFINITY } else { here };
+    for (k, ((gap, force), floor)) in gaps.iter().zip(forces).zip(floors).enumerate() {
+        let slack = norm * (force - floor);
+        let here = gap.min(slack).abs();
+        let here = if gap.is_nan() { f64::INFINITY } else { here };
         if here > worst.1 {
             worst = (k, here);
         }
@@ -109,6 +159,27 @@ fn gaps_under(problem: &mut Projection<'_>, forces: &[f64], gaps: &mut [f64]) {
     }
 }
 
+/// Products are summed in lanes, which is as fixed an order as any and can be vectorised.
+const LANE_COUNT: usize = 8;
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let (left, right) = (a.chunks_exact(LANE_COUNT), b.chunks_exact(LANE_COUNT));
+    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();
+    let mut sums = [0.0; LANE_COUNT];
+    for (a, b) in left.zip(right) {
+        for lane in 0..LANE_COUNT {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The first vectors of `scratch`, `count` long.
+fn split<const N: usize>(scratch: &mut [f64], count: usize) -> [&mut [f64]; N] {
+    let mut rest = scratch;
+    std::array::from_fn(|_| {
+        let (first, others) = std::mem::take(&mut rest).split_at_mut(count);
+        rest = others;
+        first
+    })
 }

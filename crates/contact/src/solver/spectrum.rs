@@ -5,20 +5,22 @@ use super::{GapOperator, dot};
 /// Power iterations made: enough to come within a few per cent, and a step length may be off by nearly two.
 const ITERATION_COUNT: usize = 20;
 
-/// Rayleigh quotient after some power iterations: a lower bound of `||A||`, exact for one contact.
-pub fn largest_eigenvalue(operator: &mut dyn GapOperator, count: usize) -> f64 {
+/// Rayleigh quotient after some power iterations: a lower bound of `||A||`, exact for one contact. `x` and `y` are vectors
+/// to work on.
+pub fn largest_eigenvalue(operator: &mut dyn GapOperator, x: &mut [f64], y: &mut [f64]) -> f64 {
     // Signs and sizes that no regular packing has, so that the start is not orthogonal to the answer.
-    let mut x: Vec<f64> = (0..count).map(|k| (k as f64 * 0.618_033_988_749_894_9).fract() - 0.3).collect();
-    let mut y = vec![0.0; count];
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = (k as f64 * 0.618_033_988_749_894_9).fract() - 0.3;
+    }
     let mut quotient = 0.0;
     for _ in 0..ITERATION_COUNT {
-        operator.apply(&x, &mut y);
-        quotient = dot(&x, &y) / dot(&x, &x);
-        let norm = dot(&y, &y).sqrt();
+        operator.apply(x, y);
+        quotient = dot(x, y) / dot(x, x);
+        let norm = dot(y, y).sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
             break;
         }
-        for (x, y) in x.iter_mut().zip(&y) {
+        for (x, y) in x.iter_mut().zip(&*y) {
             *x = y / norm;
         }
     }

@@ -1,8 +1,9 @@
 //! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI 10.3166/REMN.16.365-383).
 
+use super::contradiction::WATCH_VECTOR_COUNT;
 use super::{
-    Projection, ProjectionSolver, ResidualHistory, SolveFailure, SolveReport, gaps_under, largest_eigenvalue,
-    residual,
+    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, gaps_under, largest_eigenvalue,
+    residual, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
@@ -10,40 +11,40 @@ use super::{
 /// The step `rho = 1/||A||` comes from an estimate of the norm; it converges below `2/||A||` (in terms of the paper's
 /// multipliers `delta = lambda/c` that is `0 < rho < 2/||c^2 B M^-1 B^T||`), and is halved should the estimate be so
 /// poor that the residual grows.
-#[derive(Clone, Debug, Default)]
-pub struct Uzawa {
-    gaps: Vec<f64>,
-}
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Uzawa;
 
 impl ProjectionSolver for Uzawa {
+    fn scratch_count(&self) -> usize {
+        1 + WATCH_VECTOR_COUNT
+    }
+
     fn solve(
-        &mut self,
+        &self,
         problem: &mut Projection<'_>,
         forces: &mut [f64],
+        scratch: &mut [f64],
     ) -> Result<SolveReport, SolveFailure> {
-        self.gaps.resize(forces.len(), 0.0);
-        let mut norm = largest_eigenvalue(problem.operator, forces.len());
-        let mut history = ResidualHistory::default();
+        let [gaps, mark, ray, image] = split(scratch, forces.len());
+        let mut norm = largest_eigenvalue(problem.operator, ray, image);
+        let mut watch = Watch::new([mark, ray, image], forces);
+        let mut course = Course::new();
         let mut least = f64::INFINITY;
-        let mut iteration = 0;
         loop {
-            iteration += 1;
-            gaps_under(problem, forces, &mut self.gaps);
-            let (worst, residual) = residual(&self.gaps, forces, problem.floors, norm);
-            history.record(iteration, residual);
-            let report = SolveReport { iterations: iteration, residual };
-            if residual <= problem.tolerance {
-                return Ok(report);
+            gaps_under(problem, forces, gaps);
+            course.note(residual(gaps, forces, problem.floors, norm));
+            if course.residual <= problem.tolerance {
+                return Ok(course.report());
             }
-            if iteration >= problem.iteration_limit || !residual.is_finite() {
-                history.close(iteration, residual);
-                return Err(SolveFailure { report, history, worst });
+            let contradiction = watch.look(course.iteration, problem, forces, norm);
+            if contradiction.is_some() || course.is_lost(problem.iteration_limit) {
+                return Err(course.failure(contradiction));
             }
-            least = least.min(residual);
-            if residual > 100.0 * least {
-                (norm, least) = (2.0 * norm, residual);
+            least = least.min(course.residual);
+            if course.residual > 100.0 * least {
+                (norm, least) = (2.0 * norm, course.residual);
             }
-            step(forces, &self.gaps, problem.floors, 1.0 / norm);
+            step(forces, gaps, problem.floors, 1.0 / norm);
         }
     }
 }

@@ -8,7 +8,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gluey_contact::Contact;
+use gluey_contact::{Contact, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
 use vtkio::model::{
@@ -158,15 +158,20 @@ where
     }
 }
 
+/// Vertices at the centres and lines between those in contact; contacts with walls and with images across a periodic
+/// border have no second centre here and are left out.
 fn contacts_piece<const D: usize>(particles: &[Particle<D>], contacts: &[Contact]) -> UnstructuredGridPiece
 where
     Dim<D>: Space<D>,
 {
     let count = particles.len();
+    let joined =
+        |contact: &&Contact| matches!(contact.pair.second, Partner::Particle { image: [0, 0, 0], .. });
+    let contacts: Vec<&Contact> = contacts.iter().filter(joined).collect();
     let mut connectivity: Vec<u64> = (0..count as u64).collect();
     connectivity.extend(contacts.iter().flat_map(|contact| {
-        let pair = contact.pair;
-        [u64::from(pair.first), u64::from(pair.second)]
+        let (first, second) = contact.pair.particles();
+        [first as u64, second.unwrap_or(first) as u64]
     }));
     let mut offsets: Vec<u64> = (1..=count as u64).collect();
     offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as u64));
@@ -174,7 +179,7 @@ where
     types.resize(count + contacts.len(), CellType::Line);
     // Vertices carry zeros.
     let of_lines = |value: fn(&Contact) -> f64| -> Vec<f64> {
-        std::iter::repeat_n(0.0, count).chain(contacts.iter().map(value)).collect()
+        std::iter::repeat_n(0.0, count).chain(contacts.iter().copied().map(value)).collect()
     };
     let cell = vec![
         scalars("gamma", of_lines(|contact| contact.gamma)),

@@ -1,0 +1,61 @@
+//! Which balls meet: a cell list, and parry's bounding volume hierarchy for very different sizes.
+
+mod cells;
+mod hierarchy;
+
+use gluey_geom::Vector;
+
+pub use cells::CellList;
+pub(crate) use cells::{Lattice, sort_by_key};
+pub use hierarchy::Hierarchy;
+
+/// Finds the pairs of balls that meet. All implementations give the same pairs in the same order.
+pub trait Broadphase<const D: usize>: Send {
+    /// Replaces `pairs` by all `(i, j)` with `i < j`, `i < asker_count` and `|x_i - x_j| <= r_i + r_j`, sorted.
+    ///
+    /// Balls from `asker_count` on are only looked for (images across a periodic border). Coordinates are finite, radii
+    /// are positive.
+    fn meeting(
+        &mut self,
+        centers: &[Vector<D>],
+        radii: &[f64],
+        asker_count: usize,
+        pairs: &mut Vec<(u32, u32)>,
+    );
+}
+
+/// Ratio of the largest to the mean radius beyond which the hierarchy is faster than the cell list.
+const SIZE_RATIO: f64 = 4.0;
+
+/// The cell list for balls of similar sizes, the hierarchy otherwise.
+#[derive(Clone, Debug, Default)]
+pub struct BestOf {
+    cells: CellList,
+    hierarchy: Hierarchy,
+}
+
+impl<const D: usize> Broadphase<D> for BestOf {
+    fn meeting(
+        &mut self,
+        centers: &[Vector<D>],
+        radii: &[f64],
+        asker_count: usize,
+        pairs: &mut Vec<(u32, u32)>,
+    ) {
+        let largest = radii.iter().copied().fold(0.0, f64::max);
+        let sum: f64 = radii.iter().sum();
+        if largest * radii.len() as f64 <= SIZE_RATIO * sum {
+            self.cells.meeting(centers, radii, asker_count, pairs);
+        } else {
+            self.hierarchy.meeting(centers, radii, asker_count, pairs);
+        }
+    }
+}
+
+/// Whether two balls meet.
+fn meet<const D: usize>(x: &Vector<D>, y: &Vector<D>, reach: f64) -> bool {
+    (y - x).norm_squared() <= reach * reach
+}
+
+#[cfg(test)]
+mod tests;

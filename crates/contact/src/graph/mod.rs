@@ -1,0 +1,416 @@
+//! Which contacts could close in a step, kept from step to step as long as particles stay near where they were.
+
+mod affine;
+mod order;
+
+use gluey_geom::Vector;
+
+use crate::broadphase::{BestOf, Broadphase};
+use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
+use affine::AffineFit;
+use order::SpatialOrder;
+
+/// Pairs nearer than this part of their summed radii are kept in the graph whatever they do, so that one search serves
+/// several steps.
+const SKIN: f64 = 0.1;
+
+/// A candidate for contact, in the numbering of the graph.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Link {
+    /// A particle's place, or a wall's number plus the number of particles.
+    pub tail: u32,
+    /// A particle's place.
+    pub head: u32,
+    /// Which image of the head: `x_head + image * period`.
+    pub image: [i32; 3],
+}
+
+/// The candidates of a step. Particles are numbered by their *places*, an order of space.
+#[derive(Debug)]
+pub(crate) struct Graph<const D: usize> {
+    /// Particle of each place.
+    pub order: Vec<u32>,
+    /// Place of each particle.
+    places: Vec<u32>,
+    /// Candidates: pairs that were found, walls, remembered contacts that are neither.
+    pub links: Vec<Link>,
+    /// First found pair of each place; found pairs are sorted by tail.
+    starts: Vec<u32>,
+    found_count: usize,
+    walls_end: usize,
+    /// Positions and radii of the places.
+    pub positions: Vec<Vector<D>>,
+    pub radii: Vec<f64>,
+    /// Displacements of the places without contact.
+    pub free: Vec<Vector<D>>,
+    /// Rank of each place in an order of space that depends on nothing but where particles are.
+    pub ranks: Vec<u32>,
+    /// Where places were when the search was made, and the distance up to which it was made.
+    reference: Vec<Vector<D>>,
+    reach: Vec<f64>,
+    /// Gap kept between particles, relative to their radii.
+    pub margin: f64,
+    /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
+    wall_slack: f64,
+    search: Search<D>,
+}
+
+/// Buffers of a search.
+#[derive(Debug)]
+struct Search<const D: usize> {
+    spatial: SpatialOrder,
+    ranked: Vec<u32>,
+    broadphase: BestOf,
+    wrapped: Vec<Vector<D>>,
+    windings: Vec<[i32; 3]>,
+    centers: Vec<Vector<D>>,
+    reaches: Vec<f64>,
+    /// Place and image of each ball that is not a particle itself.
+    ghosts: Vec<(u32, [i32; 3])>,
+    pairs: Vec<(u32, u32)>,
+    moved: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Default for Search<D> {
+    fn default() -> Self {
+        Self {
+            spatial: SpatialOrder::default(),
+            ranked: Vec::new(),
+            broadphase: BestOf::default(),
+            wrapped: Vec::new(),
+            windings: Vec::new(),
+            centers: Vec::new(),
+            reaches: Vec::new(),
+            ghosts: Vec::new(),
+            pairs: Vec::new(),
+            moved: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Default for Graph<D> {
+    fn default() -> Self {
+        Self {
+            order: Vec::new(),
+            places: Vec::new(),
+            links: Vec::new(),
+            starts: Vec::new(),
+            found_count: 0,
+            walls_end: 0,
+            positions: Vec::new(),
+            radii: Vec::new(),
+            free: Vec::new(),
+            ranks: Vec::new(),
+            reference: Vec::new(),
+            reach: Vec::new(),
+            margin: 0.0,
+            wall_slack: 0.0,
+            search: Search::default(),
+        }
+    }
+}
+
+impl<const D: usize> Graph<D> {
+    /// Number of particles.
+    pub(crate) fn count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Wall of a link, if it is one.
+    pub(crate) fn wall(&self, link: &Link) -> Option<usize> {
+        (link.tail as usize).checked_sub(self.count())
+    }
+
+    /// What the contact is called outside.
+    pub(crate) fn key(&self, link: &Link) -> PairKey {
+        let head = self.order[link.head as usize] as usize;
+        match self.wall(link) {
+            Some(wall) => PairKey::wall(head, wall),
+            None => PairKey::across(self.order[link.tail as usize] as usize, head, link.image),
+        }
+    }
+
+    /// The link that a contact's name means.
+    fn link(&self, key: PairKey) -> Link {
+        let first = self.places[key.first as usize];
+        match key.second {
+            Partner::Wall(wall) => Link { tail: self.count() as u32 + wall, head: first, image: [0; 3] },
+            Partner::Particle { index, image } => {
+                let second = self.places[index as usize];
+                if first <= second {
+                    Link { tail: first, head: second, image }
+                } else {
+                    Link { tail: second, head: first, image: image.map(|n| -n) }
+                }
+            }
+        }
+    }
+
+    /// Index of a contact's link, added if no search found it.
+    pub(crate) fn recall(&mut self, key: PairKey) -> usize {
+        let wanted = self.link(key);
+        let found = match self.wall(&wanted) {
+            None => {
+                let tail = wanted.tail as usize;
+                let row = self.starts[tail] as usize..self.starts[tail + 1] as usize;
+                self.links[row.clone()].iter().position(|link| *link == wanted).map(|k| row.start + k)
+            }
+            Some(_) => {
+                let walls = &self.links[self.found_count..self.walls_end];
+                let place =
+                    walls.binary_search_by_key(&(wanted.tail, wanted.head), |link| (link.tail, link.head));
+                place.ok().map(|k| self.found_count + k)
+            }
+        };
+        found.unwrap_or_else(|| {
+            self.links.push(wanted);
+            self.links.len() - 1
+        })
+    }
+
+    /// Takes over the particles of a step that would move by `displacements` (by particle) without contact.
+    ///
+    /// Whether the search was made now or some steps ago changes no bit of the results.
+    pub(crate) fn begin(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        domain: &Domain<D>,
+        displacements: &[Vector<D>],
+    ) -> Result<(), ContactError> {
+        let same = self.radii.len() == step.radii.len()
+            && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
+        if same {
+            self.load(step, displacements);
+        }
+        let free = std::mem::take(&mut self.free);
+        let known = same && self.covers_pairs(domain, &free);
+        self.free = free;
+        if !known {
+            self.renew(step, domain, displacements, displacements)?;
+        }
+        self.finish(step, domain);
+        Ok(())
+    }
+
+    /// Widens the search to what `needed` displacements (by particle) could close.
+    pub(crate) fn widen(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        domain: &Domain<D>,
+        displacements: &[Vector<D>],
+        needed: &[Vector<D>],
+    ) -> Result<(), ContactError> {
+        for wall in &domain.walls {
+            let farthest = needed.iter().map(|s| wall.normal.dot(s).abs()).fold(0.0, f64::max);
+            self.wall_slack = self.wall_slack.max(farthest);
+        }
+        self.renew(step, domain, displacements, needed)?;
+        self.finish(step, domain);
+        Ok(())
+    }
+
+    /// Whether no contact that `displacements` (by place) could close is missing.
+    pub(crate) fn covers(
+        &mut self,
+        domain: &Domain<D>,
+        step: &StepGeometry<'_, D>,
+        displacements: &[Vector<D>],
+    ) -> bool {
+        let walls = domain.walls.iter().all(|wall| {
+            let reached = |place: usize| {
+                self.wall_reach(wall, place, step.dt)
+                    >= wall.speed * step.dt - wall.normal.dot(&displacements[place])
+            };
+            (0..self.count()).all(reached)
+        });
+        walls && self.covers_pairs(domain, displacements)
+    }
+
+    fn load(&mut self, step: &StepGeometry<'_, D>, displacements: &[Vector<D>]) {
+        self.positions.clear();
+        self.positions.extend(self.order.iter().map(|&i| step.positions[i as usize]));
+        self.free.clear();
+        self.free.extend(self.order.iter().map(|&i| displacements[i as usize]));
+    }
+
+    /// Ranks the places and adds the walls.
+    fn finish(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) {
+        let search = &mut self.search;
+        wrap(&self.positions, domain, &mut search.wrapped, &mut search.windings);
+        search.spatial.sort(&search.wrapped, &mut search.ranked);
+        self.ranks.resize(self.order.len(), 0);
+        for (rank, &place) in search.ranked.iter().enumerate() {
+            self.ranks[place as usize] = rank as u32;
+        }
+        self.links.truncate(self.found_count);
+        for (number, wall) in domain.walls.iter().enumerate() {
+            let tail = (self.count() + number) as u32;
+            for place in 0..self.count() {
+                if wall.distance(&self.positions[place]) - self.radii[place]
+                    <= self.wall_reach(wall, place, step.dt)
+                {
+                    self.links.push(Link { tail, head: place as u32, image: [0; 3] });
+                }
+            }
+        }
+        self.walls_end = self.links.len();
+    }
+
+    /// Gap up to which a wall is a candidate.
+    fn wall_reach(&self, wall: &Wall<D>, place: usize, dt: f64) -> f64 {
+        let approach = wall.normal.dot(&self.free[place]).abs() + wall.speed.abs() * dt;
+        approach + self.wall_slack + SKIN * self.radii[place]
+    }
+
+    /// Searches anew: for places an order of space, for pairs what `needed` could close.
+    fn renew(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        domain: &Domain<D>,
+        displacements: &[Vector<D>],
+        needed: &[Vector<D>],
+    ) -> Result<(), ContactError> {
+        // Should this fail, nothing is known.
+        self.radii.clear();
+        let search = &mut self.search;
+        wrap(step.positions, domain, &mut search.wrapped, &mut search.windings);
+        search.spatial.sort(&search.wrapped, &mut self.order);
+        self.places.resize(self.order.len(), 0);
+        for (place, &particle) in self.order.iter().enumerate() {
+            self.places[particle as usize] = place as u32;
+        }
+        self.load(step, needed);
+        self.reference.clone_from(&self.positions);
+        self.set_reach(step, domain)?;
+        self.load(step, displacements);
+        self.radii.extend(self.order.iter().map(|&i| step.radii[i as usize]));
+        self.place_balls(domain);
+        let Search { broadphase, centers, reaches, pairs, .. } = &mut self.search;
+        broadphase.meeting(centers, reaches, self.order.len(), pairs);
+        self.collect();
+        Ok(())
+    }
+
+    /// How far to search around each place, for the displacements that are loaded.
+    fn set_reach(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) -> Result<(), ContactError> {
+        let fit = AffineFit::new(&self.positions, &self.free, free_directions(domain));
+        self.reach.clear();
+        for (place, &particle) in self.order.iter().enumerate() {
+            let particle = particle as usize;
+            let (radius, rest) = (step.radii[particle], fit.rest(&self.positions[place], &self.free[place]));
+            if let Some(&period) = domain.periods.iter().flatten().find(|period| rest > 0.5 * **period) {
+                return Err(ContactError::TooFast { particle, displacement: rest, period });
+            }
+            // The next steps may strain as much before they search.
+            let need = ((1.0 + self.margin) * radius + rest) / (1.0 - fit.strain);
+            self.reach.push(need * (1.0 + fit.strain) + SKIN * radius);
+        }
+        Ok(())
+    }
+
+    /// The balls of the search: one a particle, and the images that could meet one.
+    fn place_balls(&mut self, domain: &Domain<D>) {
+        let search = &mut self.search;
+        search.centers.clear();
+        search.centers.extend(self.order.iter().map(|&i| search.wrapped[i as usize]));
+        search.reaches.clone_from(&self.reach);
+        search.ghosts.clear();
+        if !domain.is_periodic() {
+            return;
+        }
+        let margin = 2.0 * self.reach.iter().copied().fold(0.0, f64::max);
+        for place in 0..self.order.len() {
+            let x = search.centers[place];
+            // Images per direction that come within the margin of the period.
+            let range = |d: usize| match domain.periods[d] {
+                None => 0..=0,
+                Some(period) => {
+                    ((-margin - x[d]) / period).ceil() as i32
+                        ..=((period + margin - x[d]) / period).floor() as i32
+                }
+            };
+            let ranges = [0, 1, 2].map(|d| if d < D { range(d) } else { 0..=0 });
+            for image in product(ranges).filter(|image| *image != [0; 3]) {
+                search.centers.push(x + domain.shift(&image));
+                search.reaches.push(self.reach[place]);
+                search.ghosts.push((place as u32, image));
+            }
+        }
+    }
+
+    /// Turns pairs of balls into links; of a pair across the border and its mirror image, one stays.
+    fn collect(&mut self) {
+        let count = self.order.len();
+        let search = &self.search;
+        self.links.clear();
+        self.starts.clear();
+        for &(tail, ball) in &search.pairs {
+            let (head, image) = match (ball as usize).checked_sub(count) {
+                None => (ball, [0; 3]),
+                Some(ghost) => search.ghosts[ghost],
+            };
+            if head <= tail {
+                continue;
+            }
+            self.starts.resize(tail as usize + 1, self.links.len() as u32);
+            // Images count from the positions as they were given.
+            let [behind, ahead] =
+                [tail, head].map(|place| search.windings[self.order[place as usize] as usize]);
+            let image = std::array::from_fn(|d| image[d] - ahead[d] + behind[d]);
+            self.links.push(Link { tail, head, image });
+        }
+        self.starts.resize(count + 1, self.links.len() as u32);
+        self.found_count = self.links.len();
+    }
+
+    /// Whether the search reached as far as pairs could come together under `displacements` (by place).
+    ///
+    /// A pair that was not found was farther apart than its two reaches; since then particles moved by an affine motion of
+    /// gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
+    fn covers_pairs(&mut self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
+        let free = free_directions(domain);
+        let moved = &mut self.search.moved;
+        moved.clear();
+        moved.extend(self.positions.iter().zip(&self.reference).map(|(x, before)| x - before));
+        let past = AffineFit::new(&self.reference, moved, free);
+        let fit = AffineFit::new(&self.positions, displacements, free);
+        (0..self.order.len()).all(|place| {
+            let rest = fit.rest(&self.positions[place], &displacements[place]);
+            let left =
+                (1.0 - past.strain) * self.reach[place] - past.rest(&self.reference[place], &moved[place]);
+            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain) <= left
+        })
+    }
+}
+
+/// Directions without a period.
+fn free_directions<const D: usize>(domain: &Domain<D>) -> [bool; D] {
+    domain.periods.map(|period| period.is_none())
+}
+
+/// Positions brought into the periods, `0 <= x < period`, and how many periods each was moved by.
+fn wrap<const D: usize>(
+    positions: &[Vector<D>],
+    domain: &Domain<D>,
+    wrapped: &mut Vec<Vector<D>>,
+    windings: &mut Vec<[i32; 3]>,
+) {
+    windings.clear();
+    windings.extend(positions.iter().map(|x| {
+        [0, 1, 2].map(|d| {
+            let period = domain.periods.get(d).copied().flatten();
+            period.map_or(0, |period| -(x[d] / period).floor() as i32)
+        })
+    }));
+    wrapped.clear();
+    wrapped.extend(positions.iter().zip(windings).map(|(x, winding)| x + domain.shift(winding)));
+}
+
+/// All triples of three ranges.
+fn product(ranges: [std::ops::RangeInclusive<i32>; 3]) -> impl Iterator<Item = [i32; 3]> {
+    let [x, y, z] = ranges;
+    x.flat_map(move |i| {
+        let z = z.clone();
+        y.clone().flat_map(move |j| z.clone().map(move |k| [i, j, k]))
+    })
+}

@@ -1,0 +1,68 @@
+//! Names of contacts: which particle touches which partner.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// A contact of the particle `first` with another particle or a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct PairKey {
+    /// The particle; of two, the one with the smaller index.
+    pub first: u32,
+    /// What it touches.
+    pub second: Partner,
+}
+
+/// What a particle touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Partner {
+    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a period).
+    Particle {
+        /// Its index.
+        index: u32,
+        /// How many periods it is moved by.
+        image: [i32; 3],
+    },
+    /// A wall of the [`crate::Domain`].
+    Wall(u32),
+}
+
+impl PairKey {
+    /// The pair of two particles, given in any order.
+    pub fn new(i: usize, j: usize) -> Self {
+        Self::across(i, j, [0; 3])
+    }
+
+    /// The pair of particle `i` with the image `x_j + image * period` of particle `j`.
+    pub fn across(i: usize, j: usize, image: [i32; 3]) -> Self {
+        let (first, index, image) = if i <= j { (i, j, image) } else { (j, i, image.map(|n| -n)) };
+        Self { first: first as u32, second: Partner::Particle { index: index as u32, image } }
+    }
+
+    /// The contact of a particle with a wall.
+    pub fn wall(particle: usize, wall: usize) -> Self {
+        Self { first: particle as u32, second: Partner::Wall(wall as u32) }
+    }
+
+    /// The particles: the second is `None` for a wall.
+    pub fn particles(self) -> (usize, Option<usize>) {
+        match self.second {
+            Partner::Particle { index, .. } => (self.first as usize, Some(index as usize)),
+            Partner::Wall(_) => (self.first as usize, None),
+        }
+    }
+}
+
+impl fmt::Display for PairKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.second {
+            Partner::Particle { index, image: [0, 0, 0] } => {
+                write!(f, "particles {} and {index}", self.first)
+            }
+            Partner::Particle { index, image } => {
+                write!(f, "particles {} and {index} (its image {image:?})", self.first)
+            }
+            Partner::Wall(wall) => write!(f, "particle {} and wall {wall}", self.first),
+        }
+    }
+}

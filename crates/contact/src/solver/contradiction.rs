@@ -1,0 +1,58 @@
+//! Contacts that contradict each other, such as a particle between two walls that are too near.
+//!
+//! No forces open all gaps if there are forces `y >= 0` (of any sign where a contact must stay closed) with `A y = 0` and
+//! `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run away in that direction.
+
+use super::{Projection, dot};
+
+/// Forces that would have to be so many times larger than the gaps call for are taken for infinite.
+const INFINITE: f64 = 1e9;
+/// First iteration at which to look.
+const FIRST: usize = 64;
+/// Forces of a contradiction smaller than this part of the largest do not belong to it.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// Looks at iterations 64, 128, ... in which direction the forces run.
+pub(super) struct Watch<'a> {
+    mark: &'a mut [f64],
+    ray: &'a mut [f64],
+    image: &'a mut [f64],
+}
+
+/// Vectors a watch works on.
+pub(super) const WATCH_VECTOR_COUNT: usize = 3;
+
+impl<'a> Watch<'a> {
+    pub(super) fn new([mark, ray, image]: [&'a mut [f64]; WATCH_VECTOR_COUNT], forces: &[f64]) -> Self {
+        mark.copy_from_slice(forces);
+        Self { mark, ray, image }
+    }
+
+    /// The contacts of a contradiction, if the forces ran along one since the last look.
+    pub(super) fn look(
+        &mut self,
+        iteration: usize,
+        problem: &mut Projection<'_>,
+        forces: &[f64],
+        norm: f64,
+    ) -> Option<Vec<usize>> {
+        if iteration < FIRST || !iteration.is_power_of_two() {
+            return None;
+        }
+        for k in 0..forces.len() {
+            let run = forces[k] - self.mark[k];
+            self.ray[k] = if problem.floors[k] == f64::NEG_INFINITY { run } else { run.max(0.0) };
+        }
+        self.mark.copy_from_slice(forces);
+        problem.operator.apply(self.ray, self.image);
+        let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        // q + A x >= 0 implies |x|_1 >= -q.y / |A y|_inf.
+        let fall = -dot(problem.free_gaps, self.ray);
+        let needed = forces.len() as f64 * largest(problem.free_gaps).max(problem.tolerance);
+        if norm * fall <= INFINITE * needed * largest(self.image) || fall <= 0.0 {
+            return None;
+        }
+        let threshold = NEGLIGIBLE * largest(self.ray);
+        Some((0..forces.len()).filter(|&k| self.ray[k].abs() > threshold).collect())
+    }
+}
