@@ -1,14 +1,15 @@
 //! The contact step: find pairs, project, re-linearise, remember.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
-use rayon::prelude::*;
+mod admission;
+mod velocity_correction;
 
-use crate::graph::{Graph, Link};
+use gluey_geom::{Dim, Space, Twist, Vector};
+
+use crate::graph::Graph;
 use crate::islands::{Islands, Places};
 use crate::model::validate;
 use crate::project::{Failure, Setting, Work};
-use crate::push_apart::{PushParams, Pushed, Unsettled, push_apart};
-use crate::rows::{Row, closes};
+use crate::rows::Row;
 use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
 use crate::{
     Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, Mobility,
@@ -237,68 +238,6 @@ where
         }
     }
 
-    /// Sets up the pairs that remember and those that would close.
-    fn begin(&mut self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> Result<(), ContactError> {
-        let graph = &mut self.graph;
-        buffers.weights.clear();
-        let mobility = |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.rate;
-        buffers.weights.extend(graph.order.iter().map(mobility));
-        buffers.changes.clear();
-        buffers.changes.resize(graph.count(), Vector::zeros());
-        buffers.displacements.clone_from(&graph.free);
-
-        buffers.memory.clear();
-        buffers.forces.clear();
-        buffers.takes_part.clear();
-        for state in &self.state.pairs {
-            let link = check_known(state, step, &self.domain).map(|()| graph.recall(state.pair))?;
-            let size = buffers.memory.len().max(graph.links.len());
-            buffers.memory.resize(size, PairMemory::default());
-            buffers.takes_part.resize(size, Part::No);
-            buffers.memory[link] = PairMemory { gamma: state.gamma, lambda: state.lambda };
-            buffers.takes_part[link] = Part::Fresh;
-        }
-        buffers.memory.resize(graph.links.len(), PairMemory::default());
-        buffers.takes_part.resize(graph.links.len(), Part::No);
-        buffers.forces.extend(buffers.memory.iter().map(|memory| memory.lambda));
-        self.admit(step, buffers);
-        Ok(())
-    }
-
-    /// Lets links that `displacements` close take part; whether there are any.
-    fn admit(&self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> bool {
-        let (graph, margin) = (&self.graph, 0.5 * self.margin());
-        let Buffers { takes_part, displacements, weights, .. } = buffers;
-        let movable = |place: u32| weights.get(place as usize).is_some_and(|weight| *weight > 0.0);
-        let admit = |(part, link): (&mut Part, &Link)| {
-            let closing = *part == Part::No
-                && closes(link, graph, &self.domain, step.dt, displacements, margin)
-                && (movable(link.head) || movable(link.tail));
-            if closing {
-                *part = Part::Fresh;
-            }
-            closing
-        };
-        takes_part
-            .par_iter_mut()
-            .zip(&graph.links)
-            .with_min_len(4096)
-            .map(admit)
-            .reduce(|| false, |a, b| a | b)
-    }
-
-    /// Lists the links that take part, in the order of space.
-    fn list_rows(&self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> Result<(), ContactError> {
-        buffers.rows.clear();
-        for (link, part) in buffers.takes_part.iter().enumerate() {
-            if *part != Part::No {
-                buffers.rows.push(Row::new(link, &self.graph, &self.domain, step)?);
-            }
-        }
-        buffers.rows.sort_unstable_by_key(|row| row.rank);
-        Ok(())
-    }
-
     /// The projection on the pairs that are admitted, until no other closes.
     fn project(
         &mut self,
@@ -394,65 +333,6 @@ where
         }
     }
 
-    /// The velocity correction: no projection.
-    fn push(
-        &mut self,
-        step: &StepGeometry<'_, D>,
-        tolerance: f64,
-        buffers: &mut Buffers<D>,
-    ) -> Result<(Reach, ContactReport), ContactError> {
-        let params = PushParams {
-            threshold: self.params.threshold,
-            tolerance,
-            sweep_limit: self.params.iteration_limit,
-        };
-        let mut report = ContactReport::default();
-        // Pushes have no memory: every pair starts without a force.
-        buffers.forces.fill(0.0);
-        loop {
-            self.list_rows(step, buffers)?;
-            let mut forces: Vec<f64> =
-                buffers.rows.iter().map(|row| buffers.forces[row.link as usize]).collect();
-            let mut pushed = Pushed {
-                positions: &self.graph.positions,
-                radii: &self.graph.radii,
-                weights: &buffers.weights,
-                displacements: &mut buffers.displacements,
-            };
-            let settled = push_apart(&buffers.rows, &mut pushed, &mut forces, &params);
-            let (sweeps, residual) =
-                settled.map_err(|unsettled| self.unsettled(unsettled, &buffers.rows, &params))?;
-            for (row, force) in buffers.rows.iter().zip(forces) {
-                buffers.forces[row.link as usize] = force;
-                buffers.takes_part[row.link as usize] = Part::Yes;
-            }
-            report.iterations += sweeps;
-            report.passes += 1;
-            report.residual = residual;
-            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
-                return Ok((Reach::TooShort, report));
-            }
-            if !self.admit(step, buffers) {
-                break;
-            }
-        }
-        let moves = buffers.displacements.iter().zip(&self.graph.free);
-        for (change, (end, free)) in buffers.changes.iter_mut().zip(moves) {
-            *change = (end - free) / step.rate;
-        }
-        Ok((Reach::Enough, report))
-    }
-
-    fn unsettled(&self, unsettled: Unsettled, rows: &[Row<D>], params: &PushParams) -> ContactError {
-        ContactError::NotConverged {
-            residual: unsettled.residual,
-            tolerance: params.tolerance,
-            iterations: params.sweep_limit,
-            history: unsettled.history,
-            worst: self.graph.key(&self.graph.links[rows[unsettled.worst].link as usize]),
-        }
-    }
-
     fn summary(&self, report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
         let mut worst: Option<WorstPair> = None;
         let mut active_count = 0;
@@ -489,31 +369,5 @@ where
             gamma: contact.gamma,
             lambda: contact.lambda,
         }));
-    }
-}
-
-/// Whether a remembered contact still can be one.
-fn check_known<const D: usize>(
-    state: &PairState,
-    step: &StepGeometry<'_, D>,
-    domain: &Domain<D>,
-) -> Result<(), ContactError> {
-    let PairState { pair, .. } = *state;
-    let count = step.positions.len();
-    let (first, second) = pair.particles();
-    if first.max(second.unwrap_or(0)) >= count {
-        return Err(ContactError::UnknownParticle { pair, count });
-    }
-    match pair.second {
-        Partner::Wall(wall) if wall as usize >= domain.walls.len() => {
-            Err(ContactError::UnknownWall { pair, count: domain.walls.len() })
-        }
-        Partner::Wall(_) => Ok(()),
-        Partner::Particle { index, image } => {
-            let separation = step.positions[index as usize] + domain.shift(&image) - step.positions[first];
-            let gap = separation.norm() - step.radii[first] - step.radii[index as usize];
-            let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            if gap > 0.5 * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
-        }
     }
 }

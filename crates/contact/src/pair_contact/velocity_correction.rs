@@ -1,0 +1,72 @@
+//! The strategy that projects nothing: pairs are pushed apart one after the other.
+
+use gluey_geom::{Dim, Space};
+
+use super::{Buffers, PairContact, Part, Reach};
+use crate::push_apart::{PushParams, Pushed, Unsettled, push_apart};
+use crate::rows::Row;
+use crate::{ContactError, ContactReport, Mobility, StepGeometry};
+
+impl<const D: usize, M: Mobility<D>> PairContact<D, M>
+where
+    Dim<D>: Space<D>,
+{
+    /// The velocity correction: no projection.
+    pub(super) fn push(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        tolerance: f64,
+        buffers: &mut Buffers<D>,
+    ) -> Result<(Reach, ContactReport), ContactError> {
+        let params = PushParams {
+            threshold: self.params.threshold,
+            tolerance,
+            sweep_limit: self.params.iteration_limit,
+        };
+        let mut report = ContactReport::default();
+        // Pushes have no memory: every pair starts without a force.
+        buffers.forces.fill(0.0);
+        loop {
+            self.list_rows(step, buffers)?;
+            let mut forces: Vec<f64> =
+                buffers.rows.iter().map(|row| buffers.forces[row.link as usize]).collect();
+            let mut pushed = Pushed {
+                positions: &self.graph.positions,
+                radii: &self.graph.radii,
+                weights: &buffers.weights,
+                displacements: &mut buffers.displacements,
+            };
+            let settled = push_apart(&buffers.rows, &mut pushed, &mut forces, &params);
+            let (sweeps, residual) =
+                settled.map_err(|unsettled| self.unsettled(unsettled, &buffers.rows, &params))?;
+            for (row, force) in buffers.rows.iter().zip(forces) {
+                buffers.forces[row.link as usize] = force;
+                buffers.takes_part[row.link as usize] = Part::Yes;
+            }
+            report.iterations += sweeps;
+            report.passes += 1;
+            report.residual = residual;
+            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
+                return Ok((Reach::TooShort, report));
+            }
+            if !self.admit(step, buffers) {
+                break;
+            }
+        }
+        let moves = buffers.displacements.iter().zip(&self.graph.free);
+        for (change, (end, free)) in buffers.changes.iter_mut().zip(moves) {
+            *change = (end - free) / step.rate;
+        }
+        Ok((Reach::Enough, report))
+    }
+
+    fn unsettled(&self, unsettled: Unsettled, rows: &[Row<D>], params: &PushParams) -> ContactError {
+        ContactError::NotConverged {
+            residual: unsettled.residual,
+            tolerance: params.tolerance,
+            iterations: params.sweep_limit,
+            history: unsettled.history,
+            worst: self.graph.key(&self.graph.links[rows[unsettled.worst].link as usize]),
+        }
+    }
+}
