@@ -13,7 +13,7 @@ use crate::rows::Row;
 use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
 use crate::{
     Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, Mobility,
-    PairState, Partner, SolverKind, StepGeometry, StokesDrag, Strategy, WorstPair,
+    PairState, SolverKind, StepGeometry, StokesDrag, Strategy, WorstPair,
 };
 
 /// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
