@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gluey::output::vtk::{Frame, VtkWriter};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
-use gluey_contact::{Contact, PairKey};
+use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
 use tempfile::TempDir;
@@ -75,8 +75,15 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     let folder = TempDir::new().expect("a folder");
     let fields = one_cell::<D>();
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let frame =
-        Frame { step: 40, time: 1.0, particles: &[], twists: &[], contacts: &[], fields: Some(&fields) };
+    let frame = Frame {
+        step: 40,
+        time: 1.0,
+        particles: &[],
+        twists: &[],
+        contacts: &[],
+        domain: &Domain::default(),
+        fields: Some(&fields),
+    };
     writer.write(&frame).expect("files");
     let piece = read(&folder.path().join("fields-000040.vtu"));
 
@@ -135,6 +142,7 @@ fn particles_and_contacts() {
         particles: &particles,
         twists: &twists,
         contacts: &contacts,
+        domain: &Domain::default(),
         fields: None,
     };
     writer.write(&frame).expect("files");
@@ -152,6 +160,42 @@ fn particles_and_contacts() {
     let (nodes, offsets) = piece.cells.cell_verts.into_xml();
     assert_eq!((nodes.as_slice(), offsets.as_slice()), ([0, 1, 2, 0, 2].as_slice(), [1, 2, 3, 5].as_slice()));
     assert!(!folder.path().join("fields.pvd").exists(), "a collection without files");
+}
+
+#[test]
+fn contacts_with_walls_and_images() {
+    let folder = TempDir::new().expect("a folder");
+    let particles = [[0.5, 1.0], [3.5, 1.5]].map(|x| Particle::new(Vector::<2>::from(x), 0.5));
+    let ceiling = Wall::new(&Vector::<2>::new(0.0, 2.0), &-Vector::<2>::y());
+    let domain = Domain::default().with_period(0, 4.0).with_wall(ceiling);
+    let pairs = [PairKey::new(0, 1), PairKey::across(0, 1, [-1, 0, 0]), PairKey::wall(1, 0)];
+    let contacts = [1.0, 2.0, 3.0].map(|lambda| Contact {
+        pair: pairs[lambda as usize - 1],
+        lambda,
+        gamma: -lambda,
+        gap: 0.1 * lambda,
+    });
+    let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
+    let (twists, particles) = ([Twist::default(); 2], &particles);
+    let frame = Frame {
+        step: 0,
+        time: 0.0,
+        particles,
+        twists: &twists,
+        contacts: &contacts,
+        domain: &domain,
+        fields: None,
+    };
+    writer.write(&frame).expect("files");
+
+    let piece = read(&folder.path().join("contacts-000000.vtu"));
+    assert_eq!(piece.cells.types, [[CellType::Vertex; 2].as_slice(), &[CellType::Line; 3]].concat());
+    assert_eq!(numbers(&piece.data.cell, "lambda"), [0.0, 0.0, 1.0, 2.0, 3.0]);
+    assert_eq!(numbers(&piece.data.cell, "gamma"), [0.0, 0.0, -1.0, -2.0, -3.0]);
+    let points: Vec<f64> = piece.points.cast_into().expect("numbers");
+    // After the centres: the image of particle 1, and its foot point on the ceiling.
+    assert_eq!(points[6..], [-0.5, 1.5, 0.0, 3.5, 2.0, 0.0]);
+    assert_eq!(piece.cells.cell_verts.into_xml().0, [0, 1, 0, 1, 0, 2, 1, 3]);
 }
 
 #[test]

@@ -277,6 +277,7 @@ where
                 particles: simulation.particles(),
                 twists: simulation.twists(),
                 contacts: simulation.contacts(),
+                domain: simulation.contact().domain(),
                 fields: simulation.fields().as_ref(),
             }),
             _ => Ok(()),

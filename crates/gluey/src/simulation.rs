@@ -224,6 +224,11 @@ where
         &self.twists
     }
 
+    /// The contact model.
+    pub fn contact(&self) -> &C {
+        &self.contact
+    }
+
     /// Pairs in contact at the last correction.
     pub fn contacts(&self) -> &[Contact] {
         self.contact.contacts()

@@ -1,14 +1,14 @@
 //! Fields, particles and contacts for ParaView, VTK and meshio: compressed `.vtu` files and `.pvd` collections.
 //!
 //! Three series a run: `fields` (velocity, pressure, viscosity, level set and rigidity multiplier at the nodes of
-//! quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for each pair in
-//! contact, from centre to centre: gamma, lambda, gap; and a vertex for every particle, so that the file is
-//! readable when nothing touches).
+//! quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for each contact, from
+//! centre to centre, to the centre of an image across a periodic border, or to the foot point on a wall: gamma, lambda,
+//! gap; and a vertex for every particle, so that the file is readable when nothing touches).
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{Contact, Partner};
+use gluey_contact::{Contact, Domain, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
 use vtkio::model::{
@@ -42,8 +42,10 @@ where
     pub particles: &'a [Particle<D>],
     /// Their velocities.
     pub twists: &'a [Twist<D>],
-    /// Pairs in contact.
+    /// Contacts.
     pub contacts: &'a [Contact],
+    /// Their walls and periods.
+    pub domain: &'a Domain<D>,
     /// Flow fields, where the model has any.
     pub fields: Option<&'a Fields<D>>,
 }
@@ -82,7 +84,7 @@ impl VtkWriter {
         let pieces = [
             frame.fields.map(fields_piece),
             Some(particles_piece(frame.particles, frame.twists)),
-            Some(contacts_piece(frame.particles, frame.contacts)),
+            Some(contacts_piece(frame.particles, frame.contacts, frame.domain)),
         ];
         for (series, piece) in self.series.iter_mut().zip(pieces) {
             if let Some(piece) = piece {
@@ -158,28 +160,36 @@ where
     }
 }
 
-/// Vertices at the centres and lines between those in contact; contacts with walls and with images across a periodic
-/// border have no second centre here and are left out.
-fn contacts_piece<const D: usize>(particles: &[Particle<D>], contacts: &[Contact]) -> UnstructuredGridPiece
+/// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images follow the
+/// centres, without a vertex.
+fn contacts_piece<const D: usize>(
+    particles: &[Particle<D>],
+    contacts: &[Contact],
+    domain: &Domain<D>,
+) -> UnstructuredGridPiece
 where
     Dim<D>: Space<D>,
 {
     let count = particles.len();
-    let joined =
-        |contact: &&Contact| matches!(contact.pair.second, Partner::Particle { image: [0, 0, 0], .. });
-    let contacts: Vec<&Contact> = contacts.iter().filter(joined).collect();
+    let mut points = centers(particles);
     let mut connectivity: Vec<u64> = (0..count as u64).collect();
-    connectivity.extend(contacts.iter().flat_map(|contact| {
-        let (first, second) = contact.pair.particles();
-        [first as u64, second.unwrap_or(first) as u64]
-    }));
+    for Contact { pair, .. } in contacts {
+        let second = match (pair.second, pair.branch(&points[..count], domain)) {
+            (Partner::Particle { index, image: [0, 0, 0] }, _) => u64::from(index),
+            (_, branch) => {
+                points.push(points[pair.first as usize] + branch.unwrap_or_else(Vector::zeros));
+                points.len() as u64 - 1
+            }
+        };
+        connectivity.extend([u64::from(pair.first), second]);
+    }
     let mut offsets: Vec<u64> = (1..=count as u64).collect();
     offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as u64));
     let mut types = vec![CellType::Vertex; count];
     types.resize(count + contacts.len(), CellType::Line);
     // Vertices carry zeros.
     let of_lines = |value: fn(&Contact) -> f64| -> Vec<f64> {
-        std::iter::repeat_n(0.0, count).chain(contacts.iter().copied().map(value)).collect()
+        std::iter::repeat_n(0.0, count).chain(contacts.iter().map(value)).collect()
     };
     let cell = vec![
         scalars("gamma", of_lines(|contact| contact.gamma)),
@@ -187,7 +197,7 @@ where
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
     UnstructuredGridPiece {
-        points: in_space(&centers(particles)).into(),
+        points: in_space(&points).into(),
         cells: cell_list(connectivity, offsets, types),
         data: Attributes { point: Vec::new(), cell },
     }
