@@ -2,6 +2,8 @@
 //!
 //! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
 
+use std::sync::Arc;
+
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -85,7 +87,12 @@ where
         let ramp = Ramp::new(paper.ramp * discretisation.mesh.size(surface));
         let matrices = PointMatrices::new(paper.quadrature);
         let region = SolidRegion::new(&discretisation, &balls, ramp, &matrices);
-        let stress = SolidStress::new(&discretisation, &region, &matrices, VISCOSITY * paper.viscosity_ratio);
+        let stress = SolidStress::new(
+            &discretisation,
+            &region,
+            &Arc::new(matrices),
+            VISCOSITY * paper.viscosity_ratio,
+        );
         let touched = region.touched_nodes(&discretisation.velocity, &balls);
         let nowhere = vec![None; discretisation.velocity.node_count()];
         let space = VelocitySpace::new::<Ball<D>>(discretisation.velocity.clone(), &[], &nowhere);

@@ -8,44 +8,12 @@
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, Workspace};
-use gluey_fem::element::{gauss_cube, value};
-use gluey_fem::{Chunks, NodeMap, Reference};
+use gluey_fem::{Chunks, NodeMap};
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
 use gluey_levelset::{Ball, Body, Ramp, nearest};
 
 use crate::discretisation::Discretisation;
-
-/// Element matrices of every quadrature point, for cells with a viscosity that varies inside.
-#[derive(Clone, Debug)]
-pub struct PointMatrices<const D: usize> {
-    /// Points a direction.
-    line: usize,
-    points: Vec<([f64; D], f64)>,
-    /// One matrix a point, the weight included.
-    viscous: Arc<Vec<Vec<f64>>>,
-    /// Values of the velocity shape functions at each point.
-    shapes: Vec<Vec<f64>>,
-}
-
-impl<const D: usize> PointMatrices<D> {
-    /// Prepares the tensor-product Gauss rule with `points` points a direction.
-    pub fn new(line: usize) -> Self {
-        let points = gauss_cube::<D>(line);
-        let n = Reference::<D>::VELOCITY;
-        let matrix = |(x, weight): &([f64; D], f64)| {
-            let mut matrix = vec![0.0; n * n];
-            gluey_fem::add_viscous(x, *weight, &mut matrix);
-            matrix
-        };
-        let shape = |(x, _): &([f64; D], f64)| (0..n / D).map(|i| value::<D>(2, i, x)).collect();
-        Self {
-            line,
-            viscous: Arc::new(points.iter().map(matrix).collect()),
-            shapes: points.iter().map(shape).collect(),
-            points,
-        }
-    }
-}
+use crate::point_matrices::PointMatrices;
 
 /// Solid fraction `I` in a cell, and the body it belongs to.
 #[derive(Clone, Debug)]
@@ -69,8 +37,7 @@ pub struct SolidStress<const D: usize> {
     cells: Arc<Vec<SolidCell>>,
     /// `eta_s h^(D-2)` of each cell.
     scales: Arc<Vec<f64>>,
-    line: usize,
-    matrices: Arc<Vec<Vec<f64>>>,
+    matrices: Arc<PointMatrices<D>>,
 }
 
 /// What the solid adds to the viscosities of cells.
@@ -123,7 +90,7 @@ where
                 let x = lower + Vector::from_fn(|d, _| h * x[d]);
                 nearest(bodies, &x).map_or(0.0, |b| ramp.fraction(b.1))
             };
-            let mut fraction: Vec<f64> = matrices.points.iter().map(|p| at(&p.0)).collect();
+            let mut fraction: Vec<f64> = matrices.points().map(|p| at(p.0)).collect();
             if fraction.iter().any(|&f| f > 0.0) {
                 if fraction.iter().all(|&f| f == 1.0) {
                     fraction = Vec::new();
@@ -166,9 +133,9 @@ where
             let c = &discretisation.mesh.cells()[cell];
             let (lower, h) = (discretisation.mesh.lower_corner(c), discretisation.cell_size(cell));
             let nodes = discretisation.velocity.cell(cell);
-            for (q, (x, weight)) in matrices.points.iter().enumerate() {
+            for (q, (x, weight, shapes)) in matrices.points().enumerate() {
                 let mut u = Vector::<D>::zeros();
-                for (&node, &shape) in nodes.iter().zip(&matrices.shapes[q]) {
+                for (&node, &shape) in nodes.iter().zip(shapes) {
                     for d in 0..D {
                         u[d] += shape * velocity[node as usize * D + d];
                     }
@@ -255,7 +222,7 @@ where
 impl<const D: usize> SolidStress<D> {
     /// Gauss points a direction.
     pub fn quadrature(&self) -> usize {
-        self.line
+        self.matrices.line()
     }
 
     /// `factor I eta_s h^(D-2)` in the cells of a mesh.
@@ -264,7 +231,7 @@ impl<const D: usize> SolidStress<D> {
             uniform: vec![0.0; cell_count],
             start: vec![u32::MAX; cell_count],
             points: Vec::new(),
-            point_count: self.matrices.len(),
+            point_count: self.matrices.points().len(),
         };
         for (solid, scale) in self.cells.iter().zip(self.scales.iter()) {
             let scale = factor * scale;
@@ -282,7 +249,7 @@ impl<const D: usize> SolidStress<D> {
     pub fn new(
         discretisation: &Discretisation<D>,
         region: &SolidRegion<D>,
-        matrices: &PointMatrices<D>,
+        matrices: &Arc<PointMatrices<D>>,
         solid_viscosity: f64,
     ) -> Self {
         let scale =
@@ -291,8 +258,7 @@ impl<const D: usize> SolidStress<D> {
             chunks: discretisation.chunks.clone(),
             scales: Arc::new(region.cells.iter().map(scale).collect()),
             cells: region.cells.clone(),
-            line: matrices.line,
-            matrices: matrices.viscous.clone(),
+            matrices: matrices.clone(),
         }
     }
 
@@ -302,19 +268,9 @@ impl<const D: usize> SolidStress<D> {
         for (solid, &scale) in self.cells.iter().zip(self.scales.iter()) {
             match solid.fraction.is_empty() {
                 true => visit(solid.cell, scale, None),
-                false => visit(solid.cell, 1.0, Some(&self.cut_matrix(solid, scale))),
+                false => visit(solid.cell, 1.0, Some(&self.matrices.matrix(scale, &solid.fraction))),
             }
         }
-    }
-
-    fn cut_matrix(&self, solid: &SolidCell, scale: f64) -> Vec<f64> {
-        let mut sum = vec![0.0; Reference::<D>::VELOCITY.pow(2)];
-        for (&fraction, matrix) in solid.fraction.iter().zip(self.matrices.iter()) {
-            if fraction > 0.0 {
-                gluey_linalg::vector::axpy(scale * fraction, matrix, &mut sum);
-            }
-        }
-        sum
     }
 
     /// `y += K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes moved to
@@ -325,7 +281,7 @@ impl<const D: usize> SolidStress<D> {
             let (viscous, points) = viscosities.of(solid.cell as usize);
             CellData { cell: solid.cell as usize, viscous, divergence: 0.0, points }
         });
-        let operator = CellOperator::<f64, D>::new(&self.chunks, nodes, data, self.line, &[], 0);
+        let operator = CellOperator::<f64, D>::new(&self.chunks, nodes, data, self.quadrature(), &[], 0);
         let mut load = vec![0.0; operator.velocity_dim()];
         operator.viscous_of_field(x, &mut load, &mut Workspace::default());
         gluey_linalg::vector::axpy(1.0, &load, &mut y[..load.len()]);

@@ -8,9 +8,9 @@ use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 
 use crate::formulation::{Formulation, PaperParams};
+use crate::point_matrices::PointMatrices;
 use crate::pressure::WeakPressures;
 use crate::problem::Problem;
-use crate::solid::PointMatrices;
 
 use super::MultigridSolver;
 
