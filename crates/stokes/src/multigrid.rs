@@ -13,6 +13,7 @@ use std::sync::Arc;
 use gluey_fem::Interpolation;
 use gluey_fem::cells::Workspace;
 use gluey_geom::{Dim, Space};
+use gluey_levelset::Body;
 use gluey_linalg::{
     DirectSpd, Fgmres, FgmresParams, Ordering, Preconditioner, Reference, RefinementParams, Symbolic, vector,
 };
@@ -195,7 +196,11 @@ where
             .collect();
         let finest = &levels[levels.len() - 1].operator.space;
         let solid = match preparation.touched {
-            Some(touched) => Some(SolidBlock::new(discretisation, system, touched, finest)?),
+            Some(touched) => {
+                let radii = preparation.bodies.iter().map(Body::bounding_radius);
+                let hierarchy = (radii.fold(0.0, f64::max), &meshes[..meshes.len() - 1]);
+                Some(SolidBlock::new(discretisation, system, touched, finest, hierarchy)?)
+            }
             None => None,
         };
         let coarse_space = levels[0].operator.space.clone();

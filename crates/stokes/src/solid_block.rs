@@ -1,125 +1,227 @@
-//! The stiff part of the penalised operator: its diagonal block around the solid, solved directly.
+//! The stiff part of the penalised operator: its diagonal block around the solid.
 //!
 //! Every velocity is a field that is rigid on the nodes the solid touches, plus a field that vanishes away from them. The
 //! first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On the second the penalised
-//! operator is a block `A_WW` that holds all of the contrast; it is factorised, so that neither the viscosity ratio nor
-//! slivers of solid in a cell are felt. The two are combined multiplicatively, block, rigid levels, block:
+//! operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers for it, so that neither the viscosity
+//! ratio nor slivers of solid in a cell are felt. The two are combined multiplicatively, block, rigid levels, block, with the
+//! halves `C` and `C^T` of the cycle:
 //!
-//! `z = E A_WW^-1 E^T r`, `z += V (r - A z)`, `z += E A_WW^-1 E^T (r - A z)`.
+//! `z = E C E^T r`, `z += V (r - A z)`, `z += E C^T E^T (r - A z)`.
 //!
-//! A rigid motion costs the solid nothing and the block is solved exactly, so the residuals between the steps need the
-//! fluid's stress in the layer of cells around the solid only: no matrix of a solid cell is ever applied.
+//! A rigid motion costs the solid nothing, so what it leaves to the block needs the fluid's stress in the layer of cells
+//! around the solid only: rounding errors of the motion are not multiplied by the solid's viscosity.
 
-use std::sync::Arc;
-
+use gluey_fem::Reference;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{DirectSpd, Ordering, Preconditioner, RefinementParams, Symbolic, vector};
+use gluey_linalg::{LinOp, vector};
 
-use crate::assembly::{Unknowns, assemble_viscous_on};
+use crate::assembly::assemble_viscous_on;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::error::StokesError;
 use crate::level::{cells_touching, nodes_of_cells_with};
+use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
-use crate::system::{StokesSystem, cell_operator};
+use crate::system::{ActiveCell, StokesSystem, cell_operator};
 
-/// The factorised block with the layer of cells that couples it to the rest.
+/// Cells in the radius of the largest body on a level of the cycle that is factorised in 3D, at most.
+const FACTORISED_CELLS: f64 = 2.0;
+
+/// The block with the layer of cells that couples it to the rest.
 pub struct SolidBlock<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     space: VelocitySpace<D>,
-    factor: DirectSpd,
-    unknowns: Unknowns,
+    cycle: SolidCycle<D>,
+    /// The block's unknowns among the reduced velocities.
+    positions: Vec<u32>,
     layer: Layer<D>,
     b: Vec<f64>,
     x: Vec<f64>,
+    r: Vec<f64>,
     /// Nodal vectors with room for the twists of the rigid levels.
     velocity: Vec<f64>,
     load: Vec<f64>,
-    applications: usize,
 }
 
 impl<const D: usize> SolidBlock<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The block around the nodes named in `touched`, which in `rigid` move with their bodies.
+    /// The block around the nodes named in `touched`, which in `rigid` move with their bodies, the largest of which has the
+    /// given radius. `meshes` are those of the coarser levels, coarsest first.
     pub fn new(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
         touched: &[Option<u32>],
         rigid: &VelocitySpace<D>,
+        (radius, meshes): (f64, &[Discretisation<D>]),
     ) -> Result<Self, StokesError> {
         let nodes = &discretisation.velocity;
-        let mut marked: Vec<bool> = touched.iter().map(Option::is_some).collect();
-        if D == 2 {
-            // An overlap saves a third of the iterations; in 3D that does not pay for its factorisation.
-            marked = nodes_of_cells_with(nodes, &marked);
+        let touched: Vec<bool> = touched.iter().map(Option::is_some).collect();
+        // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for its factorisation.
+        let around = nodes_of_cells_with(nodes, &touched);
+        let is_factorised = |mesh: &Discretisation<D>| {
+            D == 2 || radius <= FACTORISED_CELLS * mesh.mesh.size(mesh.mesh.max_level())
+        };
+        let (block, positions, cycle);
+        if is_factorised(discretisation) || meshes.is_empty() {
+            block = if D == 2 { around } else { touched };
+            let assembled = assemble_viscous_on(discretisation, system, |node| block[node])?;
+            cycle = SolidCycle::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?;
+            positions = assembled.unknowns.positions;
+        } else {
+            let assembled = assemble_viscous_on(discretisation, system, |node| touched[node])?;
+            let is_free = |node: usize| system.space.is_free(node);
+            let solid = Numbered::new(discretisation, |node| is_free(node) && touched[node]);
+            let ring = (0..touched.len()).filter(|&n| is_free(n) && around[n] && !touched[n]);
+            let ring = ring.flat_map(|n| (n * D..(n + 1) * D).map(|k| k as u32));
+            positions = assembled.unknowns.positions.into_iter().chain(ring).collect();
+            let operator = BlockOperator::new(discretisation, system, &around, &positions);
+            let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
+            let coarser = meshes.iter().rev().take(smoothed + 1);
+            cycle = SolidCycle::new(operator, solid, &assembled.matrix, coarser)?;
+            block = around;
         }
-        let assembled = assemble_viscous_on(discretisation, system, |node| marked[node])?;
-        let order = assembled.blocks.minimum_degree()?;
-        let symbolic = Symbolic::new(assembled.matrix.pattern().clone(), Ordering::Custom(&order))?;
-        let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
-        factor.factorise(assembled.matrix.values())?;
-        let count = assembled.unknowns.positions.len();
+        let zeros = || vec![0.0; positions.len()];
         Ok(Self {
             space: system.space.clone(),
-            factor,
-            unknowns: assembled.unknowns,
-            layer: Layer::new(discretisation, system, &marked, rigid),
-            b: vec![0.0; count],
-            x: vec![0.0; count],
+            layer: Layer::new(discretisation, system, &block, rigid),
+            b: zeros(),
+            x: zeros(),
+            r: zeros(),
+            cycle,
+            positions,
             velocity: vec![0.0; rigid.dim()],
             load: vec![0.0; rigid.dim()],
-            applications: 0,
         })
     }
 
     /// `z = M^-1 r` where `rigid_levels(f, u)` turns the nodal load `f` into the nodal velocities `u` of the rigid levels.
     pub fn apply(&mut self, r: &[f64], z: &mut [f64], mut rigid_levels: impl FnMut(&mut [f64], &mut [f64])) {
         let nodal = self.space.full_dim();
+        gather(&self.positions, r, &mut self.b);
+        self.cycle.descend(&self.b, &mut self.x);
+        self.cycle.residual(&self.b, &self.x, &mut self.r);
         z.fill(0.0);
-        self.unknowns.gather(r, &mut self.b);
-        self.solve(z);
+        add_at(&self.positions, &self.x, z);
         self.velocity[..nodal].copy_from_slice(z);
         self.space.nodes().distribute(D, |w| w, &mut self.velocity);
-        self.apply_layer();
-        for (load, r) in self.load.iter_mut().zip(r) {
-            *load = r - *load;
+        self.layer.apply(&self.velocity, &mut self.load[..nodal]);
+        vector::residual_from_product(&r[..nodal], &mut self.load[..nodal]);
+        self.load[nodal..].fill(0.0);
+        for (&k, &r) in self.positions.iter().zip(&self.r) {
+            self.load[k as usize] = r;
         }
-        self.unknowns.positions.iter().for_each(|&k| self.load[k as usize] = 0.0);
 
         rigid_levels(&mut self.load, &mut self.velocity);
         vector::axpy(1.0, &self.velocity[..nodal], z);
         self.space.project(z);
-        self.apply_layer();
-        self.unknowns.gather(&self.load[..nodal], &mut self.b);
-        vector::scale(-1.0, &mut self.b);
-        self.solve(z);
+        self.layer.apply(&self.velocity, &mut self.load[..nodal]);
+        gather(&self.positions, &self.load, &mut self.b);
+        vector::residual_from_product(&self.r, &mut self.b);
+        self.cycle.ascend(&self.b, &mut self.x);
+        add_at(&self.positions, &self.x, z);
     }
 
-    /// Applications of the layer since the last call, each as its share of the mesh. Solves with the factor do not count.
+    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and smoothing by
+    /// patches do not count.
     pub fn take_applications(&mut self) -> f64 {
-        std::mem::take(&mut self.applications) as f64 * self.layer.share
+        self.cycle.take_applications()
+            + std::mem::take(&mut self.layer.applications) as f64 * self.layer.share
+    }
+}
+
+fn gather(positions: &[u32], from: &[f64], to: &mut [f64]) {
+    to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
+}
+
+fn add_at(positions: &[u32], from: &[f64], to: &mut [f64]) {
+    positions.iter().zip(from).for_each(|(&k, value)| to[k as usize] += value);
+}
+
+/// The penalised operator on the unknowns of the block.
+pub struct BlockOperator<const D: usize> {
+    positions: Vec<u32>,
+    operator: CellOperator<f64, D>,
+    work: Workspace<f64>,
+    /// Nodal vectors; the first is zero away from the block.
+    velocity: Vec<f64>,
+    load: Vec<f64>,
+    /// The fluid's part of the diagonal.
+    diagonal: Vec<f64>,
+    /// Fraction of all cells.
+    share: f64,
+    applications: usize,
+}
+
+impl<const D: usize> BlockOperator<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        block: &[bool],
+        positions: &[u32],
+    ) -> Self {
+        let nodes = &discretisation.velocity;
+        let acts = cells_touching(nodes, block);
+        let mut cells = system.cells.clone();
+        cells.retain(|c| acts[c.cell as usize]);
+        let mut new = Self {
+            positions: positions.to_vec(),
+            share: cells.len() as f64 / system.cells.len().max(1) as f64,
+            operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),
+            work: Workspace::default(),
+            velocity: vec![0.0; system.space.dim()],
+            load: vec![0.0; system.space.dim()],
+            diagonal: vec![0.0; positions.len()],
+            applications: 0,
+        };
+        new.add_fluid_diagonal(discretisation, &cells);
+        new
     }
 
-    /// `z_W += A_WW^-1 b`.
-    fn solve(&mut self, z: &mut [f64]) {
-        self.factor.apply(&self.b, &mut self.x);
-        for (x, &k) in self.x.iter().zip(&self.unknowns.positions) {
-            z[k as usize] += x;
+    fn add_fluid_diagonal(&mut self, discretisation: &Discretisation<D>, cells: &[ActiveCell]) {
+        let nodes = &discretisation.velocity;
+        let viscous = Reference::<D>::new().viscous;
+        let n = Reference::<D>::VELOCITY;
+        for cell in cells {
+            for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
+                for c in 0..D {
+                    self.load[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
+                }
+            }
         }
+        nodes.collect(D, |w| w * w, &mut self.load);
+        gather(&self.positions, &self.load, &mut self.diagonal);
     }
 
-    /// The reduced load of the velocity on free nodes.
-    fn apply_layer(&mut self) {
-        let nodal = self.space.full_dim();
-        let Layer { operator, work, .. } = &mut self.layer;
-        let (load, twists) = self.load.split_at_mut(nodal);
-        operator.viscous_of_field(&self.velocity, load, work);
-        twists.fill(0.0);
+    /// The diagonal of the fluid's part, which is all of it on nodes that the solid does not touch.
+    pub fn fluid_diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
+    /// Applications since the last call, each as its share of the mesh.
+    pub fn take_applications(&mut self) -> f64 {
+        std::mem::take(&mut self.applications) as f64 * self.share
+    }
+}
+
+impl<const D: usize> LinOp<f64> for BlockOperator<D> {
+    fn dim(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
+        for (&k, &x) in self.positions.iter().zip(x) {
+            self.velocity[k as usize] = x;
+        }
+        self.operator.viscous(&self.velocity, &mut self.load, &mut self.work);
+        gather(&self.positions, &self.load, y);
     }
 }
 
@@ -130,6 +232,7 @@ struct Layer<const D: usize> {
     work: Workspace<f64>,
     /// Fraction of all cells.
     share: f64,
+    applications: usize,
 }
 
 impl<const D: usize> Layer<D>
@@ -153,6 +256,13 @@ where
             share: cells.len() as f64 / system.cells.len().max(1) as f64,
             operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),
             work: Workspace::default(),
+            applications: 0,
         }
+    }
+
+    /// The reduced load of a velocity that fulfils the constraints, on free nodes.
+    fn apply(&mut self, velocity: &[f64], load: &mut [f64]) {
+        self.applications += 1;
+        self.operator.viscous_of_field(velocity, load, &mut self.work);
     }
 }

@@ -41,7 +41,7 @@ impl<'a, const D: usize> Evaluator<'a, D> {
     }
 
     /// Cell that holds a node of another mesh, with the coordinates in it.
-    fn locate(&self, nodes: &NodeMap<D>, node: usize) -> Option<(usize, [f64; D])> {
+    pub fn locate(&self, nodes: &NodeMap<D>, node: usize) -> Option<(usize, [f64; D])> {
         let finest = self.mesh.max_level();
         let h = self.mesh.size(finest);
         let offset = (nodes.point(node) - self.mesh.domain().lower) / h;
