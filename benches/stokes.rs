@@ -3,7 +3,6 @@
 //! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
 
 use std::sync::Arc;
-
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
