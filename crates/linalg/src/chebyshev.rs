@@ -5,7 +5,7 @@
 //! at least `1/T_k(theta/delta)`, and modes below `lower` never grow. Nothing but `A`, `M` and vector updates is
 //! needed, so the result does not depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
 
-use crate::{LinOp, Preconditioner, Scalar, parallel};
+use crate::{LinOp, Preconditioner, Scalar, parallel, vector};
 
 /// Part of the spectrum of `M^-1 A` that is to be smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,21 +33,27 @@ pub enum Guess {
     Given,
 }
 
-/// Chebyshev smoother of fixed degree. Owns its workspace of three vectors.
+/// Chebyshev smoother of fixed degree. Owns its workspace of two vectors.
+///
+/// The last two iterates take the place of residual and step: `x_{k+1} = x_k + old (x_k - x_{k-1}) + new M^-1 (b - A x_k)`
+/// overwrites `x_{k-1}`, so a step reads five vectors and writes one.
 #[derive(Clone, Debug)]
 pub struct Chebyshev<T> {
     degree: usize,
     interval: SpectralInterval,
-    r: Vec<T>,
-    d: Vec<T>,
+    /// Every second iterate; the others are in the caller's vector.
+    y: Vec<T>,
+    /// `A x_k`.
     z: Vec<T>,
+    /// Residual where `M` is not a diagonal.
+    rest: Vec<T>,
 }
 
 impl<T: Scalar> Chebyshev<T> {
     /// A smoother with `degree` >= 1 applications of the preconditioner, for operators of dimension `dim`.
     pub fn new(dim: usize, degree: usize, interval: SpectralInterval) -> Self {
         let zeros = || vec![T::ZERO; dim];
-        Self { degree: degree.max(1), interval, r: zeros(), d: zeros(), z: zeros() }
+        Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), rest: Vec::new() }
     }
 
     /// The interval in use.
@@ -78,62 +84,72 @@ impl<T: Scalar> Chebyshev<T> {
     ) {
         let SpectralInterval { lower, upper } = self.interval;
         let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
+        let is_odd = self.degree % 2 == 1;
+        if guess == Guess::Given {
+            a.apply(x, &mut self.z);
+            if is_odd {
+                vector::copy(x, &mut self.y);
+            }
+        }
+        let Self { y, z, rest, .. } = self;
+        // So that the last iterate is in `x`.
+        let (mut before, mut now) = if is_odd { (&mut y[..], x) } else { (x, &mut y[..]) };
         let first = T::from_f64(1.0 / theta);
         match guess {
-            Guess::Zero => self.step(m, b, x, |_, _, b| b, |z, _, _| (first * z, first * z)),
-            Guess::Given => {
-                a.apply(x, &mut self.z);
-                self.step(m, b, x, |_, ax, b| b - ax, |z, _, x| (first * z, x + first * z));
-            }
+            Guess::Zero => step(m, (b, z, rest), before, now, |b, _| b, |z, _, _| first * z),
+            Guess::Given => step(m, (b, z, rest), before, now, |b, z| b - z, |z, x, _| x + first * z),
         }
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
-        for _ in 1..self.degree {
-            a.apply(&self.d, &mut self.z);
+        for k in 1..self.degree {
+            a.apply(now, z);
             let rho_next = 1.0 / (2.0 * sigma - rho);
             let (new, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
-            let next = |z: T, d: T| new * z + old * d;
-            self.step(m, b, x, |r, ad, _| r - ad, |z, d, x| (next(z, d), x + next(z, d)));
+            if k == 1 && guess == Guess::Zero {
+                step(m, (b, z, rest), now, before, |b, z| b - z, |z, x, _| x + old * x + new * z);
+            } else {
+                let next = |z: T, x: T, before: T| x + old * (x - before) + new * z;
+                step(m, (b, z, rest), now, before, |b, z| b - z, next);
+            }
+            std::mem::swap(&mut before, &mut now);
             rho = rho_next;
         }
     }
+}
 
-    /// `r = residual(r, z, b)`, `z = M^-1 r`, `(d, x) = advance(z, d, x)`, in one pass where `M` is a diagonal.
-    fn step(
-        &mut self,
-        m: &mut (impl Preconditioner<T> + ?Sized),
-        b: &[T],
-        x: &mut [T],
-        residual: impl Fn(T, T, T) -> T + Sync,
-        advance: impl Fn(T, T, T) -> (T, T) + Sync,
-    ) {
-        let Self { r, d, z, .. } = self;
-        let split = m.diagonal().len();
-        let (r, r_rest) = r.split_at_mut(split);
-        let (d, d_rest) = d.split_at_mut(split);
-        let (z, z_rest) = z.split_at_mut(split);
-        let (b, b_rest) = b.split_at(split);
-        let (x, x_rest) = x.split_at_mut(split);
-        if !r_rest.is_empty() {
-            parallel::for_each(r_rest, |first, r| {
-                for (r, (&z, &b)) in r.iter_mut().zip(z_rest[first..].iter().zip(&b_rest[first..])) {
-                    *r = residual(*r, z, b);
-                }
-            });
-            m.apply_rest(r_rest, z_rest);
-            parallel::for_each_2(d_rest, x_rest, |first, d, x| {
-                for ((d, x), &z) in d.iter_mut().zip(x).zip(&z_rest[first..]) {
-                    (*d, *x) = advance(z, *d, *x);
-                }
-            });
-        }
-        let diagonal = m.diagonal();
-        parallel::for_each_3(r, d, x, |first, r, d, x| {
-            let given = diagonal[first..].iter().zip(z[first..].iter().zip(&b[first..]));
-            for (((r, d), x), (&inverse, (&z, &b))) in r.iter_mut().zip(d).zip(x).zip(given) {
-                *r = residual(*r, z, b);
-                (*d, *x) = advance(inverse * *r, *d, *x);
+/// `to = next(M^-1 residual(b, z), from, to)`, in one pass where `M` is a diagonal.
+fn step<T: Scalar>(
+    m: &mut (impl Preconditioner<T> + ?Sized),
+    (b, z, rest): (&[T], &mut [T], &mut Vec<T>),
+    from: &[T],
+    to: &mut [T],
+    residual: impl Fn(T, T) -> T + Sync,
+    next: impl Fn(T, T, T) -> T + Sync,
+) {
+    let split = m.diagonal().len();
+    let (to, to_rest) = to.split_at_mut(split);
+    if !to_rest.is_empty() {
+        let (b, z, from) = (&b[split..], &mut z[split..], &from[split..]);
+        rest.resize(b.len(), T::ZERO);
+        parallel::for_each(rest, |first, r| {
+            for (r, (&b, &z)) in r.iter_mut().zip(b[first..].iter().zip(&z[first..])) {
+                *r = residual(b, z);
+            }
+        });
+        m.apply_rest(rest, z);
+        parallel::for_each(to_rest, |first, to| {
+            for (to, (&z, &from)) in to.iter_mut().zip(z[first..].iter().zip(&from[first..])) {
+                *to = next(z, from, *to);
             }
         });
     }
+    let diagonal = m.diagonal();
+    parallel::for_each(to, |first, to| {
+        let n = to.len();
+        let (diagonal, b) = (&diagonal[first..][..n], &b[first..][..n]);
+        let (z, from) = (&z[first..][..n], &from[first..][..n]);
+        for k in 0..n {
+            to[k] = next(diagonal[k] * residual(b[k], z[k]), from[k], to[k]);
+        }
+    });
 }

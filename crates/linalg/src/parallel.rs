@@ -82,22 +82,6 @@ pub fn for_each_2<T: Send, S: Send>(
     pieces.for_each(|(k, (x, y))| work(k * piece, x, y));
 }
 
-/// `work(first index, piece of x, piece of y, piece of z)` on all pieces of three vectors of one length.
-pub fn for_each_3<T: Send>(
-    x: &mut [T],
-    y: &mut [T],
-    z: &mut [T],
-    work: impl Fn(usize, &mut [T], &mut [T], &mut [T]) + Sync,
-) {
-    debug_assert!(x.len() == y.len() && x.len() == z.len());
-    if !is_shared(x.len()) {
-        return work(0, x, y, z);
-    }
-    let piece = piece_len(x.len());
-    let pieces = x.par_chunks_mut(piece).zip(y.par_chunks_mut(piece)).zip(z.par_chunks_mut(piece));
-    pieces.enumerate().for_each(|(k, ((x, y), z))| work(k * piece, x, y, z));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,18 +115,13 @@ mod tests {
     #[test]
     fn every_entry_is_visited_once() {
         for (len, threads) in [(10, 1), (100_003, 1), (100_003, 3)] {
-            let (x, y, z) = with_threads(threads, || {
-                let (mut x, mut y, mut z) = (vec![0; len], vec![0; len], vec![0; len]);
+            let (x, y) = with_threads(threads, || {
+                let (mut x, mut y) = (vec![0; len], vec![0; len]);
                 for_each(&mut x, |first, x| x.iter_mut().enumerate().for_each(|(i, x)| *x += first + i));
                 for_each_2(&mut x, &mut y, |_, x, y| y.iter_mut().zip(x).for_each(|(y, x)| *y += *x));
-                for_each_3(&mut x, &mut y, &mut z, |_, x, y, z| {
-                    for i in 0..z.len() {
-                        z[i] += x[i] + y[i];
-                    }
-                });
-                (x, y, z)
+                (x, y)
             });
-            assert!((0..len).all(|i| x[i] == i && y[i] == i && z[i] == 2 * i));
+            assert!((0..len).all(|i| x[i] == i && y[i] == i));
         }
     }
 }
