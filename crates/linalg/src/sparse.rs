@@ -394,10 +394,27 @@ impl<T: Scalar> SparseMatrix<T> {
         }
     }
 
+    /// The same matrix with its entries rounded to another precision.
+    pub fn converted<S: Scalar>(&self) -> SparseMatrix<S> {
+        let values = self.values.iter().map(|v| S::from_f64(v.to_f64())).collect();
+        SparseMatrix { pattern: self.pattern.clone(), values }
+    }
+
+    /// In partial sums, so that one product need not wait for the one before.
     fn row_product(&self, row: usize, x: &[T]) -> T {
+        const SUMS: usize = 4;
         let range = self.pattern.range(row);
-        let columns = &self.pattern.columns[range.clone()];
-        columns.iter().zip(&self.values[range]).fold(T::ZERO, |sum, (&c, &v)| sum + v * x[c as usize])
+        let (columns, last_columns) = self.pattern.columns[range.clone()].as_chunks::<SUMS>();
+        let (values, last_values) = self.values[range].as_chunks::<SUMS>();
+        let mut sums = [T::ZERO; SUMS];
+        for (columns, values) in columns.iter().zip(values) {
+            for k in 0..SUMS {
+                sums[k] += values[k] * x[columns[k] as usize];
+            }
+        }
+        let last = last_columns.iter().zip(last_values);
+        let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+        last.fold(sum, |sum, (&c, &v)| sum + v * x[c as usize])
     }
 }
 

@@ -3,11 +3,11 @@
 //! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so `S <= M / (2 eta)` with the
 //! pressure mass matrix `M`, and most pressures come close to equality. Hence `S^-1` is taken to be `2 eta M^-1`: the
 //! eigenvalues then gather at one, where those of the velocity block are. `M^-1` is Chebyshev iteration on the matrix scaled by
-//! its diagonal (Wathen and Rees 2009). Where that estimate fails, in gaps narrower than a cell, the inverses of small exact
+//! its diagonal (Wathen and Rees 2009), in `f32`. Where that estimate fails, in gaps narrower than a cell, the inverses of small exact
 //! Schur complements are added, see [`crate::gap`].
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, Jacobi, SparseMatrix, SpectralInterval, estimate_lambda_max};
+use gluey_linalg::{Chebyshev, Guess, Jacobi, SparseMatrix, SpectralInterval, estimate_lambda_max, vector};
 
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
@@ -25,9 +25,11 @@ const SAFETY: f64 = 1.1;
 /// `2 eta M^-1`, up to Chebyshev's error, and the gaps.
 pub struct SchurInverse {
     /// `M / (2 eta)`.
-    mass: SparseMatrix,
-    jacobi: Jacobi<f64>,
-    chebyshev: Chebyshev<f64>,
+    mass: SparseMatrix<f32>,
+    jacobi: Jacobi<f32>,
+    chebyshev: Chebyshev<f32>,
+    r: Vec<f32>,
+    z: Vec<f32>,
     gaps: GapInverse,
 }
 
@@ -44,17 +46,23 @@ impl SchurInverse {
         let mut mass = pressure_mass(discretisation, system, viscosity)?;
         mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
         let gaps = GapInverse::new(discretisation, system, &mass)?;
+        let mut mass = mass.converted::<f32>();
         let mut jacobi = Jacobi::new(&mass.diagonal())
             .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
         let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
-        let chebyshev = Chebyshev::new(mass.pattern().row_count(), STEPS, interval);
-        Ok(Self { mass, jacobi, chebyshev, gaps })
+        let dim = mass.pattern().row_count();
+        let chebyshev = Chebyshev::new(dim, STEPS, interval);
+        Ok(Self { mass, jacobi, chebyshev, r: vec![0.0; dim], z: vec![0.0; dim], gaps })
     }
 
     /// `z` close to `S^-1 r`.
     pub fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
+        let norm = vector::norm(r);
+        let scale = if norm > 0.0 { norm } else { 1.0 };
+        vector::convert(1.0 / scale, r, &mut self.r);
+        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, &self.r, &mut self.z, Guess::Zero);
+        vector::convert(scale, &self.z, z);
         self.gaps.add(r, z);
     }
 }
