@@ -107,23 +107,21 @@ impl<const D: usize> Interpolation<D> {
     /// `coarse = P^T fine` for fields with `C <= 3` interleaved components.
     pub fn restrict<const C: usize>(&mut self, fine: &[f32], coarse: &mut [f32]) {
         let coarse = &mut coarse[..self.coarse_nodes.node_count() * C];
-        if parallel::is_shared(fine.len()) {
-            self.restrict_shared::<C>(fine, coarse);
-        } else {
-            coarse.fill(0.0);
-            for cell in 0..self.refined.len() {
-                let load = self.restrict_cell::<C>(cell, fine);
-                for (load, &node) in load.chunks_exact(C).zip(self.coarse_nodes.cell(cell)) {
-                    add(load, &mut coarse[node as usize * C..][..C]);
-                }
-            }
+        match (parallel::is_shared(fine.len()), self.line.degree) {
+            (true, 1) => self.restrict_shared::<C, 1>(fine, coarse),
+            (true, _) => self.restrict_shared::<C, 2>(fine, coarse),
+            (false, 1) => self.restrict_serially::<C, 1>(fine, coarse),
+            (false, _) => self.restrict_serially::<C, 2>(fine, coarse),
         }
     }
 
     /// The nodes of a range of cells are a range of `fine`: cut both in two until they are not worth sharing.
     fn prolong_cells<const C: usize>(&self, cells: Range<usize>, coarse: &[f32], fine: &mut [f32]) {
         if cells.len() < 2 || !parallel::is_shared(fine.len()) {
-            return self.prolong_serially::<C>(cells, coarse, fine);
+            return match self.line.degree {
+                1 => self.prolong_serially::<C, 1>(cells, coarse, fine),
+                _ => self.prolong_serially::<C, 2>(cells, coarse, fine),
+            };
         }
         let middle = cells.start + cells.len() / 2;
         let (left, right) = fine.split_at_mut((self.first[middle] - self.first[cells.start]) as usize * C);
@@ -133,45 +131,73 @@ impl<const D: usize> Interpolation<D> {
         );
     }
 
-    fn prolong_serially<const C: usize>(&self, cells: Range<usize>, coarse: &[f32], fine: &mut [f32]) {
+    fn prolong_serially<const C: usize, const DEGREE: usize>(
+        &self,
+        cells: Range<usize>,
+        coarse: &[f32],
+        fine: &mut [f32],
+    ) {
         let start = self.first[cells.start] as usize;
+        let (coarse, fine) = (coarse.as_chunks::<C>().0, fine.as_chunks_mut::<C>().0);
+        let grids = &mut [[0.0; GRID]; 2];
         for cell in cells {
-            let range = self.first[cell] as usize..self.first[cell + 1] as usize;
-            let fine = &mut fine[(range.start - start) * C..(range.end - start) * C];
-            let mut grid = [0.0; GRID];
-            for (value, &node) in grid.chunks_exact_mut(C).zip(self.coarse_nodes.cell(cell)) {
-                value.copy_from_slice(&coarse[node as usize * C..][..C]);
+            for (value, &node) in grids[0].as_chunks_mut::<C>().0.iter_mut().zip(self.coarse_nodes.cell(cell))
+            {
+                *value = coarse[node as usize];
             }
-            let grid = if self.refined[cell] { self.expand::<C>(grid) } else { grid };
-            for (fine, &place) in fine.chunks_exact_mut(C).zip(&self.place[range]) {
-                match place {
-                    NOWHERE => fine.fill(0.0),
-                    _ => fine.copy_from_slice(&grid[place as usize * C..][..C]),
-                }
+            let grid = if self.refined[cell] { self.expand::<C, DEGREE>(grids) } else { &grids[0] };
+            let (range, grid) = (self.range(cell), grid.as_chunks::<C>().0);
+            let fine = &mut fine[range.start - start..range.end - start];
+            for (fine, &place) in fine.iter_mut().zip(&self.place[range]) {
+                *fine = if place == NOWHERE { [0.0; C] } else { grid[place as usize] };
+            }
+        }
+    }
+
+    /// The fine nodes that belong to a coarse cell.
+    fn range(&self, cell: usize) -> Range<usize> {
+        self.first[cell] as usize..self.first[cell + 1] as usize
+    }
+
+    fn restrict_serially<const C: usize, const DEGREE: usize>(&self, fine: &[f32], coarse: &mut [f32]) {
+        coarse.fill(0.0);
+        let coarse = coarse.as_chunks_mut::<C>().0;
+        let grids = &mut [[0.0; GRID]; 2];
+        for cell in 0..self.refined.len() {
+            let load = self.restrict_cell::<C, DEGREE>(cell, fine, grids).as_chunks::<C>().0;
+            for (load, &node) in load.iter().zip(self.coarse_nodes.cell(cell)) {
+                add(load, &mut coarse[node as usize]);
             }
         }
     }
 
     /// Loads on the nodes of one coarse cell from the fine nodes that belong to it.
-    fn restrict_cell<const C: usize>(&self, cell: usize, fine: &[f32]) -> [f32; GRID] {
-        let range = self.first[cell] as usize..self.first[cell + 1] as usize;
-        let mut grid = [0.0; GRID];
-        let fine = &fine[range.start * C..range.end * C];
-        for (fine, &place) in fine.chunks_exact(C).zip(&self.place[range]) {
+    #[inline(always)]
+    fn restrict_cell<'a, const C: usize, const DEGREE: usize>(
+        &self,
+        cell: usize,
+        fine: &[f32],
+        grids: &'a mut [[f32; GRID]; 2],
+    ) -> &'a [f32; GRID] {
+        grids[0][..(2 * DEGREE + 1).pow(D as u32) * C].fill(0.0);
+        let (range, grid) = (self.range(cell), grids[0].as_chunks_mut::<C>().0);
+        let fine = &fine.as_chunks::<C>().0[range.clone()];
+        for (fine, &place) in fine.iter().zip(&self.place[range]) {
             if place != NOWHERE {
-                grid[place as usize * C..][..C].copy_from_slice(fine);
+                grid[place as usize] = *fine;
             }
         }
-        if self.refined[cell] { self.contract::<C>(grid) } else { grid }
+        if self.refined[cell] { self.contract::<C, DEGREE>(grids) } else { &grids[0] }
     }
 
     /// Sums the loads on every node in the order of the cells, as they are without threads.
-    fn restrict_shared<const C: usize>(&mut self, fine: &[f32], coarse: &mut [f32]) {
+    fn restrict_shared<const C: usize, const DEGREE: usize>(&mut self, fine: &[f32], coarse: &mut [f32]) {
         let corners = self.coarse_nodes.nodes_per_cell() * C;
         let mut loads = std::mem::take(&mut self.loads);
         loads.resize(self.refined.len() * corners, 0.0);
         loads.par_chunks_exact_mut(corners).enumerate().with_min_len(64).for_each(|(cell, load)| {
-            load.copy_from_slice(&self.restrict_cell::<C>(cell, fine)[..corners]);
+            let grids = &mut [[0.0; GRID]; 2];
+            load.copy_from_slice(&self.restrict_cell::<C, DEGREE>(cell, fine, grids)[..corners]);
         });
         coarse.par_chunks_exact_mut(C).enumerate().with_min_len(1024).for_each(|(node, sum)| {
             sum.fill(0.0);
@@ -183,26 +209,40 @@ impl<const D: usize> Interpolation<D> {
     }
 
     /// From the nodes of a refined coarse cell to its grid.
-    fn expand<const C: usize>(&self, mut grid: [f32; GRID]) -> [f32; GRID] {
-        let (nodes, points) = (self.line.nodes(), self.line.points());
+    #[inline(always)]
+    fn expand<'a, const C: usize, const DEGREE: usize>(
+        &self,
+        grids: &'a mut [[f32; GRID]; 2],
+    ) -> &'a [f32; GRID] {
         for d in 0..D {
-            let (inner, outer) = (points.pow(d as u32) * C, nodes.pow((D - 1 - d) as u32));
-            let coarse = grid;
-            self.line.expand(inner, outer, &coarse, &mut grid);
+            let (inner, outer) = ((2 * DEGREE + 1).pow(d as u32) * C, (DEGREE + 1).pow((D - 1 - d) as u32));
+            let (coarse, fine) = two(grids, d);
+            self.line.expand::<DEGREE>(inner, outer, coarse, fine);
         }
-        grid
+        &grids[D % 2]
     }
 
     /// The transpose of [`Self::expand`].
-    fn contract<const C: usize>(&self, mut grid: [f32; GRID]) -> [f32; GRID] {
-        let (nodes, points) = (self.line.nodes(), self.line.points());
-        for d in (0..D).rev() {
-            let (inner, outer) = (points.pow(d as u32) * C, nodes.pow((D - 1 - d) as u32));
-            let fine = grid;
-            self.line.contract(inner, outer, &fine, &mut grid);
+    #[inline(always)]
+    fn contract<'a, const C: usize, const DEGREE: usize>(
+        &self,
+        grids: &'a mut [[f32; GRID]; 2],
+    ) -> &'a [f32; GRID] {
+        for k in 0..D {
+            let d = D - 1 - k;
+            let (inner, outer) = ((2 * DEGREE + 1).pow(d as u32) * C, (DEGREE + 1).pow((D - 1 - d) as u32));
+            let (fine, coarse) = two(grids, k);
+            self.line.contract::<DEGREE>(inner, outer, fine, coarse);
         }
-        grid
+        &grids[D % 2]
     }
+}
+
+/// The grid that step `k` reads and the one it writes.
+#[inline(always)]
+fn two(grids: &mut [[f32; GRID]; 2], k: usize) -> (&[f32; GRID], &mut [f32; GRID]) {
+    let [first, second] = grids;
+    if k.is_multiple_of(2) { (first, second) } else { (second, first) }
 }
 
 fn is_child<const D: usize>(cell: &Cell<D>, parent: &Cell<D>) -> bool {
@@ -227,40 +267,54 @@ impl Line {
         Self { degree, weights: (0..degree).map(|k| at(2 * k + 1)).collect() }
     }
 
-    /// Coarse nodes.
-    fn nodes(&self) -> usize {
-        self.degree + 1
-    }
-
     /// Fine points.
     fn points(&self) -> usize {
         2 * self.degree + 1
     }
 
     /// From nodes to points along one direction of a grid with `inner` values before it and `outer` after it.
-    fn expand(&self, inner: usize, outer: usize, coarse: &[f32; GRID], fine: &mut [f32; GRID]) {
+    #[inline(always)]
+    fn expand<const DEGREE: usize>(
+        &self,
+        inner: usize,
+        outer: usize,
+        coarse: &[f32; GRID],
+        fine: &mut [f32; GRID],
+    ) {
+        let (nodes, points) = (DEGREE + 1, 2 * DEGREE + 1);
         for line in 0..outer {
-            let from = &coarse[line * self.nodes() * inner..][..self.nodes() * inner];
-            let to = &mut fine[line * self.points() * inner..][..self.points() * inner];
-            for (k, node) in from.chunks_exact(inner).enumerate() {
-                to[2 * k * inner..][..inner].copy_from_slice(node);
+            let from = &coarse[line * nodes * inner..][..nodes * inner];
+            let to = &mut fine[line * points * inner..][..points * inner];
+            for k in 0..nodes {
+                to[2 * k * inner..][..inner].copy_from_slice(&from[k * inner..][..inner]);
             }
-            for (k, weights) in self.weights.iter().enumerate() {
-                combine(weights, from, &mut to[(2 * k + 1) * inner..][..inner]);
+            for (k, weights) in self.weights[..DEGREE].iter().enumerate() {
+                combine::<DEGREE>(weights, from, &mut to[(2 * k + 1) * inner..][..inner]);
             }
         }
     }
 
     /// The transpose of [`Line::expand`].
-    fn contract(&self, inner: usize, outer: usize, fine: &[f32; GRID], coarse: &mut [f32; GRID]) {
+    #[inline(always)]
+    fn contract<const DEGREE: usize>(
+        &self,
+        inner: usize,
+        outer: usize,
+        fine: &[f32; GRID],
+        coarse: &mut [f32; GRID],
+    ) {
+        let (nodes, points) = (DEGREE + 1, 2 * DEGREE + 1);
         for line in 0..outer {
-            let from = &fine[line * self.points() * inner..][..self.points() * inner];
-            let to = &mut coarse[line * self.nodes() * inner..][..self.nodes() * inner];
-            for (k, node) in to.chunks_exact_mut(inner).enumerate() {
+            let from = &fine[line * points * inner..][..points * inner];
+            let to = &mut coarse[line * nodes * inner..][..nodes * inner];
+            for k in 0..nodes {
+                let node = &mut to[k * inner..][..inner];
                 node.copy_from_slice(&from[2 * k * inner..][..inner]);
-                for (point, weights) in self.weights.iter().enumerate() {
+                for (point, weights) in self.weights[..DEGREE].iter().enumerate() {
                     let between = &from[(2 * point + 1) * inner..][..inner];
-                    node.iter_mut().zip(between).for_each(|(node, value)| *node += weights[k] * value);
+                    for i in 0..inner {
+                        node[i] += weights[k] * between[i];
+                    }
                 }
             }
         }
@@ -268,15 +322,13 @@ impl Line {
 }
 
 /// `sum = sum_k weights[k] rows[k]` for two or three rows.
-fn combine(weights: &[f32; 3], rows: &[f32], sum: &mut [f32]) {
+#[inline(always)]
+fn combine<const DEGREE: usize>(weights: &[f32; 3], rows: &[f32], sum: &mut [f32]) {
     let n = sum.len();
-    let (first, second, third) = (&rows[..n], &rows[n..2 * n], &rows[rows.len() - n..]);
     for i in 0..n {
-        sum[i] = weights[0] * first[i] + weights[1] * second[i];
-    }
-    if rows.len() > 2 * n {
-        for i in 0..n {
-            sum[i] += weights[2] * third[i];
+        sum[i] = weights[0] * rows[i] + weights[1] * rows[n + i];
+        if DEGREE == 2 {
+            sum[i] += weights[2] * rows[2 * n + i];
         }
     }
 }
