@@ -21,7 +21,7 @@ use gluey_linalg::{
 use crate::assembly::{Unknowns, assemble_viscous};
 use crate::discretisation::{Discretisation, solid_nodes};
 use crate::error::StokesError;
-use crate::level::Level;
+use crate::level::{Level, Smoothing};
 use crate::pressure::WeakPressures;
 use crate::schur::SchurInverse;
 use crate::solid_block::SolidBlock;
@@ -92,8 +92,6 @@ where
         let (Some(cycle), Some(schur)) = (&mut self.cycle, &mut self.schur) else {
             return Err(StokesError::NotPrepared);
         };
-        let mut b = b.to_vec();
-        system.pressure.remove_mean(&mut b[system.velocity_dim()..]);
         let mut preconditioner = BlockTriangular {
             system,
             cycle,
@@ -105,8 +103,7 @@ where
         preconditioner.cycle.take_fine_applications();
         self.krylov.set_relative_tolerance(tolerance);
         let mut operator = SystemOperator::new(system);
-        let report =
-            self.krylov.solve(&mut operator, &mut preconditioner, &b, x, Reference::RightHandSide)?;
+        let report = self.krylov.solve(&mut operator, &mut preconditioner, b, x, Reference::RightHandSide)?;
         let applied_by_krylov = operator.applications() as f64;
         Ok(SolveReport {
             iterations: report.iterations,
@@ -185,7 +182,11 @@ where
                 true => finest_rigid_space(system, preparation),
                 false => rigid_space(mesh, preparation),
             };
-            levels.push(Level::rigid(mesh, space, preparation.viscosity, (index, is_finest))?);
+            let smoothing = match preparation.touched {
+                Some(_) => Smoothing::of_penalised(is_finest),
+                None => Smoothing::of_eliminated(is_finest),
+            };
+            levels.push(Level::rigid(mesh, space, preparation.viscosity, (index, smoothing))?);
         }
         let transfers = meshes
             .windows(2)
@@ -222,7 +223,6 @@ where
         }
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
-        fine.smooth_from_zero();
         fine.restrict(&mut self.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
         self.run(top - 1);
         let (below, above) = self.levels.split_at_mut(top);

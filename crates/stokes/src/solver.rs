@@ -45,7 +45,8 @@ where
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError>;
 
-    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took.
+    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took. The divergences in
+    /// `b` sum to zero, as those of [`StokesSystem::residual`] do.
     fn solve(
         &mut self,
         system: &StokesSystem<D>,
