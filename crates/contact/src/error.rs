@@ -1,7 +1,7 @@
 //! What can go wrong in a contact step.
 
-use crate::PairKey;
 use crate::solver::ResidualHistory;
+use crate::{PairKey, Strategy};
 
 /// Why velocities could not be corrected. They are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -55,6 +55,18 @@ pub enum ContactError {
     Coincident {
         /// The particles.
         pair: PairKey,
+    },
+    /// Two shapes whose cores meet, so that no direction leads them apart.
+    #[error("the cores of {pair} meet: they overlap by all of their rounding")]
+    Entangled {
+        /// The shapes.
+        pair: PairKey,
+    },
+    /// A strategy that round particles know only.
+    #[error("the strategy `{strategy}` does not know other shapes than discs and spheres")]
+    NotForShapes {
+        /// The strategy.
+        strategy: Strategy,
     },
     /// A remembered contact of a particle that is not there.
     #[error("a remembered contact joins {pair}, but there are only {count} particles")]
@@ -165,8 +177,12 @@ pub enum ContactError {
 pub enum Quantity {
     /// Centre.
     Position,
+    /// Orientation.
+    Orientation,
     /// Predicted velocity.
     Velocity,
+    /// Predicted spin.
+    Spin,
     /// Displacement known before the velocity.
     Drift,
 }
@@ -175,7 +191,9 @@ impl std::fmt::Display for Quantity {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Position => "position",
+            Self::Orientation => "orientation",
             Self::Velocity => "velocity",
+            Self::Spin => "spin",
             Self::Drift => "drift",
         })
     }

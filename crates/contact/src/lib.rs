@@ -52,6 +52,7 @@ mod params;
 mod project;
 mod push_apart;
 mod rows;
+pub mod shape;
 pub mod solver;
 
 pub use domain::{Domain, Wall};

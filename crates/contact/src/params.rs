@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
+
 /// What happens when particles would overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -81,6 +83,17 @@ pub enum SolverKind {
     Accelerated,
     /// Conjugate gradients on the active set (MPRGP; Dostal 2009). For many contacts.
     ActiveSet,
+}
+
+impl SolverKind {
+    /// The method of this name.
+    pub(crate) fn method(self) -> &'static dyn ProjectionSolver {
+        match self {
+            Self::Uzawa => &Uzawa,
+            Self::Accelerated => &Accelerated,
+            Self::ActiveSet => &ActiveSet,
+        }
+    }
 }
 
 /// Tuning of [`crate::PairContact`]. The defaults are the gluey law with the paper's first-order gap.

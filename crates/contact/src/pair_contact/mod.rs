@@ -10,10 +10,9 @@ use crate::islands::{Islands, Places};
 use crate::model::validate;
 use crate::project::{Failure, Setting, Work};
 use crate::rows::Row;
-use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
 use crate::{
     Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, Mobility,
-    PairState, SolverKind, StepGeometry, StokesDrag, Strategy, WorstPair,
+    PairState, StepGeometry, StokesDrag, Strategy, WorstPair,
 };
 
 /// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
@@ -230,14 +229,6 @@ where
         }
     }
 
-    fn solver(&self) -> &'static dyn ProjectionSolver {
-        match self.params.solver {
-            SolverKind::Uzawa => &Uzawa,
-            SolverKind::Accelerated => &Accelerated,
-            SolverKind::ActiveSet => &ActiveSet,
-        }
-    }
-
     /// The projection on the pairs that are admitted, until no other closes.
     fn project(
         &mut self,
@@ -270,7 +261,7 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let solver = self.solver();
+        let solver = self.params.solver.method();
         let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
         let places = Places { positions: &self.graph.positions, free: &self.graph.free, weights };
         let is_fresh = |row: &Row<D>| takes_part[row.link as usize] == Part::Fresh;
