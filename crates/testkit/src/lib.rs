@@ -1,4 +1,5 @@
-//! What tests measure against: exact Stokes flows, orders of convergence, reference data and an allocation counter.
+//! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings and an allocation
+//! counter.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
@@ -14,6 +15,7 @@
 pub mod allocation;
 mod convergence;
 pub mod exact;
+pub mod packing;
 pub mod reference;
 
 pub use convergence::{convergence_order, convergence_orders};

@@ -48,6 +48,7 @@ pub(crate) struct Graph<const D: usize> {
     /// Where places were when the search was made, and the distance up to which it was made.
     reference: Vec<Vector<D>>,
     reach: Vec<f64>,
+    left: Vec<f64>,
     /// Gap kept between particles, relative to their radii.
     pub margin: f64,
     /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
@@ -103,6 +104,7 @@ impl<const D: usize> Default for Graph<D> {
             ranks: Vec::new(),
             reference: Vec::new(),
             reach: Vec::new(),
+            left: Vec::new(),
             margin: 0.0,
             wall_slack: 0.0,
             search: Search::default(),
@@ -181,11 +183,9 @@ impl<const D: usize> Graph<D> {
             && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
         if same {
             self.load(step, displacements);
+            self.set_left(domain);
         }
-        let free = std::mem::take(&mut self.free);
-        let known = same && self.covers_pairs(domain, &free);
-        self.free = free;
-        if !known {
+        if !(same && self.covers_pairs(domain, &self.free)) {
             self.renew(step, domain, displacements, displacements)?;
         }
         self.finish(step, domain);
@@ -211,7 +211,7 @@ impl<const D: usize> Graph<D> {
 
     /// Whether no contact that `displacements` (by place) could close is missing.
     pub(crate) fn covers(
-        &mut self,
+        &self,
         domain: &Domain<D>,
         step: &StepGeometry<'_, D>,
         displacements: &[Vector<D>],
@@ -288,6 +288,7 @@ impl<const D: usize> Graph<D> {
         let Search { broadphase, centers, reaches, pairs, .. } = &mut self.search;
         broadphase.meeting(centers, reaches, self.order.len(), pairs);
         self.collect();
+        self.left.clone_from(&self.reach);
         Ok(())
     }
 
@@ -363,22 +364,27 @@ impl<const D: usize> Graph<D> {
         self.found_count = self.links.len();
     }
 
-    /// Whether the search reached as far as pairs could come together under `displacements` (by place).
+    /// How much of each reach particles have left by moving since the search.
     ///
     /// A pair that was not found was farther apart than its two reaches; since then particles moved by an affine motion of
     /// gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
-    fn covers_pairs(&mut self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
-        let free = free_directions(domain);
+    fn set_left(&mut self, domain: &Domain<D>) {
         let moved = &mut self.search.moved;
         moved.clear();
         moved.extend(self.positions.iter().zip(&self.reference).map(|(x, before)| x - before));
-        let past = AffineFit::new(&self.reference, moved, free);
-        let fit = AffineFit::new(&self.positions, displacements, free);
+        let past = AffineFit::new(&self.reference, moved, free_directions(domain));
+        let rests = self.reference.iter().zip(moved).map(|(x, moved)| past.rest(x, moved));
+        self.left.clear();
+        self.left
+            .extend(self.reach.iter().zip(rests).map(|(reach, rest)| (1.0 - past.strain) * reach - rest));
+    }
+
+    /// Whether the search reached as far as pairs could come together under `displacements` (by place).
+    fn covers_pairs(&self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
+        let fit = AffineFit::new(&self.positions, displacements, free_directions(domain));
         (0..self.order.len()).all(|place| {
             let rest = fit.rest(&self.positions[place], &displacements[place]);
-            let left =
-                (1.0 - past.strain) * self.reach[place] - past.rest(&self.reference[place], &moved[place]);
-            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain) <= left
+            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain) <= self.left[place]
         })
     }
 }
