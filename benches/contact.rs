@@ -72,10 +72,6 @@ impl Shear {
     }
 }
 
-fn on_one_thread(run: impl FnOnce() + Send) {
-    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(run);
-}
-
 fn search(criterion: &mut Criterion, positions: &[Vector<3>]) {
     let count = positions.len();
     let mut group = criterion.benchmark_group("search, pairs nearer than 0.2 diameters");
@@ -142,13 +138,13 @@ fn warm_step(positions: &[Vector<3>], turns: bool) -> Duration {
 }
 
 fn contact(criterion: &mut Criterion) {
+    // Times are those of one thread.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("no pool before this one");
     for count in COUNTS {
         let positions = Packing::<3>::fluid(count, 0.4, 1).positions;
-        on_one_thread(|| {
-            search(criterion, &positions);
-            graph(criterion, &positions);
-            steps(criterion, &positions);
-        });
+        search(criterion, &positions);
+        graph(criterion, &positions);
+        steps(criterion, &positions);
     }
 }
 

@@ -18,7 +18,7 @@ const SWEEP_COUNT: usize = 20;
 
 impl<const D: usize> Packing<D> {
     /// A hard-sphere fluid at the given fraction of the volume (of the area), sampled by the Metropolis method (1953, DOI
-    /// 10.1063/1.1699114) from a cubic lattice, in a cube that is periodic.
+    /// 10.1063/1.1699114) from a lattice, in a cube that is periodic.
     ///
     /// Sampling is short: neighbours have forgotten the lattice, distant particles have not.
     ///
@@ -26,19 +26,24 @@ impl<const D: usize> Packing<D> {
     /// If the lattice has no room for the fraction, or the cube for three cells a side.
     pub fn fluid(count: usize, fraction: f64, seed: u64) -> Self {
         let own = if D == 2 { std::f64::consts::FRAC_PI_4 } else { std::f64::consts::PI / 6.0 };
-        let per_side = (count as f64).powf(1.0 / D as f64).ceil().round() as usize;
-        let spacing = (own * count as f64 / fraction).powf(1.0 / D as f64) / per_side as f64;
+        let side = (own * count as f64 / fraction).powf(1.0 / D as f64);
+        // Every other point of a cubic lattice, checkered: the densest packing in 3D.
+        let mut per_side: usize = 2;
+        while per_side.pow(D as u32) / 2 < count {
+            per_side += 2;
+        }
+        let spacing = side / per_side as f64;
         assert!(
-            spacing >= 1.0,
-            "a cubic lattice of {count} particles has no room for the fraction {fraction}"
+            spacing * 2f64.sqrt() >= 1.0,
+            "a lattice of {count} particles has no room for the fraction {fraction}"
         );
-        let site = |i: usize| {
-            Vector::<D>::from_fn(|d, _| (0.5 + (i / per_side.pow(d as u32) % per_side) as f64) * spacing)
-        };
-        let side = spacing * per_side as f64;
+        let index = |i: usize, d: usize| i / per_side.pow(d as u32) % per_side;
+        let site = |i: usize| Vector::<D>::from_fn(|d, _| (0.5 + index(i, d) as f64) * spacing);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // Sites that stay empty are spread at random.
-        let mut sites: Vec<usize> = (0..per_side.pow(D as u32)).collect();
+        let mut sites: Vec<usize> = (0..per_side.pow(D as u32))
+            .filter(|&i| (0..D).map(|d| index(i, d)).sum::<usize>().is_multiple_of(2))
+            .collect();
         sites.shuffle(&mut random);
         let mut fluid = Fluid::new(sites[..count].iter().map(|&i| site(i)).collect(), side);
         for _ in 0..SWEEP_COUNT {

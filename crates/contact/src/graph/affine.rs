@@ -31,13 +31,7 @@ impl<const D: usize> AffineFit<D> {
             moments += x * x.transpose();
             products += s * x.transpose();
         }
-        let mut gradient = Matrix::<D>::zeros();
-        // Direction by direction: exact when positions are uncorrelated, and a bound in any case.
-        for d in 0..D {
-            if free[d] && moments[(d, d)] > 0.0 {
-                gradient.set_column(d, &(products.column(d) / moments[(d, d)]));
-            }
-        }
+        let gradient = regression(moments, products, free);
         let strain = gradient.norm();
         if strain > 0.0 && strain <= LARGEST_STRAIN {
             Self { center, mean, gradient, strain }
@@ -49,5 +43,58 @@ impl<const D: usize> AffineFit<D> {
     /// `|r|`: how far a particle moves besides the affine motion.
     pub(crate) fn rest(&self, position: &Vector<D>, displacement: &Vector<D>) -> f64 {
         (displacement - self.mean - self.gradient * (position - self.center)).norm()
+    }
+}
+
+/// Directions whose spread is a smaller part of the largest are left out.
+const FLAT: f64 = 1e-10;
+
+/// `L` with `L moments = products`, by Gaussian elimination; columns of directions that are not `free`, or in which the
+/// positions do not spread independently of the others, are 0.
+fn regression<const D: usize>(mut moments: Matrix<D>, mut products: Matrix<D>, free: [bool; D]) -> Matrix<D> {
+    let smallest = FLAT * moments.diagonal().max();
+    let mut usable = [false; D];
+    for d in (0..D).filter(|&d| free[d]) {
+        usable[d] = moments[(d, d)] > smallest;
+        for e in (0..D).filter(|&e| usable[d] && e > d && free[e]) {
+            let factor = moments[(d, e)] / moments[(d, d)];
+            for k in 0..D {
+                let (moment, product) = (moments[(k, d)], products[(k, d)]);
+                moments[(k, e)] -= factor * moment;
+                products[(k, e)] -= factor * product;
+            }
+        }
+    }
+    let mut gradient = Matrix::<D>::zeros();
+    for d in (0..D).rev().filter(|&d| usable[d]) {
+        for row in 0..D {
+            let known: f64 = (d + 1..D).map(|e| gradient[(row, e)] * moments[(e, d)]).sum();
+            gradient[(row, d)] = (products[(row, d)] - known) / moments[(d, d)];
+        }
+    }
+    gradient
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn affine_motions_leave_no_rest() {
+        let gradient = Matrix::<3>::new(0.01, 0.3, -0.1, 0.05, 0.0, 0.02, -0.1, 0.2, 0.03);
+        // A cloud that is itself sheared, so that its coordinates are correlated.
+        let shear = Matrix::<3>::new(1.0, 2.0, 0.3, 0.0, 1.0, -0.7, 0.0, 0.0, 1.0);
+        let point =
+            |i: usize| shear * Vector::<3>::from_fn(|d, _| (i as f64 * [0.7548, 0.5698, 0.4301][d]).fract());
+        let positions: Vec<_> = (0..100).map(point).collect();
+        let moves: Vec<_> =
+            positions.iter().map(|x| gradient * x + Vector::<3>::new(3.0, 2.0, 1.0)).collect();
+        let fit = AffineFit::new(&positions, &moves, [true; 3]);
+        assert!((fit.gradient - gradient).norm() < 1e-12 && fit.strain >= gradient.norm() - 1e-12);
+        assert!(positions.iter().zip(&moves).all(|(x, s)| fit.rest(x, s) < 1e-12));
+        let flat: Vec<_> = positions.iter().map(|x| Vector::<3>::new(x.x, 0.0, x.z)).collect();
+        let moves: Vec<_> = flat.iter().map(|x| gradient * x).collect();
+        let fit = AffineFit::new(&flat, &moves, [true, true, false]);
+        assert_eq!((fit.gradient.column(1).norm(), fit.gradient.column(2).norm()), (0.0, 0.0));
     }
 }

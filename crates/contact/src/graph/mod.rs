@@ -357,7 +357,7 @@ impl<const D: usize> Graph<D> {
             // Images count from the positions as they were given.
             let [behind, ahead] =
                 [tail, head].map(|place| search.windings[self.order[place as usize] as usize]);
-            let image = std::array::from_fn(|d| image[d] - ahead[d] + behind[d]);
+            let image = std::array::from_fn(|d| image[d] + ahead[d] - behind[d]);
             self.links.push(Link { tail, head, image });
         }
         self.starts.resize(count + 1, self.links.len() as u32);
@@ -420,3 +420,6 @@ fn product(ranges: [std::ops::RangeInclusive<i32>; 3]) -> impl Iterator<Item = [
         y.clone().flat_map(move |j| z.clone().map(move |k| [i, j, k]))
     })
 }
+
+#[cfg(test)]
+mod tests;

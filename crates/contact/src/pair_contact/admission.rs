@@ -83,6 +83,9 @@ where
     }
 }
 
+/// Part of the period by which the particles of a contact cannot have moved apart.
+const FAR: f64 = 0.25;
+
 /// Whether a remembered contact still can be one.
 fn check_known<const D: usize>(
     state: &PairState,
@@ -104,7 +107,7 @@ fn check_known<const D: usize>(
             let separation = step.positions[index as usize] + domain.shift(&image) - step.positions[first];
             let gap = separation.norm() - step.radii[first] - step.radii[index as usize];
             let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            if gap > 0.5 * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
+            if gap > FAR * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
         }
     }
 }

@@ -1,0 +1,123 @@
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A step of spheres anywhere, with small random displacements.
+struct Cloud<const D: usize> {
+    positions: Vec<Vector<D>>,
+    radii: Vec<f64>,
+    moves: Vec<Vector<D>>,
+    domain: Domain<D>,
+}
+
+impl<const D: usize> Cloud<D> {
+    fn new(random: &mut ChaCha8Rng, lengths: [f64; D], periodic: [bool; D], count: usize) -> Self {
+        let mut domain = Domain::default();
+        for d in (0..D).filter(|&d| periodic[d]) {
+            domain.periods[d] = Some(lengths[d]);
+        }
+        let mut anywhere =
+            |size: f64| Vector::<D>::from_fn(|d, _| size * lengths[d] * random.random_range(-1.5..1.5));
+        let positions = (0..count).map(|_| anywhere(1.0)).collect();
+        let moves = (0..count).map(|_| anywhere(0.01)).collect();
+        let radii = (0..count).map(|_| random.random_range(0.3..0.5)).collect();
+        Self { positions, radii, moves, domain }
+    }
+
+    fn step<'a>(&'a self, drift: &'a [Vector<D>]) -> StepGeometry<'a, D> {
+        StepGeometry { positions: &self.positions, radii: &self.radii, drift, rate: 1.0, dt: 1.0 }
+    }
+
+    /// All pairs of particles and images nearer than `reach_i + reach_j`, but for a particle's own images.
+    fn brute_force(&self, reach: &[f64]) -> Vec<PairKey> {
+        let mut pairs = Vec::new();
+        for i in 0..reach.len() {
+            for j in i + 1..reach.len() {
+                let apart = self.positions[j] - self.positions[i];
+                let range = |d: usize| match self.domain.periods.get(d).copied().flatten() {
+                    Some(period) => {
+                        let nearest = -(apart[d] / period).round() as i32;
+                        nearest - 2..=nearest + 2
+                    }
+                    None => 0..=0,
+                };
+                for image in product([range(0), range(1), range(2)]) {
+                    if (apart + self.domain.shift(&image)).norm() <= reach[i] + reach[j] {
+                        pairs.push(PairKey::across(i, j, image));
+                    }
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs
+    }
+}
+
+fn keys<const D: usize>(graph: &Graph<D>) -> Vec<PairKey> {
+    let mut keys: Vec<PairKey> = graph.links.iter().map(|link| graph.key(link)).collect();
+    keys.sort_unstable();
+    keys
+}
+
+fn check_boxes<const D: usize>(box_count: usize) {
+    let mut random = ChaCha8Rng::seed_from_u64(D as u64);
+    let mut pair_count = 0;
+    for case in 0..box_count {
+        // From boxes barely larger than two diameters to large ones; some directions are free.
+        let longest = if case % 2 == 0 { 2.1 } else { 9.0 };
+        let lengths = std::array::from_fn(|_| random.random_range(2.01..longest));
+        let periodic = std::array::from_fn(|d| case % 3 == 0 || (case + d) % 2 == 0);
+        let count = random.random_range(1..40);
+        let cloud = Cloud::<D>::new(&mut random, lengths, periodic, count);
+        let drift = vec![Vector::zeros(); count];
+        let mut graph = Graph::default();
+        graph.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
+        let mut reach = vec![0.0; count];
+        graph.order.iter().zip(&graph.reach).for_each(|(&i, r)| reach[i as usize] = *r);
+        assert!(reach.iter().zip(&cloud.radii).all(|(reach, radius)| reach > radius));
+        let expected = cloud.brute_force(&reach);
+        assert_eq!(keys(&graph), expected, "box {case} of {lengths:?}");
+        pair_count += expected.len();
+    }
+    assert!(pair_count > 10 * box_count);
+}
+
+#[test]
+fn periodic_pairs_equal_brute_force() {
+    check_boxes::<2>(100);
+    check_boxes::<3>(100);
+}
+
+/// A graph that is kept over steps names every pair that could close in them.
+#[test]
+fn a_kept_graph_misses_no_pair() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut cloud = Cloud::<3>::new(&mut random, [6.0; 3], [true, false, false], 300);
+    let drift = vec![Vector::zeros(); 300];
+    let mut graph = Graph::default();
+    let mut search_count = 0;
+    for _ in 0..200 {
+        // A shear, which moves distant particles apart but neighbours little, and some noise.
+        for (s, x) in cloud.moves.iter_mut().zip(&cloud.positions) {
+            *s = Vector::<3>::new(0.01 * x.y, 0.0, 0.0)
+                + Vector::<3>::from_fn(|_, _| random.random_range(-2e-3..2e-3));
+        }
+        let before = graph.reference.clone();
+        graph.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
+        search_count += usize::from(graph.reference != before);
+        let known = keys(&graph);
+        // Could close: the gap is not larger than the relative displacement.
+        let far: Vec<f64> = cloud.radii.iter().map(|radius| radius + 0.2).collect();
+        for key in cloud.brute_force(&far) {
+            let Partner::Particle { index, image } = key.second else { panic!("no walls here") };
+            let (i, j) = (key.first as usize, index as usize);
+            let apart = (cloud.positions[j] + cloud.domain.shift(&image) - cloud.positions[i]).norm();
+            let approach = (cloud.moves[j] - cloud.moves[i]).norm();
+            if apart - cloud.radii[i] - cloud.radii[j] <= approach {
+                assert!(known.binary_search(&key).is_ok(), "{key} is missing");
+            }
+        }
+        cloud.positions.iter_mut().zip(&cloud.moves).for_each(|(x, s)| *x += s);
+    }
+    assert!((2..=100).contains(&search_count), "{search_count} searches in 200 steps");
+}
