@@ -193,3 +193,24 @@ fn contacts_of_nobody_are_refused() {
     let pair = PairKey::wall(0, 2);
     assert_eq!(refuses::<3>(pair), ContactError::UnknownWall { pair, count: 0 });
 }
+
+#[test]
+fn contacts_name_the_image_of_particles_that_have_left_the_period() {
+    // The second disc is written two periods away; the pair is 2.1 apart, within the period and across its border.
+    let domain = Domain::default().with_period(0, 8.0);
+    let (radii, drift) = ([1.0; 2], [Vector::zeros(); 2]);
+    for (first, second, image) in [(1.0, 3.1 + 16.0, -2), (1.0, -1.1 - 16.0, 2), (7.9 - 8.0, 2.0, 0)] {
+        let positions = [first, second].map(|x| Vector::<2>::new(x, 0.0));
+        let towards = positions[1].x - 8.0 * 2.0 * (second / 16.0).round() - first;
+        let mut twists = [1.0, -1.0].map(|sign| Twist {
+            velocity: Vector::<2>::new(sign * towards.signum(), 0.0),
+            ..Twist::default()
+        });
+        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.1, dt: 0.1 };
+        let mut model = PairContact::new(ContactParams::default()).within(domain.clone());
+        model.correct(&step, &mut twists).expect("a good step");
+        let found = model.contacts().first().unwrap_or_else(|| panic!("no contact of {first} and {second}"));
+        assert_eq!(found.pair, PairKey::across(0, 1, [image, 0, 0]));
+        assert!(found.gap.abs() < 1e-12 && (twists[0].velocity.x.abs() - 0.5).abs() < 1e-9, "{found:?}");
+    }
+}
