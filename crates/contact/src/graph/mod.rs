@@ -51,6 +51,9 @@ pub(crate) struct Graph<const D: usize> {
     left: Vec<f64>,
     /// Gap kept between particles, relative to their radii.
     pub margin: f64,
+    /// Factor of the displacements that are searched for: doubles whenever a step needs a wider search, for contact pushes
+    /// particles elsewhere when it knows more pairs.
+    widening: f64,
     /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
     wall_slack: f64,
     search: Search<D>,
@@ -106,6 +109,7 @@ impl<const D: usize> Default for Graph<D> {
             reach: Vec::new(),
             left: Vec::new(),
             margin: 0.0,
+            widening: 1.0,
             wall_slack: 0.0,
             search: Search::default(),
         }
@@ -179,6 +183,7 @@ impl<const D: usize> Graph<D> {
         domain: &Domain<D>,
         displacements: &[Vector<D>],
     ) -> Result<(), ContactError> {
+        self.widening = 1.0;
         let same = self.radii.len() == step.radii.len()
             && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
         if same {
@@ -200,6 +205,7 @@ impl<const D: usize> Graph<D> {
         displacements: &[Vector<D>],
         needed: &[Vector<D>],
     ) -> Result<(), ContactError> {
+        self.widening *= 2.0;
         for wall in &domain.walls {
             let farthest = needed.iter().map(|s| wall.normal.dot(s).abs()).fold(0.0, f64::max);
             self.wall_slack = self.wall_slack.max(farthest);
@@ -303,7 +309,7 @@ impl<const D: usize> Graph<D> {
                 return Err(ContactError::TooFast { particle, displacement: rest, period });
             }
             // The next steps may strain as much before they search.
-            let need = ((1.0 + self.margin) * radius + rest) / (1.0 - fit.strain);
+            let need = ((1.0 + self.margin) * radius + self.widening * rest) / (1.0 - fit.strain);
             self.reach.push(need * (1.0 + fit.strain) + SKIN * radius);
         }
         Ok(())
