@@ -13,8 +13,8 @@ use gluey_contact::{
 };
 use gluey_geom::{Twist, Vector};
 
-/// Settles `count` discs of radii about 1 in a box 80 wide.
-pub fn settle(count: usize) -> Result<String, Box<dyn Error>> {
+/// Lets `count` discs of radii about 1 fall for some time at the speed 1 in a box 80 wide.
+pub fn settle(count: usize, time: f64) -> Result<String, Box<dyn Error>> {
     let (width, columns, dt) = (80.0, 32, 0.25);
     let wall = |x, direction| Wall::new(&Vector::<2>::new(x, 0.0), &direction);
     let floor = wall(0.0, Vector::<2>::y());
@@ -35,15 +35,13 @@ pub fn settle(count: usize) -> Result<String, Box<dyn Error>> {
     let params = ContactParams {
         strategy: Strategy::Inelastic,
         solver: SolverKind::ActiveSet,
-        tolerance: 1e-6,
+        tolerance: 1e-5,
         ..ContactParams::default()
     };
     let mut contact = PairContact::new(params).within(domain.clone());
     let drift = vec![Vector::zeros(); count];
     let falling = Twist { velocity: -Vector::<2>::y(), ..Twist::default() };
-    // As high as they stand, so long they fall.
-    let step_count = (2.5 * (count / columns + 1) as f64 / dt) as usize;
-    for _ in 0..step_count {
+    for _ in 0..(time / dt) as usize {
         let mut twists = vec![falling; count];
         let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
         contact.correct(&step, &mut twists)?;
@@ -56,7 +54,7 @@ pub fn settle(count: usize) -> Result<String, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "settle.svg".into());
-    std::fs::write(&path, settle(1000)?)?;
+    std::fs::write(&path, settle(1000, 80.0)?)?;
     println!("{path}");
     Ok(())
 }

@@ -1,4 +1,6 @@
 //! The examples run, on smaller cases, and their pictures show discs that do not overlap and the contacts between them.
+// Both examples draw with the same file.
+#![allow(clippy::duplicate_mod)]
 
 #[allow(dead_code)]
 #[path = "../examples/settle.rs"]
@@ -17,7 +19,7 @@ fn values(svg: &str, element: &str, attribute: &str) -> Vec<f64> {
     elements.map(value).collect()
 }
 
-fn check(svg: &str, disc_count: usize) {
+fn check(svg: &str, disc_count: usize, least_contact_count: usize) {
     let [x, y, r] = ["cx", "cy", "r"].map(|name| values(svg, "circle", name));
     assert_eq!(x.len(), disc_count);
     for j in 0..x.len() {
@@ -28,14 +30,14 @@ fn check(svg: &str, disc_count: usize) {
         assert!(y[j] > r[j] - 2e-4, "disc {j} is in the floor");
     }
     let lines = values(svg, "line", "stroke-width");
-    assert!(lines.len() > disc_count / 2, "{} contacts", lines.len());
+    assert!(lines.len() >= least_contact_count, "{} contacts", lines.len());
     assert!(lines.iter().all(|width| (0.03..=0.71).contains(width)));
 }
 
 #[test]
 fn settle_makes_a_heap() {
-    let svg = settle::settle(96).unwrap_or_else(|error| panic!("{error}"));
-    check(&svg, 96);
+    let svg = settle::settle(96, 10.0).unwrap_or_else(|error| panic!("{error}"));
+    check(&svg, 96, 150);
     let highest = values(&svg, "circle", "cy").into_iter().fold(0.0, f64::max);
     assert!(highest < 9.0, "the heap is {highest} high");
 }
@@ -44,6 +46,14 @@ fn settle_makes_a_heap() {
 fn shear_makes_contacts_across_the_border() {
     let svg = shear::shear(8, 6, 1.0).unwrap_or_else(|error| panic!("{error}"));
     // A copy on either side of the period.
-    check(&svg, 3 * 48);
+    check(&svg, 3 * 48, 72);
     assert!(svg.contains("#1f5fbf") || svg.contains("#c0271d"));
+}
+
+#[test]
+fn a_thousand_discs_begin_to_settle() {
+    // In the 14th step contact pushes discs farther than was searched; with the pairs that are found then, others farther.
+    // Searches must not take turns for ever.
+    let svg = settle::settle(1000, 5.0).unwrap_or_else(|error| panic!("{error}"));
+    check(&svg, 1000, 100);
 }
