@@ -1,6 +1,6 @@
 //! What can go wrong in a contact step.
 
-use crate::solver::ResidualHistory;
+use crate::solver::{ResidualHistory, SolveFailure};
 use crate::{PairKey, Strategy};
 
 /// Why velocities could not be corrected. They are left as they were.
@@ -170,6 +170,27 @@ pub enum ContactError {
         /// Linearisations made.
         passes: usize,
     },
+}
+
+impl ContactError {
+    /// What the failure of a solver means; `key` names its rows.
+    pub(crate) fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
+        match &failure.contradiction {
+            Some(rows) => {
+                let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();
+                pairs.sort_unstable();
+                pairs.dedup();
+                Self::Contradictory { pairs }
+            }
+            None => Self::NotConverged {
+                residual: failure.report.residual,
+                tolerance,
+                iterations: failure.report.iterations,
+                history: failure.history.clone(),
+                worst: key(failure.worst),
+            },
+        }
+    }
 }
 
 /// A vector of a particle.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use gluey_geom::Vector;
 
-use crate::broadphase::sort_by_key;
+use crate::lattice::sort_by_key;
 use crate::rows::{GROUND, Row};
 
 /// A connected component of the contact network.

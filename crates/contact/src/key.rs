@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use gluey_geom::Vector;
 use serde::{Deserialize, Serialize};
+
+use crate::{ContactError, Domain};
 
 /// A contact of the particle `first` with another particle or a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -49,6 +52,35 @@ impl PairKey {
         match self.second {
             Partner::Particle { index, .. } => (self.first as usize, Some(index as usize)),
             Partner::Wall(_) => (self.first as usize, None),
+        }
+    }
+
+    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the wall; `None`
+    /// if one of them is not there.
+    pub fn branch<const D: usize>(self, positions: &[Vector<D>], domain: &Domain<D>) -> Option<Vector<D>> {
+        let x = positions.get(self.first as usize)?;
+        match self.second {
+            Partner::Particle { index, image } => {
+                Some(positions.get(index as usize)? + domain.shift(&image) - x)
+            }
+            Partner::Wall(wall) => {
+                let wall = domain.walls.get(wall as usize)?;
+                Some(wall.normal * -wall.distance(x))
+            }
+        }
+    }
+
+    /// That there are such particles and such a wall.
+    pub(crate) fn check_known(self, count: usize, wall_count: usize) -> Result<(), ContactError> {
+        let (first, second) = self.particles();
+        if first.max(second.unwrap_or(0)) >= count {
+            return Err(ContactError::UnknownParticle { pair: self, count });
+        }
+        match self.second {
+            Partner::Wall(wall) if wall as usize >= wall_count => {
+                Err(ContactError::UnknownWall { pair: self, count: wall_count })
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -43,6 +43,7 @@ mod error;
 mod graph;
 mod islands;
 mod key;
+mod lattice;
 mod memory;
 mod mobility;
 mod model;

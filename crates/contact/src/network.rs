@@ -8,7 +8,7 @@ use gluey_geom::{Matrix, Vector};
 
 pub use clusters::{Cluster, Clusters};
 
-use crate::{Contact, ContactError, Domain, PairKey, Partner};
+use crate::{Contact, ContactError, Domain, Partner};
 
 /// The contacts of one instant, with what they join.
 ///
@@ -61,23 +61,6 @@ pub struct Coordination {
     pub rattler_count: usize,
 }
 
-impl PairKey {
-    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the wall; `None`
-    /// if one of them is not there.
-    pub fn branch<const D: usize>(self, positions: &[Vector<D>], domain: &Domain<D>) -> Option<Vector<D>> {
-        let x = positions.get(self.first as usize)?;
-        match self.second {
-            Partner::Particle { index, image } => {
-                Some(positions.get(index as usize)? + domain.shift(&image) - x)
-            }
-            Partner::Wall(wall) => {
-                let wall = domain.walls.get(wall as usize)?;
-                Some(wall.normal * -wall.distance(x))
-            }
-        }
-    }
-}
-
 impl<'a, const D: usize> ContactNetwork<'a, D> {
     /// The network of `contacts` between these particles and the walls of `domain`.
     pub fn new(
@@ -87,15 +70,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         domain: &'a Domain<D>,
     ) -> Result<Self, ContactError> {
         let count = positions.len().min(radii.len());
-        for &Contact { pair, .. } in contacts {
-            let (first, second) = pair.particles();
-            if first.max(second.unwrap_or(0)) >= count {
-                return Err(ContactError::UnknownParticle { pair, count });
-            }
-            if matches!(pair.second, Partner::Wall(wall) if wall as usize >= domain.walls.len()) {
-                return Err(ContactError::UnknownWall { pair, count: domain.walls.len() });
-            }
-        }
+        contacts.iter().try_for_each(|contact| contact.pair.check_known(count, domain.walls.len()))?;
         Ok(Self { contacts, positions, radii, domain })
     }
 

@@ -137,3 +137,12 @@ impl Default for ContactParams {
         }
     }
 }
+
+impl ContactParams {
+    /// The residual that is asked for, a length: the relative tolerance times a length of the step, but never below what
+    /// positions can resolve. For bodies of at least this `radius` that move by `farthest` at most, no farther than `extent`
+    /// from the origin.
+    pub(crate) fn residual(&self, radius: f64, farthest: f64, extent: f64) -> f64 {
+        (self.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest))
+    }
+}

@@ -1,10 +1,9 @@
 //! The cell list: balls binned by cells as wide as two of the largest radii, so that those that meet are neighbours.
 
-use std::ops::Range;
-
 use gluey_geom::Vector;
 
 use super::{Broadphase, meet};
+use crate::lattice::{Lattice, sort_by_key};
 
 /// Cells for every ball at most, so that a sparse cloud needs no more memory than a dense one.
 const CELLS_PER_BALL: usize = 2;
@@ -22,106 +21,6 @@ pub struct CellList {
     cells: Vec<u32>,
     /// Centre and radius of each member.
     balls: Vec<[f64; 4]>,
-}
-
-/// A lattice of cells over a cloud of points.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Lattice<const D: usize> {
-    lower: Vector<D>,
-    inverse_width: f64,
-    counts: [usize; D],
-}
-
-impl<const D: usize> Lattice<D> {
-    /// The lattice of cells at least `width` wide, wider if there would be more than `most` of them.
-    fn over(points: &[Vector<D>], width: f64, most: usize) -> Self {
-        let (lower, extent) = bounds(points);
-        Self::within(lower, extent, width, most)
-    }
-
-    /// A lattice with about a cell a point.
-    pub(crate) fn fine(points: &[Vector<D>]) -> Self {
-        let (lower, extent) = bounds(points);
-        Self::within(lower, extent, extent.amax() / points.len().max(1) as f64, points.len())
-    }
-
-    fn within(lower: Vector<D>, extent: Vector<D>, mut width: f64, most: usize) -> Self {
-        loop {
-            let counts: [usize; D] =
-                std::array::from_fn(|d| (extent[d] / width).clamp(0.0, 1e9) as usize + 1);
-            let total = counts.iter().fold(1.0, |total, count| total * *count as f64);
-            if total <= most.max(1) as f64 {
-                return Self { lower, inverse_width: 1.0 / width, counts };
-            }
-            width *= 1.2;
-        }
-    }
-
-    pub(crate) fn cell_count(&self) -> usize {
-        self.counts.iter().product()
-    }
-
-    /// Place of a point along each axis.
-    fn place(&self, x: &Vector<D>) -> [usize; D] {
-        std::array::from_fn(|d| {
-            (((x[d] - self.lower[d]) * self.inverse_width) as usize).min(self.counts[d] - 1)
-        })
-    }
-
-    /// Number of the cell of a point.
-    pub(crate) fn cell(&self, x: &Vector<D>) -> usize {
-        let place = self.place(x);
-        (0..D).rev().fold(0, |cell, d| cell * self.counts[d] + place[d])
-    }
-
-    /// Calls `visit` with the numbers of each run of neighbouring cells around a point, in increasing order.
-    fn for_each_row(&self, x: &Vector<D>, mut visit: impl FnMut(Range<usize>)) {
-        let place = self.place(x);
-        let lower: [usize; D] = std::array::from_fn(|d| place[d].saturating_sub(1));
-        let upper: [usize; D] = std::array::from_fn(|d| (place[d] + 1).min(self.counts[d] - 1));
-        let mut at = lower;
-        loop {
-            let row = (1..D).rev().fold(0, |cell, d| (cell + at[d]) * self.counts[d - 1]);
-            visit(row + lower[0]..row + upper[0] + 1);
-            let Some(d) = (1..D).find(|&d| at[d] < upper[d]) else { return };
-            at[d] += 1;
-            at[1..d].copy_from_slice(&lower[1..d]);
-        }
-    }
-}
-
-/// Lower corner and edge lengths of the box around points.
-fn bounds<const D: usize>(points: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
-    let infinite = Vector::<D>::repeat(f64::INFINITY);
-    let lower = points.iter().fold(infinite, |lower, x| lower.inf(x));
-    let upper = points.iter().fold(-infinite, |upper, x| upper.sup(x));
-    if points.is_empty() { (Vector::zeros(), Vector::zeros()) } else { (lower, upper - lower) }
-}
-
-/// Sorts `0..count` by `key` (smaller than `key_count`), stably: `starts[k]..starts[k + 1]` is the range of key `k`.
-pub(crate) fn sort_by_key(
-    count: usize,
-    key_count: usize,
-    key: impl Fn(usize) -> usize,
-    starts: &mut Vec<u32>,
-    sorted: &mut Vec<u32>,
-) {
-    starts.clear();
-    starts.resize(key_count + 1, 0);
-    for i in 0..count {
-        starts[key(i)] += 1;
-    }
-    let mut sum = 0;
-    for start in starts.iter_mut() {
-        sum += *start;
-        *start = sum;
-    }
-    sorted.resize(count, 0);
-    for i in (0..count).rev() {
-        let place = &mut starts[key(i)];
-        *place -= 1;
-        sorted[*place as usize] = i as u32;
-    }
 }
 
 impl CellList {

@@ -6,7 +6,6 @@ mod hierarchy;
 use gluey_geom::Vector;
 
 pub use cells::CellList;
-pub(crate) use cells::{Lattice, sort_by_key};
 pub use hierarchy::Hierarchy;
 
 /// Finds the pairs of balls that meet. All implementations give the same pairs in the same order.

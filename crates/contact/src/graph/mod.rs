@@ -183,17 +183,19 @@ impl<const D: usize> Graph<D> {
         domain: &Domain<D>,
         displacements: &[Vector<D>],
     ) -> Result<(), ContactError> {
-        self.widening = 1.0;
+        (self.widening, self.wall_slack) = (1.0, 0.0);
         let same = self.radii.len() == step.radii.len()
             && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
         if same {
             self.load(step, displacements);
             self.set_left(domain);
         }
-        if !(same && self.covers_pairs(domain, &self.free)) {
+        if same && self.covers_pairs(domain, &self.free) {
+            self.rank(domain);
+        } else {
             self.renew(step, domain, displacements, displacements)?;
         }
-        self.finish(step, domain);
+        self.add_walls(step, domain);
         Ok(())
     }
 
@@ -211,7 +213,7 @@ impl<const D: usize> Graph<D> {
             self.wall_slack = self.wall_slack.max(farthest);
         }
         self.renew(step, domain, displacements, needed)?;
-        self.finish(step, domain);
+        self.add_walls(step, domain);
         Ok(())
     }
 
@@ -239,8 +241,8 @@ impl<const D: usize> Graph<D> {
         self.free.extend(self.order.iter().map(|&i| displacements[i as usize]));
     }
 
-    /// Ranks the places and adds the walls.
-    fn finish(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) {
+    /// Ranks the places, which particles have moved away from.
+    fn rank(&mut self, domain: &Domain<D>) {
         let search = &mut self.search;
         wrap(&self.positions, domain, &mut search.wrapped, &mut search.windings);
         search.spatial.sort(&search.wrapped, &mut search.ranked);
@@ -248,6 +250,10 @@ impl<const D: usize> Graph<D> {
         for (rank, &place) in search.ranked.iter().enumerate() {
             self.ranks[place as usize] = rank as u32;
         }
+    }
+
+    /// Puts the walls behind the found pairs.
+    fn add_walls(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) {
         self.links.truncate(self.found_count);
         for (number, wall) in domain.walls.iter().enumerate() {
             let tail = (self.count() + number) as u32;
@@ -285,6 +291,8 @@ impl<const D: usize> Graph<D> {
         for (place, &particle) in self.order.iter().enumerate() {
             self.places[particle as usize] = place as u32;
         }
+        self.ranks.clear();
+        self.ranks.extend(0..self.order.len() as u32);
         self.load(step, needed);
         self.reference.clone_from(&self.positions);
         self.set_reach(step, domain)?;

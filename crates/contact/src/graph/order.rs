@@ -2,7 +2,7 @@
 
 use gluey_geom::Vector;
 
-use crate::broadphase::{Lattice, sort_by_key};
+use crate::lattice::{Lattice, sort_by_key};
 
 /// Sorts points so that neighbours in space are near each other in memory, whatever order they come in.
 #[derive(Clone, Debug, Default)]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Buffers, PairContact, PairMemory, Part};
 use crate::graph::Link;
 use crate::rows::{Row, closes};
-use crate::{ContactError, Domain, Mobility, PairState, Partner, StepGeometry};
+use crate::{ContactError, Domain, Mobility, PairState, StepGeometry};
 
 impl<const D: usize, M: Mobility<D>> PairContact<D, M>
 where
@@ -93,21 +93,10 @@ fn check_known<const D: usize>(
     domain: &Domain<D>,
 ) -> Result<(), ContactError> {
     let PairState { pair, .. } = *state;
-    let count = step.positions.len();
-    let (first, second) = pair.particles();
-    if first.max(second.unwrap_or(0)) >= count {
-        return Err(ContactError::UnknownParticle { pair, count });
-    }
-    match pair.second {
-        Partner::Wall(wall) if wall as usize >= domain.walls.len() => {
-            Err(ContactError::UnknownWall { pair, count: domain.walls.len() })
-        }
-        Partner::Wall(_) => Ok(()),
-        Partner::Particle { index, image } => {
-            let separation = step.positions[index as usize] + domain.shift(&image) - step.positions[first];
-            let gap = separation.norm() - step.radii[first] - step.radii[index as usize];
-            let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            if gap > FAR * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
-        }
-    }
+    pair.check_known(step.positions.len(), domain.walls.len())?;
+    let (first, Some(second)) = pair.particles() else { return Ok(()) };
+    let distance = pair.branch(step.positions, domain).map_or(0.0, |branch| branch.norm());
+    let gap = distance - step.radii[first] - step.radii[second];
+    let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    if gap > FAR * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
 }

@@ -212,12 +212,12 @@ where
         Ok(report)
     }
 
-    /// The relative tolerance times a length, but never below what positions can resolve.
+    /// The residual that is asked for.
     fn tolerance(&self, step: &StepGeometry<'_, D>, free: &[Vector<D>]) -> f64 {
         let radius = step.radii.iter().copied().fold(f64::INFINITY, f64::min);
         let farthest = free.iter().map(|s| s.norm()).fold(0.0, f64::max);
         let extent = step.positions.iter().map(|x| x.amax()).fold(0.0, f64::max);
-        (self.params.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest))
+        self.params.residual(radius, farthest, extent)
     }
 
     /// Gap below which pairs are pushed apart, relative to the mean radius.
@@ -307,20 +307,7 @@ where
             Failure::Gap { row, gap, passes } => {
                 ContactError::GapNotClosed { pair: key(*row), gap: *gap, passes: *passes }
             }
-            Failure::Solve(failure) => match &failure.contradiction {
-                Some(rows) => {
-                    let mut pairs: Vec<_> = rows.iter().map(|k| key(start + k)).collect();
-                    pairs.sort_unstable();
-                    ContactError::Contradictory { pairs }
-                }
-                None => ContactError::NotConverged {
-                    residual: failure.report.residual,
-                    tolerance,
-                    iterations: failure.report.iterations,
-                    history: failure.history.clone(),
-                    worst: key(start + failure.worst),
-                },
-            },
+            Failure::Solve(failure) => ContactError::of_solve(failure, tolerance, |row| key(start + row)),
         }
     }
 

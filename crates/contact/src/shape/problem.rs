@@ -7,7 +7,7 @@ use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 
 use super::closest::{closest, frame};
 use super::{Shape, ShapeStep, displaced};
-use crate::solver::{GapOperator, Projection, SolveFailure};
+use crate::solver::{GapOperator, Projection};
 use crate::{
     Contact, ContactError, ContactParams, ContactReport, ContactState, Mobility, PairKey, StepGeometry,
     WorstPair,
@@ -323,7 +323,8 @@ where
             iteration_limit: self.params.iteration_limit,
         };
         let solved = solver.solve(&mut problem, &mut forces, &mut scratch);
-        let solved = solved.map_err(|failure| explain(&failure, &arrows, self.tolerance))?;
+        let key = |row: usize| PairKey::new(arrows[row].ends[0], arrows[row].ends[1]);
+        let solved = solved.map_err(|failure| ContactError::of_solve(&failure, self.tolerance, key))?;
         operator.spread(&forces);
         report.iterations += solved.iterations;
         report.residual = solved.residual;
@@ -385,7 +386,7 @@ where
     }
 }
 
-/// The relative tolerance times a length, but never below what positions can resolve.
+/// [`ContactParams::residual`] of bodies that reach beyond their centres.
 fn tolerance<const D: usize, S: Shape<D>>(
     step: &ShapeStep<'_, D, S>,
     params: &ContactParams,
@@ -398,7 +399,7 @@ where
     let reach = step.shapes.iter().map(Shape::reach).fold(0.0, f64::max);
     let farthest = free.iter().map(|by| by.velocity.norm()).fold(0.0, f64::max);
     let extent = step.poses.iter().map(|pose| pose.position.amax()).fold(0.0, f64::max);
-    (params.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest + reach))
+    params.residual(radius, farthest, extent + reach)
 }
 
 /// `G V` for the twists of all bodies.
@@ -412,26 +413,6 @@ where
     Dim<D>: Space<D>,
 {
     normal.dot(&(twists[j].velocity_at(&arms[1]) - twists[i].velocity_at(&arms[0])))
-}
-
-/// The error that a failure of the solver means.
-fn explain<const D: usize>(failure: &SolveFailure, arrows: &[Arrow<D>], tolerance: f64) -> ContactError {
-    let key = |row: usize| PairKey::new(arrows[row].ends[0], arrows[row].ends[1]);
-    match &failure.contradiction {
-        Some(rows) => {
-            let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();
-            pairs.sort_unstable();
-            pairs.dedup();
-            ContactError::Contradictory { pairs }
-        }
-        None => ContactError::NotConverged {
-            residual: failure.report.residual,
-            tolerance,
-            iterations: failure.report.iterations,
-            history: failure.history.clone(),
-            worst: key(failure.worst),
-        },
-    }
 }
 
 /// A row as the operator sees it: its scaled normal, arms and bodies.

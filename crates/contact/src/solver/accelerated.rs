@@ -39,14 +39,11 @@ impl ProjectionSolver for Accelerated {
             gaps_under(problem, ahead, gaps);
             // At the extrapolated forces, which in the end are the forces.
             course.note(residual(gaps, ahead, problem.floors, norm));
-            if course.residual <= problem.tolerance {
+            if course.has_arrived(problem) {
                 forces.copy_from_slice(ahead);
                 return Ok(course.report());
             }
-            let contradiction = watch.look(course.iteration, problem, forces, norm);
-            if contradiction.is_some() || course.is_lost(problem.iteration_limit) {
-                return Err(course.failure(contradiction));
-            }
+            course.check(&mut watch, problem, forces, norm)?;
             least = least.min(course.residual);
             if course.residual > 100.0 * least {
                 (norm, least, momentum) = (2.0 * norm, course.residual, 1.0);

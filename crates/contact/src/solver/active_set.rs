@@ -54,15 +54,12 @@ impl ProjectionSolver for ActiveSet {
         let mut fresh = true;
         loop {
             course.note(residual(state.gaps, forces, problem.floors, norm));
-            if course.residual <= problem.tolerance && fresh {
+            if course.has_arrived(problem) && fresh {
                 return Ok(course.report());
             }
-            let contradiction = watch.look(course.iteration, problem, forces, norm);
-            if contradiction.is_some() || course.is_lost(problem.iteration_limit) {
-                return Err(course.failure(contradiction));
-            }
-            fresh = course.residual <= problem.tolerance
-                || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
+            course.check(&mut watch, problem, forces, norm)?;
+            fresh =
+                course.has_arrived(problem) || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
             if fresh {
                 state.begin(problem, forces);
             } else {

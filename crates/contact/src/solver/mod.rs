@@ -116,9 +116,22 @@ impl Course {
         }
     }
 
-    /// Whether to give up.
-    fn is_lost(&self, limit: usize) -> bool {
-        self.iteration >= limit || !self.residual.is_finite()
+    /// Whether the last residual is small enough.
+    fn has_arrived(&self, problem: &Projection<'_>) -> bool {
+        self.residual <= problem.tolerance
+    }
+
+    /// The failure to report if there is no sense in going on.
+    fn check(
+        &self,
+        watch: &mut Watch<'_>,
+        problem: &mut Projection<'_>,
+        forces: &[f64],
+        norm: f64,
+    ) -> Result<(), SolveFailure> {
+        let contradiction = watch.look(self.iteration, problem, forces, norm);
+        let is_lost = self.iteration >= problem.iteration_limit || !self.residual.is_finite();
+        if contradiction.is_some() || is_lost { Err(self.failure(contradiction)) } else { Ok(()) }
     }
 
     fn report(&self) -> SolveReport {

@@ -33,13 +33,10 @@ impl ProjectionSolver for Uzawa {
         loop {
             gaps_under(problem, forces, gaps);
             course.note(residual(gaps, forces, problem.floors, norm));
-            if course.residual <= problem.tolerance {
+            if course.has_arrived(problem) {
                 return Ok(course.report());
             }
-            let contradiction = watch.look(course.iteration, problem, forces, norm);
-            if contradiction.is_some() || course.is_lost(problem.iteration_limit) {
-                return Err(course.failure(contradiction));
-            }
+            course.check(&mut watch, problem, forces, norm)?;
             least = least.min(course.residual);
             if course.residual > 100.0 * least {
                 (norm, least) = (2.0 * norm, course.residual);
