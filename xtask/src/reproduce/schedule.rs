@@ -1,4 +1,7 @@
-//! Independent jobs on a few threads; one that fails or panics does not disturb the others.
+//! Independent jobs side by side; one that fails or panics does not disturb the others.
+//!
+//! The processor's cores are dealt out among the jobs: each runs in a pool of its own. Jobs that shared one pool would wait
+//! for each other's pieces of work.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,13 +14,19 @@ pub fn in_parallel<J: Sync, T: Send>(
     workers: usize,
     work: impl Fn(&J) -> Result<T, String> + Sync,
 ) -> Vec<Result<T, String>> {
+    let workers = workers.clamp(1, jobs.len().max(1));
+    let threads = (rayon::current_num_threads() / workers).max(1);
     let next = AtomicUsize::new(0);
     let results: Vec<Mutex<Option<Result<T, String>>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     std::thread::scope(|scope| {
-        for _ in 0..workers.clamp(1, jobs.len().max(1)) {
+        for _ in 0..workers {
             scope.spawn(|| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
                 while let Some((job, slot)) = take(&next, jobs, &results) {
-                    let result = catch_unwind(AssertUnwindSafe(|| work(job)));
+                    let result = catch_unwind(AssertUnwindSafe(|| match &pool {
+                        Ok(pool) => pool.install(|| work(job)),
+                        Err(error) => Err(format!("could not start {threads} threads: {error}")),
+                    }));
                     *slot.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) =
                         Some(result.unwrap_or_else(|panic| Err(format!("panicked: {}", message(&*panic)))));
                 }
