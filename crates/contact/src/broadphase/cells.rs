@@ -21,6 +21,8 @@ pub struct CellList {
     cells: Vec<u32>,
     /// Centre and radius of each member.
     balls: Vec<[f64; 4]>,
+    /// Pairs as they are found.
+    found: Vec<(u32, u32)>,
 }
 
 impl CellList {
@@ -35,6 +37,26 @@ impl CellList {
             let (x, radius) = (&centers[i as usize], radii[i as usize]);
             std::array::from_fn(|d| if d < D { x[d] } else { radius })
         }));
+    }
+
+    /// Finds the pairs, in the order of the members. Each member looks for those behind it.
+    fn find<const D: usize>(&mut self, lattice: &Lattice<D>, asker_count: usize) {
+        let Self { starts, members, balls, found, .. } = self;
+        found.clear();
+        for (place, (&i, ball)) in members.iter().zip(balls.iter()).enumerate() {
+            let x = Vector::<D>::from_fn(|d, _| ball[d]);
+            lattice.for_each_row(&x, |row| {
+                let end = starts[row.end] as usize;
+                let range = (starts[row.start] as usize).max(place + 1).min(end)..end;
+                for (&j, other) in members[range.clone()].iter().zip(&balls[range]) {
+                    let y = Vector::<D>::from_fn(|d, _| other[d]);
+                    // Both are computed: a branch on the first could not be predicted.
+                    if meet(&x, &y, ball[D] + other[D]) & ((i.min(j) as usize) < asker_count) {
+                        found.push((i.min(j), i.max(j)));
+                    }
+                }
+            });
+        }
     }
 }
 
@@ -53,19 +75,12 @@ impl<const D: usize> Broadphase<D> for CellList {
         let largest = radii.iter().copied().fold(0.0, f64::max);
         let lattice = Lattice::over(centers, 2.0 * largest, CELLS_PER_BALL * centers.len());
         self.bin(&lattice, centers, radii);
-        for (i, (x, radius)) in centers.iter().zip(radii).take(asker_count).enumerate() {
-            let first = pairs.len();
-            lattice.for_each_row(x, |row| {
-                let range = self.starts[row.start] as usize..self.starts[row.end] as usize;
-                for (&j, ball) in self.members[range.clone()].iter().zip(&self.balls[range]) {
-                    let y = Vector::<D>::from_fn(|d, _| ball[d]);
-                    // Both are computed: a branch on the first could not be predicted.
-                    if (j as usize > i) & meet(x, &y, radius + ball[D]) {
-                        pairs.push((i as u32, j));
-                    }
-                }
-            });
-            pairs[first..].sort_unstable();
+        self.find(&lattice, asker_count);
+        let Self { found, starts, members: order, .. } = self;
+        sort_by_key(found.len(), asker_count, |k| found[k].0 as usize, starts, order);
+        pairs.extend(order.iter().map(|&k| found[k as usize]));
+        for range in starts.windows(2) {
+            pairs[range[0] as usize..range[1] as usize].sort_unstable();
         }
     }
 }
