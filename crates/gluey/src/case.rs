@@ -27,11 +27,15 @@ pub use gluey_contact::{Memory, Strategy};
 pub use gluey_motion::Scheme;
 pub use names::{Boundary, Formulation, Hydrodynamics, Solver, UnknownName};
 
-use gluey_contact::ContactParams;
+use gluey_contact::{ContactParams, Domain, Wall};
+use gluey_geom::Vector;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of root cells along the shortest edge of the box.
 const MOST_ROOTS: u32 = 16;
+
+/// The axis across the shear: the box has walls there.
+const WALLED_AXIS: usize = 1;
 
 /// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for nodes.
 const FINEST_LEVEL: u32 = 18;
@@ -282,6 +286,28 @@ impl Case {
     /// Upper corner of the box, one coordinate a dimension.
     pub fn upper(&self) -> Vec<f64> {
         self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
+    }
+
+    /// Length of the box along an axis in which the particles see images of each other.
+    pub fn period(&self, axis: usize) -> Option<f64> {
+        let flows = self.flow.hydrodynamics == Hydrodynamics::Stokes;
+        let is_periodic = flows && self.domain.boundary == Boundary::Periodic && axis != WALLED_AXIS;
+        is_periodic.then(|| self.upper()[axis] - self.lower()[axis])
+    }
+
+    /// What surrounds the particles: walls below and above (y), which move along themselves, and the periods. Nothing
+    /// without a finite-element flow.
+    pub(crate) fn surroundings<const D: usize>(&self) -> Domain<D> {
+        if self.flow.hydrodynamics != Hydrodynamics::Stokes {
+            return Domain::default();
+        }
+        let bounds = [self.lower(), self.upper()].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
+        let inwards = Vector::<D>::from_fn(|d, _| if d == WALLED_AXIS { 1.0 } else { 0.0 });
+        let [below, above] = bounds;
+        Domain {
+            walls: vec![Wall::new(&below, &inwards), Wall::new(&above, &-inwards)],
+            periods: std::array::from_fn(|axis| self.period(axis)),
+        }
     }
 
     /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the mesh. `None`

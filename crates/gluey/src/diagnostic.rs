@@ -36,7 +36,7 @@ impl Diagnosed {
                 Some("resume with the case file, strategy and formulation of the interrupted run".into())
             }
             RunError::Checkpoint(_) => Some("start without --resume".into()),
-            RunError::LeftBox { .. } => Some("end the run earlier, or take a larger box".into()),
+            RunError::LeftBox { .. } => Some("end the run earlier, or take a larger box; contact keeps particles from its walls (y), not from open sides".into()),
             RunError::Case(CaseError::Invalid(issue)) => Some(issue.problem.hint()),
             RunError::Case(CaseError::Read { .. }) => Some("give the path of a case file".into()),
             _ => None,

@@ -18,7 +18,7 @@ use gluey_stokes::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::case::{Boundary, Case, Formulation, Solver};
+use crate::case::{Case, Formulation, Solver};
 
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -33,18 +33,6 @@ pub enum FlowError {
     Box {
         /// Edge lengths.
         extent: Vec<f64>,
-    },
-    /// Two particles come close across a periodic border, where contact is not handled.
-    #[error(
-        "particles {} and {} are {gap:.3e} apart across a periodic border: contact there is not supported; use a longer box",
-        .pair[0] + 1,
-        .pair[1] + 1
-    )]
-    PeriodicContact {
-        /// Indices of the particles, from 0.
-        pair: [usize; 2],
-        /// The gap across the border.
-        gap: f64,
     },
 }
 
@@ -91,7 +79,7 @@ where
     refinement: Refinement,
     domain: Aabb<D>,
     roots: [u32; D],
-    periodic: [bool; D],
+    periods: [Option<f64>; D],
     shear_rate: f64,
     shear_factor: f64,
     radii: Vec<f64>,
@@ -112,14 +100,13 @@ where
     let roots = root_cells(case, &domain)?;
     let radii: Vec<f64> = case.particles.iter().map(|p| p.radius).collect();
     let params = flow_params::<D>(case);
-    let periodic = std::array::from_fn(|d| case.domain.boundary == Boundary::Periodic && d != 1);
     Ok(StokesFlow {
         solver: FlowSolver::new(params, seconds)?,
         params,
         refinement: refinement::<D>(case, domain.extent()[0] / f64::from(roots[0]), &radii),
         domain,
         roots,
-        periodic,
+        periods: std::array::from_fn(|axis| case.period(axis)),
         shear_rate: case.shear_rate,
         shear_factor: 1.0,
         radii,
@@ -133,29 +120,13 @@ where
     Dim<D>: Space<D>,
 {
     fn balls(&self, centers: impl Iterator<Item = Vector<D>>) -> Vec<Ball<D>> {
-        let extent = self.domain.extent();
-        let period = std::array::from_fn(|d| self.periodic[d].then_some(extent[d]));
-        centers.zip(&self.radii).map(|(center, &radius)| Ball::periodic(center, radius, period)).collect()
+        let ball = |(center, &radius)| Ball::periodic(center, radius, self.periods);
+        centers.zip(&self.radii).map(ball).collect()
     }
 
     fn mesh(&self, balls: &[Ball<D>]) -> Result<TreeMesh<D>, FlowError> {
-        Ok(self.refinement.mesh(self.domain, self.roots, self.periodic, balls)?)
-    }
-
-    /// Pairs whose nearest images are closer to each other than the particles themselves must not be in contact.
-    fn check_periodic_contact(&self, balls: &[Ball<D>]) -> Result<(), FlowError> {
-        use gluey_levelset::Body;
-        for (i, first) in balls.iter().enumerate() {
-            for (j, second) in balls.iter().enumerate().skip(i + 1) {
-                let image = first.arm(second.center());
-                let direct = second.center() - first.center();
-                let gap = image.norm() - self.radii[i] - self.radii[j];
-                if (image - direct).norm() > 1e-9 && gap < 0.1 * self.radii[i].min(self.radii[j]) {
-                    return Err(FlowError::PeriodicContact { pair: [i, j], gap });
-                }
-            }
-        }
-        Ok(())
+        let periodic = self.periods.map(|period| period.is_some());
+        Ok(self.refinement.mesh(self.domain, self.roots, periodic, balls)?)
     }
 }
 
@@ -172,7 +143,6 @@ where
         twists: &mut [Twist<D>],
     ) -> Result<(), FlowError> {
         let balls = self.balls(particles.iter().map(|p| p.pose.position));
-        self.check_periodic_contact(&balls)?;
         let start = seconds();
         let mesh = self.mesh(&balls)?;
         let meshed = seconds() - start;

@@ -154,7 +154,7 @@ mod tests {
     fn a_reference_does_not_deviate_from_itself() {
         let reference = Reference::named("pair2d_trajectory").expect("known");
         let shifted = |shift: f64| {
-            let mut trajectory = Trajectory::<2>::new(vec![RADIUS; 2]);
+            let mut trajectory = Trajectory::<2>::new(vec![RADIUS; 2], [None; 2]);
             for row in 0..reference.times.len() {
                 let center = |n: usize| {
                     Vector::<2>::new(reference.centers[n][0][row], reference.centers[n][1][row] + shift)

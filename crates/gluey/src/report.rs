@@ -187,7 +187,7 @@ mod tests {
 
     /// Particle 2 passes above particle 1 at `t = 5`, at the distance `above(t)` in y.
     fn passing(end: f64, above: impl Fn(f64) -> f64) -> Trajectory<2> {
-        let mut trajectory = Trajectory::new(vec![A; 2]);
+        let mut trajectory = Trajectory::new(vec![A; 2], [None; 2]);
         let mut t = 0.0;
         while t <= end {
             let other = Vector::<2>::new(0.1 * (t - 5.0), above(t));
@@ -216,6 +216,6 @@ mod tests {
     fn without_a_mirror_time_there_is_no_such_error() {
         assert_eq!(reversibility_error(&passing(4.0, |_| 0.11)), None);
         assert_eq!(reversibility_error(&passing(11.0, |_| 0.11)), None);
-        assert_eq!(reversibility_error(&Trajectory::<2>::new(vec![A])), None);
+        assert_eq!(reversibility_error(&Trajectory::<2>::new(vec![A], [None; 2])), None);
     }
 }

@@ -13,6 +13,8 @@ where
     Dim<D>: Space<D>,
 {
     radii: Vec<f64>,
+    /// Length of the period in each direction that has one.
+    periods: Vec<Option<f64>>,
     times: Vec<f64>,
     positions: Vec<Vector<D>>,
     spins: Vec<Spin<D>>,
@@ -28,7 +30,9 @@ where
     pub time: f64,
     /// Radii, one a particle.
     pub radii: &'a [f64],
-    /// Centres, one a particle.
+    /// Length of the period in each direction that has one.
+    pub periods: &'a [Option<f64>],
+    /// Centres, one a particle; they are not brought back into the period.
     pub positions: &'a [Vector<D>],
     /// Spins, one a particle.
     pub spins: &'a [Spin<D>],
@@ -38,10 +42,11 @@ impl<const D: usize> Row<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    /// Gap between the surfaces of two particles (Verdon et al. 2010, eq. 14).
+    /// Gap between the surfaces of two particles, of their nearest images (Verdon et al. 2010, eq. 14).
     pub fn gap(&self, first: usize, second: usize) -> f64 {
-        let distance = (self.positions[second] - self.positions[first]).norm();
-        distance - (self.radii[first] + self.radii[second])
+        let direct = self.positions[second] - self.positions[first];
+        let nearest = Vector::<D>::from_fn(|d, _| shortest(direct[d], self.periods[d]));
+        nearest.norm() - (self.radii[first] + self.radii[second])
     }
 
     /// All pairs, `(0, 1), (0, 2), (1, 2), ...` in the order 12, 13, ..., 23, ... of the output.
@@ -60,9 +65,9 @@ impl<const D: usize> Trajectory<D>
 where
     Dim<D>: Space<D>,
 {
-    /// No rows yet.
-    pub fn new(radii: Vec<f64>) -> Self {
-        Self { radii, times: Vec::new(), positions: Vec::new(), spins: Vec::new() }
+    /// No rows yet, for particles of these radii in a space of these periods.
+    pub fn new(radii: Vec<f64>, periods: [Option<f64>; D]) -> Self {
+        Self { radii, periods: periods.to_vec(), times: Vec::new(), positions: Vec::new(), spins: Vec::new() }
     }
 
     /// Adds the state at `time`, later than all before.
@@ -104,6 +109,7 @@ where
         Row {
             time: self.times[index],
             radii: &self.radii,
+            periods: &self.periods,
             positions: &self.positions[range.clone()],
             spins: &self.spins[range],
         }
@@ -122,6 +128,11 @@ where
     /// Whether the parts fit together, as they do unless they came from a damaged file.
     pub fn is_consistent(&self) -> bool {
         let entries = self.times.len().checked_mul(self.radii.len());
-        entries == Some(self.positions.len()) && entries == Some(self.spins.len())
+        entries == Some(self.positions.len()) && entries == Some(self.spins.len()) && self.periods.len() == D
     }
+}
+
+/// The shortest image of a distance along an axis.
+pub fn shortest(distance: f64, period: Option<f64>) -> f64 {
+    distance - period.map_or(0.0, |period| period * (distance / period).round())
 }

@@ -4,6 +4,7 @@ use super::Case;
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
 use crate::reference::{self, Reference};
+use crate::trajectory::shortest;
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,6 +100,8 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
             let (diameter, edge) = (2.0 * particle.radius, upper[d] - lower[d]);
             return fail(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
         }
+        // A particle may lie across a periodic border.
+        let range = if case.period(d).is_some() { (lower[d], upper[d]) } else { range };
         let excess = (range.0 - particle.position[d]).max(particle.position[d] - range.1);
         if excess > 0.0 {
             let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
@@ -111,7 +114,8 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
 fn check_overlaps(case: &Case, key: &Key) -> Check {
     for (second, b) in case.particles.iter().enumerate() {
         for (first, a) in case.particles[..second].iter().enumerate() {
-            let squares = a.position.iter().zip(&b.position).map(|(x, y)| (x - y).powi(2));
+            let along = |(d, (x, y)): (usize, (&f64, &f64))| shortest(x - y, case.period(d)).powi(2);
+            let squares = a.position.iter().zip(&b.position).enumerate().map(along);
             let distance = squares.sum::<f64>().sqrt();
             let contact_distance = a.radius + b.radius;
             if distance < contact_distance {

@@ -132,7 +132,7 @@ mod tests {
         Dim<D>: Space<D>,
     {
         for count in 1..4 {
-            let mut trajectory = Trajectory::<D>::new(vec![0.1; count]);
+            let mut trajectory = Trajectory::<D>::new(vec![0.1; count], [None; D]);
             let particles: Vec<_> =
                 (0..count).map(|n| Particle::new(Vector::<D>::repeat(n as f64 / 3.0), 0.1)).collect();
             trajectory.push(0.1, &particles, &vec![Twist::default(); count]);
