@@ -22,6 +22,7 @@ mod block;
 mod blocked;
 mod chebyshev;
 mod direct;
+mod exchange;
 mod krylov;
 mod operator;
 pub mod parallel;
@@ -37,6 +38,7 @@ pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
+pub use exchange::DenseSymmetric;
 pub use krylov::{Cg, CgParams, Fgmres, FgmresParams, KrylovError, KrylovReport, Reference};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, SinglePrecision};
 pub use scalar::Scalar;

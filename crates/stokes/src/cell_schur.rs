@@ -7,7 +7,7 @@
 use gluey_fem::Reference;
 use gluey_fem::element::split;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{BlockError, DenseCholesky, vector};
+use gluey_linalg::{BlockError, DenseSymmetric};
 
 use crate::discretisation::Discretisation;
 use crate::system::{ActiveCell, StokesSystem};
@@ -91,18 +91,22 @@ where
     fn of(&self, viscous: f64, divergence: f64, scale: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
         let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
         // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.
-        let fluid = self.reference.viscous.iter().zip(&self.rigid);
-        let mut matrix: Vec<f64> = fluid.map(|(k, r)| viscous * (k + r)).collect();
-        matrix.iter_mut().zip(own).for_each(|(a, k)| *a += scale * k);
-        let factor = DenseCholesky::new(n, matrix)?;
-        let mut schur = Vec::with_capacity(m * m);
-        for load in self.reference.divergence.chunks_exact(n) {
-            let mut v = load.to_vec();
-            factor.solve_in_place(&mut v);
-            let rows = self.reference.divergence.chunks_exact(n);
-            schur.extend(rows.map(|row| divergence * divergence * vector::dot(row, &v)));
+        let mut matrix = DenseSymmetric::zeros(n + m);
+        let fluid = self.reference.viscous.chunks_exact(n).zip(self.rigid.chunks_exact(n));
+        for (row, (fluid, rigid)) in fluid.enumerate() {
+            let target = &mut matrix.row_mut(row)[..=row];
+            let sums = fluid.iter().zip(rigid).map(|(k, r)| viscous * (k + r));
+            target.iter_mut().zip(sums).for_each(|(a, k)| *a = k);
+            let own = own.chunks_exact(n).nth(row).into_iter().flatten();
+            target.iter_mut().zip(own).for_each(|(a, k)| *a += scale * k);
         }
-        Ok(schur)
+        for (q, load) in self.reference.divergence.chunks_exact(n).enumerate() {
+            let target = matrix.row_mut(n + q).iter_mut();
+            target.zip(load).for_each(|(a, b)| *a = divergence * b);
+        }
+        matrix.eliminate(n)?;
+        let entry = |q: usize, r: usize| -matrix.row(n + q.max(r))[n + q.min(r)];
+        Ok((0..m * m).map(|k| entry(k / m, k % m)).collect())
     }
 }
 
