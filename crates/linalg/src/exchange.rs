@@ -5,27 +5,27 @@
 //! 10.2307/2683825). After all unknowns have gone it is `-A^-1`. If only the first ones go, what is left of the others is
 //! their Schur complement.
 //!
-//! The loops are compiled for the widest vectors the processor has. None of the variants rounds differently.
+//! The loops are compiled for the vectors the processor has; where it fuses products and sums, they are fused.
+
+use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 use crate::BlockError;
 
-/// Numbers in a vector.
+/// Rows are padded to a multiple of this, which is one of the numbers in a vector.
 const LANES: usize = 8;
 /// Unknowns that are exchanged at once.
 const GROUP: usize = 4;
-
-type Vector = [f64; LANES];
 
 /// A dense symmetric matrix, of which the lower triangle counts.
 #[derive(Clone, Debug, Default)]
 pub struct DenseSymmetric {
     dim: usize,
-    /// Vectors in a row.
-    width: usize,
+    /// Numbers in a padded row.
+    stride: usize,
     /// Row by row.
-    values: Vec<Vector>,
+    values: Vec<f64>,
     /// The rows `A_K` of the group that is exchanged, one after the other.
-    group: Vec<Vector>,
+    group: Vec<f64>,
 }
 
 impl DenseSymmetric {
@@ -38,10 +38,10 @@ impl DenseSymmetric {
 
     /// Makes it a zero matrix of `dim` rows.
     pub fn reset(&mut self, dim: usize) {
-        (self.dim, self.width) = (dim, dim.div_ceil(LANES));
+        (self.dim, self.stride) = (dim, dim.next_multiple_of(LANES));
         self.values.clear();
-        self.values.resize(dim * self.width, [0.0; LANES]);
-        self.group.resize(GROUP * self.width, [0.0; LANES]);
+        self.values.resize(dim * self.stride, 0.0);
+        self.group.resize(GROUP * self.stride, 0.0);
     }
 
     /// Number of rows.
@@ -51,64 +51,24 @@ impl DenseSymmetric {
 
     /// A row up to and with the diagonal.
     pub fn row(&self, row: usize) -> &[f64] {
-        &self.values[row * self.width..].as_flattened()[..=row]
+        &self.values[row * self.stride..][..=row]
     }
 
     /// A whole row; what stands behind the diagonal is ignored.
     pub fn row_mut(&mut self, row: usize) -> &mut [f64] {
-        &mut self.values[row * self.width..].as_flattened_mut()[..self.dim]
+        &mut self.values[row * self.stride..][..self.dim]
     }
 
     /// Replaces a positive definite matrix by the negative of its inverse.
     pub fn invert_to_negative(&mut self) -> Result<(), BlockError> {
-        self.dispatch::<true>(self.dim)
+        let count = self.dim;
+        Arch::new().dispatch(Exchange::<true> { matrix: self, count })
     }
 
     /// Replaces the part of the matrix beyond the first `count` unknowns, on which it is positive definite, by the Schur
     /// complement; the rest is lost.
     pub fn eliminate(&mut self, count: usize) -> Result<(), BlockError> {
-        self.dispatch::<false>(count)
-    }
-
-    fn dispatch<const BACKWARD: bool>(&mut self, count: usize) -> Result<(), BlockError> {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                // SAFETY: the instructions the function is compiled for were detected just above; its code is the safe
-                // `exchange`, with which the test `wide_and_portable_loops_agree` compares it.
-                return unsafe { exchange_avx512::<BACKWARD>(self, count) };
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: as above.
-                return unsafe { exchange_avx2::<BACKWARD>(self, count) };
-            }
-        }
-        self.exchange::<BACKWARD>(count)
-    }
-
-    /// Exchanges the first `count` unknowns. Unless `BACKWARD`, what becomes of those that have gone is not computed.
-    #[inline(always)]
-    fn exchange<const BACKWARD: bool>(&mut self, count: usize) -> Result<(), BlockError> {
-        for first in (0..count).step_by(GROUP) {
-            let size = GROUP.min(count - first);
-            let inverse = self.invert_pivots(first, size)?;
-            self.gather(first, size);
-            let group = first..first + size;
-            let start = if BACKWARD { 0 } else { group.end };
-            for row in (start..self.dim).filter(|row| !group.contains(row)) {
-                let factors = self.factors(row, &inverse);
-                self.subtract(row, if BACKWARD { 0 } else { start / LANES }, &factors);
-                if BACKWARD {
-                    self.write_beside(row, first, &factors[..size]);
-                }
-            }
-            if BACKWARD {
-                for (i, row) in inverse[..size].iter().enumerate() {
-                    self.write_beside(first + i, first, &row.map(|p| -p)[..=i]);
-                }
-            }
-        }
-        Ok(())
+        Arch::new().dispatch(Exchange::<false> { matrix: self, count })
     }
 
     /// `P^-1` for the group of `size` unknowns from `first` on, with zeros around it.
@@ -137,9 +97,7 @@ impl DenseSymmetric {
     /// Takes the rows of the group out of the lower triangle.
     #[inline(always)]
     fn gather(&mut self, first: usize, size: usize) {
-        let (stride, dim) = (self.width * LANES, self.dim);
-        let values = self.values.as_flattened();
-        let group = self.group.as_flattened_mut();
+        let Self { dim, stride, ref values, ref mut group } = *self;
         group[size * stride..].fill(0.0);
         for k in 0..size {
             let (row, pivot) = (&mut group[k * stride..][..stride], first + k);
@@ -151,25 +109,26 @@ impl DenseSymmetric {
     /// `A_iK P^-1`.
     #[inline(always)]
     fn factors(&self, row: usize, inverse: &[[f64; GROUP]; GROUP]) -> [f64; GROUP] {
-        let group = self.group.as_flattened();
-        let entries: [f64; GROUP] = std::array::from_fn(|k| group[k * self.width * LANES + row]);
+        let entries: [f64; GROUP] = std::array::from_fn(|k| self.group[k * self.stride + row]);
         std::array::from_fn(|k| {
             let [a, b, c, d] = std::array::from_fn(|l| entries[l] * inverse[l][k]);
             (a + b) + (c + d)
         })
     }
 
-    /// Subtracts the multiples `factors` of the rows of the group, from the vector `start` of the row on.
+    /// Subtracts the multiples `factors` of the rows of the group, in the columns from `start` on, which is a multiple of
+    /// [`LANES`].
     #[inline(always)]
-    fn subtract(&mut self, row: usize, start: usize, factors: &[f64; GROUP]) {
-        let end = row / LANES + 1;
-        let target = &mut self.values[row * self.width..][start..end];
-        let [a, b, c, d]: [&[Vector]; GROUP] =
-            std::array::from_fn(|k| &self.group[k * self.width..][start..end]);
-        for (target, ((a, b), (c, d))) in target.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
-            for l in 0..LANES {
-                let sum = (factors[0] * a[l] + factors[1] * b[l]) + (factors[2] * c[l] + factors[3] * d[l]);
-                target[l] -= sum;
+    fn subtract<S: Simd>(&mut self, simd: S, row: usize, start: usize, factors: &[f64; GROUP]) {
+        let columns = start..(row + 1).next_multiple_of(LANES);
+        let (target, _) = S::as_mut_simd_f64s(&mut self.values[row * self.stride..][columns.clone()]);
+        let group: [&[S::f64s]; GROUP] = std::array::from_fn(|k| {
+            &S::as_simd_f64s(&self.group[k * self.stride..][columns.clone()]).0[..target.len()]
+        });
+        let factors = factors.map(|factor| simd.splat_f64s(-factor));
+        for (i, target) in target.iter_mut().enumerate() {
+            for (factor, row) in factors.iter().zip(&group) {
+                *target = simd.mul_add_e_f64s(*factor, row[i], *target);
             }
         }
     }
@@ -177,33 +136,52 @@ impl DenseSymmetric {
     /// Writes entries of a row in the columns from `first` on.
     #[inline(always)]
     fn write_beside(&mut self, row: usize, first: usize, entries: &[f64]) {
-        let stride = self.width * LANES;
-        let values = self.values.as_flattened_mut();
         for (column, &entry) in (first..).zip(entries) {
-            values[row.max(column) * stride + row.min(column)] = entry;
+            self.values[row.max(column) * self.stride + row.min(column)] = entry;
         }
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn exchange_avx512<const BACKWARD: bool>(
-    matrix: &mut DenseSymmetric,
+/// Exchanges the first `count` unknowns. Unless `BACKWARD`, what becomes of those that have gone is not computed.
+struct Exchange<'a, const BACKWARD: bool> {
+    matrix: &'a mut DenseSymmetric,
     count: usize,
-) -> Result<(), BlockError> {
-    matrix.exchange::<BACKWARD>(count)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn exchange_avx2<const BACKWARD: bool>(matrix: &mut DenseSymmetric, count: usize) -> Result<(), BlockError> {
-    matrix.exchange::<BACKWARD>(count)
+impl<const BACKWARD: bool> WithSimd for Exchange<'_, BACKWARD> {
+    type Output = Result<(), BlockError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { matrix, count } = self;
+        for first in (0..count).step_by(GROUP) {
+            let size = GROUP.min(count - first);
+            let inverse = matrix.invert_pivots(first, size)?;
+            matrix.gather(first, size);
+            let group = first..first + size;
+            let start = if BACKWARD { 0 } else { group.end };
+            for row in (start..matrix.dim).filter(|row| !group.contains(row)) {
+                let factors = matrix.factors(row, &inverse);
+                matrix.subtract(simd, row, start / LANES * LANES, &factors);
+                if BACKWARD {
+                    matrix.write_beside(row, first, &factors[..size]);
+                }
+            }
+            if BACKWARD {
+                for (i, row) in inverse[..size].iter().enumerate() {
+                    matrix.write_beside(first + i, first, &row.map(|p| -p)[..=i]);
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::vector;
+    use faer::traits::pulp::Scalar;
 
     /// A random positive definite matrix, and its entries.
     fn random(dim: usize) -> (DenseSymmetric, Vec<f64>) {
@@ -257,16 +235,13 @@ mod tests {
     }
 
     #[test]
-    fn wide_and_portable_loops_agree() {
-        for dim in [5, 27, 81] {
-            let (matrix, _) = random(dim);
-            let run = |exchange: &dyn Fn(&mut DenseSymmetric) -> Result<(), BlockError>| {
-                let mut matrix = matrix.clone();
-                exchange(&mut matrix).expect("positive definite");
-                matrix.values
-            };
-            assert_eq!(run(&|m| m.invert_to_negative()), run(&|m| m.exchange::<true>(dim)));
-            assert_eq!(run(&|m| m.eliminate(dim - 2)), run(&|m| m.exchange::<false>(dim - 2)));
+    fn plain_loops_give_the_same_to_rounding() {
+        let (mut wide, _) = random(81);
+        let mut plain = wide.clone();
+        wide.eliminate(70).expect("positive definite");
+        Exchange::<false> { matrix: &mut plain, count: 70 }.with_simd(Scalar).expect("positive definite");
+        for (a, b) in (70..81).flat_map(|row| wide.row(row)[70..].iter().zip(&plain.row(row)[70..])) {
+            assert!((a - b).abs() < 1e-12 * plain.row(70)[70], "{a} {b}");
         }
     }
 

@@ -187,13 +187,15 @@ pub fn assemble_viscous<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    assemble_viscous_on(discretisation, system, |_| true)
+    let elements = Elements::new(discretisation, system, Reference::<D>::VELOCITY);
+    assemble_viscous_on(discretisation, system, &elements, |_| true)
 }
 
 /// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all twists.
 pub fn assemble_viscous_on<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
+    elements: &Elements<'_, D>,
     keep: impl Fn(usize) -> bool,
 ) -> Result<Assembled, SparseError>
 where
@@ -207,7 +209,7 @@ where
     let forms = |cell: usize, local: &mut CellForms| {
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
     };
-    assemble(system, unknowns, forms, &Elements::new(discretisation, system, Reference::<D>::VELOCITY))
+    assemble(system, unknowns, forms, elements)
 }
 
 fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool

@@ -9,15 +9,15 @@ use gluey_fem::element::split;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockError, DenseSymmetric};
 
-use crate::discretisation::Discretisation;
+use crate::element::Elements;
 use crate::system::{ActiveCell, StokesSystem};
 
-/// Matrices on the pressures of single cells whose sum is close to twice the Schur complement.
+/// Matrices on the pressures of the active cells whose sum is close to twice the Schur complement.
 pub struct PressureMatrices {
     /// That of the unit cube at viscosity one.
     unit: Vec<f64>,
-    /// Viscosity of each cell.
-    viscosity: Vec<f64>,
+    /// The multiple of it that each cell has.
+    scales: Vec<f64>,
     /// Those of cut cells.
     own: Vec<Option<Vec<f64>>>,
 }
@@ -28,41 +28,41 @@ impl PressureMatrices {
     /// # Errors
     /// [`BlockError`] if the viscosity of a cut cell is not positive.
     pub fn new<const D: usize>(
-        discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
+        elements: &Elements<'_, D>,
         viscosity: f64,
     ) -> Result<Self, BlockError>
     where
         Dim<D>: Space<D>,
     {
-        let cell_count = discretisation.mesh.cell_count();
+        let cells = elements.cells().iter().enumerate();
+        let scale = |(index, cell): (usize, &ActiveCell)| {
+            cell.volume * cell.viscous / (viscosity * elements.viscous(index).0)
+        };
         let mut new = Self {
             unit: Reference::<D>::new().pressure_mass.to_vec(),
-            viscosity: vec![viscosity; cell_count],
-            own: vec![None; cell_count],
+            scales: cells.clone().map(scale).collect(),
+            own: vec![None; elements.cells().len()],
         };
-        let Some(penalty) = &system.penalty else { return Ok(new) };
+        if system.penalty.is_none() {
+            return Ok(new);
+        }
         let schur = CellSchur::<D>::new()?;
         new.unit = schur.unit.iter().map(|s| 2.0 * s).collect();
-        let mut failed = Ok(());
-        penalty.stress.for_each_cell(|cell, scale, own| {
-            let (h, cell) = (discretisation.cell_size(cell as usize), cell as usize);
-            let (stiffness, scale) = (h.powi(D as i32 - 2), penalty.factor * scale);
-            match own.map(|own| schur.of(viscosity * stiffness, h.powi(D as i32 - 1), scale, own)) {
-                None => new.viscosity[cell] += scale / stiffness,
-                Some(Ok(matrix)) => new.own[cell] = Some(matrix.iter().map(|s| 2.0 * s).collect()),
-                Some(Err(error)) => failed = Err(error),
+        for (index, cell) in cells {
+            if let (viscous, Some(own)) = elements.viscous(index) {
+                let matrix = schur.of(viscous, cell.divergence, own)?;
+                new.own[index] = Some(matrix.iter().map(|s| 2.0 * s).collect());
             }
-        });
-        failed.map(|()| new)
+        }
+        Ok(new)
     }
 
-    /// Matrix of a cell, and the factor it is to be multiplied by.
-    pub fn of(&self, cell: &ActiveCell) -> (f64, &[f64]) {
-        let index = cell.cell as usize;
+    /// Matrix of an active cell, and the factor it is to be multiplied by.
+    pub fn of(&self, index: usize) -> (f64, &[f64]) {
         match &self.own[index] {
             Some(own) => (1.0, own),
-            None => (cell.volume / self.viscosity[index], &self.unit),
+            None => (self.scales[index], &self.unit),
         }
     }
 }
@@ -83,12 +83,12 @@ where
     fn new() -> Result<Self, BlockError> {
         let (reference, rigid) = (Reference::<D>::new(), rigid_projector::<D>());
         let mut new = Self { unit: Vec::new(), reference, rigid };
-        new.unit = new.of(1.0, 1.0, 0.0, &[])?;
+        new.unit = new.of(1.0, 1.0, &[])?;
         Ok(new)
     }
 
-    /// That of a cell with the matrices `A_c = viscous K + scale own` and `B_c = divergence B`, row by row.
-    fn of(&self, viscous: f64, divergence: f64, scale: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
+    /// That of a cell with the matrices `A_c = viscous K + own` and `B_c = divergence B`, row by row.
+    fn of(&self, viscous: f64, divergence: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
         let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
         // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.
         let mut matrix = DenseSymmetric::zeros(n + m);
@@ -98,7 +98,7 @@ where
             let sums = fluid.iter().zip(rigid).map(|(k, r)| viscous * (k + r));
             target.iter_mut().zip(sums).for_each(|(a, k)| *a = k);
             let own = own.chunks_exact(n).nth(row).into_iter().flatten();
-            target.iter_mut().zip(own).for_each(|(a, k)| *a += scale * k);
+            target.iter_mut().zip(own).for_each(|(a, k)| *a += k);
         }
         for (q, load) in self.reference.divergence.chunks_exact(n).enumerate() {
             let target = matrix.row_mut(n + q).iter_mut();
@@ -159,9 +159,10 @@ mod tests {
     {
         let schur = CellSchur::<D>::new().unwrap();
         let (eta, h) = (40.0, 0.25f64);
-        let own = Reference::<D>::new().viscous;
         let stiffness = h.powi(D as i32 - 2);
-        let found = schur.of(stiffness, h.powi(D as i32 - 1), (eta - 1.0) * stiffness, own).unwrap();
+        let solid = Reference::<D>::new().viscous.iter().map(|k| (eta - 1.0) * stiffness * k);
+        let own: Vec<f64> = solid.collect();
+        let found = schur.of(stiffness, h.powi(D as i32 - 1), &own).unwrap();
         for (a, b) in found.iter().zip(&schur.unit) {
             assert!((a - h.powi(D as i32) / eta * b).abs() < 1e-9);
         }

@@ -4,7 +4,7 @@ use gluey_fem::Reference;
 use gluey_geom::{Dim, Space};
 
 use crate::discretisation::Discretisation;
-use crate::system::StokesSystem;
+use crate::system::{ActiveCell, StokesSystem};
 
 /// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures that no
 /// velocity sees harmless. The solve corrects it.
@@ -48,6 +48,18 @@ where
         self.size
     }
 
+    /// The active cells.
+    pub fn cells(&self) -> &'a [ActiveCell] {
+        &self.system.cells
+    }
+
+    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a surface cuts it.
+    pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
+        let size = Reference::<D>::VELOCITY.pow(2);
+        let own = self.additional[index].map(|own| &self.own[own as usize * size..][..size]);
+        (self.viscous[index], own)
+    }
+
     fn add_penalty(&mut self, cell_count: usize) {
         let Some(penalty) = &self.system.penalty else { return };
         let mut slot = vec![usize::MAX; cell_count];
@@ -55,6 +67,7 @@ where
             slot[cell.cell as usize] = k;
         }
         let mut own_count = 0;
+        self.own.reserve_exact(penalty.stress.cut_cell_count() * Reference::<D>::VELOCITY.pow(2));
         penalty.stress.for_each_cell(|cell, scale, own| {
             let slot = slot[cell as usize];
             let scale = penalty.factor * scale;
@@ -72,12 +85,11 @@ where
     /// Writes the matrix of an active cell, row by row.
     pub fn fill(&self, index: usize, matrix: &mut [f64]) {
         let (n, size) = (Reference::<D>::VELOCITY, self.size);
-        let viscous = self.viscous[index];
+        let (viscous, own) = self.viscous(index);
         for (row, from) in matrix.chunks_exact_mut(size).zip(self.reference.viscous.chunks_exact(n)) {
             row.iter_mut().zip(from).for_each(|(value, k)| *value = viscous * k);
         }
-        if let Some(own) = self.additional[index] {
-            let own = &self.own[own as usize * n * n..][..n * n];
+        if let Some(own) = own {
             for (row, from) in matrix.chunks_exact_mut(size).zip(own.chunks_exact(n)) {
                 row.iter_mut().zip(from).for_each(|(value, k)| *value += k);
             }

@@ -10,8 +10,8 @@
 
 use std::sync::Arc;
 
-use gluey_fem::Interpolation;
 use gluey_fem::cells::Workspace;
+use gluey_fem::{Interpolation, Reference as Matrices};
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Body;
 use gluey_linalg::{
@@ -20,6 +20,7 @@ use gluey_linalg::{
 
 use crate::assembly::{Unknowns, assemble_viscous};
 use crate::discretisation::{Discretisation, solid_nodes};
+use crate::element::Elements;
 use crate::error::StokesError;
 use crate::level::{Level, Smoothing};
 use crate::pressure::WeakPressures;
@@ -77,8 +78,9 @@ where
         system: &StokesSystem<D>,
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError> {
-        self.cycle = Some(VCycle::new(discretisation, system, preparation)?);
-        self.schur = Some(SchurInverse::new(discretisation, system, preparation.viscosity)?);
+        let elements = Elements::new(discretisation, system, Matrices::<D>::VELOCITY);
+        self.cycle = Some(VCycle::new(discretisation, system, &elements, preparation)?);
+        self.schur = Some(SchurInverse::new(discretisation, system, &elements, preparation.viscosity)?);
         Ok(())
     }
 
@@ -167,6 +169,7 @@ where
     fn new(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
+        elements: &Elements<'_, D>,
         preparation: &Preparation<'_, D>,
     ) -> Result<Self, StokesError> {
         let finest = discretisation.mesh.max_level();
@@ -200,7 +203,7 @@ where
             Some(touched) => {
                 let radii = preparation.bodies.iter().map(Body::bounding_radius);
                 let hierarchy = (radii.fold(0.0, f64::max), &meshes[..meshes.len() - 1]);
-                Some(SolidBlock::new(discretisation, system, touched, finest, hierarchy)?)
+                Some(SolidBlock::new(discretisation, system, elements, touched, finest, hierarchy)?)
             }
             None => None,
         };

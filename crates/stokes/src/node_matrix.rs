@@ -1,45 +1,130 @@
 //! Symmetric sparse matrices in blocks, one for each pair of nodes, and their Galerkin products.
 
-use gluey_linalg::{BlockGroups, BlockPattern, LinOp, SparseMatrix};
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{BlockGroups, BlockPattern, LinOp, Pattern, SparseMatrix};
 
+use crate::element::Elements;
 use crate::error::StokesError;
+use crate::solid_cycle::Numbered;
+
+/// Rows of a matrix on the `D` components of two nodes.
+type Block<const D: usize> = [[f64; D]; D];
 
 /// A symmetric matrix on the `D` velocity components of numbered nodes.
 pub struct NodeMatrix<const D: usize> {
     /// First block of each row of blocks, then their number.
     start: Vec<u32>,
     columns: Vec<u32>,
-    /// `D x D` numbers each, row by row.
-    blocks: Vec<f64>,
+    blocks: Vec<Block<D>>,
+}
+
+impl<const D: usize> NodeMatrix<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The sum of the matrices of cells on the numbered nodes.
+    pub fn assembled(nodes: &Numbered<'_, D>, elements: &Elements<'_, D>) -> Result<Self, StokesError> {
+        let (forms, mut terms) = (NodeForms::new(nodes), Vec::new());
+        let (mut cells, mut groups) = (Vec::new(), BlockGroups::default());
+        for (index, cell) in elements.cells().iter().enumerate() {
+            forms.of_cell(cell.cell as usize, &mut terms);
+            if !terms.is_empty() {
+                groups.push(terms.iter().map(|term| term.number as usize));
+                cells.push(index);
+            }
+        }
+        let groups: Vec<&[usize]> = groups.iter().collect();
+        let mut new = Self::zeros(&Pattern::from_groups(nodes.count, &groups)?);
+        let mut element = vec![0.0; elements.size().pow(2)];
+        for index in cells {
+            forms.of_cell(elements.cells()[index].cell as usize, &mut terms);
+            elements.fill(index, &mut element);
+            new.add(&terms, &element, elements.size());
+        }
+        Ok(new)
+    }
+
+    fn zeros(pattern: &Pattern) -> Self {
+        let rows = 0..pattern.row_count();
+        let mut columns = Vec::with_capacity(pattern.entry_count());
+        rows.clone().for_each(|row| columns.extend_from_slice(pattern.columns_of(row)));
+        Self {
+            start: std::iter::once(0).chain(rows.map(|row| pattern.range(row).end as u32)).collect(),
+            columns,
+            blocks: vec![[[0.0; D]; D]; pattern.entry_count()],
+        }
+    }
+
+    /// Adds the matrix of a cell; the terms are sorted by their numbers.
+    fn add(&mut self, terms: &[Term], element: &[f64], size: usize) {
+        for row in terms {
+            let mut place = self.start[row.number as usize] as usize;
+            let rows = &element[row.local as usize * D * size..][..D * size];
+            for column in terms {
+                while self.columns[place] < column.number {
+                    place += 1;
+                }
+                let weight = row.weight * column.weight;
+                for (block, row) in self.blocks[place].iter_mut().zip(rows.chunks_exact(size)) {
+                    let values = &row[column.local as usize * D..][..D];
+                    block.iter_mut().zip(values).for_each(|(entry, value)| *entry += weight * value);
+                }
+            }
+        }
+    }
+}
+
+/// A numbered node that a node of a cell stands for.
+struct Term {
+    number: u32,
+    local: u32,
+    weight: f64,
+}
+
+/// The numbered nodes that nodes stand for: themselves, or the masters they hang on.
+struct NodeForms<'a, const D: usize> {
+    nodes: &'a Numbered<'a, D>,
+    /// Index of the constraint of each node, or `u32::MAX`.
+    constraint: Vec<u32>,
+}
+
+impl<'a, const D: usize> NodeForms<'a, D> {
+    fn new(nodes: &'a Numbered<'a, D>) -> Self {
+        let mut constraint = vec![u32::MAX; nodes.number.len()];
+        for (k, hanging) in nodes.mesh.velocity.constraints().iter().enumerate() {
+            constraint[hanging.node as usize] = k as u32;
+        }
+        Self { nodes, constraint }
+    }
+
+    /// The terms of a cell, sorted by their numbers.
+    fn of_cell(&self, cell: usize, terms: &mut Vec<Term>) {
+        terms.clear();
+        let nodes = &self.nodes.mesh.velocity;
+        for (local, &node) in (0..).zip(nodes.cell(cell)) {
+            let mut push = |node: u32, weight: f64| match self.nodes.number[node as usize] {
+                u32::MAX => {}
+                number => terms.push(Term { number, local, weight }),
+            };
+            match nodes.constraints().get(self.constraint[node as usize] as usize) {
+                None => push(node, 1.0),
+                Some(hanging) => hanging.masters.iter().for_each(|&(master, weight)| push(master, weight)),
+            }
+        }
+        terms.sort_unstable_by_key(|term| (term.number, term.local));
+    }
 }
 
 impl<const D: usize> NodeMatrix<D> {
-    /// The blocks of a matrix whose unknowns are the components of node after node.
-    pub fn from_sparse(matrix: &SparseMatrix) -> Self {
-        let pattern = matrix.pattern();
-        let mut new = Self { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
-        for row in 0..pattern.row_count() / D {
-            let rows: [&[f64]; D] = std::array::from_fn(|a| &matrix.values()[pattern.range(row * D + a)]);
-            let columns = pattern.columns_of(row * D).iter().step_by(D);
-            for (k, &column) in columns.enumerate() {
-                new.columns.push(column / D as u32);
-                rows.iter().for_each(|row| new.blocks.extend_from_slice(&row[k * D..(k + 1) * D]));
-            }
-            new.start.push(new.columns.len() as u32);
-        }
-        new
-    }
-
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.start.len() - 1
     }
 
     /// The blocks in a row, `(column, block)`, columns ascending.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (u32, &[f64])> {
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (u32, &Block<D>)> {
         let range = self.start[row] as usize..self.start[row + 1] as usize;
-        let blocks = self.blocks[range.start * D * D..range.end * D * D].chunks_exact(D * D);
-        self.columns[range].iter().copied().zip(blocks)
+        self.columns[range.clone()].iter().copied().zip(&self.blocks[range])
     }
 
     /// The diagonal.
@@ -47,7 +132,10 @@ impl<const D: usize> NodeMatrix<D> {
         let mut diagonal = vec![0.0; self.node_count() * D];
         for (node, diagonal) in diagonal.chunks_exact_mut(D).enumerate() {
             if let Some((_, block)) = self.row(node).find(|(column, _)| *column as usize == node) {
-                diagonal.iter_mut().zip(block.iter().step_by(D + 1)).for_each(|(d, &value)| *d = value);
+                diagonal
+                    .iter_mut()
+                    .zip(block.as_flattened().iter().step_by(D + 1))
+                    .for_each(|(d, &value)| *d = value);
             }
         }
         diagonal
@@ -62,10 +150,10 @@ impl<const D: usize> NodeMatrix<D> {
         }
         let first = (0..=self.node_count() * D).step_by(D).map(|k| k as u32).collect();
         let pattern = BlockPattern::new(first, pairs)?;
-        let mut values = Vec::with_capacity(self.blocks.len());
+        let mut values = Vec::with_capacity(self.blocks.len() * D * D);
         for row in 0..self.node_count() {
             for a in 0..D {
-                self.row(row).for_each(|(_, block)| values.extend_from_slice(&block[a * D..(a + 1) * D]));
+                self.row(row).for_each(|(_, block)| values.extend_from_slice(&block[a]));
             }
         }
         let mut matrix = SparseMatrix::zeros(pattern.pattern().clone());
@@ -97,8 +185,8 @@ impl<const D: usize> NodeMatrix<D> {
             *y = [0.0; D];
             for (column, block) in self.row(row) {
                 let x = &x[column as usize * D..][..D];
-                for (y, block) in y.iter_mut().zip(block.chunks_exact(D)) {
-                    *y += block.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+                for (y, row) in y.iter_mut().zip(block) {
+                    *y += row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
                 }
             }
         }
@@ -130,19 +218,19 @@ struct Sum<const D: usize> {
     /// Place of each column among those met, or `u32::MAX`.
     place: Vec<u32>,
     columns: Vec<u32>,
-    blocks: Vec<f64>,
+    blocks: Vec<Block<D>>,
 }
 
 impl<const D: usize> Sum<D> {
-    fn add(&mut self, column: u32, weight: f64, block: &[f64]) {
+    fn add(&mut self, column: u32, weight: f64, block: &Block<D>) {
         let place = &mut self.place[column as usize];
         if *place == u32::MAX {
             *place = self.columns.len() as u32;
             self.columns.push(column);
-            self.blocks.resize(self.columns.len() * D * D, 0.0);
+            self.blocks.push([[0.0; D]; D]);
         }
-        let sum = &mut self.blocks[*place as usize * D * D..][..D * D];
-        sum.iter_mut().zip(block).for_each(|(sum, value)| *sum += weight * value);
+        let sum = self.blocks[*place as usize].as_flattened_mut();
+        sum.iter_mut().zip(block.as_flattened()).for_each(|(sum, value)| *sum += weight * value);
     }
 }
 
@@ -160,7 +248,7 @@ fn sum_of_rows<const D: usize>(
         for column in sum.columns.drain(..) {
             let place = std::mem::replace(&mut sum.place[column as usize], u32::MAX) as usize;
             new.columns.push(column);
-            new.blocks.extend_from_slice(&sum.blocks[place * D * D..(place + 1) * D * D]);
+            new.blocks.push(sum.blocks[place]);
         }
         sum.blocks.clear();
         new.start.push(new.columns.len() as u32);
@@ -199,13 +287,19 @@ impl Prolongation {
     }
 
     fn transposed(&self) -> Self {
-        let mut rows = vec![Vec::new(); self.coarse_count];
-        for node in 0..self.start.len() - 1 {
-            self.of(node)
-                .iter()
-                .for_each(|&(coarse, weight)| rows[coarse as usize].push((node as u32, weight)));
+        let fine_count = self.start.len() - 1;
+        let mut start = vec![0; self.coarse_count + 1];
+        self.terms.iter().for_each(|term| start[term.0 as usize + 1] += 1);
+        (0..self.coarse_count).for_each(|coarse| start[coarse + 1] += start[coarse]);
+        let mut next = start.clone();
+        let mut terms = vec![(0, 0.0); self.terms.len()];
+        for node in 0..fine_count {
+            for &(coarse, weight) in self.of(node) {
+                terms[next[coarse as usize] as usize] = (node as u32, weight);
+                next[coarse as usize] += 1;
+            }
         }
-        Self::new(self.start.len() - 1, rows.into_iter())
+        Self { start, terms, coarse_count: fine_count }
     }
 
     /// `fine += P coarse` for `D` components. Nodes beyond its rows are left alone.
@@ -229,6 +323,25 @@ impl Prolongation {
                 to.iter_mut().zip(fine).for_each(|(to, value)| *to += weight * value);
             }
         }
+    }
+}
+
+#[cfg(test)]
+impl<const D: usize> NodeMatrix<D> {
+    /// The blocks of a matrix whose unknowns are the components of node after node.
+    pub fn from_sparse(matrix: &SparseMatrix) -> Self {
+        let pattern = matrix.pattern();
+        let mut new = Self { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
+        for row in 0..pattern.row_count() / D {
+            let columns = pattern.columns_of(row * D).iter().step_by(D).map(|column| column / D as u32);
+            for column in columns {
+                let entry = |a: usize, b: usize| matrix.get(row * D + a, column as usize * D + b);
+                new.blocks.push(std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b))));
+                new.columns.push(column);
+            }
+            new.start.push(new.columns.len() as u32);
+        }
+        new
     }
 }
 

@@ -108,7 +108,7 @@ fn block_on<const D: usize>(
         for (column, block) in matrix.row(node as usize) {
             let j = place[column as usize];
             if j <= i as u32 {
-                for (a, row) in block.chunks_exact(D).enumerate() {
+                for (a, row) in block.iter().enumerate() {
                     dense.row_mut(i * D + a)[j as usize * D..][..D].copy_from_slice(row);
                 }
             }

@@ -1,13 +1,16 @@
 //! Viscous matrices of cells whose viscosity varies, by quadrature.
 //!
-//! With the slopes `G[q, (i, a)] = d_a phi_i(x_q)` and `S = sum_q w_q eta_q G_q^T G_q` the matrix of
-//! `int 2 eta eps(u):eps(v)` is `K[(i,a),(j,b)] = S[(i,b),(j,a)] + [a = b] sum_d S[(i,d),(j,d)]`.
+//! With `S[(i,a),(j,b)] = sum_q w_q eta_q d_a phi_i(x_q) d_b phi_j(x_q)` the matrix of `int 2 eta eps(u):eps(v)` is
+//! `K[(i,a),(j,b)] = S[(i,b),(j,a)] + [a = b] sum_d S[(i,d),(j,d)]`. Points and shape functions are products of those on a
+//! line, so the sum over points is taken one direction after the other (Orszag 1980, 10.1016/0021-9991(80)90005-4).
 
 use gluey_fem::Reference;
-use gluey_fem::element::{gauss_cube, gradient, value};
+use gluey_fem::element::{derivatives_1d, gauss, gauss_cube, split, value, values_1d};
 
-/// Points that are summed in one pass over a row.
-const AT_ONCE: usize = 4;
+/// Shape functions on a line.
+const LINE: usize = 3;
+/// Pairs of them.
+const PAIRS: usize = LINE * LINE;
 
 /// The velocity shape functions at the quadrature points of a cell.
 #[derive(Clone, Debug)]
@@ -15,11 +18,15 @@ pub struct PointMatrices<const D: usize> {
     /// Points a direction.
     line: usize,
     points: Vec<([f64; D], f64)>,
-    /// Slopes at each point, one by one.
-    slopes: Vec<f64>,
     /// Values at each point.
     shapes: Vec<Vec<f64>>,
+    /// `f_k(x_q) g_l(x_q)` at the points of a line for all pairs `(k, l)`, where `f` are the shape functions or, in the last
+    /// two, their slopes, and `g` those or, in the second and the last, their slopes.
+    products: [Vec<[f64; PAIRS]>; 4],
 }
+
+/// Whether the first and the second factor of a product are slopes.
+type Slopes = (bool, bool);
 
 impl<const D: usize> PointMatrices<D> {
     /// Prepares the tensor-product Gauss rule with `points` points a direction.
@@ -27,13 +34,19 @@ impl<const D: usize> PointMatrices<D> {
         let points = gauss_cube::<D>(line);
         let nodes = Reference::<D>::VELOCITY / D;
         let shape = |(x, _): &([f64; D], f64)| (0..nodes).map(|i| value::<D>(2, i, x)).collect();
-        let slopes =
-            |(x, _): &([f64; D], f64)| (0..nodes).flat_map(|i| gradient::<D>(2, i, x)).collect::<Vec<_>>();
+        let factor = |is_slope: bool, x: f64| if is_slope { derivatives_1d(2, x) } else { values_1d(2, x) };
+        let products = |(f, g): Slopes| {
+            let at = |x: f64| {
+                let (f, g) = (factor(f, x), factor(g, x));
+                std::array::from_fn(|pair| f[pair / LINE] * g[pair % LINE])
+            };
+            gauss(line).iter().map(|point| at(point.0)).collect()
+        };
         Self {
             line,
-            slopes: points.iter().flat_map(slopes).collect(),
             shapes: points.iter().map(shape).collect(),
             points,
+            products: [(false, false), (false, true), (true, false), (true, true)].map(products),
         }
     }
 
@@ -50,47 +63,81 @@ impl<const D: usize> PointMatrices<D> {
     /// The matrix `K` for the viscosities `scale * fraction[q]` at the points.
     pub fn matrix(&self, scale: f64, fraction: &[f64]) -> Vec<f64> {
         let n = Reference::<D>::VELOCITY;
-        let mut products = vec![0.0; n * n];
-        let mut terms: Vec<(f64, &[f64])> = self
-            .points
-            .iter()
-            .zip(fraction)
-            .zip(self.slopes.chunks_exact(n))
-            .filter(|((_, fraction), _)| **fraction > 0.0)
-            .map(|((point, fraction), slopes)| (scale * point.1 * fraction, slopes))
-            .collect();
-        terms.resize(terms.len().next_multiple_of(AT_ONCE), (0.0, &self.slopes[..n]));
-        for (row, sums) in products.chunks_exact_mut(n).enumerate() {
-            let sums = &mut sums[..(row / D + 1) * D];
-            for [a, b, c, d] in terms.as_chunks::<AT_ONCE>().0 {
-                let factors = [a, b, c, d].map(|(factor, slopes)| factor * slopes[row]);
-                let slopes = a.1.iter().zip(b.1).zip(c.1.iter().zip(d.1));
-                for (sum, ((a, b), (c, d))) in sums.iter_mut().zip(slopes) {
-                    *sum += (factors[0] * a + factors[1] * b) + (factors[2] * c + factors[3] * d);
+        let weighted = self.points.iter().zip(fraction).map(|(point, fraction)| scale * point.1 * fraction);
+        let weights: Vec<f64> = weighted.collect();
+        let places = pair_places::<D>();
+        let mut matrix = vec![0.0; n * n];
+        let mut work = [Vec::new(), Vec::new()];
+        for a in 0..D {
+            for b in 0..=a {
+                let sums = self.sum(&weights, |d| (d == a, d == b), &mut work);
+                for (&(i, j), &sum) in places.iter().zip(sums) {
+                    add_strain_product::<D>((i * D, j * D), (a, b), sum, &mut matrix);
                 }
             }
         }
-        strain_products::<D>(&products)
+        matrix
+    }
+
+    /// `sum_q weight_q prod_d (f_d g_d)(x_q)` for all pairs of shape functions, in the order of [`pair_places`].
+    fn sum<'a>(
+        &self,
+        weights: &[f64],
+        slopes: impl Fn(usize) -> Slopes,
+        work: &'a mut [Vec<f64>; 2],
+    ) -> &'a [f64] {
+        let [from, to] = work;
+        from.clear();
+        from.extend_from_slice(weights);
+        for d in 0..D {
+            let (f, g) = slopes(d);
+            let products = &self.products[2 * usize::from(f) + usize::from(g)];
+            // Along x first: numbers of pairs come to stand before the points of the directions that are left.
+            let inner = PAIRS.pow(d as u32);
+            to.clear();
+            to.resize(from.len() / self.line * PAIRS, 0.0);
+            let blocks = from.chunks_exact(self.line * inner).zip(to.chunks_exact_mut(PAIRS * inner));
+            for (from, to) in blocks {
+                for (products, from) in products.iter().zip(from.chunks_exact(inner)) {
+                    for (product, to) in products.iter().zip(to.chunks_exact_mut(inner)) {
+                        to.iter_mut().zip(from).for_each(|(to, from)| *to += product * from);
+                    }
+                }
+            }
+            std::mem::swap(from, to);
+        }
+        from
     }
 }
 
-/// From the lower blocks of `S` to `K`.
-fn strain_products<const D: usize>(products: &[f64]) -> Vec<f64> {
+/// The shape functions `(i, j)` whose products [`PointMatrices::sum`] gives one after the other.
+fn pair_places<const D: usize>() -> Vec<(usize, usize)> {
+    let node = |pairs: &[usize; D], along: fn(usize) -> usize| {
+        (0..D).rev().fold(0, |node, d| node * LINE + along(pairs[d]))
+    };
+    let place = |k: usize| {
+        let pairs = split::<D>(k, PAIRS);
+        (node(&pairs, |pair| pair / LINE), node(&pairs, |pair| pair % LINE))
+    };
+    (0..PAIRS.pow(D as u32)).map(place).collect()
+}
+
+/// Adds what `S[(i,a),(j,b)]` and its mirror image contribute to `K`, for `i` and `j` given by their first rows.
+fn add_strain_product<const D: usize>(
+    (i, j): (usize, usize),
+    (a, b): (usize, usize),
+    sum: f64,
+    matrix: &mut [f64],
+) {
     let n = Reference::<D>::VELOCITY;
-    let mut matrix = vec![0.0; n * n];
-    for i in (0..n).step_by(D) {
-        for j in (0..=i).step_by(D) {
-            let trace: f64 = (0..D).map(|d| products[(i + d) * n + j + d]).sum();
-            for a in 0..D {
-                for b in 0..D {
-                    let value = products[(i + b) * n + j + a] + if a == b { trace } else { 0.0 };
-                    matrix[(i + a) * n + j + b] = value;
-                    matrix[(j + b) * n + i + a] = value;
-                }
-            }
-        }
+    matrix[(i + b) * n + j + a] += sum;
+    if a != b {
+        matrix[(j + a) * n + i + b] += sum;
+        return;
     }
-    matrix
+    for d in 0..D {
+        matrix[(i + d) * n + j + d] += sum;
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, SparseMatrix, SpectralInterval, estimate_lambda_max, vector};
 
 use crate::discretisation::Discretisation;
+use crate::element::Elements;
 use crate::error::StokesError;
 use crate::gap::GapInverse;
 use crate::system::{StokesSystem, pressure_mass};
@@ -38,12 +39,13 @@ impl SchurInverse {
     pub fn new<const D: usize>(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
+        elements: &Elements<'_, D>,
         viscosity: f64,
     ) -> Result<Self, StokesError>
     where
         Dim<D>: Space<D>,
     {
-        let mut mass = pressure_mass(discretisation, system, viscosity)?;
+        let mut mass = pressure_mass(discretisation, system, elements, viscosity)?;
         mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
         let gaps = GapInverse::new(discretisation, system, &mass)?;
         let mut mass = mass.converted::<f32>();

@@ -262,6 +262,11 @@ impl<const D: usize> SolidStress<D> {
         }
     }
 
+    /// Number of solid cells that are not wholly inside.
+    pub fn cut_cell_count(&self) -> usize {
+        self.cells.iter().filter(|solid| !solid.fraction.is_empty()).count()
+    }
+
     /// Calls `visit(cell, scale, matrix)` for every solid cell: interior ones have the matrix `scale * K`, cut ones
     /// their own, which is integrated for the visit.
     pub fn for_each_cell(&self, mut visit: impl FnMut(u32, f64, Option<&[f64]>)) {

@@ -18,8 +18,10 @@ use gluey_linalg::{LinOp, vector};
 
 use crate::assembly::assemble_viscous_on;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
+use crate::element::Elements;
 use crate::error::StokesError;
 use crate::level::{cells_touching, nodes_of_cells_with};
+use crate::node_matrix::NodeMatrix;
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
 use crate::system::{ActiveCell, StokesSystem, cell_operator};
@@ -54,6 +56,7 @@ where
     pub fn new(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
+        elements: &Elements<'_, D>,
         touched: &[Option<u32>],
         rigid: &VelocitySpace<D>,
         (radius, meshes): (f64, &[Discretisation<D>]),
@@ -68,20 +71,21 @@ where
         let (block, positions, cycle);
         if is_factorised(discretisation) || meshes.is_empty() {
             block = if D == 2 { around } else { touched };
-            let assembled = assemble_viscous_on(discretisation, system, |node| block[node])?;
+            let assembled = assemble_viscous_on(discretisation, system, elements, |node| block[node])?;
             cycle = SolidCycle::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?;
             positions = assembled.unknowns.positions;
         } else {
-            let assembled = assemble_viscous_on(discretisation, system, |node| touched[node])?;
             let is_free = |node: usize| system.space.is_free(node);
             let solid = Numbered::new(discretisation, |node| is_free(node) && touched[node]);
+            let matrix = NodeMatrix::assembled(&solid, elements)?;
+            let inside = (0..touched.len()).filter(|&n| is_free(n) && touched[n]);
             let ring = (0..touched.len()).filter(|&n| is_free(n) && around[n] && !touched[n]);
-            let ring = ring.flat_map(|n| (n * D..(n + 1) * D).map(|k| k as u32));
-            positions = assembled.unknowns.positions.into_iter().chain(ring).collect();
+            let components = |n: usize| (n * D..(n + 1) * D).map(|k| k as u32);
+            positions = inside.chain(ring).flat_map(components).collect();
             let operator = BlockOperator::new(discretisation, system, &around, &positions);
             let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
             let coarser = meshes.iter().rev().take(smoothed + 1);
-            cycle = SolidCycle::new(operator, solid, &assembled.matrix, coarser)?;
+            cycle = SolidCycle::new(operator, solid, matrix, coarser)?;
             block = around;
         }
         let zeros = || vec![0.0; positions.len()];

@@ -135,10 +135,9 @@ where
     pub fn new<'a>(
         mut operator: BlockOperator<D>,
         solid: Numbered<'a, D>,
-        matrix: &SparseMatrix,
+        mut matrix: NodeMatrix<D>,
         meshes: impl Iterator<Item = &'a Discretisation<D>>,
     ) -> Result<Self, StokesError> {
-        let mut matrix = NodeMatrix::from_sparse(matrix);
         let diagonal = operator.fluid_diagonal().to_vec();
         let finest = Smoother::new(&mut operator, &matrix, solid.cells(), &diagonal)?;
         let mut coarser: Vec<Coarse<D>> = Vec::new();

@@ -13,6 +13,7 @@ use gluey_linalg::{LinOp, Pattern, SparseMatrix, vector};
 
 use crate::cell_schur::PressureMatrices;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
+use crate::element::Elements;
 use crate::error::StokesError;
 use crate::pressure::{PressureSpace, WeakPressures};
 use crate::solid::SolidStress;
@@ -218,13 +219,14 @@ where
 pub fn pressure_mass<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
+    elements: &Elements<'_, D>,
     viscosity: f64,
 ) -> Result<SparseMatrix, StokesError>
 where
     Dim<D>: Space<D>,
 {
     let m = Reference::<D>::PRESSURE;
-    let matrices = PressureMatrices::new(discretisation, system, viscosity)?;
+    let matrices = PressureMatrices::new(system, elements, viscosity)?;
     let expansion = crate::assembly::pressure_expansion(system);
     let unknowns = |c: &ActiveCell| {
         let nodes = discretisation.pressure.cell(c.cell as usize).iter();
@@ -233,9 +235,9 @@ where
     let groups: Vec<Vec<usize>> = system.cells.iter().map(unknowns).collect();
     let mut mass = SparseMatrix::zeros(Arc::new(Pattern::from_groups(system.pressure.dim(), &groups)?));
     drop(groups);
-    for c in &system.cells {
+    for (index, c) in system.cells.iter().enumerate() {
         let nodes = discretisation.pressure.cell(c.cell as usize);
-        let (scale, matrix) = matrices.of(c);
+        let (scale, matrix) = matrices.of(index);
         for (i, &row) in nodes.iter().enumerate() {
             for (j, &column) in nodes.iter().enumerate() {
                 let value = scale * matrix[i * m + j];
