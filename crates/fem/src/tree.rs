@@ -134,6 +134,14 @@ impl<const D: usize> TreeMesh<D> {
         mesh
     }
 
+    /// Whether it is [`TreeMesh::coarsened`] from `fine`.
+    pub fn is_coarsening_of(&self, fine: &Self) -> bool {
+        let same_box =
+            self.domain == fine.domain && self.roots == fine.roots && self.periodic == fine.periodic;
+        let refined = fine.refined.get(..usize::from(self.max_level));
+        same_box && self.max_level <= fine.max_level && refined == Some(self.refined.as_slice())
+    }
+
     /// Number of leaves.
     pub fn cell_count(&self) -> usize {
         self.leaves.len()
@@ -252,6 +260,13 @@ impl<const D: usize> TreeMesh<D> {
     }
 }
 
+/// Meshes of the same box with the same cells and finest lattice.
+impl<const D: usize> PartialEq for TreeMesh<D> {
+    fn eq(&self, other: &Self) -> bool {
+        self.max_level == other.max_level && self.is_coarsening_of(other)
+    }
+}
+
 /// All `3^D` offsets of a cell to itself and its neighbours.
 pub(crate) fn offsets<const D: usize>() -> impl Iterator<Item = [i32; D]> {
     (0..3i32.pow(D as u32)).map(|k| std::array::from_fn(|d| k / 3i32.pow(d as u32) % 3 - 1))
@@ -298,6 +313,9 @@ mod tests {
             }
         }
         let coarse = mesh.coarsened(3);
+        assert!(coarse.is_coarsening_of(&mesh) && !mesh.is_coarsening_of(&coarse));
+        assert!(mesh == mesh.clone() && mesh != coarse);
+        assert!(!coarse.is_coarsening_of(&near_point::<D>(6, !periodic)));
         assert!(coarse.cells().iter().all(|c| c.level <= 3));
         let volume: f64 = coarse.cells().iter().map(|c| coarse.size(c.level).powi(D as i32)).sum();
         assert!((volume - 1.0).abs() < 1e-12);

@@ -122,14 +122,12 @@ impl DenseSymmetric {
     fn subtract<S: Simd>(&mut self, simd: S, row: usize, start: usize, factors: &[f64; GROUP]) {
         let columns = start..(row + 1).next_multiple_of(LANES);
         let (target, _) = S::as_mut_simd_f64s(&mut self.values[row * self.stride..][columns.clone()]);
-        let group: [&[S::f64s]; GROUP] = std::array::from_fn(|k| {
-            &S::as_simd_f64s(&self.group[k * self.stride..][columns.clone()]).0[..target.len()]
-        });
-        let factors = factors.map(|factor| simd.splat_f64s(-factor));
-        for (i, target) in target.iter_mut().enumerate() {
-            for (factor, row) in factors.iter().zip(&group) {
-                *target = simd.mul_add_e_f64s(*factor, row[i], *target);
-            }
+        let group = |k: usize| S::as_simd_f64s(&self.group[k * self.stride..][columns.clone()]).0.iter();
+        let group = group(0).zip(group(1)).zip(group(2).zip(group(3)));
+        let [fa, fb, fc, fd] = factors.map(|factor| simd.splat_f64s(-factor));
+        for (target, ((a, b), (c, d))) in target.iter_mut().zip(group) {
+            let first = simd.mul_add_e_f64s(fb, *b, simd.mul_add_e_f64s(fa, *a, *target));
+            *target = simd.mul_add_e_f64s(fd, *d, simd.mul_add_e_f64s(fc, *c, first));
         }
     }
 

@@ -74,6 +74,8 @@ where
     params: FlowParams,
     solver: Box<dyn SaddleSolver<D> + Send>,
     matrices: Arc<PointMatrices<D>>,
+    /// The last mesh, which the next one is often equal to.
+    discretisation: Option<Discretisation<D>>,
     warm_start: Option<WarmStart<D>>,
     clock: fn() -> f64,
 }
@@ -110,7 +112,7 @@ where
             SolverKind::Multigrid => Box::new(MultigridSolver::default()),
         };
         let matrices = Arc::new(PointMatrices::new(params.formulation.quadrature()));
-        Ok(Self { params, solver, matrices, warm_start: None, clock })
+        Ok(Self { params, solver, matrices, discretisation: None, warm_start: None, clock })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same function, which
@@ -134,7 +136,8 @@ where
     ) -> Result<Flow<D>, StokesError> {
         let FlowParams { viscosity, formulation, .. } = self.params;
         let start = (self.clock)();
-        let problem = Problem::new(mesh, bodies, viscosity, formulation, &self.matrices)?;
+        let discretisation = self.discretised(mesh);
+        let problem = Problem::on(discretisation, bodies, viscosity, formulation, &self.matrices)?;
         let prepared_from = (self.clock)();
         problem.prepare(self.solver.as_mut())?;
         let solved_from = (self.clock)();
@@ -162,6 +165,14 @@ where
             fine_operator_applications: effort.fine_operator_applications,
             phases: [prepared_from - start, solved_from - prepared_from, end - solved_from],
         })
+    }
+
+    /// The nodes of a mesh: those of the last one, if it is the same.
+    fn discretised(&mut self, mesh: TreeMesh<D>) -> Discretisation<D> {
+        let kept = self.discretisation.take().filter(|last| *last.mesh == mesh);
+        let discretisation = kept.unwrap_or_else(|| Discretisation::new(mesh));
+        self.discretisation = Some(discretisation.clone());
+        discretisation
     }
 
     fn solve_once(&mut self, problem: &Problem<D>, b: &[f64], x: &mut [f64]) -> Result<Effort, StokesError> {
@@ -224,8 +235,8 @@ where
     ) -> (Vec<f64>, Option<NodalFields>) {
         match &self.warm_start {
             Some(warm) if self.params.solver == SolverKind::Multigrid => {
-                let last = warm.last_on(discretisation);
-                (warm.guess(&last, discretisation, system), Some(last))
+                let (guess, last) = warm.moved(discretisation).into_guess(system);
+                (guess, Some(last))
             }
             _ => (vec![0.0; system.dim()], None),
         }

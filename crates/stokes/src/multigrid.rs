@@ -79,7 +79,9 @@ where
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError> {
         let elements = Elements::new(discretisation, system, Matrices::<D>::VELOCITY);
-        self.cycle = Some(VCycle::new(discretisation, system, &elements, preparation)?);
+        let before = self.cycle.take().map(|cycle| cycle.hierarchy).unwrap_or_default();
+        let hierarchy = Hierarchy::new(discretisation, before);
+        self.cycle = Some(VCycle::new(hierarchy, discretisation, system, &elements, preparation)?);
         self.schur = Some(SchurInverse::new(discretisation, system, &elements, preparation.viscosity)?);
         Ok(())
     }
@@ -148,15 +150,55 @@ where
     }
 }
 
+/// The meshes of the levels, coarsest first.
+struct Hierarchy<const D: usize> {
+    meshes: Vec<Discretisation<D>>,
+    /// `transfers[l]` joins mesh `l` to mesh `l + 1`.
+    transfers: Vec<Interpolation<D>>,
+}
+
+impl<const D: usize> Default for Hierarchy<D> {
+    fn default() -> Self {
+        Self { meshes: Vec::new(), transfers: Vec::new() }
+    }
+}
+
+impl<const D: usize> Hierarchy<D> {
+    /// The meshes below `finest`. What was the same in the hierarchy `before` is taken from there.
+    fn new(finest: &Discretisation<D>, before: Self) -> Self {
+        let depth = finest.mesh.max_level();
+        let mut meshes: Vec<Discretisation<D>> = (COARSEST_LEVEL.min(depth)..depth)
+            .map(|level| {
+                let is_kept = |mesh: &&Discretisation<D>| {
+                    mesh.mesh.max_level() == level && mesh.mesh.is_coarsening_of(&finest.mesh)
+                };
+                let kept = before.meshes.iter().find(is_kept).cloned();
+                kept.unwrap_or_else(|| Discretisation::new(finest.mesh.coarsened(level)))
+            })
+            .collect();
+        meshes.push(finest.clone());
+        let mut kept: Vec<_> = before.meshes.windows(2).zip(before.transfers).collect();
+        let transfers = meshes.windows(2).map(|pair| {
+            let is_same =
+                |old: &[Discretisation<D>]| (0..2).all(|k| Arc::ptr_eq(&old[k].mesh, &pair[k].mesh));
+            if let Some(place) = kept.iter().position(|old| is_same(old.0)) {
+                return kept.swap_remove(place).1;
+            }
+            let (coarse, fine) = (&pair[0], &pair[1]);
+            Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity)
+        });
+        Self { transfers: transfers.collect(), meshes }
+    }
+}
+
 /// One V-cycle on the velocity block.
 struct VCycle<const D: usize>
 where
     Dim<D>: Space<D>,
 {
+    hierarchy: Hierarchy<D>,
     /// Coarsest first.
     levels: Vec<Level<D>>,
-    /// `transfers[l]` joins level `l` to level `l + 1`.
-    transfers: Vec<Interpolation<D>>,
     coarse: CoarseSolver,
     /// The penalised solid, in that formulation.
     solid: Option<SolidBlock<D>>,
@@ -167,17 +209,13 @@ where
     Dim<D>: Space<D>,
 {
     fn new(
+        hierarchy: Hierarchy<D>,
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
         elements: &Elements<'_, D>,
         preparation: &Preparation<'_, D>,
     ) -> Result<Self, StokesError> {
-        let finest = discretisation.mesh.max_level();
-        let coarsest = COARSEST_LEVEL.min(finest);
-        let mut meshes: Vec<Discretisation<D>> = (coarsest..finest)
-            .map(|level| Discretisation::new(discretisation.mesh.coarsened(level)))
-            .collect();
-        meshes.push(discretisation.clone());
+        let meshes = &hierarchy.meshes;
         let mut levels = Vec::with_capacity(meshes.len() + 1);
         for (index, mesh) in meshes.iter().enumerate() {
             let is_finest = index + 1 == meshes.len();
@@ -191,13 +229,6 @@ where
             };
             levels.push(Level::rigid(mesh, space, preparation.viscosity, (index, smoothing))?);
         }
-        let transfers = meshes
-            .windows(2)
-            .map(|pair| {
-                let (coarse, fine) = (&pair[0], &pair[1]);
-                Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity)
-            })
-            .collect();
         let finest = &levels[levels.len() - 1].operator.space;
         let solid = match preparation.touched {
             Some(touched) => {
@@ -209,7 +240,7 @@ where
         };
         let coarse_space = levels[0].operator.space.clone();
         let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
-        Ok(Self { levels, transfers, coarse, solid })
+        Ok(Self { hierarchy, levels, coarse, solid })
     }
 
     /// Applications on the finest mesh since the last call, see [`SolveReport::fine_operator_applications`].
@@ -226,12 +257,12 @@ where
         }
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
-        fine.restrict(&mut self.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
+        fine.restrict(&mut self.hierarchy.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
         self.run(top - 1);
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
         let mut x = std::mem::take(&mut coarse.x);
-        fine.correct(&self.transfers[top - 1], &coarse.operator.space, &mut x);
+        fine.correct(&self.hierarchy.transfers[top - 1], &coarse.operator.space, &mut x);
         coarse.x = x;
         fine.smooth();
     }

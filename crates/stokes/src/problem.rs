@@ -65,9 +65,22 @@ where
         formulation: Formulation,
         matrices: &Arc<PointMatrices<D>>,
     ) -> Result<Self, StokesError> {
+        Self::on(Discretisation::new(mesh), bodies, viscosity, formulation, matrices)
+    }
+
+    /// The same on a mesh whose nodes are known.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn on(
+        discretisation: Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        formulation: Formulation,
+        matrices: &Arc<PointMatrices<D>>,
+    ) -> Result<Self, StokesError> {
         check_viscosity(viscosity)?;
         formulation.check()?;
-        let discretisation = Discretisation::new(mesh);
         match formulation {
             Formulation::RigidDofs { offset, weak_pressures } => {
                 Self::eliminated(discretisation, bodies, viscosity, offset, weak_pressures)

@@ -14,26 +14,29 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         Self { mesh }
     }
 
-    /// Sets `to[node] = field(point of node)` for a field with interleaved components. Points outside the mesh get zero.
+    /// Sets `to[node] = field(point of node)` for pairs of a field and what it becomes, with interleaved components. Points
+    /// outside the mesh get zero.
     pub fn transfer(
         &self,
         from_nodes: &NodeMap<D>,
         components: usize,
-        from: &[f64],
         to_nodes: &NodeMap<D>,
-        to: &mut [f64],
+        fields: &mut [(&[f64], &mut [f64])],
     ) {
-        for (node, values) in to.chunks_exact_mut(components).take(to_nodes.node_count()).enumerate() {
-            values.fill(0.0);
+        let degree = from_nodes.degree();
+        for node in 0..to_nodes.node_count() {
+            let target = node * components..(node + 1) * components;
+            fields.iter_mut().for_each(|(_, to)| to[target.clone()].fill(0.0));
             let Some((cell, x)) = self.locate(to_nodes, node) else { continue };
-            let degree = from_nodes.degree();
             let line: [[f64; 3]; D] = std::array::from_fn(|d| values_1d(degree, x[d]));
             for (i, &source) in from_nodes.cell(cell).iter().enumerate() {
                 let index = split::<D>(i, degree + 1);
                 let weight: f64 = (0..D).map(|d| line[d][index[d]]).product();
                 if weight != 0.0 {
-                    for c in 0..components {
-                        values[c] += weight * from[source as usize * components + c];
+                    let source = source as usize * components;
+                    for (from, to) in fields.iter_mut() {
+                        let values = to[target.clone()].iter_mut().zip(&from[source..]);
+                        values.for_each(|(value, from)| *value += weight * from);
                     }
                 }
             }
@@ -74,7 +77,7 @@ mod tests {
         let f = |x: Vector<D>| (0..D).map(|d| 1.0 + x[d] * (0.4 - x[d])).product::<f64>();
         let field: Vec<f64> = (0..from.node_count()).map(|n| f(from.point(n))).collect();
         let mut moved = vec![0.0; to.node_count()];
-        Evaluator::new(&a).transfer(&from, 1, &field, &to, &mut moved);
+        Evaluator::new(&a).transfer(&from, 1, &to, &mut [(&field, &mut moved)]);
         for (n, value) in moved.iter().enumerate() {
             assert!((value - f(to.point(n))).abs() < 1e-12);
         }

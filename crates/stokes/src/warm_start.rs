@@ -8,7 +8,7 @@
 //! makes. Iterations a step of the two spheres of the paper's figure 7 from zero / `d^n` / `2 d^n - d^(n-1)` / `d^n + c (d^n -
 //! d^(n-1))` with the smallest residual: `paper` 23 / 17 / 12 / 14, `rigid-dofs` 19 / 13 / 14 / 14.
 
-use gluey_fem::TreeMesh;
+use gluey_fem::{NodeMap, TreeMesh};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
@@ -61,21 +61,41 @@ where
         (&self.last, self.before.as_ref())
     }
 
-    /// The last flow on another mesh.
-    pub fn last_on(&self, discretisation: &Discretisation<D>) -> NodalFields {
-        self.moved(&self.last, discretisation)
+    /// The same two on another mesh.
+    pub fn moved(&self, to: &Discretisation<D>) -> Self {
+        let from = &self.discretisation;
+        if from.mesh == to.mesh {
+            return self.clone();
+        }
+        let moved =
+            |from_nodes: &NodeMap<D>, to_nodes: &NodeMap<D>, components: usize, fields: [&[f64]; 2]| {
+                let mut moved = fields.map(|field| match field {
+                    [] => Vec::new(),
+                    _ => vec![0.0; to_nodes.node_count() * components],
+                });
+                let pairs = fields.into_iter().zip(moved.iter_mut().map(Vec::as_mut_slice));
+                let mut pairs: Vec<_> = pairs.filter(|pair| !pair.0.is_empty()).collect();
+                Evaluator::new(&from.mesh).transfer(from_nodes, components, to_nodes, &mut pairs);
+                moved
+            };
+        let before =
+            |field: fn(&NodalFields) -> &Vec<f64>| self.before.as_ref().map_or(&[][..], |b| field(b));
+        let velocities = [&self.last.velocity, before(|fields| &fields.velocity)];
+        let pressures = [&self.last.pressure, before(|fields| &fields.pressure)];
+        let [velocity, velocity_before] = moved(&from.velocity, &to.velocity, D, velocities);
+        let [pressure, pressure_before] = moved(&from.pressure, &to.pressure, 1, pressures);
+        let before = NodalFields { velocity: velocity_before, pressure: pressure_before };
+        Self {
+            discretisation: to.clone(),
+            last: NodalFields { velocity, pressure },
+            before: self.before.is_some().then_some(before),
+        }
     }
 
-    /// The reduced vector a solve on another mesh starts from; `last` is what [`WarmStart::last_on`] gave for it.
-    pub fn guess(
-        &self,
-        last: &NodalFields,
-        discretisation: &Discretisation<D>,
-        system: &StokesSystem<D>,
-    ) -> Vec<f64> {
-        let mut guess = last.clone();
+    /// The reduced vector a solve on its mesh starts from, and the last flow.
+    pub fn into_guess(self, system: &StokesSystem<D>) -> (Vec<f64>, NodalFields) {
+        let mut guess = self.last.clone();
         if let Some(before) = &self.before {
-            let before = self.moved(before, discretisation);
             extrapolate(&before.velocity, &mut guess.velocity);
             extrapolate(&before.pressure, &mut guess.pressure);
         }
@@ -84,17 +104,7 @@ where
         system.space.project(&mut x);
         system.pressure.clear_fixed(&mut guess.pressure);
         x.append(&mut guess.pressure);
-        x
-    }
-
-    fn moved(&self, fields: &NodalFields, to: &Discretisation<D>) -> NodalFields {
-        let from = &self.discretisation;
-        let mut velocity = vec![0.0; to.velocity.node_count() * D];
-        let mut pressure = vec![0.0; to.pressure.node_count()];
-        let evaluator = Evaluator::new(&from.mesh);
-        evaluator.transfer(&from.velocity, D, &fields.velocity, &to.velocity, &mut velocity);
-        evaluator.transfer(&from.pressure, 1, &fields.pressure, &to.pressure, &mut pressure);
-        NodalFields { velocity, pressure }
+        (x, self.last)
     }
 }
 
