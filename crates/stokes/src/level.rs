@@ -316,6 +316,7 @@ where
     for (node, body, matrix) in space.rigid_rows() {
         rows[node as usize] = Some((body as usize, matrix));
     }
+    let viscous = nalgebra::DMatrix::from_row_slice(n, n, reference.viscous);
     let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
     for cell in cells {
         let nodes = discretisation.velocity.cell(cell.cell as usize);
@@ -333,8 +334,7 @@ where
                 }
             }
             let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
-            let viscous = nalgebra::DMatrix::from_row_slice(n, n, reference.viscous);
-            let product = motion.transpose() * (viscous * &motion) * cell.viscous;
+            let product = motion.transpose() * (&viscous * &motion) * cell.viscous;
             blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
         }
     }

@@ -10,12 +10,18 @@ use crate::solid_cycle::Numbered;
 /// Rows of a matrix on the `D` components of two nodes.
 type Block<const D: usize> = [[f64; D]; D];
 
-/// A symmetric matrix on the `D` velocity components of numbered nodes.
-pub struct NodeMatrix<const D: usize> {
-    /// First block of each row of blocks, then their number.
+/// Rows of blocks.
+struct Rows<const D: usize> {
+    /// First block of each row, then their number.
     start: Vec<u32>,
     columns: Vec<u32>,
     blocks: Vec<Block<D>>,
+}
+
+/// A symmetric matrix on the `D` velocity components of numbered nodes.
+pub struct NodeMatrix<const D: usize> {
+    /// The lower triangle.
+    lower: Rows<D>,
 }
 
 impl<const D: usize> NodeMatrix<D>
@@ -45,27 +51,29 @@ where
     }
 
     fn zeros(pattern: &Pattern) -> Self {
-        let rows = 0..pattern.row_count();
-        let mut columns = Vec::with_capacity(pattern.entry_count());
-        rows.clone().for_each(|row| columns.extend_from_slice(pattern.columns_of(row)));
-        Self {
-            start: std::iter::once(0).chain(rows.map(|row| pattern.range(row).end as u32)).collect(),
-            columns,
-            blocks: vec![[[0.0; D]; D]; pattern.entry_count()],
+        let mut lower = Rows { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
+        lower.columns.reserve_exact((pattern.entry_count() + pattern.row_count()) / 2);
+        for row in 0..pattern.row_count() {
+            let columns = pattern.columns_of(row).iter();
+            lower.columns.extend(columns.take_while(|&&column| column as usize <= row));
+            lower.start.push(lower.columns.len() as u32);
         }
+        lower.blocks.resize(lower.columns.len(), [[0.0; D]; D]);
+        Self { lower }
     }
 
     /// Adds the matrix of a cell; the terms are sorted by their numbers.
     fn add(&mut self, terms: &[Term], element: &[f64], size: usize) {
+        let Rows { start, columns, blocks } = &mut self.lower;
         for row in terms {
-            let mut place = self.start[row.number as usize] as usize;
+            let mut place = start[row.number as usize] as usize;
             let rows = &element[row.local as usize * D * size..][..D * size];
-            for column in terms {
-                while self.columns[place] < column.number {
+            for column in terms.iter().take_while(|column| column.number <= row.number) {
+                while columns[place] < column.number {
                     place += 1;
                 }
                 let weight = row.weight * column.weight;
-                for (block, row) in self.blocks[place].iter_mut().zip(rows.chunks_exact(size)) {
+                for (block, row) in blocks[place].iter_mut().zip(rows.chunks_exact(size)) {
                     let values = &row[column.local as usize * D..][..D];
                     block.iter_mut().zip(values).for_each(|(entry, value)| *entry += weight * value);
                 }
@@ -118,13 +126,12 @@ impl<'a, const D: usize> NodeForms<'a, D> {
 impl<const D: usize> NodeMatrix<D> {
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
-        self.start.len() - 1
+        self.lower.count()
     }
 
-    /// The blocks in a row, `(column, block)`, columns ascending.
+    /// The blocks in a row up to the diagonal, `(column, block)`, columns ascending.
     pub fn row(&self, row: usize) -> impl Iterator<Item = (u32, &Block<D>)> {
-        let range = self.start[row] as usize..self.start[row + 1] as usize;
-        self.columns[range.clone()].iter().copied().zip(&self.blocks[range])
+        self.lower.row(row)
     }
 
     /// The diagonal.
@@ -132,10 +139,8 @@ impl<const D: usize> NodeMatrix<D> {
         let mut diagonal = vec![0.0; self.node_count() * D];
         for (node, diagonal) in diagonal.chunks_exact_mut(D).enumerate() {
             if let Some((_, block)) = self.row(node).find(|(column, _)| *column as usize == node) {
-                diagonal
-                    .iter_mut()
-                    .zip(block.as_flattened().iter().step_by(D + 1))
-                    .for_each(|(d, &value)| *d = value);
+                let entries = block.as_flattened().iter().step_by(D + 1);
+                diagonal.iter_mut().zip(entries).for_each(|(d, &value)| *d = value);
             }
         }
         diagonal
@@ -145,51 +150,87 @@ impl<const D: usize> NodeMatrix<D> {
     pub fn to_sparse(&self) -> Result<(SparseMatrix, Vec<usize>), StokesError> {
         let mut pairs = BlockGroups::default();
         for row in 0..self.node_count() {
-            let beyond = self.row(row).map(|(column, _)| column as usize).filter(|&column| column >= row);
-            beyond.for_each(|column| pairs.push([row, column]));
+            self.row(row).for_each(|(column, _)| pairs.push([row, column as usize]));
         }
         let first = (0..=self.node_count() * D).step_by(D).map(|k| k as u32).collect();
         let pattern = BlockPattern::new(first, pairs)?;
-        let mut values = Vec::with_capacity(self.blocks.len() * D * D);
-        for row in 0..self.node_count() {
+        let mut blocks = self.lower.blocks.iter();
+        let matrix = pattern.sum(|pair, target| {
+            let Some(block) = blocks.next() else { return };
+            let (size, shift) = (pair.len() * D, (pair.len() - 1) * D);
             for a in 0..D {
-                self.row(row).for_each(|(_, block)| values.extend_from_slice(&block[a]));
+                for b in 0..D {
+                    target[a * size + shift + b] = block[a][b];
+                    target[(shift + b) * size + a] = block[a][b];
+                }
             }
-        }
-        let mut matrix = SparseMatrix::zeros(pattern.pattern().clone());
-        matrix.copy_values(&values)?;
+        });
         Ok((matrix, pattern.minimum_degree()?))
     }
 
-    /// `P^T A P`.
+    /// `P^T A P`, which is `M + M^T` for `M = P^T (L + D/2) P` with the blocks `L` below and `D` on the diagonal of `A`.
     pub fn galerkin(&self, prolongation: &Prolongation) -> Self {
         let product = sum_of_rows(self.node_count(), prolongation.coarse_count, |row, sum: &mut Sum<D>| {
             for (column, block) in self.row(row) {
+                let share = if column as usize == row { 0.5 } else { 1.0 };
                 for &(coarse, weight) in prolongation.of(column as usize) {
-                    sum.add(coarse, weight, block);
+                    sum.add(coarse, share * weight, block);
                 }
             }
         });
         let transposed = prolongation.transposed();
-        sum_of_rows(prolongation.coarse_count, prolongation.coarse_count, |row, sum: &mut Sum<D>| {
+        let half = sum_of_rows(prolongation.coarse_count, prolongation.coarse_count, |row, sum| {
             for &(fine, weight) in transposed.of(row) {
                 product.row(fine as usize).for_each(|(column, block)| sum.add(column, weight, block));
             }
-        })
+        });
+        Self { lower: half.plus_transposed() }
     }
-}
 
-impl<const D: usize> NodeMatrix<D> {
     fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        for (row, y) in y.as_chunks_mut::<D>().0.iter_mut().enumerate() {
-            *y = [0.0; D];
+        y.fill(0.0);
+        let (x, y) = (x.as_chunks::<D>().0, y.as_chunks_mut::<D>().0);
+        for row in 0..self.node_count() {
             for (column, block) in self.row(row) {
-                let x = &x[column as usize * D..][..D];
-                for (y, row) in y.iter_mut().zip(block) {
-                    *y += row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+                let column = column as usize;
+                for a in 0..D {
+                    for b in 0..D {
+                        y[row][a] += block[a][b] * x[column][b];
+                        if column != row {
+                            y[column][b] += block[a][b] * x[row][a];
+                        }
+                    }
                 }
             }
         }
+    }
+}
+
+impl<const D: usize> Rows<D> {
+    fn count(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    fn row(&self, row: usize) -> impl Iterator<Item = (u32, &Block<D>)> {
+        let range = self.start[row] as usize..self.start[row + 1] as usize;
+        self.columns[range.clone()].iter().copied().zip(&self.blocks[range])
+    }
+
+    /// The lower triangle of the sum of this square matrix and its transpose.
+    fn plus_transposed(&self) -> Self {
+        let mut upper = vec![Vec::new(); self.count()];
+        for row in 0..self.count() {
+            for (column, block) in self.row(row).filter(|(column, _)| *column as usize >= row) {
+                upper[column as usize].push((row as u32, block));
+            }
+        }
+        sum_of_rows(self.count(), self.count(), |row, sum: &mut Sum<D>| {
+            let lower = self.row(row).take_while(|(column, _)| *column as usize <= row);
+            lower.for_each(|(column, block)| sum.add(column, 1.0, block));
+            for &(column, block) in &upper[row] {
+                sum.add(column, 1.0, &std::array::from_fn(|a| std::array::from_fn(|b| block[b][a])));
+            }
+        })
     }
 }
 
@@ -239,8 +280,8 @@ fn sum_of_rows<const D: usize>(
     row_count: usize,
     column_count: usize,
     mut fill: impl FnMut(usize, &mut Sum<D>),
-) -> NodeMatrix<D> {
-    let mut new = NodeMatrix { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
+) -> Rows<D> {
+    let mut new = Rows { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
     let mut sum = Sum { place: vec![u32::MAX; column_count], columns: Vec::new(), blocks: Vec::new() };
     for row in 0..row_count {
         fill(row, &mut sum);
@@ -331,17 +372,17 @@ impl<const D: usize> NodeMatrix<D> {
     /// The blocks of a matrix whose unknowns are the components of node after node.
     pub fn from_sparse(matrix: &SparseMatrix) -> Self {
         let pattern = matrix.pattern();
-        let mut new = Self { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
+        let mut lower = Rows { start: vec![0], columns: Vec::new(), blocks: Vec::new() };
         for row in 0..pattern.row_count() / D {
             let columns = pattern.columns_of(row * D).iter().step_by(D).map(|column| column / D as u32);
-            for column in columns {
+            for column in columns.take_while(|&column| column as usize <= row) {
                 let entry = |a: usize, b: usize| matrix.get(row * D + a, column as usize * D + b);
-                new.blocks.push(std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b))));
-                new.columns.push(column);
+                lower.blocks.push(std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b))));
+                lower.columns.push(column);
             }
-            new.start.push(new.columns.len() as u32);
+            lower.start.push(lower.columns.len() as u32);
         }
-        new
+        Self { lower }
     }
 }
 

@@ -38,7 +38,8 @@ impl<const D: usize> Patches<D> {
             r: Vec::new(),
             z: Vec::new(),
         };
-        for cell in cells {
+        for mut cell in cells {
+            cell.sort_unstable();
             new.nodes.extend(cell);
             new.ends.push(new.nodes.len() as u32);
         }
@@ -93,7 +94,7 @@ impl<const D: usize> Preconditioner<f64> for Patches<D> {
     }
 }
 
-/// The dense block of `matrix` on some nodes. `place` is all `u32::MAX` before and after.
+/// The dense block of `matrix` on some nodes, ascending. `place` is all `u32::MAX` before and after.
 fn block_on<const D: usize>(
     matrix: &NodeMatrix<D>,
     nodes: &[u32],
@@ -107,7 +108,7 @@ fn block_on<const D: usize>(
     for (i, &node) in nodes.iter().enumerate() {
         for (column, block) in matrix.row(node as usize) {
             let j = place[column as usize];
-            if j <= i as u32 {
+            if j != u32::MAX {
                 for (a, row) in block.iter().enumerate() {
                     dense.row_mut(i * D + a)[j as usize * D..][..D].copy_from_slice(row);
                 }
