@@ -40,34 +40,7 @@ pub enum BlockJacobiError {
     },
 }
 
-/// Lower Cholesky factor of a symmetric positive definite matrix of any size, for local problems.
-///
-/// Plain loops: meant for blocks of a few to a few hundred rows.
-#[derive(Clone, Debug)]
-pub struct DenseCholesky<T> {
-    dim: usize,
-    /// The factor, row by row; the strict upper triangle is not used.
-    l: Vec<T>,
-}
-
-impl<T: Scalar> DenseCholesky<T> {
-    /// Factorises the matrix `a` of `dim` rows; only its lower triangle is read.
-    pub fn new(dim: usize, mut a: Vec<T>) -> Result<Self, BlockError> {
-        factorise_cholesky(dim, &mut a)?;
-        Ok(Self { dim, l: a })
-    }
-
-    /// Number of rows.
-    pub fn dim(&self) -> usize {
-        self.dim
-    }
-
-    /// `x <- A^-1 x`.
-    pub fn solve_in_place(&self, x: &mut [T]) {
-        solve_cholesky(self.dim, &self.l, x);
-    }
-}
-
+/// Replaces the lower triangle by that of the Cholesky factor.
 fn factorise_cholesky<T: Scalar>(dim: usize, a: &mut [T]) -> Result<(), BlockError> {
     for i in 0..dim {
         let (above, row) = a.split_at_mut(i * dim);
@@ -82,19 +55,6 @@ fn factorise_cholesky<T: Scalar>(dim: usize, a: &mut [T]) -> Result<(), BlockErr
         row[i] = pivot.sqrt();
     }
     Ok(())
-}
-
-fn solve_cholesky<T: Scalar>(dim: usize, l: &[T], x: &mut [T]) {
-    for i in 0..dim {
-        x[i] = (x[i] - inner(&l[i * dim..i * dim + i], &x[..i])) / l[i * dim + i];
-    }
-    for i in (0..dim).rev() {
-        x[i] = x[i] / l[i * dim + i];
-        let (known, xi) = (&l[i * dim..i * dim + i], x[i]);
-        for (x, &l) in x[..i].iter_mut().zip(known) {
-            *x -= l * xi;
-        }
-    }
 }
 
 fn inner<T: Scalar>(x: &[T], y: &[T]) -> T {
@@ -344,19 +304,6 @@ mod tests {
             BlockJacobi::new_general(2, blocks),
             Err(BlockJacobiError::NoInverse { block: 1, .. })
         ));
-    }
-
-    #[test]
-    fn dense_cholesky_solves() {
-        let dim = 40;
-        let a = random_spd(dim, 3);
-        let factor = DenseCholesky::new(dim, a.clone()).expect("positive definite");
-        let mut x = vec![0.0; dim];
-        vector::fill_pseudo_random(5, &mut x);
-        let mut y: Vec<f64> = a.chunks_exact(dim).map(|row| inner(row, &x)).collect();
-        factor.solve_in_place(&mut y);
-        vector::axpy(-1.0, &x, &mut y);
-        assert!(vector::norm(&y) < 1e-10);
     }
 
     #[test]

@@ -31,7 +31,7 @@ mod sparse;
 mod spectrum;
 pub mod vector;
 
-pub use block::{BlockError, BlockJacobi, BlockJacobiError, DenseCholesky, invert_general, invert_spd};
+pub use block::{BlockError, BlockJacobi, BlockJacobiError, invert_general, invert_spd};
 pub use blocked::{BlockGroups, BlockPattern};
 pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
 pub use direct::{

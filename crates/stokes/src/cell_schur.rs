@@ -47,7 +47,7 @@ impl PressureMatrices {
         if system.penalty.is_none() {
             return Ok(new);
         }
-        let schur = CellSchur::<D>::new()?;
+        let mut schur = CellSchur::<D>::new()?;
         new.unit = schur.unit.iter().map(|s| 2.0 * s).collect();
         for (index, cell) in cells {
             if let (viscous, Some(own)) = elements.viscous(index) {
@@ -74,6 +74,8 @@ struct CellSchur<const D: usize> {
     rigid: Vec<f64>,
     /// The Schur complement of the unit cube at viscosity one.
     unit: Vec<f64>,
+    /// `[A_c, B_c^T; B_c, 0]`, and what elimination makes of it.
+    saddle: DenseSymmetric,
 }
 
 impl<const D: usize> CellSchur<D>
@@ -82,16 +84,17 @@ where
 {
     fn new() -> Result<Self, BlockError> {
         let (reference, rigid) = (Reference::<D>::new(), rigid_projector::<D>());
-        let mut new = Self { unit: Vec::new(), reference, rigid };
+        let mut new = Self { unit: Vec::new(), saddle: DenseSymmetric::default(), reference, rigid };
         new.unit = new.of(1.0, 1.0, &[])?;
         Ok(new)
     }
 
     /// That of a cell with the matrices `A_c = viscous K + own` and `B_c = divergence B`, row by row.
-    fn of(&self, viscous: f64, divergence: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
+    fn of(&mut self, viscous: f64, divergence: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
         let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
         // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.
-        let mut matrix = DenseSymmetric::zeros(n + m);
+        let matrix = &mut self.saddle;
+        matrix.reset(n + m);
         let fluid = self.reference.viscous.chunks_exact(n).zip(self.rigid.chunks_exact(n));
         for (row, (fluid, rigid)) in fluid.enumerate() {
             let target = &mut matrix.row_mut(row)[..=row];
@@ -157,7 +160,7 @@ mod tests {
     where
         Dim<D>: Space<D>,
     {
-        let schur = CellSchur::<D>::new().unwrap();
+        let mut schur = CellSchur::<D>::new().unwrap();
         let (eta, h) = (40.0, 0.25f64);
         let stiffness = h.powi(D as i32 - 2);
         let solid = Reference::<D>::new().viscous.iter().map(|k| (eta - 1.0) * stiffness * k);

@@ -23,6 +23,8 @@ pub struct PointMatrices<const D: usize> {
     /// `f_k(x_q) g_l(x_q)` at the points of a line for all pairs `(k, l)`, where `f` are the shape functions or, in the last
     /// two, their slopes, and `g` those or, in the second and the last, their slopes.
     products: [Vec<[f64; PAIRS]>; 4],
+    /// The shape functions `(i, j)` whose products [`PointMatrices::sum`] gives one after the other.
+    pairs: Vec<(usize, usize)>,
 }
 
 /// Whether the first and the second factor of a product are slopes.
@@ -47,6 +49,7 @@ impl<const D: usize> PointMatrices<D> {
             shapes: points.iter().map(shape).collect(),
             points,
             products: [(false, false), (false, true), (true, false), (true, true)].map(products),
+            pairs: pairs::<D>(),
         }
     }
 
@@ -65,13 +68,12 @@ impl<const D: usize> PointMatrices<D> {
         let n = Reference::<D>::VELOCITY;
         let weighted = self.points.iter().zip(fraction).map(|(point, fraction)| scale * point.1 * fraction);
         let weights: Vec<f64> = weighted.collect();
-        let places = pair_places::<D>();
         let mut matrix = vec![0.0; n * n];
         let mut work = [Vec::new(), Vec::new()];
         for a in 0..D {
             for b in 0..=a {
                 let sums = self.sum(&weights, |d| (d == a, d == b), &mut work);
-                for (&(i, j), &sum) in places.iter().zip(sums) {
+                for (&(i, j), &sum) in self.pairs.iter().zip(sums) {
                     add_strain_product::<D>((i * D, j * D), (a, b), sum, &mut matrix);
                 }
             }
@@ -79,7 +81,7 @@ impl<const D: usize> PointMatrices<D> {
         matrix
     }
 
-    /// `sum_q weight_q prod_d (f_d g_d)(x_q)` for all pairs of shape functions, in the order of [`pair_places`].
+    /// `sum_q weight_q prod_d (f_d g_d)(x_q)` for all pairs of shape functions, in the order of `pairs`.
     fn sum<'a>(
         &self,
         weights: &[f64],
@@ -110,8 +112,8 @@ impl<const D: usize> PointMatrices<D> {
     }
 }
 
-/// The shape functions `(i, j)` whose products [`PointMatrices::sum`] gives one after the other.
-fn pair_places<const D: usize>() -> Vec<(usize, usize)> {
+/// See [`PointMatrices`].
+fn pairs<const D: usize>() -> Vec<(usize, usize)> {
     let node = |pairs: &[usize; D], along: fn(usize) -> usize| {
         (0..D).rev().fold(0, |node, d| node * LINE + along(pairs[d]))
     };
