@@ -95,24 +95,10 @@ where
     Dim<D>: Space<D>,
 {
     let count = step.positions.len();
-    if [step.radii.len(), step.drift.len(), twists.len()] != [count; 3] {
-        return Err(ContactError::LengthMismatch {
-            positions: count,
-            radii: step.radii.len(),
-            drifts: step.drift.len(),
-            twists: twists.len(),
-        });
-    }
-    if count >= u32::MAX as usize {
-        return Err(ContactError::TooManyParticles { count });
-    }
-    let positive = |x: f64| x > 0.0 && x.is_finite();
-    if !(positive(step.rate) && positive(step.dt)) {
-        return Err(ContactError::BadStep { rate: step.rate, dt: step.dt });
-    }
+    validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.rate, step.dt)?;
     for particle in 0..count {
         let radius = step.radii[particle];
-        if !positive(radius) {
+        if !is_positive(radius) {
             return Err(ContactError::BadRadius { particle, radius });
         }
         for (vector, quantity) in [
@@ -126,6 +112,26 @@ where
         }
     }
     validate_domain(step, domain)
+}
+
+/// Checks how many positions, radii (or shapes), drifts and velocities there are, and the step in time.
+pub(crate) fn validate_sizes(lengths: [usize; 4], rate: f64, dt: f64) -> Result<(), ContactError> {
+    let [positions, radii, drifts, twists] = lengths;
+    if lengths != [positions; 4] {
+        return Err(ContactError::LengthMismatch { positions, radii, drifts, twists });
+    }
+    if positions >= u32::MAX as usize {
+        return Err(ContactError::TooManyParticles { count: positions });
+    }
+    if !(is_positive(rate) && is_positive(dt)) {
+        return Err(ContactError::BadStep { rate, dt });
+    }
+    Ok(())
+}
+
+/// Whether a number is positive and finite.
+pub(crate) fn is_positive(x: f64) -> bool {
+    x > 0.0 && x.is_finite()
 }
 
 /// Positions may be so many periods away from the origin: images are counted in `i32`.

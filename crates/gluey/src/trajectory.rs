@@ -1,6 +1,7 @@
 //! Everything the particles did, step by step.
 
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
+use gluey_levelset::nearest_image;
 use serde::{Deserialize, Serialize};
 
 use crate::interpolate::cubic;
@@ -45,7 +46,7 @@ where
     /// Gap between the surfaces of two particles, of their nearest images (Verdon et al. 2010, eq. 14).
     pub fn gap(&self, first: usize, second: usize) -> f64 {
         let direct = self.positions[second] - self.positions[first];
-        let nearest = Vector::<D>::from_fn(|d, _| shortest(direct[d], self.periods[d]));
+        let nearest = Vector::<D>::from_fn(|d, _| nearest_image(direct[d], self.periods[d]));
         nearest.norm() - (self.radii[first] + self.radii[second])
     }
 
@@ -130,9 +131,4 @@ where
         let entries = self.times.len().checked_mul(self.radii.len());
         entries == Some(self.positions.len()) && entries == Some(self.spins.len()) && self.periods.len() == D
     }
-}
-
-/// The shortest image of a distance along an axis.
-pub fn shortest(distance: f64, period: Option<f64>) -> f64 {
-    distance - period.map_or(0.0, |period| period * (distance / period).round())
 }

@@ -50,14 +50,19 @@ impl<const D: usize> LevelSet<D> for Ball<D> {
 impl<const D: usize> Body<D> for Ball<D> {
     fn arm(&self, x: &Vector<D>) -> Vector<D> {
         let arm = x - self.center;
-        Vector::from_fn(|d, _| match self.period[d] {
-            Some(length) => arm[d] - length * (arm[d] / length).round(),
-            None => arm[d],
-        })
+        Vector::from_fn(|d, _| nearest_image(arm[d], self.period[d]))
     }
 
     fn bounding_radius(&self) -> f64 {
         self.radius
+    }
+}
+
+/// The shortest image of a distance along an axis that may be periodic.
+pub fn nearest_image(distance: f64, period: Option<f64>) -> f64 {
+    match period {
+        Some(length) => distance - length * (distance / length).round(),
+        None => distance,
     }
 }
 

@@ -14,5 +14,5 @@
 mod ball;
 mod mixing;
 
-pub use ball::{Ball, Body, LevelSet, nearest};
+pub use ball::{Ball, Body, LevelSet, nearest, nearest_image};
 pub use mixing::{Ramp, ViscosityLaw};

@@ -5,6 +5,7 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 use super::problem::Problem;
 use super::{Shape, ShapeStep};
 use crate::broadphase::{BestOf, Broadphase};
+use crate::model::{is_positive, validate_sizes};
 use crate::{
     Contact, ContactError, ContactParams, ContactReport, ContactState, Mobility, PairKey, PairState, Partner,
     Quantity, StokesDrag, Strategy,
@@ -147,22 +148,11 @@ where
     Dim<D>: Space<D>,
 {
     let count = step.poses.len();
-    let lengths = [step.shapes.len(), step.drift.len(), twists.len()];
-    if lengths != [count; 3] {
-        let [radii, drifts, twists] = lengths;
-        return Err(ContactError::LengthMismatch { positions: count, radii, drifts, twists });
-    }
-    if count >= u32::MAX as usize {
-        return Err(ContactError::TooManyParticles { count });
-    }
-    let positive = |x: f64| x > 0.0 && x.is_finite();
-    if !(positive(step.rate) && positive(step.dt)) {
-        return Err(ContactError::BadStep { rate: step.rate, dt: step.dt });
-    }
+    validate_sizes([count, step.shapes.len(), step.drift.len(), twists.len()], step.rate, step.dt)?;
     for particle in 0..count {
         let shape = &step.shapes[particle];
         for radius in [shape.rounding(), shape.reach(), shape.drag_radius()] {
-            if !positive(radius) {
+            if !is_positive(radius) {
                 return Err(ContactError::BadRadius { particle, radius });
             }
         }

@@ -1,10 +1,11 @@
 //! What a case must satisfy beyond its types.
 
+use gluey_levelset::nearest_image;
+
 use super::Case;
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
 use crate::reference::{self, Reference};
-use crate::trajectory::shortest;
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +115,7 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
 fn check_overlaps(case: &Case, key: &Key) -> Check {
     for (second, b) in case.particles.iter().enumerate() {
         for (first, a) in case.particles[..second].iter().enumerate() {
-            let along = |(d, (x, y)): (usize, (&f64, &f64))| shortest(x - y, case.period(d)).powi(2);
+            let along = |(d, (x, y)): (usize, (&f64, &f64))| nearest_image(x - y, case.period(d)).powi(2);
             let squares = a.position.iter().zip(&b.position).enumerate().map(along);
             let distance = squares.sum::<f64>().sqrt();
             let contact_distance = a.radius + b.radius;
