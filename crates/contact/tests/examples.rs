@@ -2,6 +2,7 @@
 // Both examples draw with the same file.
 #![allow(clippy::duplicate_mod)]
 
+// Their `main` functions are not called here.
 #[allow(dead_code)]
 #[path = "../examples/settle.rs"]
 mod settle;
