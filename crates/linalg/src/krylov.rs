@@ -131,6 +131,5 @@ fn finite(value: f64, iteration: usize) -> Result<f64, KrylovError> {
 /// `r = b - A x` and its norm.
 fn true_residual<T: Scalar>(a: &mut (impl LinOp<T> + ?Sized), b: &[T], x: &[T], r: &mut [T]) -> f64 {
     a.apply(x, r);
-    vector::residual_from_product(b, r);
-    vector::norm(r)
+    vector::residual_norm_from_product(b, r)
 }

@@ -27,6 +27,7 @@ mod krylov;
 mod operator;
 pub mod parallel;
 mod scalar;
+mod sliced;
 mod sparse;
 mod spectrum;
 pub mod vector;
@@ -40,7 +41,8 @@ pub use direct::{
 };
 pub use exchange::DenseSymmetric;
 pub use krylov::{Cg, CgParams, Fgmres, FgmresParams, KrylovError, KrylovReport, Reference};
-pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, SinglePrecision};
+pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
 pub use scalar::Scalar;
+pub use sliced::SlicedMatrix;
 pub use sparse::{Pattern, SparseError, SparseMatrix};
 pub use spectrum::estimate_lambda_max;

@@ -2,19 +2,22 @@
 
 use crate::{Scalar, vector};
 
-/// A square linear operator that is known by its action.
-pub trait LinOp<T> {
+/// A square linear operator that is known by its action on vectors in the precision `X`, computed in `T`.
+pub trait LinOp<T, X = T> {
     /// Number of rows, equal to the number of columns.
     fn dim(&self) -> usize;
 
     /// `y = A x`. All of `y` is overwritten; nothing is allocated.
-    fn apply(&mut self, x: &[T], y: &mut [T]);
+    fn apply(&mut self, x: &[X], y: &mut [T]);
 }
 
-/// An approximate inverse `M^-1` of an operator.
-pub trait Preconditioner<T> {
+/// An approximate inverse `M^-1` of an operator, whose results have the precision `Z`.
+///
+/// Where that is not the precision of the problem, the result may carry any positive factor that keeps it in the range of `Z`:
+/// only its direction is used, see [`crate::Fgmres::with_storage`].
+pub trait Preconditioner<T, Z = T> {
     /// `z = M^-1 r`. All of `z` is overwritten; nothing is allocated.
-    fn apply(&mut self, r: &[T], z: &mut [T]);
+    fn apply(&mut self, r: &[T], z: &mut [Z]);
 
     /// `M^-1` on the leading unknowns that it multiplies one by one, which lets a smoother do so in passing.
     fn diagonal(&self) -> &[T] {
@@ -22,23 +25,23 @@ pub trait Preconditioner<T> {
     }
 
     /// `z = M^-1 r` on the unknowns after those of [`Preconditioner::diagonal`], which they must not depend on.
-    fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
+    fn apply_rest(&mut self, r: &[T], z: &mut [Z]) {
         self.apply(r, z);
     }
 }
 
-impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
+impl<T, X, A: LinOp<T, X> + ?Sized> LinOp<T, X> for &mut A {
     fn dim(&self) -> usize {
         (**self).dim()
     }
 
-    fn apply(&mut self, x: &[T], y: &mut [T]) {
+    fn apply(&mut self, x: &[X], y: &mut [T]) {
         (**self).apply(x, y);
     }
 }
 
-impl<T, M: Preconditioner<T> + ?Sized> Preconditioner<T> for &mut M {
-    fn apply(&mut self, r: &[T], z: &mut [T]) {
+impl<T, Z, M: Preconditioner<T, Z> + ?Sized> Preconditioner<T, Z> for &mut M {
+    fn apply(&mut self, r: &[T], z: &mut [Z]) {
         (**self).apply(r, z);
     }
 
@@ -46,7 +49,7 @@ impl<T, M: Preconditioner<T> + ?Sized> Preconditioner<T> for &mut M {
         (**self).diagonal()
     }
 
-    fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
+    fn apply_rest(&mut self, r: &[T], z: &mut [Z]) {
         (**self).apply_rest(r, z);
     }
 }
@@ -175,6 +178,50 @@ impl<M: Preconditioner<f32>> Preconditioner<f64> for SinglePrecision<M> {
     }
 }
 
+/// Something in double precision between vectors in single precision: an operator that takes them, or a preconditioner that
+/// returns them, scaled to norm one.
+#[derive(Clone, Debug)]
+pub struct Rounded<A> {
+    inner: A,
+    wide: Vec<f64>,
+}
+
+impl<A> Rounded<A> {
+    /// Wraps `inner` for vectors of length `dim`.
+    pub fn new(dim: usize, inner: A) -> Self {
+        Self { inner, wide: vec![0.0; dim] }
+    }
+}
+
+impl<A: LinOp<f64>> LinOp<f64> for Rounded<A> {
+    fn dim(&self) -> usize {
+        self.inner.dim()
+    }
+
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.inner.apply(x, y);
+    }
+}
+
+impl<A: LinOp<f64>> LinOp<f64, f32> for Rounded<A> {
+    fn dim(&self) -> usize {
+        self.inner.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f64]) {
+        vector::convert(1.0, x, &mut self.wide);
+        self.inner.apply(&self.wide, y);
+    }
+}
+
+impl<M: Preconditioner<f64>> Preconditioner<f64, f32> for Rounded<M> {
+    fn apply(&mut self, r: &[f64], z: &mut [f32]) {
+        self.inner.apply(r, &mut self.wide);
+        let norm = vector::norm(&self.wide);
+        vector::convert(if norm > 0.0 { 1.0 / norm } else { 1.0 }, &self.wide, z);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +235,20 @@ mod tests {
         assert_eq!(Jacobi::new(&[1.0, 0.0]).expect_err("zero"), BadDiagonal { row: 1, value: 0.0 });
         assert!(Jacobi::new(&[f64::NAN]).is_err());
         assert!(Jacobi::new(&[f64::INFINITY]).is_err());
+    }
+
+    #[test]
+    fn rounding_keeps_seven_digits_of_a_direction_at_any_scale() {
+        for scale in [1e-100, 1.0, 1e100] {
+            let r = [3.0 * scale, -4.0 * scale / 3.0];
+            let mut z = [0f32; 2];
+            Rounded::new(2, Identity).apply(&r, &mut z);
+            assert!((f64::from(z[0] / z[1]) + 2.25).abs() < 1e-6 && z[0] > 0.0, "{z:?}");
+            let mut doubled = FnOp::new(2, |x: &[f64], y: &mut [f64]| vector::scaled_copy(2.0, x, y));
+            let mut y = [0.0; 2];
+            LinOp::<f64, f32>::apply(&mut Rounded::new(2, &mut doubled), &z, &mut y);
+            assert_eq!(y, z.map(|z| 2.0 * f64::from(z)));
+        }
     }
 
     #[test]

@@ -138,6 +138,22 @@ pub fn residual_from_product<T: Scalar>(b: &[T], r: &mut [T]) {
     });
 }
 
+/// [`residual_from_product`] and the norm of the residual.
+pub fn residual_norm_from_product<T: Scalar>(b: &[T], r: &mut [T]) -> f64 {
+    debug_assert_eq!(b.len(), r.len());
+    let [square] = parallel::update_and_sum(r, |first, piece| {
+        let blocks = piece.chunks_mut(BLOCK).zip(b[first..].chunks(BLOCK));
+        [blocks.map(|(r, b)| residual_block(b, r)).sum()]
+    });
+    square.sqrt()
+}
+
+/// The residual of one block and the square of its norm.
+fn residual_block<T: Scalar>(b: &[T], r: &mut [T]) -> f64 {
+    r.iter_mut().zip(b).for_each(|(r, &b)| *r = b - *r);
+    dot_block(r, r)
+}
+
 /// Whether every entry is finite.
 pub fn all_finite<T: Scalar>(x: &[T]) -> bool {
     // 0 x is zero for finite x and NaN otherwise, so one reduction without branches decides.
@@ -190,8 +206,10 @@ mod tests {
         assert_eq!(y, [3.0, 5.0, 7.0]);
         axpby(1.0, &x, -1.0, &mut y);
         assert_eq!(y, [-2.0, -3.0, -4.0]);
+        let mut r = y;
         residual_from_product(&x, &mut y);
         assert_eq!(y, [3.0, 5.0, 7.0]);
+        assert_eq!((residual_norm_from_product(&x, &mut r).powi(2).round(), r), (83.0, y));
         scaled_copy(0.5, &x, &mut y);
         scale(2.0, &mut y);
         assert_eq!(y, x);

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use gluey_linalg::{
     Cg, CgParams, Chebyshev, DirectIndefinite, DirectSpd, Fgmres, FgmresParams, Guess, Identity,
-    IndefiniteParams, Jacobi, Ordering, Reference, RefinementParams, SinglePrecision, SpectralInterval,
-    Symbolic,
+    IndefiniteParams, Jacobi, Ordering, Reference, RefinementParams, Rounded, SinglePrecision,
+    SpectralInterval, Symbolic,
 };
 use gluey_testkit::allocation::{CountingAllocator, count_in_thread};
 use support::{laplacian_2d, pseudo_random};
@@ -36,9 +36,10 @@ fn iterative_methods_reuse_their_workspace() {
     assert!(first > 0 && second == 0, "FGMRES: {first}, {second}");
 
     let mut narrow = Fgmres::<f64, f32>::with_storage(FgmresParams::default());
+    let (mut wide_a, mut rounded) = (Rounded::new(400, a.clone()), Rounded::new(400, jacobi.clone()));
     let (first, second) = first_and_second(|| {
         x.fill(0.0);
-        narrow.solve(&mut a, &mut jacobi, &b, &mut x, Reference::RightHandSide).expect("converges");
+        narrow.solve(&mut wide_a, &mut rounded, &b, &mut x, Reference::RightHandSide).expect("converges");
     });
     assert!(first > 0 && second == 0, "FGMRES in single precision: {first}, {second}");
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use gluey_linalg::{
     Cg, CgParams, DirectSpd, Fgmres, FgmresParams, FnOp, Identity, Jacobi, KrylovError, KrylovReport, LinOp,
-    Ordering, Preconditioner, Reference, RefinementParams, SinglePrecision, SparseMatrix, Symbolic, vector,
+    Ordering, Preconditioner, Reference, RefinementParams, Rounded, SinglePrecision, SparseMatrix, Symbolic,
+    vector,
 };
 use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 
@@ -279,8 +280,9 @@ fn vectors_in_single_precision_do_not_limit_the_residual() {
             .expect("converges");
         x.fill(0.0);
         let mut solver = Fgmres::<f64, f32>::with_storage(params);
+        let (mut a, mut m) = (Rounded::new(n, &mut a), Rounded::new(n, &mut m));
         let narrow = solver.solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
-        a.apply(&x, &mut work);
+        LinOp::<f64>::apply(&mut a, &x, &mut work);
         vector::residual_from_product(&b, &mut work);
         assert!(vector::norm(&work) <= tolerance * vector::norm(&b));
         assert!(narrow.iterations <= wide.iterations + 1, "{narrow:?} {wide:?}");
@@ -294,7 +296,8 @@ fn solutions_have_the_same_bits_for_any_number_of_threads() {
     let solve = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (mut a, mut m) = ill_conditioned(n, 1e4);
+            let (a, m) = ill_conditioned(n, 1e4);
+            let (mut a, mut m) = (Rounded::new(n, a), Rounded::new(n, m));
             let b = pseudo_random(3, n);
             let mut x = vec![0.0; n];
             let mut solver = Fgmres::<f64, f32>::with_storage(FgmresParams::default());

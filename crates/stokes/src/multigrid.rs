@@ -102,6 +102,7 @@ where
             schur,
             load: vec![0.0; system.velocity_dim()],
             pressure: vec![0.0; system.pressure.dim()],
+            answer: vec![0.0; system.pressure.dim()],
             work: Workspace::default(),
         };
         preconditioner.cycle.take_fine_applications();
@@ -127,26 +128,31 @@ where
     schur: &'a mut SchurInverse,
     load: Vec<f64>,
     pressure: Vec<f64>,
+    /// `z_p`.
+    answer: Vec<f64>,
     work: Workspace<f64>,
 }
 
-impl<const D: usize> Preconditioner<f64> for BlockTriangular<'_, D>
+impl<const D: usize> Preconditioner<f64, f32> for BlockTriangular<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let (ru, rp) = r.split_at(self.system.velocity_dim());
-        let (zu, zp) = z.split_at_mut(self.system.velocity_dim());
-        self.pressure.copy_from_slice(rp);
-        self.system.pressure.remove_mean(&mut self.pressure);
-        self.schur.apply(&self.pressure, zp);
-        self.system.pressure.remove_mean(zp);
-        vector::scale(-1.0, zp);
-        self.pressure.copy_from_slice(zp);
-        self.system.pressure.expand(&mut self.pressure);
-        self.system.gradient(&self.pressure, &mut self.load, &mut self.work);
-        vector::residual_from_product(ru, &mut self.load);
-        self.cycle.apply(&self.load, zu);
+    /// `z` over the norm of the load of the cycle, which is what the cycle gives in single precision.
+    fn apply(&mut self, r: &[f64], z: &mut [f32]) {
+        let Self { system, cycle, schur, load, pressure, answer, work } = self;
+        let (ru, rp) = r.split_at(system.velocity_dim());
+        let (zu, zp) = z.split_at_mut(system.velocity_dim());
+        pressure.copy_from_slice(rp);
+        system.pressure.remove_mean(pressure);
+        schur.apply(pressure, answer);
+        system.pressure.remove_mean(answer);
+        vector::scaled_copy(-1.0, answer, pressure);
+        system.pressure.expand(pressure);
+        system.gradient(pressure, load, work);
+        let norm = vector::residual_norm_from_product(ru, load);
+        let inverse = if norm > 0.0 { 1.0 / norm } else { 1.0 };
+        vector::convert(-inverse, answer, zp);
+        cycle.apply_scaled(inverse, load, zu);
     }
 }
 
@@ -202,6 +208,8 @@ where
     coarse: CoarseSolver,
     /// The penalised solid, in that formulation.
     solid: Option<SolidBlock<D>>,
+    /// What it answers, before that is rounded.
+    answer: Vec<f64>,
 }
 
 impl<const D: usize> VCycle<D>
@@ -240,7 +248,7 @@ where
         };
         let coarse_space = levels[0].operator.space.clone();
         let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
-        Ok(Self { hierarchy, levels, coarse, solid })
+        Ok(Self { hierarchy, levels, coarse, solid, answer: Vec::new() })
     }
 
     /// Applications on the finest mesh since the last call, see [`SolveReport::fine_operator_applications`].
@@ -272,25 +280,41 @@ impl<const D: usize> VCycle<D>
 where
     Dim<D>: Space<D>,
 {
+    /// `V (scale r)` on the reduced vectors of the finest rigid level, for a `scale` that takes `r` to norm one.
+    fn cycle(&mut self, scale: f64, r: &[f64]) -> &[f32] {
+        let top = self.levels.len() - 1;
+        vector::convert(scale, r, &mut self.levels[top].b);
+        self.run(top);
+        &self.levels[top].x
+    }
+
     /// `z = V r` on the reduced vectors of the finest rigid level.
-    fn cycle(&mut self, r: &[f64], z: &mut [f64]) {
+    fn rigid_cycle(&mut self, r: &[f64], z: &mut [f64]) {
         let norm = vector::norm(r);
         if norm == 0.0 {
             z.fill(0.0);
             return;
         }
-        let top = self.levels.len() - 1;
-        vector::convert(1.0 / norm, r, &mut self.levels[top].b);
-        self.run(top);
-        vector::convert(norm, &self.levels[top].x, z);
+        vector::convert(norm, self.cycle(1.0 / norm, r), z);
     }
 
     /// The nodal velocities `u` with which the finest rigid level answers the nodal load `f`.
     fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f64]) {
         let top = self.levels.len() - 1;
         self.levels[top].operator.space.reduce(f);
-        self.cycle(f, u);
+        self.rigid_cycle(f, u);
         self.levels[top].operator.space.expand(u);
+    }
+
+    /// `z = scale V r`, for a `scale` that takes `r` to norm one.
+    fn apply_scaled(&mut self, scale: f64, r: &[f64], z: &mut [f32]) {
+        let Some(mut solid) = self.solid.take() else { return vector::copy(self.cycle(scale, r), z) };
+        self.answer.resize(r.len(), 0.0);
+        let mut answer = std::mem::take(&mut self.answer);
+        solid.apply(r, &mut answer, |f, u| self.rigid_velocities(f, u));
+        vector::convert(scale, &answer, z);
+        self.answer = answer;
+        self.solid = Some(solid);
     }
 }
 
@@ -299,7 +323,7 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let Some(mut solid) = self.solid.take() else { return self.cycle(r, z) };
+        let Some(mut solid) = self.solid.take() else { return self.rigid_cycle(r, z) };
         solid.apply(r, z, |f, u| self.rigid_velocities(f, u));
         self.solid = Some(solid);
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use gluey_fem::Reference;
 use gluey_fem::cells::{CellData, CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Pattern, SparseMatrix, vector};
+use gluey_linalg::{LinOp, Pattern, Scalar, SparseMatrix, vector};
 
 use crate::cell_schur::PressureMatrices;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
@@ -194,7 +194,7 @@ where
     }
 }
 
-impl<const D: usize> LinOp<f64> for SystemOperator<'_, D>
+impl<X: Scalar, const D: usize> LinOp<f64, X> for SystemOperator<'_, D>
 where
     Dim<D>: Space<D>,
 {
@@ -202,12 +202,12 @@ where
         self.system.dim()
     }
 
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+    fn apply(&mut self, x: &[X], y: &mut [f64]) {
         self.applications += 1;
         let Self { system, pressure, work, .. } = self;
         let (u, p) = x.split_at(system.velocity_dim());
         let (yu, yp) = y.split_at_mut(system.velocity_dim());
-        vector::copy(p, pressure);
+        vector::convert(1.0, p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, work);
         system.reduce_pressures(yp);

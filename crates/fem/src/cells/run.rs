@@ -28,9 +28,9 @@ pub struct Workspace<T> {
 
 /// What is applied to which fields.
 #[derive(Clone, Copy)]
-pub(super) struct Input<'a, T> {
+pub(super) struct Input<'a, T, X = T> {
     /// Velocities and twists; empty for none.
-    x: &'a [T],
+    x: &'a [X],
     /// Nodal pressures; empty for none.
     p: &'a [T],
     /// Whether rigid and hanging nodes are to be set first.
@@ -50,39 +50,40 @@ pub(super) struct Output<'a, T> {
 impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     /// `y = A x`.
     pub fn viscous(&self, x: &[T], y: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<true, false>(Input { x, p: &[], expand: true }, y, &mut [], work);
+        self.apply::<true, false, _>(Input { x, p: &[], expand: true }, y, &mut [], work);
     }
 
     /// `y = A u` for a nodal velocity field that is already right on rigid and hanging nodes.
     pub fn viscous_of_field(&self, u: &[T], y: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<true, false>(Input { x: u, p: &[], expand: false }, y, &mut [], work);
+        self.apply::<true, false, _>(Input { x: u, p: &[], expand: false }, y, &mut [], work);
     }
 
-    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal.
-    pub fn stokes(&self, x: &[T], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<true, true>(Input { x, p, expand: true }, y, q, work);
+    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal. Velocities may come in another precision than
+    /// the one that is computed in.
+    pub fn stokes<X: Scalar>(&self, x: &[X], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
+        self.apply::<true, true, _>(Input { x, p, expand: true }, y, q, work);
     }
 
     /// The same for a nodal velocity field that is already right on rigid and hanging nodes.
     pub fn stokes_of_field(&self, u: &[T], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<true, true>(Input { x: u, p, expand: false }, y, q, work);
+        self.apply::<true, true, _>(Input { x: u, p, expand: false }, y, q, work);
     }
 
     /// `y = -B^T p`.
     pub fn gradient(&self, p: &[T], y: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<false, true>(Input { x: &[], p, expand: false }, y, &mut [], work);
+        self.apply::<false, true, _>(Input::<T> { x: &[], p, expand: false }, y, &mut [], work);
     }
 
-    fn apply<const VISCOUS: bool, const PRESSURE: bool>(
+    fn apply<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T>,
+        input: Input<'_, T, X>,
         y: &mut [T],
         q: &mut [T],
         work: &mut Workspace<T>,
     ) {
         work.fit(self, !q.is_empty());
         let kernel = |output: Output<'_, T>, buffers: &mut Buffers<T>| {
-            self.dispatch::<VISCOUS, PRESSURE>(input, output, buffers);
+            self.dispatch::<VISCOUS, PRESSURE, X>(input, output, buffers);
         };
         self.apply_kernel(y, q, work, &kernel);
     }
@@ -161,9 +162,9 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     }
 
     /// Runs the kernel compiled for the widest vectors this processor has.
-    pub(super) fn dispatch<const VISCOUS: bool, const PRESSURE: bool>(
+    pub(super) fn dispatch<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T>,
+        input: Input<'_, T, X>,
         output: Output<'_, T>,
         buffers: &mut Buffers<T>,
     ) {
@@ -172,21 +173,21 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
                 // SAFETY: the instructions the function is compiled for were detected just above; its code is the safe
                 // generic `run`. The test `vector_and_portable_kernels_agree` compares all three.
-                return unsafe { run_avx512::<T, D, VISCOUS, PRESSURE>(self, input, output, buffers) };
+                return unsafe { run_avx512::<T, D, VISCOUS, PRESSURE, X>(self, input, output, buffers) };
             }
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 // SAFETY: as above.
-                return unsafe { run_avx2::<T, D, VISCOUS, PRESSURE>(self, input, output, buffers) };
+                return unsafe { run_avx2::<T, D, VISCOUS, PRESSURE, X>(self, input, output, buffers) };
             }
         }
-        self.run::<Portable<T>, VISCOUS, PRESSURE>(input, output, buffers);
+        self.run::<Portable<T>, VISCOUS, PRESSURE, X>(input, output, buffers);
     }
 
     /// Works off some chunks.
     #[inline(always)]
-    pub(super) fn run<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool>(
+    pub(super) fn run<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T>,
+        input: Input<'_, T, X>,
         output: Output<'_, T>,
         buffers: &mut Buffers<T>,
     ) {
@@ -208,7 +209,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
                 output.clear();
                 continue;
             }
-            self.read::<VISCOUS, PRESSURE>(chunk, input, x_buffer);
+            self.read::<VISCOUS, PRESSURE, X>(chunk, input, x_buffer);
             y_buffer[..=self.chunks.slot_count(chunk)].fill([T::ZERO; 4]);
             for first in (span.uniform.0..span.uniform.1).step_by(V::COUNT) {
                 self.cells::<V, VISCOUS, PRESSURE, false>(
@@ -257,10 +258,10 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
 
     /// Reads the unknowns of a chunk.
     #[inline(always)]
-    fn read<const VISCOUS: bool, const PRESSURE: bool>(
+    fn read<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
         chunk: usize,
-        input: Input<'_, T>,
+        input: Input<'_, T, X>,
         buffer: &mut Nodes<T>,
     ) {
         let chunks = &*self.chunks;
@@ -294,7 +295,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
 
     /// Sets rigid nodes, then hanging ones.
     #[inline(always)]
-    fn expand(&self, chunk: usize, twists: &[T], buffer: &mut Nodes<T>) {
+    fn expand<X: Scalar>(&self, chunk: usize, twists: &[X], buffer: &mut Nodes<T>) {
         let bodies = self.bodies.of(chunk);
         for tie in self.ties.of(chunk) {
             let twist = &twists[bodies[tie.body as usize] as usize * Self::TWIST..][..Self::TWIST];
@@ -356,8 +357,8 @@ fn velocity_of<T: Scalar, const D: usize>(node: &[T; 4]) -> [T; D] {
 }
 
 #[inline(always)]
-fn set_velocity<T: Scalar, const D: usize>(node: &mut [T; 4], u: &[T; D]) {
-    *node = std::array::from_fn(|c| if c < D { u[c] } else { T::ZERO });
+fn set_velocity<T: Scalar, X: Scalar, const D: usize>(node: &mut [T; 4], u: &[X; D]) {
+    *node = std::array::from_fn(|c| if c < D { T::from_f64(u[c].to_f64()) } else { T::ZERO });
 }
 
 /// Cuts off the first `count` entries, or what there is.
@@ -433,24 +434,30 @@ fn nodes_in<T>(buffer: &mut [T]) -> &mut Nodes<T> {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-pub(super) fn run_avx2<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool>(
+pub(super) fn run_avx2<
+    T: CellScalar,
+    const D: usize,
+    const VISCOUS: bool,
+    const PRESSURE: bool,
+    X: Scalar,
+>(
     operator: &CellOperator<T, D>,
-    input: Input<'_, T>,
+    input: Input<'_, T, X>,
     output: Output<'_, T>,
     buffers: &mut Buffers<T>,
 ) {
-    operator.run::<T::Avx2, VISCOUS, PRESSURE>(input, output, buffers);
+    operator.run::<T::Avx2, VISCOUS, PRESSURE, X>(input, output, buffers);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
-fn run_avx512<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool>(
+fn run_avx512<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
     operator: &CellOperator<T, D>,
-    input: Input<'_, T>,
+    input: Input<'_, T, X>,
     output: Output<'_, T>,
     buffers: &mut Buffers<T>,
 ) {
-    operator.run::<T::Avx512, VISCOUS, PRESSURE>(input, output, buffers);
+    operator.run::<T::Avx512, VISCOUS, PRESSURE, X>(input, output, buffers);
 }
 
 /// `(y, q)` of the Stokes operator by a given kernel.

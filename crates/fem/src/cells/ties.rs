@@ -16,16 +16,17 @@ pub struct Tie<T, const D: usize> {
 impl<T: Scalar, const D: usize> Tie<T, D> {
     /// `u = U + w x arm`.
     #[inline(always)]
-    pub(super) fn set_velocity(&self, twist: &[T], u: &mut [T; 4]) {
-        let (a, w) = (&self.arm, &twist[D..]);
-        u[..D].copy_from_slice(&twist[..D]);
+    pub(super) fn set_velocity<X: Scalar>(&self, twist: &[X], u: &mut [T; 4]) {
+        let a = &self.arm;
+        let entry = |k: usize| T::from_f64(twist[k].to_f64());
+        (0..D).for_each(|c| u[c] = entry(c));
         if D == 2 {
-            u[0] += -(w[0] * a[1]);
-            u[1] += w[0] * a[0];
+            u[0] += -(entry(D) * a[1]);
+            u[1] += entry(D) * a[0];
         } else {
             for c in 0..D {
                 let (i, j) = ((c + 1) % D, (c + 2) % D);
-                u[c] += w[i] * a[j] - w[j] * a[i];
+                u[c] += entry(D + i) * a[j] - entry(D + j) * a[i];
             }
         }
     }

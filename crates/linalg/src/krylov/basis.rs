@@ -1,8 +1,8 @@
-//! The vectors that flexible GMRES keeps: an orthonormal basis in the scalar `T` of the problem, directions in a narrower
+//! The vectors that flexible GMRES keeps: an orthogonal basis in the scalar `T` of the problem, directions in a narrower
 //! one, `S`.
 //!
-//! Rounding a direction `z_j` costs nothing but a little of the preconditioner's quality: the operator is applied to what
-//! is stored.
+//! Both are written where they stay. Directions are what the preconditioner makes of a basis vector, in its precision: the
+//! operator is applied to what is stored. Basis vectors are not scaled to norm one; their norms go into the coefficients.
 //!
 //! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified between
 //! groups; the pass over `w` that subtracts one group takes the scalar products with the next.
@@ -11,29 +11,35 @@ use crate::vector::{BLOCK, axpy_block, dot_block};
 use crate::{Scalar, parallel, vector};
 
 /// Vectors that one pass over `w` is orthogonalised against.
-const GROUP: usize = 4;
+const GROUP: usize = 8;
+
+/// Largest norm of a basis vector, and its inverse the smallest.
+const LARGEST_NORM: f64 = 1e15;
 
 /// Vectors of one length, of which the first are in use. Memory is kept for later use.
 #[derive(Clone, Debug, Default)]
 struct Stack<T> {
     vectors: Vec<Vec<T>>,
+    dim: usize,
     count: usize,
 }
 
 impl<T: Scalar> Stack<T> {
     fn reset(&mut self, dim: usize) {
         self.count = 0;
-        if self.vectors.first().is_some_and(|v| v.len() != dim) {
-            self.vectors.clear();
+        if self.dim != dim {
+            self.dim = dim;
+            self.vectors.iter_mut().for_each(|v| v.resize(dim, T::ZERO));
         }
     }
 
-    fn next(&mut self, dim: usize) -> &mut [T] {
+    /// The vectors in use and the one after them, whatever is in it.
+    fn used_and_next(&mut self) -> (&[Vec<T>], &mut [T]) {
         if self.count == self.vectors.len() {
-            self.vectors.push(vec![T::ZERO; dim]);
+            self.vectors.push(vec![T::ZERO; self.dim]);
         }
-        self.count += 1;
-        &mut self.vectors[self.count - 1]
+        let (used, rest) = self.vectors.split_at_mut(self.count);
+        (used, &mut rest[0])
     }
 
     fn used(&self) -> &[Vec<T>] {
@@ -41,30 +47,53 @@ impl<T: Scalar> Stack<T> {
     }
 }
 
-/// The orthonormal basis of a Krylov space.
+/// An orthogonal basis of a Krylov space. Its vectors keep the norms they have when they become orthogonal.
 #[derive(Clone, Debug, Default)]
 pub struct Basis<T> {
     vectors: Stack<T>,
+    norms: Vec<f64>,
 }
 
 impl<T: Scalar> Basis<T> {
     /// An empty basis of vectors of length `dim`.
     pub fn reset(&mut self, dim: usize) {
         self.vectors.reset(dim);
+        self.norms.clear();
     }
 
-    /// Appends `a w` and leaves in `w` what was stored.
-    pub fn push(&mut self, a: f64, w: &mut [T]) {
-        store(a, w, 1.0, self.vectors.next(w.len()));
+    /// Where the next vector is to be written.
+    pub fn next(&mut self) -> &mut [T] {
+        self.vectors.used_and_next().1
     }
 
-    /// Makes `w` orthogonal to the basis, passes the coefficients taken out to `coefficient` and returns the norm of
-    /// what is left.
-    pub fn orthogonalise(&self, w: &mut [T], mut coefficient: impl FnMut(f64)) -> f64 {
+    /// Takes what was written to [`Basis::next`] into the basis: a vector of this norm, orthogonal to the others. It is scaled
+    /// if products with such vectors might leave the range of `f64`.
+    pub fn push(&mut self, norm: f64) {
+        let is_safe = (1.0 / LARGEST_NORM..=LARGEST_NORM).contains(&norm);
+        if !is_safe {
+            vector::scale(1.0 / norm, self.next());
+        }
+        self.vectors.count += 1;
+        self.norms.push(if is_safe { norm } else { 1.0 });
+    }
+
+    /// The last vector; empty before there is one.
+    pub fn last(&self) -> &[T] {
+        self.vectors.used().last().map_or(&[], Vec::as_slice)
+    }
+
+    /// Makes [`Basis::next`] orthogonal to the basis, passes its products with the normalised vectors to `coefficient` and
+    /// returns the norm of what is left.
+    pub fn orthogonalise(&mut self, mut coefficient: impl FnMut(f64)) -> f64 {
+        let (used, w) = self.vectors.used_and_next();
         let mut before: (&[Vec<T>], _) = (&[], [0.0; GROUP]);
-        for group in self.vectors.used().chunks(GROUP) {
-            let h = pass(w, before, |at, block| products(group, at, block));
-            h[..group.len()].iter().for_each(|&h| coefficient(h));
+        for (group, norms) in used.chunks(GROUP).zip(self.norms.chunks(GROUP)) {
+            let mut h = pass(w, before, |at, block| products(group, at, block));
+            for (h, norm) in h.iter_mut().zip(norms) {
+                *h /= norm;
+                coefficient(*h);
+                *h /= norm;
+            }
             before = (group, h);
         }
         let [square] = pass(w, before, |_, block| [dot_block(block, block)]);
@@ -105,42 +134,23 @@ fn subtract<T: Scalar>(vectors: &[Vec<T>], h: &[f64; GROUP], at: usize, block: &
     }
 }
 
-/// `to = a from` in the precision of `to`, and `from = b to`.
-fn store<S: Scalar, T: Scalar>(a: f64, from: &mut [T], b: f64, to: &mut [S]) {
-    let (a, b) = (T::from_f64(a), T::from_f64(b));
-    parallel::for_each_2(from, to, |_, from, to| {
-        for (from, to) in from.iter_mut().zip(to) {
-            *to = S::from_f64((a * *from).to_f64());
-            *from = b * T::from_f64(to.to_f64());
-        }
-    });
-}
-
-/// Preconditioned basis vectors, each scaled to norm one so that none leaves the range of `S`.
+/// Preconditioned basis vectors.
 #[derive(Clone, Debug, Default)]
 pub struct Directions<S> {
     vectors: Stack<S>,
-    norms: Vec<f64>,
 }
 
 impl<S: Scalar> Directions<S> {
     /// No directions, of length `dim`.
     pub fn reset(&mut self, dim: usize) {
         self.vectors.reset(dim);
-        self.norms.clear();
     }
 
-    /// Appends `z` and leaves in `z` what was stored.
-    pub fn push<T: Scalar>(&mut self, z: &mut [T]) {
-        let norm = vector::norm(z);
-        let scale = if norm > 0.0 { norm } else { 1.0 };
-        store(1.0 / scale, z, scale, self.vectors.next(z.len()));
-        self.norms.push(norm);
-    }
-
-    /// Bound `sum_j |y_j| |z_j|` of the norm of `Z y`.
-    pub fn bound(&self, y: &[f64]) -> f64 {
-        y.iter().zip(&self.norms).map(|(y, norm)| y.abs() * norm).sum()
+    /// One more direction, as `fill` writes it.
+    pub fn push_with(&mut self, fill: impl FnOnce(&mut [S])) -> &[S] {
+        fill(self.vectors.used_and_next().1);
+        self.vectors.count += 1;
+        &self.vectors.vectors[self.vectors.count - 1]
     }
 
     /// `x += Z y`.
@@ -148,8 +158,8 @@ impl<S: Scalar> Directions<S> {
         parallel::for_each(x, |first, piece| {
             for (k, block) in piece.chunks_mut(BLOCK).enumerate() {
                 let at = first + k * BLOCK;
-                for ((z, norm), y) in self.vectors.used().iter().zip(&self.norms).zip(y) {
-                    axpy_block(y * norm, &z[at..], block);
+                for (z, &y) in self.vectors.used().iter().zip(y) {
+                    axpy_block(y, &z[at..], block);
                 }
             }
         });
@@ -170,33 +180,56 @@ mod tests {
         let mut basis = Basis::<f64>::default();
         basis.reset(n);
         let mut stored: Vec<Vec<f64>> = Vec::new();
-        for j in 0..11 {
-            let mut w = wave(n, 0.1 + 0.37 * j as f64);
+        for j in 0..19 {
+            let w = wave(n, 0.1 + 0.37 * j as f64);
+            basis.next().copy_from_slice(&w);
             let mut h = Vec::new();
-            let norm = basis.orthogonalise(&mut w, |c| h.push(c));
+            let norm = basis.orthogonalise(|c| h.push(c));
             assert_eq!(h.len(), j);
-            assert!((norm - vector::norm(&w)).abs() < 1e-12 * norm);
-            basis.push(1.0 / norm, &mut w);
-            assert!(stored.iter().all(|v| vector::dot(v, &w).abs() < 1e-13));
-            stored.push(w);
+            assert!((norm - vector::norm(basis.next())).abs() < 1e-12 * norm);
+            let square = norm * norm + h.iter().map(|h| h * h).sum::<f64>();
+            assert!((square / vector::dot(&w, &w) - 1.0).abs() < 1e-12);
+            basis.push(norm);
+            let last = basis.last();
+            assert!(stored.iter().all(|v| vector::dot(v, last).abs() < 1e-13 * vector::norm(v) * norm));
+            stored.push(last.to_vec());
         }
     }
 
     #[test]
-    fn directions_keep_seven_digits_at_any_scale() {
+    fn directions_are_kept_as_they_are_and_added_up() {
         let mut directions = Directions::<f32>::default();
         directions.reset(100);
-        for scale in [1e-100, 1.0, 1e100] {
-            let exact: Vec<f64> = wave(100, 0.7).iter().map(|z| scale * z).collect();
-            let mut z = exact.clone();
-            directions.push(&mut z);
-            let error: f64 = z.iter().zip(&exact).map(|(a, b)| (a / scale - b / scale).abs()).sum();
-            assert!(error > 0.0 && error < 1e-5);
-            let mut x = vec![0.0; 100];
-            let mut y = vec![0.0; directions.norms.len()];
-            *y.last_mut().expect("pushed") = 1.0;
-            directions.add(&y, &mut x);
-            assert!(x.iter().zip(&z).all(|(x, z)| (x - z).abs() <= 1e-15 * scale));
+        let mut want = vec![0.0; 100];
+        for k in 0..3 {
+            let z = directions.push_with(|z| {
+                z.copy_from_slice(&wave(100, 0.7 + k as f64).iter().map(|&z| z as f32).collect::<Vec<_>>())
+            });
+            want.iter_mut().zip(z).for_each(|(sum, &z)| *sum += (k as f64 - 0.5) * f64::from(z));
+        }
+        let mut x = vec![0.0; 100];
+        directions.add(&[-0.5, 0.5, 1.5], &mut x);
+        assert!(x.iter().zip(&want).all(|(x, want)| (x - want).abs() < 1e-15));
+    }
+
+    #[test]
+    fn only_extreme_vectors_are_scaled() {
+        for (norm, stored) in [(1e-10, 1e-10), (1e-60, 1.0), (3e70, 1.0)] {
+            let mut basis = Basis::<f64>::default();
+            basis.reset(2);
+            basis.next().copy_from_slice(&[0.6 * norm, -0.8 * norm]);
+            basis.push(norm);
+            assert!((vector::norm(basis.last()) / stored - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn memory_serves_vectors_of_another_length() {
+        let mut basis = Basis::<f64>::default();
+        for n in [10, 4, 7] {
+            basis.reset(n);
+            assert_eq!((basis.next().len(), basis.last().len()), (n, 0));
+            basis.push(1.0);
         }
     }
 }

@@ -34,14 +34,10 @@ impl Default for FgmresParams {
 #[derive(Clone, Debug)]
 pub struct Fgmres<T, S = T> {
     params: FgmresParams,
-    /// Orthonormal basis `v_0 .. v_k` of the Krylov space.
+    /// Orthogonal basis `v_0 .. v_k` of the Krylov space.
     basis: Basis<T>,
     /// Preconditioned basis `z_j = M_j^-1 v_j`.
     directions: Directions<S>,
-    /// The residual or the latest basis vector.
-    w: Vec<T>,
-    /// The latest direction.
-    z: Vec<T>,
     least_squares: LeastSquares,
     history: Vec<f64>,
 }
@@ -54,7 +50,8 @@ impl<T: Scalar> Fgmres<T> {
 }
 
 impl<T: Scalar, S: Scalar> Fgmres<T, S> {
-    /// A solver with an empty workspace that keeps preconditioned vectors in `S`.
+    /// A solver with an empty workspace that keeps preconditioned vectors in `S`, which the preconditioner writes and the
+    /// operator reads. The preconditioner may scale each by a positive factor of its choice.
     ///
     /// For a good preconditioner, with convergence in a few dozen iterations: rounded directions no longer span a Krylov
     /// space, which delays convergence through hundreds of iterations, and an exact preconditioner takes two.
@@ -64,8 +61,6 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
             params: FgmresParams { restart, ..params },
             basis: Basis::default(),
             directions: Directions::default(),
-            w: Vec::new(),
-            z: Vec::new(),
             least_squares: LeastSquares::default(),
             history: Vec::with_capacity(params.max_iterations + 1),
         }
@@ -92,18 +87,16 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
     /// holds the last finite iterate.
     pub fn solve(
         &mut self,
-        a: &mut (impl LinOp<T> + ?Sized),
-        m: &mut (impl Preconditioner<T> + ?Sized),
+        a: &mut (impl LinOp<T> + LinOp<T, S> + ?Sized),
+        m: &mut (impl Preconditioner<T, S> + ?Sized),
         b: &[T],
         x: &mut [T],
         reference: Reference,
     ) -> Result<KrylovReport, KrylovError> {
-        check_dimensions(a.dim(), b, x)?;
+        check_dimensions(LinOp::<T>::dim(a), b, x)?;
         self.history.clear();
-        self.w.resize(b.len(), T::ZERO);
-        self.z.resize(b.len(), T::ZERO);
         let right_hand_side_norm = finite(vector::norm(b), 0)?;
-        let mut norm = finite(true_residual(a, b, x, &mut self.w), 0)?;
+        let mut norm = finite(self.residual(a, b, x), 0)?;
         let FgmresParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
         self.history.push(norm);
@@ -122,19 +115,24 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
         Ok(target.report(iterations, norm))
     }
 
-    /// Builds the Krylov space of the residual in `w` until its least-squares residual is small.
+    /// Starts a basis with the true residual and returns its norm.
+    fn residual(&mut self, a: &mut (impl LinOp<T> + ?Sized), b: &[T], x: &[T]) -> f64 {
+        self.basis.reset(b.len());
+        self.directions.reset(b.len());
+        true_residual(a, b, x, self.basis.next())
+    }
+
+    /// Builds the Krylov space of the residual, of this norm, until its least-squares residual is small.
     fn cycle(
         &mut self,
-        a: &mut (impl LinOp<T> + ?Sized),
-        m: &mut (impl Preconditioner<T> + ?Sized),
+        a: &mut (impl LinOp<T> + LinOp<T, S> + ?Sized),
+        m: &mut (impl Preconditioner<T, S> + ?Sized),
         norm: f64,
         target: &Target,
         iterations: &mut usize,
     ) -> Result<Cycle, KrylovError> {
-        self.basis.reset(self.w.len());
-        self.directions.reset(self.w.len());
         self.least_squares.reset(norm);
-        self.basis.push(1.0 / norm, &mut self.w);
+        self.basis.push(norm);
         let mut steps = 0;
         while steps < self.params.restart && *iterations < self.params.max_iterations {
             *iterations += 1;
@@ -147,28 +145,26 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
             if residual <= target.norm || broke_down {
                 return Ok(Cycle { steps, broke_down });
             }
-            self.basis.push(1.0 / left, &mut self.w);
+            self.basis.push(left);
         }
         Ok(Cycle { steps, broke_down: false })
     }
 
-    /// `z = M^-1 v`, `w = A z` orthogonalised against the basis, for its last vector `v` in `w`; returns the norm of the
-    /// new `w`.
+    /// `z = M^-1 v`, `w = A z` orthogonalised against the basis, for its last vector `v`; returns the norm of `w`.
     fn arnoldi_step(
         &mut self,
-        a: &mut (impl LinOp<T> + ?Sized),
-        m: &mut (impl Preconditioner<T> + ?Sized),
+        a: &mut (impl LinOp<T, S> + ?Sized),
+        m: &mut (impl Preconditioner<T, S> + ?Sized),
     ) -> f64 {
-        let Self { basis, directions, least_squares, w, z, .. } = self;
-        m.apply(w, z);
-        directions.push(z);
-        a.apply(z, w);
-        let left = basis.orthogonalise(w, |h| least_squares.push(h));
+        let Self { basis, directions, least_squares, .. } = self;
+        let z = directions.push_with(|z| m.apply(basis.last(), z));
+        a.apply(z, basis.next());
+        let left = basis.orthogonalise(|h| least_squares.push(h));
         least_squares.push(left);
         left
     }
 
-    /// `x += Z y`, unless that is not finite, and the true residual in `w`; returns its norm.
+    /// `x += Z y`, unless `y` is not finite, and the true residual for the next cycle; returns its norm.
     fn update(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
@@ -178,9 +174,9 @@ impl<T: Scalar, S: Scalar> Fgmres<T, S> {
         iterations: usize,
     ) -> Result<f64, KrylovError> {
         let y = self.least_squares.solve(steps);
-        finite(self.directions.bound(y), iterations)?;
+        finite(y.iter().map(|y| y.abs()).sum(), iterations)?;
         self.directions.add(y, x);
-        let norm = finite(true_residual(a, b, x, &mut self.w), iterations)?;
+        let norm = finite(self.residual(a, b, x), iterations)?;
         if let Some(last) = self.history.last_mut() {
             *last = norm;
         }
