@@ -117,3 +117,24 @@ time = {{ step = 0.05, end = 1.0 }}
     );
     assert!(message("couette").contains("particle 2 sticks out of the box"), "{}", message("couette"));
 }
+
+#[test]
+fn a_period_in_which_two_particles_touch_twice_is_refused() {
+    let text = |radius: f64| {
+        format!(
+            r#"
+name = "short"
+dimension = 2
+domain.boundary = "periodic"
+particles = [{{ position = [0.5, 0.5], radius = {radius} }}]
+time = {{ step = 0.05, end = 1.0 }}
+"#
+        )
+    };
+    let Err(error) = Case::parse(&text(0.26), "case.toml") else { panic!("accepted") };
+    let message = error.to_string();
+    let wanted =
+        "particles[0].radius = 0.26: particle 1 of diameter 0.52 is wider than half the period 1 along x";
+    assert!(message.contains(wanted), "{message}");
+    assert!(Case::parse(&text(0.25), "case.toml").is_ok());
+}

@@ -209,6 +209,18 @@ pub enum Problem {
         /// Name of the axis.
         axis: char,
     },
+    /// A particle that another one could touch on both sides of a periodic box at once.
+    #[error("particle {particle} of diameter {diameter} is wider than half the period {period} along {axis}")]
+    PeriodTooShort {
+        /// Its number, from 1.
+        particle: usize,
+        /// Its diameter.
+        diameter: f64,
+        /// The period.
+        period: f64,
+        /// Name of the axis.
+        axis: char,
+    },
     /// A particle that sticks out of the box.
     #[error("particle {particle} sticks out of the box by {excess:.6e} along {axis}")]
     OutsideBox {
@@ -303,6 +315,9 @@ impl Problem {
                 "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2".into()
             }
             Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
+            Self::PeriodTooShort { period, axis, .. } => {
+                format!("the radius must be at most {}, or the box longer along {axis}", 0.25 * period)
+            }
             Self::OutsideBox { axis, range, .. } => {
                 format!("{axis} of the centre must lie between {} and {}", range.0, range.1)
             }

@@ -101,8 +101,16 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
             let (diameter, edge) = (2.0 * particle.radius, upper[d] - lower[d]);
             return fail(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
         }
-        // A particle may lie across a periodic border.
-        let range = if case.period(d).is_some() { (lower[d], upper[d]) } else { range };
+        let range = match case.period(d) {
+            Some(period) if 4.0 * particle.radius > period => {
+                let (particle, diameter) = (index + 1, 2.0 * particle.radius);
+                let problem = Problem::PeriodTooShort { particle, diameter, period, axis };
+                return fail(key.name("radius"), problem);
+            }
+            // A particle may lie across a periodic border.
+            Some(_) => (lower[d], upper[d]),
+            None => range,
+        };
         let excess = (range.0 - particle.position[d]).max(particle.position[d] - range.1);
         if excess > 0.0 {
             let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
