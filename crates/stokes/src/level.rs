@@ -7,6 +7,7 @@ use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, in
 
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
+use crate::near_bodies::NearBodies;
 use crate::space::VelocitySpace;
 use crate::system::{ActiveCell, active_cells, cell_operator};
 
@@ -35,7 +36,7 @@ impl Smoothing {
 
 /// Factor by which [`cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not sums over cells: they
 /// add 2 % at most where measured.
-const SAFETY: f64 = 1.05;
+pub const SAFETY: f64 = 1.05;
 
 /// The viscous operator `T^T A T` of one level.
 #[derive(Clone, Debug)]
@@ -51,7 +52,7 @@ pub struct LevelOperator<const D: usize> {
 
 impl<const D: usize> LevelOperator<D> {
     /// Applications since the last call, each counted as its share of the mesh.
-    pub fn take_applications(&mut self) -> f64 {
+    fn take_applications(&mut self) -> f64 {
         std::mem::take(&mut self.applications) as f64 * self.share
     }
 }
@@ -72,10 +73,18 @@ where
 
 /// Inverse diagonal on free nodes, inverse blocks on twists, zero elsewhere.
 #[derive(Clone, Debug)]
-struct BlockDiagonal {
+pub struct BlockDiagonal {
     nodal: Vec<f32>,
     twists: Vec<f32>,
     rigid: usize,
+}
+
+impl BlockDiagonal {
+    /// The nodal entries at some positions, and all twists.
+    pub fn restricted(&self, positions: &[u32]) -> Self {
+        let nodal = positions.iter().map(|&k| self.nodal[k as usize]).collect();
+        Self { nodal, twists: self.twists.clone(), rigid: self.rigid }
+    }
 }
 
 impl Preconditioner<f32> for BlockDiagonal {
@@ -112,6 +121,7 @@ where
     pub operator: LevelOperator<D>,
     diagonal: BlockDiagonal,
     chebyshev: Chebyshev<f32>,
+    near_bodies: Option<NearBodies<D>>,
     /// Right-hand side.
     pub b: Vec<f32>,
     /// Solution.
@@ -164,6 +174,7 @@ where
             diagonal.twists.fill(0.0);
         }
         let (dim, twist_count) = (space.dim(), space.dim() - space.full_dim());
+        let near_bodies = NearBodies::new(discretisation, &space, &cells, &diagonal, cell_lambda_max::<D>());
         let operator = LevelOperator {
             operator: cell_operator(discretisation, &space, &cells, None),
             work: Workspace::default(),
@@ -177,6 +188,7 @@ where
             operator,
             diagonal,
             chebyshev: Chebyshev::new(dim, smoothing.degree, interval),
+            near_bodies,
             b: zeros(),
             x: zeros(),
             before: smoothing.before,
@@ -184,10 +196,19 @@ where
         })
     }
 
-    /// Smooths `A x = b` from the present `x`.
+    /// Applications since the last call, each counted as its share of the mesh.
+    pub fn take_applications(&mut self) -> f64 {
+        let near_bodies = self.near_bodies.as_mut().map_or(0.0, NearBodies::take_applications);
+        self.operator.take_applications() + near_bodies * self.operator.share
+    }
+
+    /// Smooths `A x = b` from the present `x`, then once more around the bodies.
     pub fn smooth(&mut self) {
-        let Self { operator, diagonal, chebyshev, b, x, .. } = self;
+        let Self { operator, diagonal, chebyshev, near_bodies, b, x, .. } = self;
         chebyshev.smooth(operator, diagonal, b, x, Guess::Given);
+        if let Some(near_bodies) = near_bodies {
+            near_bodies.smooth(b, x);
+        }
     }
 
     /// Restricts what is to be corrected to the right-hand side of the coarser level: the residual of a sweep from zero, or the

@@ -32,6 +32,7 @@ mod formulation;
 mod gap;
 mod level;
 mod multigrid;
+mod near_bodies;
 mod node_matrix;
 mod patches;
 mod point_matrices;

@@ -253,7 +253,7 @@ where
 
     /// Applications on the finest mesh since the last call, see [`SolveReport::fine_operator_applications`].
     fn take_fine_applications(&mut self) -> f64 {
-        let levels = self.levels.last_mut().map_or(0.0, |level| level.operator.take_applications());
+        let levels = self.levels.last_mut().map_or(0.0, Level::take_applications);
         levels + self.solid.as_mut().map_or(0.0, SolidBlock::take_applications)
     }
 

@@ -5,8 +5,8 @@
 //! cut as it is. [`Patches`] smooth on all but the coarsest level, which is factorised. In 2D, where factors are small, that
 //! is the finest.
 //!
-//! A cycle is cut in two, so that the rigid levels come between: [`SolidCycle::descend`] smooths and then corrects by the
-//! coarser levels, [`SolidCycle::ascend`] is its transpose.
+//! The cycle runs before and after the rigid levels. Cut in two halves around them it costs half as much, but so many more
+//! iterations that the applications of the operator are the same.
 
 use std::sync::Arc;
 
@@ -157,23 +157,16 @@ where
         Ok(Self { finest: Some((operator, finest)), coarser, direct: factorise(&matrix, &order)?, r })
     }
 
-    /// From a zero guess: smooths `A x = b`, then corrects by the coarser levels.
-    pub fn descend(&mut self, b: &[f64], x: &mut [f64]) {
+    /// From a zero guess: smooths `A x = b`, corrects by the coarser levels and smooths again.
+    pub fn apply(&mut self, b: &[f64], x: &mut [f64]) {
         let Some((a, smoother)) = &mut self.finest else { return self.direct.apply(b, x) };
         smoother.smooth(a, b, x, Guess::Zero);
         residual(a, b, x, &mut self.r);
         correct(&mut self.coarser, &mut self.direct, &self.r, x);
-    }
-
-    /// From a zero guess: corrects `A x = b` by the coarser levels, then smooths.
-    pub fn ascend(&mut self, b: &[f64], x: &mut [f64]) {
-        let Some((a, smoother)) = &mut self.finest else { return self.direct.apply(b, x) };
-        x.fill(0.0);
-        correct(&mut self.coarser, &mut self.direct, b, x);
         smoother.smooth(a, b, x, Guess::Given);
     }
 
-    /// What [`SolidCycle::descend`] left: `r = b - A x`, or zero where it solves.
+    /// What [`SolidCycle::apply`] left: `r = b - A x`, or zero where it solves.
     pub fn residual(&mut self, b: &[f64], x: &[f64], r: &mut [f64]) {
         match &mut self.finest {
             Some((a, _)) => residual(a, b, x, r),
