@@ -406,6 +406,46 @@ mod tests {
         assert!(largest < upper && upper < 1.2 * largest, "{largest} {upper}");
     }
 
+    fn level_around_a_ball<const D: usize>() -> Level<D>
+    where
+        Dim<D>: Space<D>,
+    {
+        let ball = Ball::new(Vector::<D>::repeat(0.47), 0.1);
+        let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |_, _, _| true).unwrap();
+        let discretisation = Discretisation::new(mesh);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], -0.1);
+        let space = VelocitySpace::new(discretisation.velocity.clone(), &[ball], &solid);
+        Level::rigid(&discretisation, space, 1.0, (0, Smoothing::of_eliminated(true))).unwrap()
+    }
+
+    #[test]
+    fn relaxation_damps_errors_near_a_disc_and_touches_no_others() {
+        let mut level = level_around_a_ball::<2>();
+        let mut near = level.near_bodies.take().unwrap();
+        let dim = level.operator.dim();
+        let (mut random, zeros) = (vec![0.0; dim], vec![0.0; dim]);
+        vector::fill_pseudo_random(1, &mut random);
+        level.operator.space.reduce(&mut random);
+        let distance =
+            |k: usize| (level.operator.space.nodes().point(k / 2) - Vector::<2>::repeat(0.47)).norm();
+        let far: Vec<usize> = (0..level.operator.space.full_dim()).filter(|&k| distance(k) > 0.4).collect();
+        let mut energy = |x: &[f32]| {
+            let mut ax = vec![0.0; dim];
+            level.operator.operator.viscous(x, &mut ax, &mut level.operator.work);
+            vector::dot(x, &ax)
+        };
+        let mut x = random.clone();
+        near.smooth(&zeros, &mut x);
+        assert!(!far.is_empty() && far.iter().all(|&k| x[k] == random[k]));
+        assert!(energy(&x) < energy(&random));
+        // What changed lies near the disc.
+        let local: Vec<f32> = random.iter().zip(&x).map(|(before, after)| before - after).collect();
+        let mut left = local.clone();
+        near.smooth(&zeros, &mut left);
+        assert!(energy(&left) < 0.05 * energy(&local), "{} {}", energy(&left), energy(&local));
+        assert!(level_around_a_ball::<3>().near_bodies.is_none());
+    }
+
     #[test]
     fn the_bound_of_a_cell_holds_on_the_mesh() {
         for gap in [0.001, 0.02, 0.1] {

@@ -4,9 +4,9 @@
 //! first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On the second the penalised
 //! operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers for it, so that neither the viscosity
 //! ratio nor slivers of solid in a cell are felt. The two are combined multiplicatively, block, rigid levels, block, with the
-//! cycle `C`:
+//! cycle or its first half as `C`:
 //!
-//! `z = E C E^T r`, `z += V (r - A z)`, `z += E C E^T (r - A z)`.
+//! `z = E C E^T r`, `z += V (r - A z)`, `z += E C^T E^T (r - A z)`.
 //!
 //! A rigid motion costs the solid nothing, so what it leaves to the block needs the fluid's stress in the layer of cells
 //! around the solid only: rounding errors of the motion are not multiplied by the solid's viscosity.
@@ -85,7 +85,8 @@ where
             let operator = BlockOperator::new(discretisation, system, &around, &positions);
             let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
             let coarser = meshes.iter().rev().take(smoothed + 1);
-            cycle = SolidCycle::new(operator, solid, matrix, coarser)?;
+            let contrast = system.penalty.as_ref().map_or(1.0, |penalty| 1.0 / (1.0 - penalty.factor));
+            cycle = SolidCycle::new(operator, solid, matrix, coarser, contrast)?;
             block = around;
         }
         let zeros = || vec![0.0; positions.len()];
@@ -106,7 +107,7 @@ where
     pub fn apply(&mut self, r: &[f64], z: &mut [f64], mut rigid_levels: impl FnMut(&mut [f64], &mut [f64])) {
         let nodal = self.space.full_dim();
         gather(&self.positions, r, &mut self.b);
-        self.cycle.apply(&self.b, &mut self.x);
+        self.cycle.descend(&self.b, &mut self.x);
         self.cycle.residual(&self.b, &self.x, &mut self.r);
         z.fill(0.0);
         add_at(&self.positions, &self.x, z);
@@ -125,7 +126,7 @@ where
         self.layer.apply(&self.velocity, &mut self.load[..nodal]);
         gather(&self.positions, &self.load, &mut self.b);
         vector::residual_from_product(&self.r, &mut self.b);
-        self.cycle.apply(&self.b, &mut self.x);
+        self.cycle.ascend(&self.b, &mut self.x);
         add_at(&self.positions, &self.x, z);
     }
 
