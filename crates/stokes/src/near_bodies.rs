@@ -52,9 +52,12 @@ where
         diagonal: &BlockDiagonal,
         lambda_max: f64,
     ) -> Option<Self> {
+        if D > MOST_DIMENSIONS {
+            return None;
+        }
         let nodes = &discretisation.velocity;
         let mut near: Vec<bool> = (0..nodes.node_count()).map(|n| space.body_of(n).is_some()).collect();
-        if D > MOST_DIMENSIONS || !near.contains(&true) {
+        if !near.contains(&true) {
             return None;
         }
         for _ in 0..RINGS {

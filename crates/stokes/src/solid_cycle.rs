@@ -107,6 +107,7 @@ pub struct SolidCycle<const D: usize> {
     direct: DirectSpd,
     /// Residual of the finest level.
     r: Vec<f64>,
+    /// Whether it is its own transpose.
     is_whole: bool,
 }
 
@@ -187,10 +188,9 @@ where
 
     /// The transpose of [`SolidCycle::descend`].
     pub fn ascend(&mut self, b: &[f64], x: &mut [f64]) {
-        if self.is_whole {
+        let (Some((a, smoother)), false) = (&mut self.finest, self.is_whole) else {
             return self.descend(b, x);
-        }
-        let Some((a, smoother)) = &mut self.finest else { return self.direct.apply(b, x) };
+        };
         x.fill(0.0);
         correct(&mut self.coarser, &mut self.direct, b, x);
         smoother.smooth(a, b, x, Guess::Given);
