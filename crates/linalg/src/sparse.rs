@@ -394,12 +394,6 @@ impl<T: Scalar> SparseMatrix<T> {
         }
     }
 
-    /// The same matrix with its entries rounded to another precision.
-    pub fn converted<S: Scalar>(&self) -> SparseMatrix<S> {
-        let values = self.values.iter().map(|v| S::from_f64(v.to_f64())).collect();
-        SparseMatrix { pattern: self.pattern.clone(), values }
-    }
-
     /// In partial sums, so that one product need not wait for the one before.
     fn row_product(&self, row: usize, x: &[T]) -> T {
         const SUMS: usize = 4;
