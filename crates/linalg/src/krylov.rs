@@ -2,10 +2,10 @@
 
 mod basis;
 mod cg;
-mod fgmres;
+mod gcr;
 
 pub use cg::{Cg, CgParams};
-pub use fgmres::{Fgmres, FgmresParams};
+pub use gcr::{Gcr, GcrParams};
 
 use crate::{LinOp, Scalar, vector};
 

@@ -40,7 +40,7 @@ pub use direct::{
     Regularise, SolveReport, Symbolic,
 };
 pub use exchange::DenseSymmetric;
-pub use krylov::{Cg, CgParams, Fgmres, FgmresParams, KrylovError, KrylovReport, Reference};
+pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
 pub use scalar::Scalar;
 pub use sliced::SlicedMatrix;

@@ -128,12 +128,12 @@ pub fn clear<T: Scalar>(x: &mut [T]) {
     parallel::for_each(x, |_, x| x.fill(T::ZERO));
 }
 
-/// `r = b - r`, which turns `A x` held in `r` into the residual.
-pub fn residual_from_product<T: Scalar>(b: &[T], r: &mut [T]) {
+/// `r = b - r`, which turns `A x` held in `r` into the residual, in the precision of `r`.
+pub fn residual_from_product<S: Scalar, T: Scalar>(b: &[S], r: &mut [T]) {
     debug_assert_eq!(b.len(), r.len());
     parallel::for_each(r, |first, r| {
         for (r, &b) in r.iter_mut().zip(&b[first..]) {
-            *r = b - *r;
+            *r = T::from_f64(b.to_f64()) - *r;
         }
     });
 }

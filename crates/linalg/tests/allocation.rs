@@ -5,9 +5,8 @@ mod support;
 use std::sync::Arc;
 
 use gluey_linalg::{
-    Cg, CgParams, Chebyshev, DirectIndefinite, DirectSpd, Fgmres, FgmresParams, Guess, Identity,
-    IndefiniteParams, Jacobi, Ordering, Reference, RefinementParams, Rounded, SinglePrecision,
-    SpectralInterval, Symbolic,
+    Cg, CgParams, Chebyshev, DirectIndefinite, DirectSpd, Gcr, GcrParams, Guess, Identity, IndefiniteParams,
+    Jacobi, Ordering, Reference, RefinementParams, Rounded, SinglePrecision, SpectralInterval, Symbolic,
 };
 use gluey_testkit::allocation::{CountingAllocator, count_in_thread};
 use support::{laplacian_2d, pseudo_random};
@@ -27,21 +26,21 @@ fn iterative_methods_reuse_their_workspace() {
     let mut x = vec![0.0; 400];
     let mut jacobi = Jacobi::new(&a.diagonal()).expect("positive");
 
-    let mut fgmres = Fgmres::new(FgmresParams::default());
+    let mut gcr = Gcr::new(GcrParams::default());
     let mut single = SinglePrecision::new(400, Identity);
     let (first, second) = first_and_second(|| {
         x.fill(0.0);
-        fgmres.solve(&mut a, &mut single, &b, &mut x, Reference::RightHandSide).expect("converges");
+        gcr.solve(&mut a, &mut single, &b, &mut x, Reference::RightHandSide).expect("converges");
     });
-    assert!(first > 0 && second == 0, "FGMRES: {first}, {second}");
+    assert!(first > 0 && second == 0, "GCR: {first}, {second}");
 
-    let mut narrow = Fgmres::<f64, f32>::with_storage(FgmresParams::default());
+    let mut narrow = Gcr::<f64, f32>::with_steps(GcrParams::default());
     let (mut wide_a, mut rounded) = (Rounded::new(400, a.clone()), Rounded::new(400, jacobi.clone()));
     let (first, second) = first_and_second(|| {
         x.fill(0.0);
         narrow.solve(&mut wide_a, &mut rounded, &b, &mut x, Reference::RightHandSide).expect("converges");
     });
-    assert!(first > 0 && second == 0, "FGMRES in single precision: {first}, {second}");
+    assert!(first > 0 && second == 0, "GCR in single precision: {first}, {second}");
 
     let mut cg = Cg::new(400, CgParams::default());
     let mut chebyshev = Chebyshev::new(400, 4, SpectralInterval { lower: 0.1, upper: 2.0 });

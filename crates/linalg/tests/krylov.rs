@@ -5,19 +5,19 @@ mod support;
 use std::sync::Arc;
 
 use gluey_linalg::{
-    Cg, CgParams, DirectSpd, Fgmres, FgmresParams, FnOp, Identity, Jacobi, KrylovError, KrylovReport, LinOp,
+    Cg, CgParams, DirectSpd, FnOp, Gcr, GcrParams, Identity, Jacobi, KrylovError, KrylovReport, LinOp,
     Ordering, Preconditioner, Reference, RefinementParams, Rounded, SinglePrecision, SparseMatrix, Symbolic,
     vector,
 };
 use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 
-fn fgmres(
-    params: FgmresParams,
+fn gcr(
+    params: GcrParams,
     a: &mut SparseMatrix,
     b: &[f64],
     x: &mut [f64],
 ) -> Result<KrylovReport, KrylovError> {
-    Fgmres::new(params).solve(a, &mut Identity, b, x, Reference::RightHandSide)
+    Gcr::new(params).solve(a, &mut Identity, b, x, Reference::RightHandSide)
 }
 
 fn direct(a: &SparseMatrix) -> DirectSpd {
@@ -52,8 +52,8 @@ fn both_methods_agree_with_the_direct_solver() {
     assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
     x.fill(0.0);
     let params =
-        FgmresParams { relative_tolerance: 1e-12, restart: 30, max_iterations: 2000, ..Default::default() };
-    fgmres(params, &mut a, &b, &mut x).expect("converges");
+        GcrParams { relative_tolerance: 1e-12, restart: 30, max_iterations: 2000, ..Default::default() };
+    gcr(params, &mut a, &b, &mut x).expect("converges");
     assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
 }
 
@@ -62,8 +62,8 @@ fn small_systems_end_in_as_many_steps_as_unknowns() {
     let mut a = upwind(6);
     let b = pseudo_random(2, 6);
     let mut x = [0.0; 6];
-    let params = FgmresParams { relative_tolerance: 1e-13, ..Default::default() };
-    let report = fgmres(params, &mut a, &b, &mut x).expect("converges");
+    let params = GcrParams { relative_tolerance: 1e-13, ..Default::default() };
+    let report = gcr(params, &mut a, &b, &mut x).expect("converges");
     assert!(report.iterations <= 6);
     assert!(relative_residual(&a, &b, &x) < 1e-13);
     let report = Cg::new(4, CgParams::default())
@@ -78,7 +78,7 @@ fn an_exact_preconditioner_needs_one_step() {
     let b = pseudo_random(1, 225);
     let mut x = vec![0.0; 225];
     let mut exact = direct(&a);
-    let report = Fgmres::new(FgmresParams::default())
+    let report = Gcr::new(GcrParams::default())
         .solve(&mut a, &mut exact, &b, &mut x, Reference::RightHandSide)
         .expect("converges");
     assert_eq!(report.iterations, 1);
@@ -94,8 +94,7 @@ fn the_history_falls_and_ends_with_the_true_residual() {
     let mut a = upwind(300);
     let b = pseudo_random(1, 300);
     let mut x = pseudo_random(2, 300);
-    let mut solver =
-        Fgmres::new(FgmresParams { restart: 7, relative_tolerance: 1e-10, ..Default::default() });
+    let mut solver = Gcr::new(GcrParams { restart: 7, relative_tolerance: 1e-10, ..Default::default() });
     let report =
         solver.solve(&mut a, &mut Identity, &b, &mut x, Reference::RightHandSide).expect("converges");
     let history = solver.residual_history();
@@ -115,7 +114,7 @@ fn references_and_guesses_decide_when_to_stop() {
     let mut solved = vec![0.0; 100];
     direct(&a).solve(&b, &mut solved).expect("solvable");
     let mut x = solved.clone();
-    let report = fgmres(FgmresParams::default(), &mut a, &b, &mut x).expect("converges");
+    let report = gcr(GcrParams::default(), &mut a, &b, &mut x).expect("converges");
     assert_eq!((report.iterations, &x), (0, &solved));
 
     let mut near = solved.clone();
@@ -131,8 +130,8 @@ fn references_and_guesses_decide_when_to_stop() {
     assert!(counts[2] < counts[0] && counts[0] < counts[1], "{counts:?}");
 
     let mut x = vec![1.0; 100];
-    let params = FgmresParams { absolute_floor: 1e-6, ..Default::default() };
-    let report = fgmres(params, &mut a, &[0.0; 100], &mut x).expect("the floor stops it");
+    let params = GcrParams { absolute_floor: 1e-6, ..Default::default() };
+    let report = gcr(params, &mut a, &[0.0; 100], &mut x).expect("the floor stops it");
     assert!(report.residual_norm <= 1e-6 && report.iterations > 0);
 }
 
@@ -153,8 +152,8 @@ fn a_single_precision_preconditioner_reaches_double_precision() {
     let mut a = saddle.clone();
     let b = pseudo_random(1, n);
     let mut x = vec![0.0; n];
-    let params = FgmresParams { relative_tolerance: 1e-10, ..Default::default() };
-    let report = Fgmres::new(params)
+    let params = GcrParams { relative_tolerance: 1e-10, ..Default::default() };
+    let report = Gcr::new(params)
         .solve(&mut a, &mut SinglePrecision::new(n, inner), &b, &mut x, Reference::RightHandSide)
         .expect("converges");
     assert!(relative_residual(&saddle, &b, &x) <= 1e-10);
@@ -165,8 +164,7 @@ fn a_single_precision_preconditioner_reaches_double_precision() {
 fn runs_repeat_bit_for_bit_and_reuse_their_workspace() {
     let mut saddle = stokes_2d(6, |x, _| 1.0 + 10.0 * x);
     let b = pseudo_random(1, saddle.is_pressure.len());
-    let mut solver =
-        Fgmres::new(FgmresParams { relative_tolerance: 1e-6, restart: 300, ..Default::default() });
+    let mut solver = Gcr::new(GcrParams { relative_tolerance: 1e-6, restart: 300, ..Default::default() });
     let mut run = || {
         let mut x = vec![0.0; b.len()];
         let report = solver.solve(&mut saddle.matrix, &mut Identity, &b, &mut x, Reference::RightHandSide);
@@ -182,8 +180,8 @@ fn giving_up_returns_the_history_and_the_best_iterate() {
     let mut a = laplacian_2d(30);
     let b = pseudo_random(1, 900);
     let mut x = vec![0.0; 900];
-    let params = FgmresParams { max_iterations: 5, relative_tolerance: 1e-12, ..Default::default() };
-    let error = fgmres(params, &mut a, &b, &mut x).expect_err("five steps are too few");
+    let params = GcrParams { max_iterations: 5, relative_tolerance: 1e-12, ..Default::default() };
+    let error = gcr(params, &mut a, &b, &mut x).expect_err("five steps are too few");
     let KrylovError::NotConverged { iterations: 5, residual_norm, history, .. } = error else {
         panic!("{error:?}");
     };
@@ -202,9 +200,9 @@ fn giving_up_returns_the_history_and_the_best_iterate() {
 fn a_singular_operator_ends_without_looping() {
     let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (1, 1, 0.0)]).expect("in range");
     let mut x = [0.0; 2];
-    let error = fgmres(FgmresParams::default(), &mut a, &[1.0, 1.0], &mut x).expect_err("no solution");
+    let error = gcr(GcrParams::default(), &mut a, &[1.0, 1.0], &mut x).expect_err("no solution");
     assert!(matches!(error, KrylovError::NotConverged { iterations, .. } if iterations < 10), "{error:?}");
-    let report = fgmres(FgmresParams::default(), &mut a, &[1.0, 0.0], &mut x);
+    let report = gcr(GcrParams::default(), &mut a, &[1.0, 0.0], &mut x);
     assert!(report.is_ok(), "in the range: {report:?}");
 }
 
@@ -213,13 +211,13 @@ fn numbers_that_are_not_finite_are_reported_and_kept_out_of_x() {
     let nan = |_: &[f64], z: &mut [f64]| z.fill(f64::NAN);
     let mut a = laplacian_2d(3);
     let mut x = [0.5; 9];
-    let mut solver = Fgmres::new(FgmresParams::default());
+    let mut solver = Gcr::new(GcrParams::default());
     let bad_m = solver.solve(&mut a, &mut FnOp::new(9, nan), &[1.0; 9], &mut x, Reference::RightHandSide);
     assert_eq!((bad_m, x), (Err(KrylovError::NotFinite { iteration: 1 }), [0.5; 9]));
     let bad_a =
         solver.solve(&mut FnOp::new(9, nan), &mut Identity, &[1.0; 9], &mut x, Reference::RightHandSide);
     assert_eq!(bad_a, Err(KrylovError::NotFinite { iteration: 0 }));
-    let bad_b = fgmres(FgmresParams::default(), &mut a, &[f64::INFINITY; 9], &mut x);
+    let bad_b = gcr(GcrParams::default(), &mut a, &[f64::INFINITY; 9], &mut x);
     assert_eq!(bad_b, Err(KrylovError::NotFinite { iteration: 0 }));
     let mut cg = Cg::new(9, CgParams::default());
     let bad_m = cg.solve(&mut a, &mut FnOp::new(9, nan), &[1.0; 9], &mut x, Reference::RightHandSide);
@@ -242,7 +240,7 @@ fn conjugate_gradients_refuse_what_is_not_positive_definite() {
 #[test]
 fn wrong_lengths_are_refused() {
     let mut a = laplacian_2d(3);
-    let error = fgmres(FgmresParams::default(), &mut a, &[1.0; 8], &mut [0.0; 9]);
+    let error = gcr(GcrParams::default(), &mut a, &[1.0; 8], &mut [0.0; 9]);
     assert_eq!(error, Err(KrylovError::DimensionMismatch { expected: 9, found: 8 }));
     let mut cg = Cg::new(8, CgParams::default());
     let error = cg.solve(&mut a, &mut Identity, &[1.0; 9], &mut [0.0; 9], Reference::RightHandSide);
@@ -273,13 +271,12 @@ fn vectors_in_single_precision_do_not_limit_the_residual() {
     let b = pseudo_random(3, n);
     let mut work = vec![0.0; n];
     for tolerance in [1e-6, 1e-10, 1e-13] {
-        let params = FgmresParams { relative_tolerance: tolerance, ..Default::default() };
+        let params = GcrParams { relative_tolerance: tolerance, ..Default::default() };
         let mut x = vec![0.0; n];
-        let wide = Fgmres::new(params)
-            .solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide)
-            .expect("converges");
+        let wide =
+            Gcr::new(params).solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
         x.fill(0.0);
-        let mut solver = Fgmres::<f64, f32>::with_storage(params);
+        let mut solver = Gcr::<f64, f32>::with_steps(params);
         let (mut a, mut m) = (Rounded::new(n, &mut a), Rounded::new(n, &mut m));
         let narrow = solver.solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
         LinOp::<f64>::apply(&mut a, &x, &mut work);
@@ -300,7 +297,7 @@ fn solutions_have_the_same_bits_for_any_number_of_threads() {
             let (mut a, mut m) = (Rounded::new(n, a), Rounded::new(n, m));
             let b = pseudo_random(3, n);
             let mut x = vec![0.0; n];
-            let mut solver = Fgmres::<f64, f32>::with_storage(FgmresParams::default());
+            let mut solver = Gcr::<f64, f32>::with_steps(GcrParams::default());
             let report =
                 solver.solve(&mut a, &mut m, &b, &mut x, Reference::RightHandSide).expect("converges");
             (report, x, solver.residual_history().to_vec())

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    DirectIndefinite, Fgmres, FgmresParams, IndefiniteParams, KrylovError, Ordering, Preconditioner,
-    Reference, Symbolic,
+    DirectIndefinite, Gcr, GcrParams, IndefiniteParams, KrylovError, Ordering, Preconditioner, Reference,
+    Symbolic,
 };
 
 use crate::assembly::{Unknowns, assemble_stokes};
@@ -22,22 +22,21 @@ const RESTART: usize = 4;
 /// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
 /// approximate minimum degree. The symbolic part is kept as long as the pattern of the matrix stands.
 ///
-/// The factorised matrix is a little compressible and has one pressure left out. FGMRES on the true system, with the
+/// The factorised matrix is a little compressible and has one pressure left out. Generalised conjugate residuals on the true system, with the
 /// factor as its preconditioner, corrects both in one to three steps and checks the true residual.
 #[derive(Debug)]
 pub struct DirectSolver {
     factor: Option<DirectIndefinite>,
     unknowns: Option<Unknowns>,
-    krylov: Fgmres<f64>,
+    krylov: Gcr<f64>,
     b: Vec<f64>,
     x: Vec<f64>,
 }
 
 impl Default for DirectSolver {
     fn default() -> Self {
-        let params =
-            FgmresParams { max_iterations: MAX_CORRECTIONS, restart: RESTART, ..FgmresParams::default() };
-        Self { factor: None, unknowns: None, krylov: Fgmres::new(params), b: Vec::new(), x: Vec::new() }
+        let params = GcrParams { max_iterations: MAX_CORRECTIONS, restart: RESTART, ..GcrParams::default() };
+        Self { factor: None, unknowns: None, krylov: Gcr::new(params), b: Vec::new(), x: Vec::new() }
     }
 }
 

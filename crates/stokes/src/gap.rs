@@ -57,10 +57,11 @@ impl GapInverse {
     }
 
     /// `z += S_P^-1 r` on the pressures of every gap.
-    pub fn add(&self, r: &[f64], z: &mut [f64]) {
+    pub fn add(&self, r: &[f32], z: &mut [f32]) {
         for Block { pressures, inverse } in &self.blocks {
             for (&q, row) in pressures.iter().zip(inverse.row_iter()) {
-                z[q as usize] += row.iter().zip(pressures).map(|(s, &p)| s * r[p as usize]).sum::<f64>();
+                let terms = row.iter().zip(pressures).map(|(s, &p)| s * f64::from(r[p as usize]));
+                z[q as usize] += terms.sum::<f64>() as f32;
             }
         }
     }

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space};
+use gluey_linalg::Scalar;
 
 use crate::discretisation::Discretisation;
 use crate::space::VelocitySpace;
@@ -92,38 +93,38 @@ where
     }
 
     /// Sets the constrained pressures from the free ones.
-    pub fn expand(&self, p: &mut [f64]) {
+    pub fn expand<T: Scalar>(&self, p: &mut [T]) {
         for constraint in &self.constraints {
-            p[constraint.node as usize] =
-                constraint.masters.iter().map(|&(master, weight)| weight * p[master as usize]).sum();
+            let term = |&(master, weight): &(u32, f64)| weight * p[master as usize].to_f64();
+            p[constraint.node as usize] = T::from_f64(constraint.masters.iter().map(term).sum());
         }
     }
 
     /// The transpose of [`PressureSpace::expand`]; entries of nodes that are not free become zero.
-    pub fn reduce(&self, q: &mut [f64]) {
+    pub fn reduce<T: Scalar>(&self, q: &mut [T]) {
         for constraint in self.constraints.iter().rev() {
-            let value = std::mem::take(&mut q[constraint.node as usize]);
+            let value = std::mem::replace(&mut q[constraint.node as usize], T::ZERO);
             for &(master, weight) in &constraint.masters {
-                q[master as usize] += weight * value;
+                q[master as usize] += T::from_f64(weight) * value;
             }
         }
         self.clear_fixed(q);
     }
 
     /// Clears the entries of nodes that are not free.
-    pub fn clear_fixed(&self, q: &mut [f64]) {
+    pub fn clear_fixed<T: Scalar>(&self, q: &mut [T]) {
         for (value, &free) in q.iter_mut().zip(&self.free) {
             if !free {
-                *value = 0.0;
+                *value = T::ZERO;
             }
         }
     }
 
     /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and what is left of the divergence
     /// is spread evenly.
-    pub fn remove_mean(&self, q: &mut [f64]) {
-        let sum: f64 = q.iter().zip(&self.free).filter(|e| *e.1).map(|e| e.0).sum();
-        let mean = sum / self.free_count.max(1) as f64;
+    pub fn remove_mean<T: Scalar>(&self, q: &mut [T]) {
+        let sum: f64 = q.iter().zip(&self.free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum();
+        let mean = T::from_f64(sum / self.free_count.max(1) as f64);
         for (value, &free) in q.iter_mut().zip(&self.free) {
             if free {
                 *value -= mean;

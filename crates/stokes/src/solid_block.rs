@@ -24,7 +24,7 @@ use crate::level::{cells_touching, nodes_of_cells_with};
 use crate::node_matrix::NodeMatrix;
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, StokesSystem, cell_operator};
+use crate::system::{ActiveCell, Penalty, StokesSystem, cell_operator};
 
 /// Cells in the radius of the largest body on a level of the cycle that is factorised in 3D, at most.
 const FACTORISED_CELLS: f64 = 2.0;
@@ -85,7 +85,7 @@ where
             let operator = BlockOperator::new(discretisation, system, &around, &positions);
             let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
             let coarser = meshes.iter().rev().take(smoothed + 1);
-            let contrast = system.penalty.as_ref().map_or(1.0, |penalty| 1.0 / (1.0 - penalty.factor));
+            let contrast = system.penalty.as_ref().map_or(1.0, Penalty::contrast);
             cycle = SolidCycle::new(operator, solid, matrix, coarser, contrast)?;
             block = around;
         }

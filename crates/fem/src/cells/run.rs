@@ -17,22 +17,29 @@ pub(super) struct Buffers<T> {
     points: Vec<T>,
 }
 
-/// What a [`CellOperator`] works in: buffers for every thread, and contributions to nodes of other chunks.
-#[derive(Clone, Debug, Default)]
-pub struct Workspace<T> {
+/// What a [`CellOperator`] works in: buffers for every thread, in the precision `T` that is computed in, and contributions to
+/// nodes of other chunks, in that of the vectors.
+#[derive(Clone, Debug)]
+pub struct Workspace<T, X = T> {
     buffers: Vec<Buffers<T>>,
-    velocity: Vec<T>,
-    pressure: Vec<T>,
-    twists: Vec<T>,
+    velocity: Vec<X>,
+    pressure: Vec<X>,
+    twists: Vec<X>,
+}
+
+impl<T, X> Default for Workspace<T, X> {
+    fn default() -> Self {
+        Self { buffers: Vec::new(), velocity: Vec::new(), pressure: Vec::new(), twists: Vec::new() }
+    }
 }
 
 /// What is applied to which fields.
 #[derive(Clone, Copy)]
-pub(super) struct Input<'a, T, X = T> {
+pub(super) struct Input<'a, X> {
     /// Velocities and twists; empty for none.
     x: &'a [X],
     /// Nodal pressures; empty for none.
-    p: &'a [T],
+    p: &'a [X],
     /// Whether rigid and hanging nodes are to be set first.
     expand: bool,
 }
@@ -58,9 +65,9 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         self.apply::<true, false, _>(Input { x: u, p: &[], expand: false }, y, &mut [], work);
     }
 
-    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal. Velocities may come in another precision than
-    /// the one that is computed in.
-    pub fn stokes<X: Scalar>(&self, x: &[X], p: &[T], y: &mut [T], q: &mut [T], work: &mut Workspace<T>) {
+    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal. Vectors may have another precision than the one
+    /// that is computed in.
+    pub fn stokes<X: Scalar>(&self, x: &[X], p: &[X], y: &mut [X], q: &mut [X], work: &mut Workspace<T, X>) {
         self.apply::<true, true, _>(Input { x, p, expand: true }, y, q, work);
     }
 
@@ -71,30 +78,30 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
 
     /// `y = -B^T p`.
     pub fn gradient(&self, p: &[T], y: &mut [T], work: &mut Workspace<T>) {
-        self.apply::<false, true, _>(Input::<T> { x: &[], p, expand: false }, y, &mut [], work);
+        self.apply::<false, true, _>(Input { x: &[], p, expand: false }, y, &mut [], work);
     }
 
     fn apply<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T, X>,
-        y: &mut [T],
-        q: &mut [T],
-        work: &mut Workspace<T>,
+        input: Input<'_, X>,
+        y: &mut [X],
+        q: &mut [X],
+        work: &mut Workspace<T, X>,
     ) {
         work.fit(self, !q.is_empty());
-        let kernel = |output: Output<'_, T>, buffers: &mut Buffers<T>| {
+        let kernel = |output: Output<'_, X>, buffers: &mut Buffers<T>| {
             self.dispatch::<VISCOUS, PRESSURE, X>(input, output, buffers);
         };
         self.apply_kernel(y, q, work, &kernel);
     }
 
     /// Runs a kernel on all chunks and adds up what they share.
-    fn apply_kernel(
+    fn apply_kernel<X: Scalar>(
         &self,
-        y: &mut [T],
-        q: &mut [T],
-        work: &mut Workspace<T>,
-        kernel: &(impl Fn(Output<'_, T>, &mut Buffers<T>) + Sync),
+        y: &mut [X],
+        q: &mut [X],
+        work: &mut Workspace<T, X>,
+        kernel: &(impl Fn(Output<'_, X>, &mut Buffers<T>) + Sync),
     ) {
         let shares = &self.chunks.velocity;
         let (y, twists) = y.split_at_mut(shares.node_count() * D);
@@ -109,11 +116,11 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             twists: of_chunks,
         };
         self.in_parallel(output, buffers, kernel);
-        add_returned::<T, D>(shares, 0..count, y, velocity, buffers.len());
+        add_returned::<X, D>(shares, 0..count, y, velocity, buffers.len());
         if !q.is_empty() {
-            add_returned::<T, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
+            add_returned::<X, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
         }
-        twists.fill(T::ZERO);
+        twists.fill(X::ZERO);
         for (&body, load) in self.bodies.items().iter().zip(of_chunks.chunks_exact(Self::TWIST)) {
             let sum = &mut twists[body as usize * Self::TWIST..][..Self::TWIST];
             sum.iter_mut().zip(load).for_each(|(sum, &load)| *sum += load);
@@ -121,11 +128,11 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     }
 
     /// Halves the chunks until each part has buffers of its own.
-    fn in_parallel(
+    fn in_parallel<X: Scalar>(
         &self,
-        output: Output<'_, T>,
+        output: Output<'_, X>,
         buffers: &mut [Buffers<T>],
-        run: &(impl Fn(Output<'_, T>, &mut Buffers<T>) + Sync),
+        run: &(impl Fn(Output<'_, X>, &mut Buffers<T>) + Sync),
     ) {
         if let [one] = buffers {
             return run(output, one);
@@ -136,7 +143,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         rayon::join(|| self.in_parallel(left, first, run), || self.in_parallel(right, second, run));
     }
 
-    fn split<'a>(&self, output: Output<'a, T>, chunk: usize) -> (Output<'a, T>, Output<'a, T>) {
+    fn split<'a, X>(&self, output: Output<'a, X>, chunk: usize) -> (Output<'a, X>, Output<'a, X>) {
         let start = output.chunks.start;
         let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
         let nodes = |shares: &Shares| shares.owned(chunk).start - shares.owned(start).start;
@@ -164,8 +171,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     /// Runs the kernel compiled for the widest vectors this processor has.
     pub(super) fn dispatch<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T, X>,
-        output: Output<'_, T>,
+        input: Input<'_, X>,
+        output: Output<'_, X>,
         buffers: &mut Buffers<T>,
     ) {
         #[cfg(target_arch = "x86_64")]
@@ -187,8 +194,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     #[inline(always)]
     pub(super) fn run<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
-        input: Input<'_, T, X>,
-        output: Output<'_, T>,
+        input: Input<'_, X>,
+        output: Output<'_, X>,
         buffers: &mut Buffers<T>,
     ) {
         let Output { chunks, mut y, mut q, mut borrowed_y, mut borrowed_q, mut twists } = output;
@@ -261,7 +268,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     fn read<const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
         &self,
         chunk: usize,
-        input: Input<'_, T, X>,
+        input: Input<'_, X>,
         buffer: &mut Nodes<T>,
     ) {
         let chunks = &*self.chunks;
@@ -282,12 +289,12 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         if PRESSURE {
             let own = chunks.pressure.owned(chunk);
             for (&slot, &p) in chunks.pressure_slots[own.clone()].iter().zip(&input.p[own]) {
-                buffer[slot as usize][D] = p;
+                buffer[slot as usize][D] = T::from_f64(p.to_f64());
             }
             let borrowed = chunks.pressure.borrowed.range(chunk);
             let slots = &chunks.borrowed_pressure_slots[borrowed];
             for (&slot, &q) in slots.iter().zip(chunks.pressure.borrowed.of(chunk)) {
-                buffer[slot as usize][D] = input.p[q as usize];
+                buffer[slot as usize][D] = T::from_f64(input.p[q as usize].to_f64());
             }
         }
         buffer[chunks.slot_count(chunk)] = [T::ZERO; 4];
@@ -313,7 +320,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
 
     /// Moves the loads of a chunk to its unknowns and writes them.
     #[inline(always)]
-    fn write(&self, chunk: usize, buffer: &mut Nodes<T>, output: Output<'_, T>) {
+    fn write<X: Scalar>(&self, chunk: usize, buffer: &mut Nodes<T>, output: Output<'_, X>) {
         let chunks = &*self.chunks;
         self.chunks.for_each_hanging(chunk, |slot, masters, weights| {
             let load = take_velocity::<T, D>(&mut buffer[slot as usize]);
@@ -322,7 +329,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
                 (0..D).for_each(|c| master[c] += weight * load[c]);
             }
         });
-        output.twists.fill(T::ZERO);
+        output.twists.fill(X::ZERO);
         for tie in self.ties.of(chunk) {
             let force = take_velocity::<T, D>(&mut buffer[tie.node as u16 as usize]);
             tie.add_moment(&force, &mut output.twists[tie.body as usize * Self::TWIST..][..Self::TWIST]);
@@ -336,11 +343,11 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         borrowed.iter_mut().zip(rest).for_each(|(y, node)| *y = velocity_of(node));
         if !output.q.is_empty() || !output.borrowed_q.is_empty() {
             for (q, &slot) in output.q.iter_mut().zip(&chunks.pressure_slots[chunks.pressure.owned(chunk)]) {
-                *q = buffer[slot as usize][D];
+                *q = X::from_f64(buffer[slot as usize][D].to_f64());
             }
             let slots = &chunks.borrowed_pressure_slots[chunks.pressure.borrowed.range(chunk)];
             for (q, &slot) in output.borrowed_q.iter_mut().zip(slots) {
-                *q = buffer[slot as usize][D];
+                *q = X::from_f64(buffer[slot as usize][D].to_f64());
             }
         }
     }
@@ -352,8 +359,8 @@ fn take_velocity<T: Scalar, const D: usize>(node: &mut [T; 4]) -> [T; D] {
 }
 
 #[inline(always)]
-fn velocity_of<T: Scalar, const D: usize>(node: &[T; 4]) -> [T; D] {
-    std::array::from_fn(|c| node[c])
+fn velocity_of<T: Scalar, X: Scalar, const D: usize>(node: &[T; 4]) -> [X; D] {
+    std::array::from_fn(|c| X::from_f64(node[c].to_f64()))
 }
 
 #[inline(always)]
@@ -403,7 +410,7 @@ impl<T: Scalar> Output<'_, T> {
     }
 }
 
-impl<T: CellScalar> Workspace<T> {
+impl<T: CellScalar, X: Scalar> Workspace<T, X> {
     /// Makes room for an operator on the current pool of threads; a second time nothing is allocated.
     fn fit<const D: usize>(&mut self, operator: &CellOperator<T, D>, divergence: bool) {
         let chunks = &operator.chunks;
@@ -413,11 +420,11 @@ impl<T: CellScalar> Workspace<T> {
             y: vec![T::ZERO; BUFFER],
             points: vec![T::ZERO; operator.rule.workspace_len(GROUP)],
         });
-        self.velocity.resize(chunks.velocity.borrowed.items().len() * D, T::ZERO);
+        self.velocity.resize(chunks.velocity.borrowed.items().len() * D, X::ZERO);
         if divergence {
-            self.pressure.resize(chunks.pressure.borrowed.items().len(), T::ZERO);
+            self.pressure.resize(chunks.pressure.borrowed.items().len(), X::ZERO);
         }
-        self.twists.resize(operator.bodies.items().len() * CellOperator::<T, D>::TWIST, T::ZERO);
+        self.twists.resize(operator.bodies.items().len() * CellOperator::<T, D>::TWIST, X::ZERO);
     }
 }
 
@@ -442,8 +449,8 @@ pub(super) fn run_avx2<
     X: Scalar,
 >(
     operator: &CellOperator<T, D>,
-    input: Input<'_, T, X>,
-    output: Output<'_, T>,
+    input: Input<'_, X>,
+    output: Output<'_, X>,
     buffers: &mut Buffers<T>,
 ) {
     operator.run::<T::Avx2, VISCOUS, PRESSURE, X>(input, output, buffers);
@@ -453,8 +460,8 @@ pub(super) fn run_avx2<
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
 fn run_avx512<T: CellScalar, const D: usize, const VISCOUS: bool, const PRESSURE: bool, X: Scalar>(
     operator: &CellOperator<T, D>,
-    input: Input<'_, T, X>,
-    output: Output<'_, T>,
+    input: Input<'_, X>,
+    output: Output<'_, X>,
     buffers: &mut Buffers<T>,
 ) {
     operator.run::<T::Avx512, VISCOUS, PRESSURE, X>(input, output, buffers);

@@ -33,17 +33,16 @@ impl<T: Scalar, const D: usize> Tie<T, D> {
 
     /// Adds the force and its moment `arm x f`.
     #[inline(always)]
-    pub(super) fn add_moment(&self, f: &[T; D], load: &mut [T]) {
+    pub(super) fn add_moment<X: Scalar>(&self, f: &[T; D], load: &mut [X]) {
         let a = &self.arm;
-        for c in 0..D {
-            load[c] += f[c];
-        }
+        let mut add = |k: usize, value: T| load[k] += X::from_f64(value.to_f64());
+        (0..D).for_each(|c| add(c, f[c]));
         if D == 2 {
-            load[2] += a[0] * f[1] - a[1] * f[0];
+            add(2, a[0] * f[1] - a[1] * f[0]);
         } else {
             for k in 0..D {
                 let (i, j) = ((k + 1) % D, (k + 2) % D);
-                load[D + k] += a[i] * f[j] - a[j] * f[i];
+                add(D + k, a[i] * f[j] - a[j] * f[i]);
             }
         }
     }

@@ -1,8 +1,7 @@
-//! The vectors that flexible GMRES keeps: an orthogonal basis in the scalar `T` of the problem, directions in a narrower
-//! one, `S`.
+//! The vectors that a Krylov method keeps: an orthogonal basis, and the directions whose images span the same space.
 //!
-//! Both are written where they stay. Directions are what the preconditioner makes of a basis vector, in its precision: the
-//! operator is applied to what is stored. Basis vectors are not scaled to norm one; their norms go into the coefficients.
+//! Both are written where they stay: directions by the preconditioner, basis vectors by the operator. Basis vectors are not
+//! scaled to norm one; their norms go into the coefficients.
 //!
 //! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified between
 //! groups; the pass over `w` that subtracts one group takes the scalar products with the next.
@@ -13,8 +12,8 @@ use crate::{Scalar, parallel, vector};
 /// Vectors that one pass over `w` is orthogonalised against.
 const GROUP: usize = 8;
 
-/// Largest norm of a basis vector, and its inverse the smallest.
-const LARGEST_NORM: f64 = 1e15;
+/// Largest norm of a basis vector, and its inverse the smallest: products of entries stay in the range of `f32`.
+const LARGEST_NORM: f64 = 1e8;
 
 /// Vectors of one length, of which the first are in use. Memory is kept for later use.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +46,16 @@ impl<T: Scalar> Stack<T> {
     }
 }
 
-/// An orthogonal basis of a Krylov space. Its vectors keep the norms they have when they become orthogonal.
+/// What a basis leaves of a vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Left {
+    /// Its norm.
+    pub norm: f64,
+    /// The product of what is left, over its norm, with another vector.
+    pub product: f64,
+}
+
+/// An orthogonal basis. Its vectors keep the norms they have when they become orthogonal.
 #[derive(Clone, Debug, Default)]
 pub struct Basis<T> {
     vectors: Stack<T>,
@@ -67,7 +75,7 @@ impl<T: Scalar> Basis<T> {
     }
 
     /// Takes what was written to [`Basis::next`] into the basis: a vector of this norm, orthogonal to the others. It is scaled
-    /// if products with such vectors might leave the range of `f64`.
+    /// if products with such vectors might leave the range of the scalar.
     pub fn push(&mut self, norm: f64) {
         let is_safe = (1.0 / LARGEST_NORM..=LARGEST_NORM).contains(&norm);
         if !is_safe {
@@ -77,34 +85,77 @@ impl<T: Scalar> Basis<T> {
         self.norms.push(if is_safe { norm } else { 1.0 });
     }
 
+    /// Number of vectors.
+    pub fn len(&self) -> usize {
+        self.vectors.count
+    }
+
     /// The last vector; empty before there is one.
     pub fn last(&self) -> &[T] {
         self.vectors.used().last().map_or(&[], Vec::as_slice)
     }
 
     /// Makes [`Basis::next`] orthogonal to the basis, passes its products with the normalised vectors to `coefficient` and
-    /// returns the norm of what is left.
-    pub fn orthogonalise(&mut self, mut coefficient: impl FnMut(f64)) -> f64 {
+    /// returns the norm of what is left and its product with `r`.
+    pub fn orthogonalise(&mut self, r: &[T], coefficient: impl FnMut(f64)) -> Left {
         let (used, w) = self.vectors.used_and_next();
-        let mut before: (&[Vec<T>], _) = (&[], [0.0; GROUP]);
-        for (group, norms) in used.chunks(GROUP).zip(self.norms.chunks(GROUP)) {
-            let mut h = pass(w, before, |at, block| products(group, at, block));
-            for (h, norm) in h.iter_mut().zip(norms) {
-                *h /= norm;
-                coefficient(*h);
-                *h /= norm;
-            }
-            before = (group, h);
-        }
-        let [square] = pass(w, before, |_, block| [dot_block(block, block)]);
-        square.sqrt()
+        let last = take_out_all(used, &self.norms, w, coefficient);
+        let terms =
+            |at: usize, block: &[T]| [dot_block(block, block), dot_block(&r[at..][..block.len()], block)];
+        let [square, product] = pass(w, last, terms);
+        let norm = square.sqrt();
+        Left { norm, product: product / norm }
     }
+
+    /// Makes `r` orthogonal to the basis, passes its products with the normalised vectors to `coefficient` and returns the
+    /// norm of what is left.
+    pub fn take_out(&self, r: &mut [T], coefficient: impl FnMut(f64)) -> f64 {
+        let last = take_out_all(self.vectors.used(), &self.norms, r, coefficient);
+        norm_after(r, last)
+    }
+
+    /// Subtracts this multiple of the last vector, normalised, from `r` and returns the norm of what is left.
+    pub fn take_out_last(&self, multiple: f64, r: &mut [T]) -> f64 {
+        let last = self.vectors.count.saturating_sub(1);
+        let mut h = [0.0; GROUP];
+        h[0] = multiple / self.norms.last().copied().unwrap_or(1.0);
+        norm_after(r, (&self.vectors.used()[last..], h))
+    }
+}
+
+/// Vectors of a group, and their multiples that are still to be subtracted.
+type Pending<'a, T> = (&'a [Vec<T>], [f64; GROUP]);
+
+/// Takes all groups but the last out of `w`; what is to be subtracted of that one is returned.
+fn take_out_all<'a, T: Scalar>(
+    vectors: &'a [Vec<T>],
+    norms: &[f64],
+    w: &mut [T],
+    mut coefficient: impl FnMut(f64),
+) -> Pending<'a, T> {
+    let mut before: Pending<'a, T> = (&[], [0.0; GROUP]);
+    for (group, norms) in vectors.chunks(GROUP).zip(norms.chunks(GROUP)) {
+        let mut h = pass(w, before, |at, block| products(group, at, block));
+        for (h, norm) in h.iter_mut().zip(norms) {
+            *h /= norm;
+            coefficient(*h);
+            *h /= norm;
+        }
+        before = (group, h);
+    }
+    before
+}
+
+/// Subtracts what is pending from `w` and returns its norm.
+fn norm_after<T: Scalar>(w: &mut [T], pending: Pending<'_, T>) -> f64 {
+    let [square] = pass(w, pending, |_, block| [dot_block(block, block)]);
+    square.sqrt()
 }
 
 /// Subtracts the multiples `h` of `group` from `w` and sums `terms(first index, block)` over the blocks of the result.
 fn pass<T: Scalar, const N: usize>(
     w: &mut [T],
-    (group, h): (&[Vec<T>], [f64; GROUP]),
+    (group, h): Pending<'_, T>,
     terms: impl Fn(usize, &[T]) -> [f64; N] + Sync,
 ) -> [f64; N] {
     parallel::update_and_sum(w, |first, piece| {
@@ -134,7 +185,7 @@ fn subtract<T: Scalar>(vectors: &[Vec<T>], h: &[f64; GROUP], at: usize, block: &
     }
 }
 
-/// Preconditioned basis vectors.
+/// What a preconditioner has returned.
 #[derive(Clone, Debug, Default)]
 pub struct Directions<S> {
     vectors: Stack<S>,
@@ -151,6 +202,11 @@ impl<S: Scalar> Directions<S> {
         fill(self.vectors.used_and_next().1);
         self.vectors.count += 1;
         &self.vectors.vectors[self.vectors.count - 1]
+    }
+
+    /// Drops the last direction.
+    pub fn pop(&mut self) {
+        self.vectors.count = self.vectors.count.saturating_sub(1);
     }
 
     /// `x += Z y`.
@@ -184,8 +240,10 @@ mod tests {
             let w = wave(n, 0.1 + 0.37 * j as f64);
             basis.next().copy_from_slice(&w);
             let mut h = Vec::new();
-            let norm = basis.orthogonalise(|c| h.push(c));
+            let r = wave(n, 0.2);
+            let Left { norm, product } = basis.orthogonalise(&r, |c| h.push(c));
             assert_eq!(h.len(), j);
+            assert!((product * norm - vector::dot(&r, basis.next())).abs() < 1e-12 * vector::norm(&r) * norm);
             assert!((norm - vector::norm(basis.next())).abs() < 1e-12 * norm);
             let square = norm * norm + h.iter().map(|h| h * h).sum::<f64>();
             assert!((square / vector::dot(&w, &w) - 1.0).abs() < 1e-12);
@@ -194,6 +252,14 @@ mod tests {
             assert!(stored.iter().all(|v| vector::dot(v, last).abs() < 1e-13 * vector::norm(v) * norm));
             stored.push(last.to_vec());
         }
+        let mut r = wave(n, 0.2);
+        basis.take_out(&mut r, |_| {});
+        assert!(
+            stored.iter().all(|v| vector::dot(v, &r).abs() < 1e-12 * vector::norm(v) * (n as f64).sqrt())
+        );
+        let mut last = stored[18].clone();
+        let norm = vector::norm(&last);
+        assert!(basis.take_out_last(0.75 * norm, &mut last) / norm - 0.25 < 1e-14);
     }
 
     #[test]
@@ -214,7 +280,7 @@ mod tests {
 
     #[test]
     fn only_extreme_vectors_are_scaled() {
-        for (norm, stored) in [(1e-10, 1e-10), (1e-60, 1.0), (3e70, 1.0)] {
+        for (norm, stored) in [(1e-7, 1e-7), (1e-60, 1.0), (3e70, 1.0)] {
             let mut basis = Basis::<f64>::default();
             basis.reset(2);
             basis.next().copy_from_slice(&[0.6 * norm, -0.8 * norm]);
