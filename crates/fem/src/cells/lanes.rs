@@ -4,6 +4,8 @@
 
 use gluey_linalg::Scalar;
 
+use super::buffers::Pool;
+
 /// Velocity components and pressure at one node.
 pub type Node<T> = [T; 4];
 /// A buffer of nodes as long as an index of 16 bits reaches, so that no index needs to be checked.
@@ -44,6 +46,33 @@ pub trait CellScalar: Scalar {
     /// Lanes of 256 bits.
     #[cfg(target_arch = "x86_64")]
     type Avx2: Lanes<Scalar = Self>;
+
+    /// The buffers of all operators in this precision.
+    fn pool() -> &'static Pool<Self>;
+}
+
+impl CellScalar for f64 {
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = super::x86::F64x8;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = super::x86::F64x4;
+
+    fn pool() -> &'static Pool<Self> {
+        static POOL: Pool<f64> = Pool::new();
+        &POOL
+    }
+}
+
+impl CellScalar for f32 {
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = super::x86::F32x16;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = super::x86::F32x8;
+
+    fn pool() -> &'static Pool<Self> {
+        static POOL: Pool<f32> = Pool::new();
+        &POOL
+    }
 }
 
 /// Lanes of any processor.

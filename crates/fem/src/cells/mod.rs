@@ -8,6 +8,7 @@
 //! Kernels are compiled for AVX-512, AVX2 and portably, and chosen at run time. Chunks run in parallel on the current
 //! rayon pool; the results have the same bits for any number of threads.
 
+mod buffers;
 mod kernel;
 mod lanes;
 mod legendre;

@@ -4,21 +4,14 @@ use std::ops::Range;
 
 use gluey_linalg::Scalar;
 
+use super::buffers::Buffers;
 use super::kernel::Registers;
 use super::lanes::{CellScalar, Lanes, Nodes, Portable};
 use super::{CellOperator, GROUP};
 use crate::chunks::Shares;
 
-/// The buffers of one thread.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Buffers<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    points: Vec<T>,
-}
-
-/// What a [`CellOperator`] works in: buffers for every thread, in the precision `T` that is computed in, and contributions to
-/// nodes of other chunks, in that of the vectors.
+/// What a [`CellOperator`] works in: buffers for every thread while it runs, in the precision `T` that is computed in, and
+/// contributions to nodes of other chunks, in that of the vectors.
 #[derive(Clone, Debug)]
 pub struct Workspace<T, X = T> {
     buffers: Vec<Buffers<T>>,
@@ -120,6 +113,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         if !q.is_empty() {
             add_returned::<X, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
         }
+        T::pool().take_back(buffers);
         twists.fill(X::ZERO);
         for (&body, load) in self.bodies.items().iter().zip(of_chunks.chunks_exact(Self::TWIST)) {
             let sum = &mut twists[body as usize * Self::TWIST..][..Self::TWIST];
@@ -200,7 +194,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     ) {
         let Output { chunks, mut y, mut q, mut borrowed_y, mut borrowed_q, mut twists } = output;
         let registers = &mut Registers::new();
-        let (x_buffer, y_buffer) = (nodes_in(&mut buffers.x), nodes_in(&mut buffers.y));
+        let (x_buffer, y_buffer, points) = buffers.split();
         for chunk in chunks {
             let span = &self.spans[chunk];
             let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
@@ -237,7 +231,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
                         x_buffer,
                         y_buffer,
                         registers,
-                        &mut buffers.points,
+                        points,
                     );
                 }
             } else {
@@ -411,32 +405,17 @@ impl<T: Scalar> Output<'_, T> {
 }
 
 impl<T: CellScalar, X: Scalar> Workspace<T, X> {
-    /// Makes room for an operator on the current pool of threads; a second time nothing is allocated.
+    /// Makes room for an operator on the current pool of threads and borrows buffers; a second time nothing is allocated.
     fn fit<const D: usize>(&mut self, operator: &CellOperator<T, D>, divergence: bool) {
         let chunks = &operator.chunks;
         let threads = rayon::current_num_threads().clamp(1, chunks.count());
-        self.buffers.resize_with(threads, || Buffers {
-            x: vec![T::ZERO; BUFFER],
-            y: vec![T::ZERO; BUFFER],
-            points: vec![T::ZERO; operator.rule.workspace_len(GROUP)],
-        });
+        T::pool().lend(threads, operator.rule.workspace_len(GROUP), &mut self.buffers);
         self.velocity.resize(chunks.velocity.borrowed.items().len() * D, X::ZERO);
         if divergence {
             self.pressure.resize(chunks.pressure.borrowed.items().len(), X::ZERO);
         }
         self.twists.resize(operator.bodies.items().len() * CellOperator::<T, D>::TWIST, X::ZERO);
     }
-}
-
-/// Alignment of a buffer, in bytes: no node crosses a line of the cache.
-const ALIGNMENT: usize = 64;
-/// Numbers of a buffer. Pages that no chunk reaches are never touched, so they take no memory.
-const BUFFER: usize = (4 << 16) + ALIGNMENT / 4;
-
-fn nodes_in<T>(buffer: &mut [T]) -> &mut Nodes<T> {
-    let offset = buffer.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT / 4);
-    let (nodes, _) = buffer[offset..].as_chunks_mut::<4>();
-    (&mut nodes[..1 << 16]).try_into().expect("the buffer is longer than all slots")
 }
 
 #[cfg(target_arch = "x86_64")]

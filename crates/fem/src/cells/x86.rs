@@ -6,17 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{CellScalar, Lanes, Nodes};
-
-impl CellScalar for f64 {
-    type Avx512 = F64x8;
-    type Avx2 = F64x4;
-}
-
-impl CellScalar for f32 {
-    type Avx512 = F32x16;
-    type Avx2 = F32x8;
-}
+use super::lanes::{Lanes, Nodes};
 
 macro_rules! lanes {
     ($(#[$doc:meta])* $name:ident([$scalar:ty; $count:literal] in $register:ty):
