@@ -207,6 +207,24 @@ fn a_singular_operator_ends_without_looping() {
 }
 
 #[test]
+fn a_tolerance_beyond_rounding_ends_without_looping() {
+    let params = GcrParams { relative_tolerance: 1e-30, ..Default::default() };
+    for n in [2, 3, 5, 40] {
+        let b = pseudo_random(4, n);
+        let ends_near_rounding = |solved: Result<KrylovReport, KrylovError>| match solved {
+            Ok(KrylovReport { residual_norm, .. }) | Err(KrylovError::NotConverged { residual_norm, .. }) => {
+                assert!(residual_norm <= 1e-14 * vector::norm(&b), "{residual_norm:e}");
+            }
+            Err(other) => panic!("{other:?}"),
+        };
+        ends_near_rounding(gcr(params, &mut upwind(n), &b, &mut vec![0.0; n]));
+        let (mut a, mut x) = (Rounded::new(n, upwind(n)), vec![0.0; n]);
+        let mut narrow = Gcr::<f64, f32>::with_steps(params);
+        ends_near_rounding(narrow.solve(&mut a, &mut Identity, &b, &mut x, Reference::RightHandSide));
+    }
+}
+
+#[test]
 fn numbers_that_are_not_finite_are_reported_and_kept_out_of_x() {
     let nan = |_: &[f64], z: &mut [f64]| z.fill(f64::NAN);
     let mut a = laplacian_2d(3);

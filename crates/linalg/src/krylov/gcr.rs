@@ -162,6 +162,9 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.coefficients.clear();
         let mut now = self.images.take_out(&mut self.r, |c| self.coefficients.push(c));
         let enough = (target.norm / norm).max(S::EPSILON.powf(2.0 / 3.0));
+        if now <= enough {
+            return Ok(StageEnd::BrokeDown);
+        }
         let mut is_slow = false;
         while now > enough
             && self.images.len() < self.params.restart
@@ -230,7 +233,7 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StageEnd {
     Regular,
-    /// The last direction added nothing.
+    /// The last direction added nothing, or the residual is a combination of images from the start.
     BrokeDown,
 }
 
