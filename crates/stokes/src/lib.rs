@@ -39,6 +39,7 @@ mod point_matrices;
 mod pressure;
 mod problem;
 mod refine;
+mod restricted;
 mod schur;
 mod solid;
 mod solid_block;

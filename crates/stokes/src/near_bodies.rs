@@ -10,14 +10,14 @@
 //! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists is
 //! smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
-use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, SpectralInterval};
 
 use crate::discretisation::Discretisation;
-use crate::level::{BlockDiagonal, SAFETY, cells_touching, nodes_of_cells_with};
+use crate::level::{BlockDiagonal, SAFETY, nodes_of_cells_with};
+use crate::restricted::{Restricted, acting, add_at};
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, cell_operator};
+use crate::system::ActiveCell;
 
 /// Dimensions in which the nodes around bodies are few enough.
 const MOST_DIMENSIONS: usize = 2;
@@ -31,7 +31,8 @@ const RATIO: f64 = 20.0;
 /// The sweep around the bodies of one level.
 #[derive(Clone, Debug)]
 pub struct NearBodies<const D: usize> {
-    operator: LocalOperator<D>,
+    /// `E^T A E` on the nodes around the bodies and the twists.
+    operator: Restricted<f32, D>,
     diagonal: BlockDiagonal,
     chebyshev: Chebyshev<f32>,
     /// On the unknowns of the sweep.
@@ -65,9 +66,11 @@ where
         }
         let relaxed = |n: &usize| near[*n] && space.is_free(*n);
         let nodal = (0..near.len()).filter(relaxed).flat_map(|n| n * D..(n + 1) * D);
-        let nodal: Vec<u32> = nodal.map(|k| k as u32).collect();
-        let diagonal = diagonal.restricted(&nodal);
-        let operator = LocalOperator::new(discretisation, space, cells, &near, nodal);
+        let mut positions: Vec<u32> = nodal.map(|k| k as u32).collect();
+        let diagonal = diagonal.restricted(&positions);
+        positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
+        let acting = acting(discretisation, cells, &near);
+        let operator = Restricted::new(discretisation, space, (&acting, cells.len()), None, positions);
         let interval = SpectralInterval::upper_part(lambda_max, RATIO, SAFETY);
         let dim = operator.dim();
         let chebyshev = Chebyshev::new(dim, DEGREE, interval);
@@ -79,85 +82,11 @@ where
         let Self { operator, diagonal, chebyshev, r, e } = self;
         operator.residual(b, x, r);
         chebyshev.smooth(operator, diagonal, r, e, Guess::Zero);
-        for (&k, &e) in operator.positions.iter().zip(e.iter()) {
-            x[k as usize] += e;
-        }
+        add_at(operator.positions(), e, x);
     }
 
     /// Applications since the last call, each counted as its share of the cells of the level.
     pub fn take_applications(&mut self) -> f64 {
-        std::mem::take(&mut self.operator.applications) as f64 * self.operator.share
-    }
-}
-
-/// `E^T A E` on the nodes around the bodies and the twists.
-#[derive(Clone, Debug)]
-struct LocalOperator<const D: usize> {
-    /// The unknowns among the reduced velocities, twists last.
-    positions: Vec<u32>,
-    operator: CellOperator<f32, D>,
-    work: Workspace<f32>,
-    /// Reduced velocities, zero away from the bodies, and their loads.
-    velocity: Vec<f32>,
-    load: Vec<f32>,
-    /// Fraction of the cells of the level.
-    share: f64,
-    applications: usize,
-}
-
-impl<const D: usize> LocalOperator<D>
-where
-    Dim<D>: Space<D>,
-{
-    fn new(
-        discretisation: &Discretisation<D>,
-        space: &VelocitySpace<D>,
-        cells: &[ActiveCell],
-        near: &[bool],
-        nodal: Vec<u32>,
-    ) -> Self {
-        let acts = cells_touching(&discretisation.velocity, near);
-        let mut local = cells.to_vec();
-        local.retain(|c| acts[c.cell as usize]);
-        let mut positions = nodal;
-        positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
-        Self {
-            operator: cell_operator(discretisation, space, &local, None),
-            work: Workspace::default(),
-            velocity: vec![0.0; space.dim()],
-            load: vec![0.0; space.dim()],
-            share: local.len() as f64 / cells.len().max(1) as f64,
-            applications: 0,
-            positions,
-        }
-    }
-
-    /// `r = E^T (b - A x)`.
-    fn residual(&mut self, b: &[f32], x: &[f32], r: &mut [f32]) {
-        self.applications += 1;
-        self.operator.viscous(x, &mut self.load, &mut self.work);
-        for (r, &k) in r.iter_mut().zip(&self.positions) {
-            *r = b[k as usize] - self.load[k as usize];
-        }
-    }
-}
-
-impl<const D: usize> LinOp<f32> for LocalOperator<D>
-where
-    Dim<D>: Space<D>,
-{
-    fn dim(&self) -> usize {
-        self.positions.len()
-    }
-
-    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
-        self.applications += 1;
-        for (&k, &x) in self.positions.iter().zip(x) {
-            self.velocity[k as usize] = x;
-        }
-        self.operator.viscous(&self.velocity, &mut self.load, &mut self.work);
-        for (y, &k) in y.iter_mut().zip(&self.positions) {
-            *y = self.load[k as usize];
-        }
+        self.operator.take_applications()
     }
 }

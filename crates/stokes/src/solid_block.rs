@@ -14,14 +14,15 @@
 use gluey_fem::Reference;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, vector};
+use gluey_linalg::vector;
 
 use crate::assembly::assemble_viscous_on;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::element::Elements;
 use crate::error::StokesError;
-use crate::level::{cells_touching, nodes_of_cells_with};
+use crate::level::nodes_of_cells_with;
 use crate::node_matrix::NodeMatrix;
+use crate::restricted::{Restricted, acting, add_at, gather};
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
 use crate::system::{ActiveCell, Penalty, StokesSystem, cell_operator};
@@ -82,11 +83,15 @@ where
             let ring = (0..touched.len()).filter(|&n| is_free(n) && around[n] && !touched[n]);
             let components = |n: usize| (n * D..(n + 1) * D).map(|k| k as u32);
             positions = inside.chain(ring).flat_map(components).collect();
-            let operator = BlockOperator::new(discretisation, system, &around, &positions);
+            let acting = acting(discretisation, &system.cells, &around);
+            let diagonal = fluid_diagonal(discretisation, &acting, &positions);
+            let cells = (&acting[..], system.cells.len());
+            let penalty = system.penalty.as_ref();
+            let operator = Restricted::new(discretisation, &system.space, cells, penalty, positions.clone());
             let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
             let coarser = meshes.iter().rev().take(smoothed + 1);
-            let contrast = system.penalty.as_ref().map_or(1.0, Penalty::contrast);
-            cycle = SolidCycle::new(operator, solid, matrix, coarser, contrast)?;
+            let contrast = penalty.map_or(1.0, Penalty::contrast);
+            cycle = SolidCycle::new((operator, &diagonal), (solid, matrix), coarser, contrast)?;
             block = around;
         }
         let zeros = || vec![0.0; positions.len()];
@@ -138,96 +143,25 @@ where
     }
 }
 
-fn gather(positions: &[u32], from: &[f64], to: &mut [f64]) {
-    to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
-}
-
-fn add_at(positions: &[u32], from: &[f64], to: &mut [f64]) {
-    positions.iter().zip(from).for_each(|(&k, value)| to[k as usize] += value);
-}
-
-/// The penalised operator on the unknowns of the block.
-pub struct BlockOperator<const D: usize> {
-    positions: Vec<u32>,
-    operator: CellOperator<f64, D>,
-    work: Workspace<f64>,
-    /// Nodal vectors; the first is zero away from the block.
-    velocity: Vec<f64>,
-    load: Vec<f64>,
-    /// The fluid's part of the diagonal.
-    diagonal: Vec<f64>,
-    /// Fraction of all cells.
-    share: f64,
-    applications: usize,
-}
-
-impl<const D: usize> BlockOperator<D>
-where
-    Dim<D>: Space<D>,
-{
-    fn new(
-        discretisation: &Discretisation<D>,
-        system: &StokesSystem<D>,
-        block: &[bool],
-        positions: &[u32],
-    ) -> Self {
-        let nodes = &discretisation.velocity;
-        let acts = cells_touching(nodes, block);
-        let mut cells = system.cells.clone();
-        cells.retain(|c| acts[c.cell as usize]);
-        let mut new = Self {
-            positions: positions.to_vec(),
-            share: cells.len() as f64 / system.cells.len().max(1) as f64,
-            operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),
-            work: Workspace::default(),
-            velocity: vec![0.0; system.space.dim()],
-            load: vec![0.0; system.space.dim()],
-            diagonal: vec![0.0; positions.len()],
-            applications: 0,
-        };
-        new.add_fluid_diagonal(discretisation, &cells);
-        new
-    }
-
-    fn add_fluid_diagonal(&mut self, discretisation: &Discretisation<D>, cells: &[ActiveCell]) {
-        let nodes = &discretisation.velocity;
-        let viscous = Reference::<D>::new().viscous;
-        let n = Reference::<D>::VELOCITY;
-        for cell in cells {
-            for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
-                for c in 0..D {
-                    self.load[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
-                }
+/// The diagonal of the fluid's part of the operator, which is all of it on nodes that the solid does not touch.
+fn fluid_diagonal<const D: usize>(
+    discretisation: &Discretisation<D>,
+    cells: &[ActiveCell],
+    positions: &[u32],
+) -> Vec<f64> {
+    let nodes = &discretisation.velocity;
+    let viscous = Reference::<D>::new().viscous;
+    let n = Reference::<D>::VELOCITY;
+    let mut nodal = vec![0.0; nodes.node_count() * D];
+    for cell in cells {
+        for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
+            for c in 0..D {
+                nodal[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
             }
         }
-        nodes.collect(D, |w| w * w, &mut self.load);
-        gather(&self.positions, &self.load, &mut self.diagonal);
     }
-
-    /// The diagonal of the fluid's part, which is all of it on nodes that the solid does not touch.
-    pub fn fluid_diagonal(&self) -> &[f64] {
-        &self.diagonal
-    }
-
-    /// Applications since the last call, each as its share of the mesh.
-    pub fn take_applications(&mut self) -> f64 {
-        std::mem::take(&mut self.applications) as f64 * self.share
-    }
-}
-
-impl<const D: usize> LinOp<f64> for BlockOperator<D> {
-    fn dim(&self) -> usize {
-        self.positions.len()
-    }
-
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.applications += 1;
-        for (&k, &x) in self.positions.iter().zip(x) {
-            self.velocity[k as usize] = x;
-        }
-        self.operator.viscous(&self.velocity, &mut self.load, &mut self.work);
-        gather(&self.positions, &self.load, y);
-    }
+    nodes.collect(D, |w| w * w, &mut nodal);
+    positions.iter().map(|&k| nodal[k as usize]).collect()
 }
 
 /// The cells that act on the block's nodes and do not move as one body. Those of them with solid in them are strained by
@@ -251,12 +185,11 @@ where
         rigid: &VelocitySpace<D>,
     ) -> Self {
         let nodes = &discretisation.velocity;
-        let acts = cells_touching(nodes, marked);
         let strained = |cell: usize| {
             cell_kind(nodes.cell(cell).iter().map(|&n| rigid.body_of(n as usize))) != CellKind::Rigid
         };
-        let mut cells = system.cells.clone();
-        cells.retain(|c| acts[c.cell as usize] && strained(c.cell as usize));
+        let mut cells = acting(discretisation, &system.cells, marked);
+        cells.retain(|c| strained(c.cell as usize));
         Self {
             share: cells.len() as f64 / system.cells.len().max(1) as f64,
             operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),

@@ -21,7 +21,7 @@ use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::node_matrix::{NodeMatrix, Prolongation};
 use crate::patches::Patches;
-use crate::solid_block::BlockOperator;
+use crate::restricted::Restricted;
 use crate::transfer::Evaluator;
 
 /// Applications of the patches in a sweep.
@@ -101,7 +101,7 @@ impl<'a, const D: usize> Numbered<'a, D> {
 /// The levels.
 pub struct SolidCycle<const D: usize> {
     /// Operator and smoother of the finest level, unless that is factorised.
-    finest: Option<(BlockOperator<D>, Smoother<D>)>,
+    finest: Option<(Restricted<f64, D>, Smoother<D>)>,
     /// From fine to coarse.
     coarser: Vec<Coarse<D>>,
     direct: DirectSpd,
@@ -141,17 +141,15 @@ where
         })
     }
 
-    /// The cycle for an operator whose first unknowns are those at the nodes of `solid`, where it is `matrix`. `meshes` are
-    /// those of the coarser levels, fine to coarse.
+    /// The cycle for an operator whose first unknowns are those at the nodes of `solid`, where it is `matrix`, and which has
+    /// this diagonal on the others. `meshes` are those of the coarser levels, fine to coarse.
     pub fn new<'a>(
-        mut operator: BlockOperator<D>,
-        solid: Numbered<'a, D>,
-        mut matrix: NodeMatrix<D>,
+        (mut operator, diagonal): (Restricted<f64, D>, &[f64]),
+        (solid, mut matrix): (Numbered<'a, D>, NodeMatrix<D>),
         meshes: impl Iterator<Item = &'a Discretisation<D>>,
         contrast: f64,
     ) -> Result<Self, StokesError> {
-        let diagonal = operator.fluid_diagonal().to_vec();
-        let finest = Smoother::new(&mut operator, &matrix, solid.cells(), &diagonal)?;
+        let finest = Smoother::new(&mut operator, &matrix, solid.cells(), diagonal)?;
         let mut coarser: Vec<Coarse<D>> = Vec::new();
         let mut nodes = solid;
         for mesh in meshes {

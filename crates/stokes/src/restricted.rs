@@ -1,0 +1,106 @@
+//! The viscous operator on some of the reduced velocities, with all others at rest: `E^T A E`.
+
+use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{LinOp, Scalar};
+
+use crate::discretisation::Discretisation;
+use crate::level::cells_touching;
+use crate::space::VelocitySpace;
+use crate::system::{ActiveCell, Penalty, cell_operator};
+
+/// `E^T A E` from the cells that act on its unknowns.
+#[derive(Clone, Debug)]
+pub struct Restricted<T, const D: usize> {
+    /// The unknowns among the reduced velocities.
+    positions: Vec<u32>,
+    operator: CellOperator<T, D>,
+    work: Workspace<T>,
+    /// Reduced velocities, zero away from the unknowns, and their loads.
+    velocity: Vec<T>,
+    load: Vec<T>,
+    /// Fraction of the cells that act.
+    share: f64,
+    applications: usize,
+}
+
+/// The cells whose stress acts on marked nodes.
+pub fn acting<const D: usize>(
+    discretisation: &Discretisation<D>,
+    cells: &[ActiveCell],
+    marked: &[bool],
+) -> Vec<ActiveCell> {
+    let acts = cells_touching(&discretisation.velocity, marked);
+    cells.iter().filter(|c| acts[c.cell as usize]).copied().collect()
+}
+
+impl<T: CellScalar, const D: usize> Restricted<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The operator on the velocities at `positions`, on which `acting` cells of `cell_count` act.
+    pub fn new(
+        discretisation: &Discretisation<D>,
+        space: &VelocitySpace<D>,
+        (acting, cell_count): (&[ActiveCell], usize),
+        penalty: Option<&Penalty<D>>,
+        positions: Vec<u32>,
+    ) -> Self {
+        Self {
+            operator: cell_operator(discretisation, space, acting, penalty),
+            work: Workspace::default(),
+            velocity: vec![T::ZERO; space.dim()],
+            load: vec![T::ZERO; space.dim()],
+            share: acting.len() as f64 / cell_count.max(1) as f64,
+            applications: 0,
+            positions,
+        }
+    }
+
+    /// The unknowns among the reduced velocities.
+    pub fn positions(&self) -> &[u32] {
+        &self.positions
+    }
+
+    /// `r = E^T (b - A x)` for reduced velocities `x`.
+    pub fn residual(&mut self, b: &[T], x: &[T], r: &mut [T]) {
+        self.applications += 1;
+        self.operator.viscous(x, &mut self.load, &mut self.work);
+        for (r, &k) in r.iter_mut().zip(&self.positions) {
+            *r = b[k as usize] - self.load[k as usize];
+        }
+    }
+
+    /// Applications since the last call, each as its share of the cells.
+    pub fn take_applications(&mut self) -> f64 {
+        std::mem::take(&mut self.applications) as f64 * self.share
+    }
+}
+
+impl<T: CellScalar, const D: usize> LinOp<T> for Restricted<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        self.applications += 1;
+        for (&k, &x) in self.positions.iter().zip(x) {
+            self.velocity[k as usize] = x;
+        }
+        self.operator.viscous(&self.velocity, &mut self.load, &mut self.work);
+        gather(&self.positions, &self.load, y);
+    }
+}
+
+/// `to = E^T from`.
+pub fn gather<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
+    to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
+}
+
+/// `to += E from`.
+pub fn add_at<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
+    positions.iter().zip(from).for_each(|(&k, &value)| to[k as usize] += value);
+}
