@@ -35,7 +35,7 @@ enum Task {
 
 #[derive(clap::Args)]
 struct ReproduceArguments {
-    /// A coarse mesh, large time steps and shorter runs: minutes instead of an hour.
+    /// A coarse mesh, large time steps and shorter runs: half the time.
     #[arg(long)]
     quick: bool,
     /// Only these figures, separated by commas.
