@@ -124,15 +124,15 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         let GcrParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
         self.history.push(norm);
-        let mut iterations = 0;
+        let (mut iterations, mut end) = (0, StageEnd::Regular);
         while norm > target.norm {
             if iterations == max_iterations {
                 return Err(target.not_converged(iterations, norm, &self.history));
             }
-            let end = self.stage(a, m, norm, &target, &mut iterations)?;
+            end = self.stage(a, m, norm, &target, (&mut iterations, end))?;
             let before = norm;
             norm = self.update(a, b, x, norm, iterations)?;
-            if end == StageEnd::BrokeDown && norm > 0.5 * before {
+            if end == StageEnd::BrokeDown && norm > target.norm.max(0.5 * before) {
                 return Err(target.not_converged(iterations, norm, &self.history));
             }
         }
@@ -146,14 +146,15 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.triangle.clear();
     }
 
-    /// Takes steps from the true residual, of this norm, until it is small or the precision of the steps is used up.
+    /// Takes steps from the true residual, of this norm, until it is small or the precision of the steps is used up: none if
+    /// the images known already leave little of it, but at least one if there was none in the `last` stage.
     fn stage(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
         m: &mut (impl Preconditioner<S> + ?Sized),
         norm: f64,
         target: &Target,
-        iterations: &mut usize,
+        (iterations, last): (&mut usize, StageEnd),
     ) -> Result<StageEnd, KrylovError> {
         if self.images.len() >= self.params.restart {
             self.forget();
@@ -162,14 +163,15 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.coefficients.clear();
         let mut now = self.images.take_out(&mut self.r, |c| self.coefficients.push(c));
         let enough = (target.norm / norm).max(S::EPSILON.powf(2.0 / 3.0));
-        if now <= enough {
-            return Ok(StageEnd::BrokeDown);
+        if now <= enough && last != StageEnd::NoStep {
+            return Ok(StageEnd::NoStep);
         }
-        let mut is_slow = false;
-        while now > enough
+        let (mut is_slow, mut is_first) = (false, true);
+        while (now > enough || is_first)
             && self.images.len() < self.params.restart
             && *iterations < self.params.max_iterations
         {
+            is_first = false;
             *iterations += 1;
             let before = now;
             let step = self.step(a, m, is_slow);
@@ -233,7 +235,9 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StageEnd {
     Regular,
-    /// The last direction added nothing, or the residual is a combination of images from the start.
+    /// The images known already left little of the residual.
+    NoStep,
+    /// The last direction added nothing.
     BrokeDown,
 }
 
