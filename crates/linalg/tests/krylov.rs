@@ -224,6 +224,40 @@ fn a_tolerance_beyond_rounding_ends_without_looping() {
     }
 }
 
+/// One in double precision and 1/1.6 in single: a correction by what the steps know leaves -0.6 of the residual.
+struct Inexact;
+
+impl LinOp<f64> for Inexact {
+    fn dim(&self) -> usize {
+        2
+    }
+
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+}
+
+impl LinOp<f32> for Inexact {
+    fn dim(&self) -> usize {
+        2
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        y.copy_from_slice(&[x[0] / 1.6, x[1] / 1.6]);
+    }
+}
+
+#[test]
+fn a_correction_without_a_step_may_reach_the_target() {
+    let params = GcrParams { relative_tolerance: 0.4, ..Default::default() };
+    let mut x = [0.0; 2];
+    let report = Gcr::<f64, f32>::with_steps(params)
+        .solve(&mut Inexact, &mut Identity, &[3.0, 4.0], &mut x, Reference::RightHandSide)
+        .expect("0.36 is less than 0.4");
+    assert_eq!(report.iterations, 1);
+    assert!((report.residual_norm / 5.0 - 0.36).abs() < 1e-5, "{report:?}");
+}
+
 #[test]
 fn numbers_that_are_not_finite_are_reported_and_kept_out_of_x() {
     let nan = |_: &[f64], z: &mut [f64]| z.fill(f64::NAN);
