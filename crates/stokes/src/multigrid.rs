@@ -2,7 +2,7 @@
 //!
 //! Generalised conjugate residuals ([`Gcr`]) on `[A, -B^T; -B, 0]` with the block triangular preconditioner `z_p = -S^-1 r_p`,
 //! `z_u = V (r_u + B^T z_p)`: `S` is close to the Schur complement (see [`crate::schur`]), `V` one V-cycle on the velocity.
-//! All of it runs in `f32`, and now and then a residual is computed in `f64`.
+//! Steps are in `f32`, with a residual in `f64` now and then, or in `f64` where rounding would disturb them ([`rounding_noise`]).
 //! The levels are the tree's own: level `l` is the mesh cut at depth `l`. On every level the solid nodes of that level
 //! are eliminated; a coarse correction enters as the rigid motion that fits it best. In the `paper` formulation the
 //! finest level moves every node the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and
