@@ -9,7 +9,7 @@ use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::near_bodies::NearBodies;
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, active_cells, cell_operator};
+use crate::system::{ActiveCell, active_cells, cell_operator, viscous_diagonal};
 
 /// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue it damps.
 #[derive(Clone, Copy, Debug)]
@@ -297,20 +297,10 @@ fn block_diagonal<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let reference = Reference::<D>::new();
-    let n = Reference::<D>::VELOCITY;
-    let nodes = space.nodes();
-    let mut nodal = vec![0f32; space.full_dim()];
-    for cell in cells {
-        for (i, &node) in discretisation.velocity.cell(cell.cell as usize).iter().enumerate() {
-            for c in 0..D {
-                nodal[node as usize * D + c] +=
-                    (cell.viscous * reference.viscous[(i * D + c) * (n + 1)]) as f32;
-            }
-        }
-    }
+    let mut nodal = viscous_diagonal(discretisation, cells);
     // The squares keep the sum positive: weights of hanging nodes may be negative.
-    nodes.collect(D, |w| (w * w) as f32, &mut nodal);
+    space.nodes().collect(D, |w| w * w, &mut nodal);
+    let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
             true if *value > 0.0 => 1.0 / *value,
@@ -318,7 +308,7 @@ where
             false => 0.0,
         };
     }
-    let twists = twist_blocks(discretisation, space, cells, &reference)?;
+    let twists = twist_blocks(discretisation, space, cells, &Reference::new())?;
     Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
 }
 

@@ -23,6 +23,7 @@
 
 mod assembly;
 mod cell_schur;
+mod coarse_schur;
 mod direct;
 mod discretisation;
 mod element;
@@ -37,6 +38,7 @@ mod node_matrix;
 mod patches;
 mod point_matrices;
 mod pressure;
+mod pressure_weights;
 mod problem;
 mod refine;
 mod restricted;

@@ -48,7 +48,7 @@ where
     /// See [`rounding_noise`].
     noise: f64,
     cycle: Option<VCycle<D>>,
-    schur: Option<SchurInverse>,
+    schur: Option<SchurInverse<D>>,
     /// The operator of the fluid.
     fluid: Option<CellOperator<f32, D>>,
 }
@@ -98,8 +98,10 @@ where
         let elements = Elements::new(discretisation, system, Matrices::<D>::VELOCITY);
         let before = self.cycle.take().map(|cycle| cycle.hierarchy).unwrap_or_default();
         let hierarchy = Hierarchy::new(discretisation, before);
+        let before = self.schur.take();
+        self.schur =
+            Some(SchurInverse::new(&hierarchy.meshes, system, &elements, preparation.viscosity, before)?);
         self.cycle = Some(VCycle::new(hierarchy, discretisation, system, &elements, preparation)?);
-        self.schur = Some(SchurInverse::new(discretisation, system, &elements, preparation.viscosity)?);
         self.fluid = Some(system.in_single_precision(discretisation));
         self.noise = rounding_noise(discretisation, system);
         Ok(())
@@ -165,7 +167,7 @@ where
     system: &'a StokesSystem<D>,
     fluid: &'a CellOperator<f32, D>,
     cycle: &'a mut VCycle<D>,
-    schur: &'a mut SchurInverse,
+    schur: &'a mut SchurInverse<D>,
     /// `r_p`, then `z_p` at all nodes.
     pressure: Vec<f32>,
     /// `z_p`.
@@ -181,7 +183,7 @@ where
         system: &'a StokesSystem<D>,
         fluid: &'a CellOperator<f32, D>,
         cycle: &'a mut VCycle<D>,
-        schur: &'a mut SchurInverse,
+        schur: &'a mut SchurInverse<D>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];
         Self { system, fluid, cycle, schur, pressure: zeros(), answer: zeros(), work: Workspace::default() }
@@ -198,7 +200,7 @@ where
         let (zu, zp) = z.split_at_mut(system.velocity_dim());
         vector::convert(-1.0, rp, pressure);
         system.pressure.remove_mean(pressure);
-        schur.apply(pressure, answer);
+        schur.apply(&system.pressure, pressure, answer);
         system.pressure.remove_mean(answer);
         vector::convert(1.0, answer, zp);
         vector::copy(answer, pressure);

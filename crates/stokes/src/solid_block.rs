@@ -11,7 +11,6 @@
 //! A rigid motion costs the solid nothing, so what it leaves to the block needs the fluid's stress in the layer of cells
 //! around the solid only: rounding errors of the motion are not multiplied by the solid's viscosity.
 
-use gluey_fem::Reference;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
@@ -25,7 +24,7 @@ use crate::node_matrix::NodeMatrix;
 use crate::restricted::{Restricted, acting, add_at, gather};
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, Penalty, StokesSystem, cell_operator};
+use crate::system::{Penalty, StokesSystem, cell_operator, viscous_diagonal};
 
 /// Cells in the radius of the largest body on a level of the cycle that is factorised in 3D, at most.
 const FACTORISED_CELLS: f64 = 2.0;
@@ -84,7 +83,10 @@ where
             let components = |n: usize| (n * D..(n + 1) * D).map(|k| k as u32);
             positions = inside.chain(ring).flat_map(components).collect();
             let acting = acting(discretisation, &system.cells, &around);
-            let diagonal = fluid_diagonal(discretisation, &acting, &positions);
+            // That of the fluid, which is all of it on nodes that the solid does not touch.
+            let mut nodal = viscous_diagonal(discretisation, &acting);
+            nodes.collect(D, |w| w * w, &mut nodal);
+            let diagonal: Vec<f64> = positions.iter().map(|&k| nodal[k as usize]).collect();
             let cells = (&acting[..], system.cells.len());
             let penalty = system.penalty.as_ref();
             let operator = Restricted::new(discretisation, &system.space, cells, penalty, positions.clone());
@@ -141,27 +143,6 @@ where
         self.cycle.take_applications()
             + std::mem::take(&mut self.layer.applications) as f64 * self.layer.share
     }
-}
-
-/// The diagonal of the fluid's part of the operator, which is all of it on nodes that the solid does not touch.
-fn fluid_diagonal<const D: usize>(
-    discretisation: &Discretisation<D>,
-    cells: &[ActiveCell],
-    positions: &[u32],
-) -> Vec<f64> {
-    let nodes = &discretisation.velocity;
-    let viscous = Reference::<D>::new().viscous;
-    let n = Reference::<D>::VELOCITY;
-    let mut nodal = vec![0.0; nodes.node_count() * D];
-    for cell in cells {
-        for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
-            for c in 0..D {
-                nodal[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
-            }
-        }
-    }
-    nodes.collect(D, |w| w * w, &mut nodal);
-    positions.iter().map(|&k| nodal[k as usize]).collect()
 }
 
 /// The cells that act on the block's nodes and do not move as one body. Those of them with solid in them are strained by

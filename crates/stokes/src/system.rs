@@ -86,6 +86,25 @@ where
     (0..discretisation.mesh.cell_count()).filter(|&c| kind(c) != CellKind::Rigid).map(active).collect()
 }
 
+/// The diagonal of `A` in nodal velocities, as `cells` add it up: boundary, bodies and hanging nodes are nodes like all others.
+pub fn viscous_diagonal<const D: usize>(discretisation: &Discretisation<D>, cells: &[ActiveCell]) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let nodes = &discretisation.velocity;
+    let viscous = Reference::<D>::new().viscous;
+    let n = Reference::<D>::VELOCITY;
+    let mut nodal = vec![0.0; nodes.node_count() * D];
+    for cell in cells {
+        for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
+            for c in 0..D {
+                nodal[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
+            }
+        }
+    }
+    nodal
+}
+
 /// The operator of these cells, with the penalised solid in one pass with the fluid.
 pub fn cell_operator<T: CellScalar, const D: usize>(
     discretisation: &Discretisation<D>,
