@@ -3,11 +3,16 @@
 //! With `A = sum R_c^T A_c R_c` and `p^T S p = max_v 2 p^T B v - v^T A v` the sum of the cells' own maxima bounds the
 //! Schur complement of the whole system from above, `S <= sum S_c`, whatever the viscosity does inside the cells. A
 //! mass matrix over some mean of the viscosity does not know how much of a cut cell can still flow.
+//!
+//! In a cell of one viscosity `2 S_c` is not the mass matrix, which is close to twice the Schur complement of the whole: a cell alone is
+//! free to expand, and for constant pressures the bound is `D` times too high. So that cut cells fit to those around them, theirs is
+//! `T S_c T` with the symmetric `T` that turns the Schur complement of a plain cell into its mass matrix.
 
 use gluey_fem::Reference;
 use gluey_fem::element::split;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockError, DenseSymmetric};
+use nalgebra::DMatrix;
 
 use crate::element::Elements;
 use crate::system::{ActiveCell, StokesSystem};
@@ -23,7 +28,7 @@ pub struct PressureMatrices {
 }
 
 impl PressureMatrices {
-    /// Mass matrices over the viscosity, or, where a solid is penalised, Schur complements of the cells.
+    /// Mass matrices over the viscosity, or, where a solid cuts a cell, what its Schur complement makes of them.
     ///
     /// # Errors
     /// [`BlockError`] if the viscosity of a cut cell is not positive.
@@ -48,11 +53,12 @@ impl PressureMatrices {
             return Ok(new);
         }
         let mut schur = CellSchur::<D>::new()?;
-        new.unit = schur.unit.iter().map(|s| 2.0 * s).collect();
+        let factor = mass_factor(&schur.unit, &new.unit);
+        let m = Reference::<D>::PRESSURE;
         for (index, cell) in cells {
             if let (viscous, Some(own)) = elements.viscous(index) {
-                let matrix = schur.of(viscous, cell.divergence, own)?;
-                new.own[index] = Some(matrix.iter().map(|s| 2.0 * s).collect());
+                let matrix = DMatrix::from_vec(m, m, schur.of(viscous, cell.divergence, own)?);
+                new.own[index] = Some((&factor * matrix * &factor).data.into());
             }
         }
         Ok(new)
@@ -65,6 +71,20 @@ impl PressureMatrices {
             None => (self.scales[index], &self.unit),
         }
     }
+}
+
+/// The symmetric `T` with `T S T = M`: the geometric mean `S^-1 # M` (Pusz and Woronowicz 1975).
+fn mass_factor(schur: &[f64], mass: &[f64]) -> DMatrix<f64> {
+    let m = mass.len().isqrt();
+    let power = |matrix: DMatrix<f64>, exponent: f64| {
+        let eigen = matrix.symmetric_eigen();
+        let scaled = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.powf(exponent)));
+        &eigen.eigenvectors * scaled * eigen.eigenvectors.transpose()
+    };
+    let schur = DMatrix::from_row_slice(m, m, schur);
+    let (root, inverse) = (power(schur.clone(), 0.5), power(schur, -0.5));
+    let middle = power(&root * DMatrix::from_row_slice(m, m, mass) * &root, 0.5);
+    &inverse * middle * &inverse
 }
 
 /// Computes the Schur complements of cells.
@@ -169,6 +189,27 @@ mod tests {
         for (a, b) in found.iter().zip(&schur.unit) {
             assert!((a - h.powi(D as i32) / eta * b).abs() < 1e-9);
         }
+    }
+
+    /// The factor turns a plain cell into its mass matrix.
+    fn a_plain_cell_has_its_mass<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let schur = CellSchur::<D>::new().unwrap().unit;
+        let mass = Reference::<D>::new().pressure_mass;
+        let m = Reference::<D>::PRESSURE;
+        let factor = mass_factor(&schur, mass);
+        assert!((&factor - factor.transpose()).amax() < 1e-12);
+        let difference =
+            &factor * DMatrix::from_vec(m, m, schur) * &factor - DMatrix::from_row_slice(m, m, mass);
+        assert!(difference.amax() < 1e-14);
+    }
+
+    #[test]
+    fn the_schur_complement_of_a_plain_cell_becomes_its_mass() {
+        a_plain_cell_has_its_mass::<2>();
+        a_plain_cell_has_its_mass::<3>();
     }
 
     #[test]

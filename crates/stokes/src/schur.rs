@@ -113,7 +113,7 @@ mod tests {
     use crate::pressure_weights::without_bodies;
     use crate::solver::{Preparation, SaddleSolver};
     use gluey_fem::TreeMesh;
-    use gluey_geom::{Aabb, Vector};
+    use gluey_geom::Aabb;
     use gluey_levelset::Ball;
 
     /// A box without bodies, its coarser meshes and its system.

@@ -275,7 +275,7 @@ where
 }
 
 /// The pressure mass matrix of the active cells over their viscosity, on free pressure nodes; other rows hold a one. Where
-/// a solid is penalised, twice the Schur complements of the cells take the place of their mass matrices.
+/// a solid cuts a cell its matrix is that of [`PressureMatrices`].
 pub fn pressure_mass<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
