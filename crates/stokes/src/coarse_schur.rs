@@ -177,3 +177,59 @@ where
     }
     Ok(schur)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gluey_fem::TreeMesh;
+    use gluey_geom::{Aabb, Vector};
+    use gluey_linalg::vector;
+
+    /// Meshes of a long box, from level 2 on, the finest with hanging nodes.
+    fn long_box(roots: u32) -> Vec<Discretisation<2>> {
+        let domain = Aabb { lower: Vector::zeros(), upper: Vector::from([f64::from(roots), 4.0]) };
+        let mesh = TreeMesh::refine(domain, [roots, 4], [false; 2], 3, |lower, _, level| {
+            level < 2 || lower[0] < 1.0
+        });
+        let mesh = mesh.unwrap();
+        vec![Discretisation::new(mesh.coarsened(2)), Discretisation::new(mesh)]
+    }
+
+    /// `y . C x` for the correction `C` between unknowns.
+    fn product(correction: &mut CoarseSchur<2>, x: &[f32], y: &[f32]) -> f64 {
+        let mut z = vec![0.0; x.len()];
+        correction.add(x, &mut z);
+        vector::dot(y, &z)
+    }
+
+    fn loads(mesh: &Discretisation<2>, seed: u64) -> Vec<f32> {
+        let mut load = vec![0.0; mesh.pressure.node_count()];
+        vector::fill_pseudo_random(seed, &mut load);
+        mesh.pressure.constraints().iter().for_each(|c| load[c.node as usize] = 0.0);
+        load
+    }
+
+    #[test]
+    fn a_box_of_many_roots_is_coarsened_until_its_matrix_is_small() {
+        let meshes = long_box(20);
+        assert!(meshes[0].pressure.node_count() > MOST_PRESSURES);
+        let mut correction = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
+        assert_eq!(correction.meshes.len(), 3);
+        assert_eq!(correction.unknowns.len(), 41 * 9);
+        let [x, y] = [1, 2].map(|seed| loads(&meshes[1], seed));
+        let (xy, yx) = (product(&mut correction, &x, &y), product(&mut correction, &y, &x));
+        assert!((xy - yx).abs() < 1e-4 * xy.abs(), "{xy} {yx}");
+        assert!(CoarseSchur::new(&long_box(300), 2.0, None).unwrap().is_none());
+    }
+
+    #[test]
+    fn the_matrix_is_kept_while_coarsest_mesh_and_viscosity_stand() {
+        let meshes = long_box(3);
+        let first = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
+        let matrix = first.correction.clone();
+        let again = CoarseSchur::new(&meshes, 2.0, Some(first)).unwrap().unwrap();
+        assert_eq!(again.correction, matrix);
+        let thicker = CoarseSchur::new(&meshes, 4.0, Some(again)).unwrap().unwrap();
+        assert!((thicker.correction - matrix.scale(2.0)).amax() < 1e-4 * matrix.amax());
+    }
+}
