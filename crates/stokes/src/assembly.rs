@@ -5,12 +5,17 @@
 //! `C^T K C` to its reduced unknowns. These come in blocks that are coupled alike: the components at a free node, the
 //! twist of a body, a pressure.
 
+use std::sync::Arc;
+
 use gluey_fem::Reference;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{BlockGroups, BlockPattern, SparseError, SparseMatrix};
+use gluey_linalg::{
+    BlockGroups, BlockPattern, DirectSpd, Ordering, RefinementParams, SparseError, SparseMatrix, Symbolic,
+};
 
 use crate::discretisation::Discretisation;
 use crate::element::Elements;
+use crate::error::StokesError;
 use crate::space::VelocitySpace;
 use crate::system::StokesSystem;
 
@@ -107,6 +112,14 @@ where
         expansion.set_sum(constraint.node as usize, masters);
     }
     expansion
+}
+
+/// The factor of a symmetric positive definite matrix.
+pub fn factorised(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Result<DirectSpd, StokesError> {
+    let symbolic = Symbolic::new(matrix.pattern().clone(), ordering)?;
+    let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
+    factor.factorise(matrix.values())?;
+    Ok(factor)
 }
 
 /// Numbering of the unknowns that a matrix keeps out of all positions of a reduced vector.

@@ -13,10 +13,10 @@ use std::sync::Arc;
 
 use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{DirectSpd, LinOp, Ordering, Preconditioner, RefinementParams, Symbolic};
+use gluey_linalg::{LinOp, Ordering, Preconditioner};
 use nalgebra::{DMatrix, DVector};
 
-use crate::assembly::assemble_viscous;
+use crate::assembly::{assemble_viscous, factorised};
 use crate::discretisation::Discretisation;
 use crate::element::Elements;
 use crate::error::StokesError;
@@ -154,9 +154,7 @@ where
     Dim<D>: Space<D>,
 {
     let assembled = assemble_viscous(discretisation, system)?;
-    let symbolic = Symbolic::new(assembled.matrix.pattern().clone(), Ordering::Amd)?;
-    let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
-    factor.factorise(assembled.matrix.values())?;
+    let mut factor = factorised(&assembled.matrix, Ordering::Amd)?;
     let mut operator = SystemOperator::new(system);
     let velocities = system.velocity_dim();
     let zeros = || vec![0.0; assembled.unknowns.positions.len()];

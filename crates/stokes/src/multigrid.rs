@@ -14,12 +14,9 @@ use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{Interpolation, Reference as Matrices};
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Body;
-use gluey_linalg::{
-    DirectSpd, Gcr, GcrParams, LinOp, Ordering, Preconditioner, Reference, RefinementParams, Scalar,
-    Symbolic, vector,
-};
+use gluey_linalg::{DirectSpd, Gcr, GcrParams, LinOp, Ordering, Preconditioner, Reference, Scalar, vector};
 
-use crate::assembly::{Unknowns, assemble_viscous};
+use crate::assembly::{Unknowns, assemble_viscous, factorised};
 use crate::discretisation::{Discretisation, solid_nodes};
 use crate::element::Elements;
 use crate::error::StokesError;
@@ -427,9 +424,7 @@ impl CoarseSolver {
     {
         let system = StokesSystem::new(discretisation, space, viscosity, WeakPressures::Keep, None);
         let assembled = assemble_viscous(discretisation, &system)?;
-        let symbolic = Symbolic::new(assembled.matrix.pattern().clone(), Ordering::Amd)?;
-        let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
-        factor.factorise(assembled.matrix.values())?;
+        let factor = factorised(&assembled.matrix, Ordering::Amd)?;
         let count = assembled.unknowns.positions.len();
         Ok(Self { factor, unknowns: assembled.unknowns, b: vec![0.0; count], x: vec![0.0; count] })
     }

@@ -8,15 +8,14 @@
 //! The cycle runs before and after the rigid levels: whole, or where the contrast is low, cut in two halves, of which the first
 //! smooths and then corrects ([`SolidCycle::descend`]) and the second is its transpose ([`SolidCycle::ascend`]).
 
-use std::sync::Arc;
-
 use gluey_fem::element::{split, values_1d};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, DirectSpd, Guess, LinOp, Ordering, Preconditioner, RefinementParams, SparseMatrix,
-    SpectralInterval, Symbolic, estimate_lambda_max, vector,
+    Chebyshev, DirectSpd, Guess, LinOp, Ordering, Preconditioner, SparseMatrix, SpectralInterval,
+    estimate_lambda_max, vector,
 };
 
+use crate::assembly::factorised;
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::node_matrix::{NodeMatrix, Prolongation};
@@ -135,7 +134,7 @@ where
         Ok(Self {
             finest: None,
             coarser: Vec::new(),
-            direct: factorise(matrix, order)?,
+            direct: factorised(matrix, Ordering::Custom(order))?,
             r: Vec::new(),
             is_whole: true,
         })
@@ -167,7 +166,7 @@ where
         Ok(Self {
             finest: Some((operator, finest)),
             coarser,
-            direct: factorise(&matrix, &order)?,
+            direct: factorised(&matrix, Ordering::Custom(&order))?,
             r,
             is_whole: contrast >= WHOLE_FROM,
         })
@@ -253,11 +252,4 @@ fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: 
 fn residual(a: &mut impl LinOp<f64>, b: &[f64], x: &[f64], r: &mut [f64]) {
     a.apply(x, r);
     vector::residual_from_product(b, r);
-}
-
-fn factorise(matrix: &SparseMatrix, order: &[usize]) -> Result<DirectSpd, StokesError> {
-    let symbolic = Symbolic::new(matrix.pattern().clone(), Ordering::Custom(order))?;
-    let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
-    factor.factorise(matrix.values())?;
-    Ok(factor)
 }
