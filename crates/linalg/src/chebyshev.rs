@@ -45,15 +45,27 @@ pub struct Chebyshev<T> {
     y: Vec<T>,
     /// `A x_k`.
     z: Vec<T>,
-    /// Residual where `M` is not a diagonal.
+    apart: Apart<T>,
+}
+
+/// Residuals, and what becomes of them, where `M` is not a diagonal.
+#[derive(Clone, Debug)]
+struct Apart<T> {
     rest: Vec<T>,
+    scattered: [Vec<T>; 2],
+}
+
+impl<T> Default for Apart<T> {
+    fn default() -> Self {
+        Self { rest: Vec::new(), scattered: Default::default() }
+    }
 }
 
 impl<T: Scalar> Chebyshev<T> {
     /// A smoother with `degree` >= 1 applications of the preconditioner, for operators of dimension `dim`.
     pub fn new(dim: usize, degree: usize, interval: SpectralInterval) -> Self {
         let zeros = || vec![T::ZERO; dim];
-        Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), rest: Vec::new() }
+        Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), apart: Apart::default() }
     }
 
     /// The interval in use.
@@ -91,13 +103,13 @@ impl<T: Scalar> Chebyshev<T> {
                 vector::copy(x, &mut self.y);
             }
         }
-        let Self { y, z, rest, .. } = self;
+        let Self { y, z, apart, .. } = self;
         // So that the last iterate is in `x`.
         let (mut before, mut now) = if is_odd { (&mut y[..], x) } else { (x, &mut y[..]) };
         let first = T::from_f64(1.0 / theta);
         match guess {
-            Guess::Zero => step(m, (b, z, rest), before, now, |b, _| b, |z, _, _| first * z),
-            Guess::Given => step(m, (b, z, rest), before, now, |b, z| b - z, |z, x, _| x + first * z),
+            Guess::Zero => step(m, (b, z, apart), (before, now), |b, _| b, (first, |_, _| T::ZERO)),
+            Guess::Given => step(m, (b, z, apart), (before, now), |b, z| b - z, (first, |x, _| x)),
         }
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
@@ -106,10 +118,10 @@ impl<T: Scalar> Chebyshev<T> {
             let rho_next = 1.0 / (2.0 * sigma - rho);
             let (new, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
             if k == 1 && guess == Guess::Zero {
-                step(m, (b, z, rest), now, before, |b, z| b - z, |z, x, _| x + old * x + new * z);
+                step(m, (b, z, apart), (now, before), |b, z| b - z, (new, |x, _| x + old * x));
             } else {
-                let next = |z: T, x: T, before: T| x + old * (x - before) + new * z;
-                step(m, (b, z, rest), now, before, |b, z| b - z, next);
+                let next = |x: T, before: T| x + old * (x - before);
+                step(m, (b, z, apart), (now, before), |b, z| b - z, (new, next));
             }
             std::mem::swap(&mut before, &mut now);
             rho = rho_next;
@@ -117,19 +129,19 @@ impl<T: Scalar> Chebyshev<T> {
     }
 }
 
-/// `to = next(M^-1 residual(b, z), from, to)`, in one pass where `M` is a diagonal.
+/// `to = next(from, to) + new M^-1 residual(b, z)`, in one pass where `M` is a diagonal.
 fn step<T: Scalar>(
     m: &mut (impl Preconditioner<T> + ?Sized),
-    (b, z, rest): (&[T], &mut [T], &mut Vec<T>),
-    from: &[T],
-    to: &mut [T],
+    (b, z, apart): (&[T], &mut [T], &mut Apart<T>),
+    (from, to): (&[T], &mut [T]),
     residual: impl Fn(T, T) -> T + Sync,
-    next: impl Fn(T, T, T) -> T + Sync,
+    (new, next): (T, impl Fn(T, T) -> T + Sync),
 ) {
     let split = m.diagonal().len();
     let (to, to_rest) = to.split_at_mut(split);
     if !to_rest.is_empty() {
         let (b, z, from) = (&b[split..], &mut z[split..], &from[split..]);
+        let rest = &mut apart.rest;
         rest.resize(b.len(), T::ZERO);
         parallel::for_each(rest, |first, r| {
             for (r, (&b, &z)) in r.iter_mut().zip(b[first..].iter().zip(&z[first..])) {
@@ -139,7 +151,7 @@ fn step<T: Scalar>(
         m.apply_rest(rest, z);
         parallel::for_each(to_rest, |first, to| {
             for (to, (&z, &from)) in to.iter_mut().zip(z[first..].iter().zip(&from[first..])) {
-                *to = next(z, from, *to);
+                *to = next(from, *to) + new * z;
             }
         });
     }
@@ -149,7 +161,15 @@ fn step<T: Scalar>(
         let (diagonal, b) = (&diagonal[first..][..n], &b[first..][..n]);
         let (z, from) = (&z[first..][..n], &from[first..][..n]);
         for k in 0..n {
-            to[k] = next(diagonal[k] * residual(b[k], z[k]), from[k], to[k]);
+            to[k] = next(from[k], to[k]) + new * (diagonal[k] * residual(b[k], z[k]));
         }
     });
+    if !m.scattered().is_empty() {
+        let [r, sum] = &mut apart.scattered;
+        r.clear();
+        r.extend(m.scattered().iter().map(|&k| residual(b[k as usize], z[k as usize])));
+        sum.resize(r.len(), T::ZERO);
+        m.apply_scattered(r, sum);
+        m.scattered().iter().zip(sum).for_each(|(&k, sum)| to[k as usize] += new * *sum);
+    }
 }

@@ -21,6 +21,16 @@ pub trait Preconditioner<T> {
         &[]
     }
 
+    /// Unknowns among those of [`Preconditioner::diagonal`] on which there is more than it, to be added.
+    fn scattered(&self) -> &[u32] {
+        &[]
+    }
+
+    /// What is to be added there: `z = P r` for vectors on the scattered unknowns alone.
+    fn apply_scattered(&mut self, _r: &[T], z: &mut [T]) {
+        debug_assert!(z.is_empty(), "scattered unknowns without a matrix");
+    }
+
     /// `z = M^-1 r` on the unknowns after those of [`Preconditioner::diagonal`], which they must not depend on.
     fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
         self.apply(r, z);
@@ -44,6 +54,14 @@ impl<T, M: Preconditioner<T> + ?Sized> Preconditioner<T> for &mut M {
 
     fn diagonal(&self) -> &[T] {
         (**self).diagonal()
+    }
+
+    fn scattered(&self) -> &[u32] {
+        (**self).scattered()
+    }
+
+    fn apply_scattered(&mut self, r: &[T], z: &mut [T]) {
+        (**self).apply_scattered(r, z);
     }
 
     fn apply_rest(&mut self, r: &[T], z: &mut [T]) {

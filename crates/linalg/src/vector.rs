@@ -55,13 +55,13 @@ pub fn norm<T: Scalar>(x: &[T]) -> f64 {
     dot(x, x).sqrt()
 }
 
-/// `y += a x`.
-pub fn axpy<T: Scalar>(a: f64, x: &[T], y: &mut [T]) {
+/// `y += a x`, in the precision of `y`.
+pub fn axpy<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
     debug_assert_eq!(x.len(), y.len());
     parallel::for_each(y, |first, y| axpy_block(a, &x[first..], y));
 }
 
-/// [`axpy`] in this thread, in the precision of `y`, which may be shorter than `x`.
+/// [`axpy`] in this thread; `y` may be shorter than `x`.
 pub(crate) fn axpy_block<S: Scalar, T: Scalar>(a: f64, x: &[S], y: &mut [T]) {
     let a = T::from_f64(a);
     for (y, &x) in y.iter_mut().zip(x) {

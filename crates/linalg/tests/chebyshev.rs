@@ -188,3 +188,45 @@ fn threads_and_fused_passes_change_no_bit() {
         assert!(smooth(threads, offered) == reference);
     }
 }
+
+#[test]
+fn what_is_scattered_is_added_to_the_diagonal() {
+    /// The inverse diagonal, on every third unknown given apart from the rest.
+    struct Split {
+        diagonal: Vec<f64>,
+        scattered: Vec<u32>,
+    }
+    impl Preconditioner<f64> for Split {
+        fn apply(&mut self, _: &[f64], _: &mut [f64]) {
+            unreachable!("all of it is in its parts")
+        }
+        fn diagonal(&self) -> &[f64] {
+            &self.diagonal
+        }
+        fn scattered(&self) -> &[u32] {
+            &self.scattered
+        }
+        fn apply_scattered(&mut self, r: &[f64], z: &mut [f64]) {
+            z.iter_mut().zip(r).for_each(|(z, r)| *z = 0.25 * r);
+        }
+    }
+    let n = 9;
+    let mut a = laplacian_2d(n);
+    let b = pseudo_random(1, n * n);
+    let whole = a.diagonal();
+    let scattered: Vec<u32> = (0..(n * n) as u32).step_by(3).collect();
+    let mut diagonal = vec![0.25; n * n];
+    scattered.iter().for_each(|&k| diagonal[k as usize] = 0.0);
+    let mut split = Split { diagonal, scattered };
+    let mut jacobi = Jacobi::new(&whole).expect("positive");
+    for degree in [1, 2, 3, 4] {
+        let mut chebyshev = Chebyshev::new(n * n, degree, SpectralInterval { lower: 0.4, upper: 2.0 });
+        let (mut x, mut y) = (vec![0.0; n * n], vec![0.0; n * n]);
+        for guess in [Guess::Zero, Guess::Given] {
+            chebyshev.smooth(&mut a, &mut split, &b, &mut x, guess);
+            chebyshev.smooth(&mut a, &mut jacobi, &b, &mut y, guess);
+            assert!(whole.iter().all(|&d| d == 4.0) && vector::norm(&x) > 0.0);
+            assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-14), "degree {degree}");
+        }
+    }
+}

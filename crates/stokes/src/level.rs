@@ -1,6 +1,5 @@
 //! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
 
-use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{Interpolation, NodeMap, Reference};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, invert_spd, vector};
@@ -8,8 +7,9 @@ use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, in
 use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::near_bodies::NearBodies;
+use crate::restricted::CountedOperator;
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, active_cells, cell_operator, viscous_diagonal};
+use crate::system::{ActiveCell, active_cells, viscous_diagonal};
 
 /// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue it damps.
 #[derive(Clone, Copy, Debug)]
@@ -38,39 +38,6 @@ impl Smoothing {
 /// add 2 % at most where measured.
 pub const SAFETY: f64 = 1.05;
 
-/// The viscous operator `T^T A T` of one level.
-#[derive(Clone, Debug)]
-pub struct LevelOperator<const D: usize> {
-    /// Reduced velocities.
-    pub space: VelocitySpace<D>,
-    operator: CellOperator<f32, D>,
-    work: Workspace<f32>,
-    /// Fraction of the cells that are not rigid on which it acts.
-    share: f64,
-    applications: usize,
-}
-
-impl<const D: usize> LevelOperator<D> {
-    /// Applications since the last call, each counted as its share of the mesh.
-    fn take_applications(&mut self) -> f64 {
-        std::mem::take(&mut self.applications) as f64 * self.share
-    }
-}
-
-impl<const D: usize> LinOp<f32> for LevelOperator<D>
-where
-    Dim<D>: Space<D>,
-{
-    fn dim(&self) -> usize {
-        self.space.dim()
-    }
-
-    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
-        self.applications += 1;
-        self.operator.viscous(x, y, &mut self.work);
-    }
-}
-
 /// Inverse diagonal on free nodes, inverse blocks on twists, zero elsewhere.
 #[derive(Clone, Debug)]
 pub struct BlockDiagonal {
@@ -80,6 +47,11 @@ pub struct BlockDiagonal {
 }
 
 impl BlockDiagonal {
+    /// The nodal entries.
+    pub fn into_nodal(self) -> Vec<f32> {
+        self.nodal
+    }
+
     /// The nodal entries at some positions, and all twists.
     pub fn restricted(&self, positions: &[u32]) -> Self {
         let nodal = positions.iter().map(|&k| self.nodal[k as usize]).collect();
@@ -109,105 +81,110 @@ impl Preconditioner<f32> for BlockDiagonal {
 }
 
 /// One level of the multigrid.
-///
-/// Only some nodes are smoothed; the cells that act on them take part in the operator. Elsewhere the iterate stays what the
-/// coarser level gave, and all residuals that are used are those of the whole operator.
 #[derive(Clone, Debug)]
 pub struct Level<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    /// Operator of this level.
-    pub operator: LevelOperator<D>,
-    diagonal: BlockDiagonal,
-    chebyshev: Chebyshev<f32>,
-    near_bodies: Option<NearBodies<D>>,
+    /// Reduced velocities.
+    pub space: VelocitySpace<D>,
+    /// `None` where it only joins the coarser levels to one that smooths.
+    pub relaxation: Option<Relaxation<D>>,
     /// Right-hand side.
     pub b: Vec<f32>,
     /// Solution.
     pub x: Vec<f32>,
-    before: bool,
     /// Residual or correction where a sweep goes before, else forces and torques while `b` holds them at rigid nodes.
     r: Vec<f32>,
 }
 
-impl<const D: usize> Level<D>
+/// The viscous operator `T^T A T` of a level, and how it smooths.
+///
+/// Only some nodes are smoothed; the cells that act on them take part in the operator. Elsewhere the iterate stays what the
+/// coarser level gave, and all residuals that are used are those of the whole operator.
+#[derive(Clone, Debug)]
+pub struct Relaxation<const D: usize> {
+    /// In the reduced velocities.
+    pub operator: CountedOperator<f32, D>,
+    diagonal: BlockDiagonal,
+    chebyshev: Chebyshev<f32>,
+    near_bodies: Option<NearBodies<D>>,
+    before: bool,
+}
+
+impl<const D: usize> Relaxation<D>
 where
     Dim<D>: Space<D>,
 {
-    /// A level with rigid bodies; `index` names it in errors. It smooths around its finest cells only: the others are
-    /// those of the next coarser level, which smooths them.
-    pub fn rigid(
-        discretisation: &Discretisation<D>,
-        space: VelocitySpace<D>,
-        viscosity: f64,
-        (index, smoothing): (usize, Smoothing),
-    ) -> Result<Self, StokesError> {
-        let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
-        let mut finest = vec![false; nodes.node_count()];
-        for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
-            nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
-        }
-        Self::new(discretisation, space, viscosity, &finest, (index, smoothing))
-    }
-
-    /// A level that smooths around the nodes of `core`.
+    /// Smooths around the finest cells; `index` names the level in errors.
     fn new(
         discretisation: &Discretisation<D>,
-        space: VelocitySpace<D>,
+        space: &VelocitySpace<D>,
         viscosity: f64,
-        core: &[bool],
         (index, smoothing): (usize, Smoothing),
     ) -> Result<Self, StokesError> {
         let nodes = &discretisation.velocity;
-        let smoothed = &nodes_of_cells_with(nodes, core);
-        let mut cells = active_cells(discretisation, &space, viscosity);
+        let smoothed = &around_finest_cells(discretisation);
+        let mut cells = active_cells(discretisation, space, viscosity);
         let touches = cells_touching(nodes, smoothed);
         let holds_a_body =
             |c: &ActiveCell| nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some());
         let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
-        let mut diagonal = block_diagonal(discretisation, &space, &cells, smoothed)
+        let mut diagonal = block_diagonal(discretisation, space, &cells, smoothed)
             .map_err(|reason| StokesError::Smoother { level: index, reason })?;
         if !smooths_twists {
             diagonal.twists.fill(0.0);
         }
-        let (dim, twist_count) = (space.dim(), space.dim() - space.full_dim());
-        let near_bodies = NearBodies::new(discretisation, &space, &cells, &diagonal, cell_lambda_max::<D>());
-        let operator = LevelOperator {
-            operator: cell_operator(discretisation, &space, &cells, None),
-            work: Workspace::default(),
-            share: cells.len() as f64 / cell_count.max(1) as f64,
-            applications: 0,
-            space,
-        };
         let interval = SpectralInterval::upper_part(cell_lambda_max::<D>(), smoothing.ratio, SAFETY);
-        let zeros = || vec![0.0; dim];
         Ok(Self {
-            operator,
-            diagonal,
-            chebyshev: Chebyshev::new(dim, smoothing.degree, interval),
-            near_bodies,
-            b: zeros(),
-            x: zeros(),
+            near_bodies: NearBodies::new(discretisation, space, &cells, &diagonal, cell_lambda_max::<D>()),
+            operator: CountedOperator::new(discretisation, space, (&cells, cell_count), None),
+            chebyshev: Chebyshev::new(space.dim(), smoothing.degree, interval),
             before: smoothing.before,
-            r: vec![0.0; if smoothing.before { dim } else { twist_count }],
+            diagonal,
         })
+    }
+
+    fn smooth(&mut self, b: &[f32], x: &mut [f32], guess: Guess) {
+        self.chebyshev.smooth(&mut self.operator, &mut self.diagonal, b, x, guess);
+    }
+}
+
+impl<const D: usize> Level<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// A level with rigid bodies; `index` names it in errors. It smooths around its finest cells only, if at all.
+    pub fn rigid(
+        discretisation: &Discretisation<D>,
+        space: VelocitySpace<D>,
+        viscosity: f64,
+        (index, smoothing): (usize, Option<Smoothing>),
+    ) -> Result<Self, StokesError> {
+        let relaxation = smoothing
+            .map(|smoothing| Relaxation::new(discretisation, &space, viscosity, (index, smoothing)))
+            .transpose()?;
+        let (dim, nodal) = (space.dim(), space.full_dim());
+        let before = relaxation.as_ref().is_some_and(|r| r.before);
+        let r = vec![0.0; if before { dim } else { dim - nodal }];
+        Ok(Self { b: vec![0.0; dim], x: vec![0.0; dim], r, relaxation, space })
     }
 
     /// Applications since the last call, each counted as its share of the mesh.
     pub fn take_applications(&mut self) -> f64 {
-        let near_bodies = self.near_bodies.as_mut().map_or(0.0, NearBodies::take_applications);
-        self.operator.take_applications() + near_bodies * self.operator.share
+        let Some(Relaxation { operator, near_bodies, .. }) = &mut self.relaxation else { return 0.0 };
+        let near_bodies = near_bodies.as_mut().map_or(0.0, NearBodies::take_applications);
+        operator.take_applications() + near_bodies * operator.share()
     }
 
     /// Smooths `A x = b` from the present `x`, then once more around the bodies.
     pub fn smooth(&mut self) {
-        let Self { operator, diagonal, chebyshev, near_bodies, b, x, .. } = self;
-        chebyshev.smooth(operator, diagonal, b, x, Guess::Given);
-        if let Some(near_bodies) = near_bodies {
-            near_bodies.smooth(b, x);
+        let Some(relaxation) = &mut self.relaxation else { return };
+        relaxation.smooth(&self.b, &mut self.x, Guess::Given);
+        if let Some(near_bodies) = &mut relaxation.near_bodies {
+            near_bodies.smooth(&self.b, &mut self.x);
         }
     }
 
@@ -219,43 +196,62 @@ where
         coarse: &VelocitySpace<D>,
         coarse_b: &mut [f32],
     ) {
-        match self.before {
-            true => self.restrict_residual(transfer, coarse_b),
-            false => self.restrict_load(transfer, coarse_b),
+        let Self { space, relaxation, b, x, r } = self;
+        match relaxation {
+            Some(relaxation) if relaxation.before => {
+                relaxation.smooth(b, x, Guess::Zero);
+                relaxation.operator.apply(x, r);
+                vector::residual_from_product(b, r);
+                space.spread(r);
+                transfer.restrict::<D>(r, coarse_b);
+            }
+            _ => restrict_load(space, b, r, |b| transfer.restrict::<D>(b, coarse_b)),
         }
         coarse.reduce(coarse_b);
-    }
-
-    fn restrict_residual(&mut self, transfer: &mut Interpolation<D>, coarse_b: &mut [f32]) {
-        let Self { operator, diagonal, chebyshev, b, x, r, .. } = self;
-        chebyshev.smooth(operator, diagonal, b, x, Guess::Zero);
-        operator.apply(x, r);
-        vector::residual_from_product(b, r);
-        operator.space.spread(r);
-        transfer.restrict::<D>(r, coarse_b);
-    }
-
-    fn restrict_load(&mut self, transfer: &mut Interpolation<D>, coarse_b: &mut [f32]) {
-        let Self { operator, b, r: twist_loads, .. } = self;
-        let nodal = operator.space.full_dim();
-        twist_loads.copy_from_slice(&b[nodal..]);
-        // What this leaves at rigid nodes no smoother looks at.
-        operator.space.spread(b);
-        transfer.restrict::<D>(b, coarse_b);
-        b[nodal..].copy_from_slice(twist_loads);
     }
 
     /// Adds the correction `coarse_x` of the coarser level, whose entries it expands in place.
     pub fn correct(&mut self, transfer: &Interpolation<D>, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
         coarse.expand(coarse_x);
-        let space = &self.operator.space;
-        let correction = if self.before { &mut self.r } else { &mut self.x };
-        transfer.prolong::<D>(coarse_x, &mut correction[..space.full_dim()]);
-        space.project(correction);
-        if self.before {
+        let before = self.relaxation.as_ref().is_some_and(|r| r.before);
+        let correction = if before { &mut self.r } else { &mut self.x };
+        transfer.prolong::<D>(coarse_x, &mut correction[..self.space.full_dim()]);
+        self.space.project(correction);
+        if before {
             vector::axpy(1.0, &self.r, &mut self.x);
         }
     }
+}
+
+/// Restricts `b` with the loads on the twists spread over the nodes; `twist_loads` keeps them meanwhile.
+fn restrict_load<const D: usize>(
+    space: &VelocitySpace<D>,
+    b: &mut [f32],
+    twist_loads: &mut [f32],
+    restrict: impl FnOnce(&[f32]),
+) where
+    Dim<D>: Space<D>,
+{
+    let nodal = space.full_dim();
+    twist_loads.copy_from_slice(&b[nodal..]);
+    // What this leaves at rigid nodes no smoother looks at.
+    space.spread(b);
+    restrict(b);
+    b[nodal..].copy_from_slice(twist_loads);
+}
+
+/// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those of the next
+/// coarser level, which smooths them.
+pub fn around_finest_cells<const D: usize>(discretisation: &Discretisation<D>) -> Vec<bool>
+where
+    Dim<D>: Space<D>,
+{
+    let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
+    let mut finest = vec![false; nodes.node_count()];
+    for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
+        nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
+    }
+    nodes_of_cells_with(nodes, &finest)
 }
 
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds that of sums over
@@ -288,7 +284,8 @@ pub fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Ve
     (0..nodes.cell_count()).map(|c| nodes.cell(c).iter().any(|&n| acting[n as usize])).collect()
 }
 
-fn block_diagonal<const D: usize>(
+/// The inverse diagonal of the fluid's operator on the nodes in `smoothed`, and those of the twists.
+pub fn block_diagonal<const D: usize>(
     discretisation: &Discretisation<D>,
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
@@ -389,10 +386,11 @@ mod tests {
         assert!(!discretisation.velocity.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, -0.1);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
-        let mut level =
-            Level::rigid(&discretisation, space, 1.7, (0, Smoothing::of_eliminated(true))).unwrap();
-        let largest = estimate_lambda_max(&mut level.operator, &mut level.diagonal, 40).unwrap();
-        let upper = level.chebyshev.interval().upper;
+        let level =
+            Level::rigid(&discretisation, space, 1.7, (0, Some(Smoothing::of_eliminated(true)))).unwrap();
+        let mut relaxation = level.relaxation.unwrap();
+        let largest = estimate_lambda_max(&mut relaxation.operator, &mut relaxation.diagonal, 40).unwrap();
+        let upper = relaxation.chebyshev.interval().upper;
         assert!(largest < upper && upper < 1.2 * largest, "{largest} {upper}");
     }
 
@@ -405,23 +403,23 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], -0.1);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &[ball], &solid);
-        Level::rigid(&discretisation, space, 1.0, (0, Smoothing::of_eliminated(true))).unwrap()
+        Level::rigid(&discretisation, space, 1.0, (0, Some(Smoothing::of_eliminated(true)))).unwrap()
     }
 
     #[test]
     fn relaxation_damps_errors_near_a_disc_and_touches_no_others() {
-        let mut level = level_around_a_ball::<2>();
-        let mut near = level.near_bodies.take().unwrap();
-        let dim = level.operator.dim();
+        let Level { space, relaxation, .. } = level_around_a_ball::<2>();
+        let Relaxation { mut operator, near_bodies, .. } = relaxation.unwrap();
+        let mut near = near_bodies.unwrap();
+        let dim = operator.dim();
         let (mut random, zeros) = (vec![0.0; dim], vec![0.0; dim]);
         vector::fill_pseudo_random(1, &mut random);
-        level.operator.space.reduce(&mut random);
-        let distance =
-            |k: usize| (level.operator.space.nodes().point(k / 2) - Vector::<2>::repeat(0.47)).norm();
-        let far: Vec<usize> = (0..level.operator.space.full_dim()).filter(|&k| distance(k) > 0.4).collect();
+        space.reduce(&mut random);
+        let distance = |k: usize| (space.nodes().point(k / 2) - Vector::<2>::repeat(0.47)).norm();
+        let far: Vec<usize> = (0..space.full_dim()).filter(|&k| distance(k) > 0.4).collect();
         let mut energy = |x: &[f32]| {
             let mut ax = vec![0.0; dim];
-            level.operator.operator.viscous(x, &mut ax, &mut level.operator.work);
+            operator.apply(x, &mut ax);
             vector::dot(x, &ax)
         };
         let mut x = random.clone();
@@ -433,7 +431,7 @@ mod tests {
         let mut left = local.clone();
         near.smooth(&zeros, &mut left);
         assert!(energy(&left) < 0.05 * energy(&local), "{} {}", energy(&left), energy(&local));
-        assert!(level_around_a_ball::<3>().near_bodies.is_none());
+        assert!(level_around_a_ball::<3>().relaxation.unwrap().near_bodies.is_none());
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod multigrid;
 mod near_bodies;
 mod node_matrix;
 mod patches;
+mod penalised_smoother;
 mod point_matrices;
 mod pressure;
 mod pressure_weights;

@@ -23,7 +23,7 @@ use crate::error::StokesError;
 use crate::level::{Level, Smoothing};
 use crate::pressure::WeakPressures;
 use crate::schur::SchurInverse;
-use crate::solid_block::SolidBlock;
+use crate::solid_block::{SolidBlock, is_factorised};
 use crate::solver::{Preparation, SaddleSolver, SolveReport};
 use crate::space::VelocitySpace;
 use crate::system::{Penalty, StokesSystem, SystemOperator};
@@ -274,6 +274,7 @@ where
         preparation: &Preparation<'_, D>,
     ) -> Result<Self, StokesError> {
         let meshes = &hierarchy.meshes;
+        let radius = preparation.bodies.iter().map(Body::bounding_radius).fold(0.0, f64::max);
         let mut levels = Vec::with_capacity(meshes.len() + 1);
         for (index, mesh) in meshes.iter().enumerate() {
             let is_finest = index + 1 == meshes.len();
@@ -282,21 +283,22 @@ where
                 false => rigid_space(mesh, preparation),
             };
             let smoothing = match preparation.touched {
-                Some(_) => Smoothing::of_penalised(is_finest),
-                None => Smoothing::of_eliminated(is_finest),
+                None => Some(Smoothing::of_eliminated(is_finest)),
+                Some(_) if is_factorised(meshes, radius) => Some(Smoothing::of_penalised(is_finest)),
+                // The solid's smoother is that of the finest mesh.
+                Some(_) => (!is_finest).then(|| Smoothing::of_eliminated(is_finest)),
             };
             levels.push(Level::rigid(mesh, space, preparation.viscosity, (index, smoothing))?);
         }
-        let finest = &levels[levels.len() - 1].operator.space;
+        let finest = &levels[levels.len() - 1].space;
         let solid = match preparation.touched {
             Some(touched) => {
-                let radii = preparation.bodies.iter().map(Body::bounding_radius);
-                let hierarchy = (radii.fold(0.0, f64::max), &meshes[..meshes.len() - 1]);
+                let hierarchy = (&meshes[..], radius);
                 Some(SolidBlock::new(discretisation, system, elements, touched, finest, hierarchy)?)
             }
             None => None,
         };
-        let coarse_space = levels[0].operator.space.clone();
+        let coarse_space = levels[0].space.clone();
         let coarse = CoarseSolver::new(&meshes[0], coarse_space, preparation.viscosity)?;
         Ok(Self { hierarchy, levels, coarse, solid, wide: Default::default() })
     }
@@ -315,12 +317,12 @@ where
         }
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
-        fine.restrict(&mut self.hierarchy.transfers[top - 1], &coarse.operator.space, &mut coarse.b);
+        fine.restrict(&mut self.hierarchy.transfers[top - 1], &coarse.space, &mut coarse.b);
         self.run(top - 1);
         let (below, above) = self.levels.split_at_mut(top);
         let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
         let mut x = std::mem::take(&mut coarse.x);
-        fine.correct(&self.hierarchy.transfers[top - 1], &coarse.operator.space, &mut x);
+        fine.correct(&self.hierarchy.transfers[top - 1], &coarse.space, &mut x);
         coarse.x = x;
         fine.smooth();
     }
@@ -331,10 +333,10 @@ where
     Dim<D>: Space<D>,
 {
     /// `z = V r` on the reduced vectors of the finest rigid level.
-    fn rigid_cycle(&mut self, r: &[f64], z: &mut [f64]) {
+    fn rigid_cycle<T: Scalar>(&mut self, r: &[f64], z: &mut [T]) {
         let norm = vector::norm(r);
         if norm == 0.0 {
-            z.fill(0.0);
+            z.fill(T::ZERO);
             return;
         }
         let top = self.levels.len() - 1;
@@ -343,12 +345,10 @@ where
         vector::convert(norm, &self.levels[top].x, z);
     }
 
-    /// The nodal velocities `u` with which the finest rigid level answers the nodal load `f`.
-    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f64]) {
-        let top = self.levels.len() - 1;
-        self.levels[top].operator.space.reduce(f);
+    /// The reduced velocities `u` with which the finest rigid level answers the nodal load `f`, which it reduces.
+    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
+        self.levels[self.levels.len() - 1].space.reduce(f);
         self.rigid_cycle(f, u);
-        self.levels[top].operator.space.expand(u);
     }
 
     /// `z = V (r - g)` for the gradient `g` that `gradient` writes.

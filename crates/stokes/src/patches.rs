@@ -5,12 +5,12 @@
 //! a node belongs to, `z = W^1/2 sum R_c^T A_c^-1 R_c W^1/2 r`. The weights bring the largest eigenvalue from about ten down
 //! to two. Nodes of no patch are divided by their diagonal.
 
-use gluey_linalg::{BlockError, DenseSymmetric, Preconditioner};
+use gluey_linalg::{BlockError, DenseSymmetric, Preconditioner, Scalar};
 
 use crate::node_matrix::NodeMatrix;
 
-/// The inverses of the blocks on cells.
-pub struct Patches<const D: usize> {
+/// The inverses of the blocks on cells, for vectors of `T`.
+pub struct Patches<T, const D: usize> {
     /// Nodes of patch after patch.
     nodes: Vec<u32>,
     /// Where those of each patch end.
@@ -18,23 +18,23 @@ pub struct Patches<const D: usize> {
     /// Lower triangles of the inverses, weights included, row by row.
     inverses: Vec<f32>,
     /// Inverse diagonal on nodes of no patch, zero elsewhere.
-    diagonal: Vec<f64>,
+    diagonal: Vec<T>,
     r: Vec<f32>,
     z: Vec<f32>,
 }
 
-impl<const D: usize> Patches<D> {
-    /// For the block of `matrix` on the nodes of each cell, and `diagonal` on the nodes that are in none.
+impl<T: Scalar, const D: usize> Patches<T, D> {
+    /// For the block of `matrix` on the nodes of each cell, and an inverse `diagonal` for the nodes that are in none.
     pub fn new(
         matrix: &NodeMatrix<D>,
         cells: impl Iterator<Item = Vec<u32>>,
-        diagonal: &[f64],
+        diagonal: Vec<T>,
     ) -> Result<Self, BlockError> {
         let mut new = Self {
             nodes: Vec::new(),
             ends: Vec::new(),
             inverses: Vec::new(),
-            diagonal: diagonal.iter().map(|d| 1.0 / d).collect(),
+            diagonal,
             r: Vec::new(),
             z: Vec::new(),
         };
@@ -43,11 +43,9 @@ impl<const D: usize> Patches<D> {
             new.nodes.extend(cell);
             new.ends.push(new.nodes.len() as u32);
         }
-        let mut count = vec![0u32; diagonal.len() / D];
+        let mut count = vec![0u32; matrix.node_count()];
         new.nodes.iter().for_each(|&n| count[n as usize] += 1);
-        let in_patches = |k: usize| count[k / D] > 0;
-        new.diagonal.iter_mut().enumerate().filter(|(k, _)| in_patches(*k)).for_each(|(_, d)| *d = 0.0);
-        let mut place = vec![u32::MAX; diagonal.len() / D];
+        let mut place = vec![u32::MAX; matrix.node_count()];
         let sizes = std::iter::once(0).chain(new.ends.iter().copied()).zip(&new.ends);
         let size = |(start, end): (u32, &u32)| (end - start) as usize * D;
         new.inverses.reserve_exact(sizes.map(size).map(|n| n * (n + 1) / 2).sum());
@@ -66,12 +64,15 @@ impl<const D: usize> Patches<D> {
             }
             start = end;
         }
+        for &node in &new.nodes {
+            new.diagonal[node as usize * D..][..D].fill(T::ZERO);
+        }
         Ok(new)
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for Patches<D> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+impl<T: Scalar, const D: usize> Preconditioner<T> for Patches<T, D> {
+    fn apply(&mut self, r: &[T], z: &mut [T]) {
         gluey_linalg::vector::multiply(&self.diagonal, r, z);
         let (mut start, mut inverses) = (0, self.inverses.as_slice());
         for &end in &self.ends {
@@ -80,14 +81,14 @@ impl<const D: usize> Preconditioner<f64> for Patches<D> {
             let (inverse, rest) = inverses.split_at(n * (n + 1) / 2);
             self.r.clear();
             for &node in nodes {
-                self.r.extend(r[node as usize * D..][..D].iter().map(|&r| r as f32));
+                self.r.extend(r[node as usize * D..][..D].iter().map(|r| r.to_f64() as f32));
             }
             self.z.clear();
             self.z.resize(n, 0.0);
             multiply_triangle(inverse, &self.r, &mut self.z);
             for (z_local, &node) in self.z.chunks_exact(D).zip(nodes) {
                 let z = &mut z[node as usize * D..][..D];
-                z.iter_mut().zip(z_local).for_each(|(z, &local)| *z += f64::from(local));
+                z.iter_mut().zip(z_local).for_each(|(z, &local)| *z += T::from_f64(f64::from(local)));
             }
             (start, inverses) = (end, rest);
         }
@@ -160,7 +161,7 @@ mod tests {
         matrix.add_block(&all, &dense).unwrap();
         let mut matrix = NodeMatrix::<D>::from_sparse(&matrix);
         let cells = std::iter::once((0..nodes as u32).rev().collect());
-        let mut patches = Patches::new(&matrix, cells, &vec![1.0; n]).unwrap();
+        let mut patches = Patches::new(&matrix, cells, vec![1.0; n]).unwrap();
         let (mut x, mut ax, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         vector::fill_pseudo_random(1, &mut x);
         matrix.apply(&x, &mut ax);

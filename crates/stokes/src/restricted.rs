@@ -1,4 +1,4 @@
-//! The viscous operator on some of the reduced velocities, with all others at rest: `E^T A E`.
+//! The viscous operator of some of the cells, and that on some of the velocities, with all others at rest: `E^T A E`.
 
 use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
@@ -9,19 +9,78 @@ use crate::level::cells_touching;
 use crate::space::VelocitySpace;
 use crate::system::{ActiveCell, Penalty, cell_operator};
 
+/// The viscous operator of some cells, which counts its applications.
+#[derive(Clone, Debug)]
+pub struct CountedOperator<T, const D: usize> {
+    operator: CellOperator<T, D>,
+    work: Workspace<T>,
+    /// Reduced velocities.
+    dim: usize,
+    /// Fraction of all cells.
+    share: f64,
+    applications: usize,
+}
+
+impl<T: CellScalar, const D: usize> CountedOperator<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The operator of these cells, of `cell_count` in all, on the velocities of `space`.
+    pub fn new(
+        discretisation: &Discretisation<D>,
+        space: &VelocitySpace<D>,
+        (cells, cell_count): (&[ActiveCell], usize),
+        penalty: Option<&Penalty<D>>,
+    ) -> Self {
+        Self {
+            operator: cell_operator(discretisation, space, cells, penalty),
+            work: Workspace::default(),
+            dim: space.dim(),
+            share: cells.len() as f64 / cell_count.max(1) as f64,
+            applications: 0,
+        }
+    }
+
+    /// The reduced loads of nodal velocities that fulfil the constraints.
+    pub fn apply_to_field(&mut self, x: &[T], y: &mut [T]) {
+        self.applications += 1;
+        self.operator.viscous_of_field(x, y, &mut self.work);
+    }
+
+    /// Fraction of all cells.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Applications since the last call, each as its share of the cells.
+    pub fn take_applications(&mut self) -> f64 {
+        std::mem::take(&mut self.applications) as f64 * self.share
+    }
+}
+
+impl<T: CellScalar, const D: usize> LinOp<T> for CountedOperator<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.dim
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        self.applications += 1;
+        self.operator.viscous(x, y, &mut self.work);
+    }
+}
+
 /// `E^T A E` from the cells that act on its unknowns.
 #[derive(Clone, Debug)]
 pub struct Restricted<T, const D: usize> {
     /// The unknowns among the reduced velocities.
     positions: Vec<u32>,
-    operator: CellOperator<T, D>,
-    work: Workspace<T>,
+    operator: CountedOperator<T, D>,
     /// Reduced velocities, zero away from the unknowns, and their loads.
     velocity: Vec<T>,
     load: Vec<T>,
-    /// Fraction of the cells that act.
-    share: f64,
-    applications: usize,
 }
 
 /// The cells whose stress acts on marked nodes.
@@ -43,16 +102,12 @@ where
         discretisation: &Discretisation<D>,
         space: &VelocitySpace<D>,
         (acting, cell_count): (&[ActiveCell], usize),
-        penalty: Option<&Penalty<D>>,
         positions: Vec<u32>,
     ) -> Self {
         Self {
-            operator: cell_operator(discretisation, space, acting, penalty),
-            work: Workspace::default(),
+            operator: CountedOperator::new(discretisation, space, (acting, cell_count), None),
             velocity: vec![T::ZERO; space.dim()],
             load: vec![T::ZERO; space.dim()],
-            share: acting.len() as f64 / cell_count.max(1) as f64,
-            applications: 0,
             positions,
         }
     }
@@ -64,8 +119,7 @@ where
 
     /// `r = E^T (b - A x)` for reduced velocities `x`.
     pub fn residual(&mut self, b: &[T], x: &[T], r: &mut [T]) {
-        self.applications += 1;
-        self.operator.viscous(x, &mut self.load, &mut self.work);
+        self.operator.apply(x, &mut self.load);
         for (r, &k) in r.iter_mut().zip(&self.positions) {
             *r = b[k as usize] - self.load[k as usize];
         }
@@ -73,7 +127,7 @@ where
 
     /// Applications since the last call, each as its share of the cells.
     pub fn take_applications(&mut self) -> f64 {
-        std::mem::take(&mut self.applications) as f64 * self.share
+        self.operator.take_applications()
     }
 }
 
@@ -86,11 +140,10 @@ where
     }
 
     fn apply(&mut self, x: &[T], y: &mut [T]) {
-        self.applications += 1;
         for (&k, &x) in self.positions.iter().zip(x) {
             self.velocity[k as usize] = x;
         }
-        self.operator.viscous(&self.velocity, &mut self.load, &mut self.work);
+        self.operator.apply(&self.velocity, &mut self.load);
         gather(&self.positions, &self.load, y);
     }
 }

@@ -1,187 +1,206 @@
-//! The stiff part of the penalised operator: its diagonal block around the solid.
+//! The preconditioner of the penalised operator: the solid, the rigid levels, the rest.
 //!
 //! Every velocity is a field that is rigid on the nodes the solid touches, plus a field that vanishes away from them. The
 //! first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On the second the penalised
-//! operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers for it, so that neither the viscosity
-//! ratio nor slivers of solid in a cell are felt. The two are combined multiplicatively, block, rigid levels, block, with the
-//! cycle or its first half as `C`:
+//! operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers for it with `C`. The two are combined
+//! multiplicatively, then the sweep `G` takes what both leave:
 //!
-//! `z = E C E^T r`, `z += V (r - A z)`, `z += E C^T E^T (r - A z)`.
+//! `z = E C E^T r`, `z += V (r - A z)`, `z += G (r - A z)`.
 //!
-//! A rigid motion costs the solid nothing, so what it leaves to the block needs the fluid's stress in the layer of cells
-//! around the solid only: rounding errors of the motion are not multiplied by the solid's viscosity.
+//! Where the block is factorised, `G` is `E C E^T` once more and the rigid levels smooth on all meshes. Elsewhere `C` has no
+//! smoother and `V` none on the finest mesh: `G` is the smoother of the solid and of the fluid ([`PenalisedSmoother`]).
+//!
+//! A rigid motion costs the solid nothing, so what it leaves is the fluid's stress only: rounding errors of the motion are not
+//! multiplied by the solid's viscosity.
 
-use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::vector;
+use gluey_linalg::{LinOp, Preconditioner, vector};
 
 use crate::assembly::assemble_viscous_on;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
 use crate::element::Elements;
 use crate::error::StokesError;
-use crate::level::nodes_of_cells_with;
+use crate::level::{around_finest_cells, nodes_of_cells_with};
 use crate::node_matrix::NodeMatrix;
-use crate::restricted::{Restricted, acting, add_at, gather};
+use crate::penalised_smoother::PenalisedSmoother;
+use crate::restricted::{CountedOperator, acting, add_at, gather};
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
-use crate::system::{Penalty, StokesSystem, cell_operator, viscous_diagonal};
+use crate::system::StokesSystem;
 
 /// Cells in the radius of the largest body on a level of the cycle that is factorised in 3D, at most.
 const FACTORISED_CELLS: f64 = 2.0;
 
-/// The block with the layer of cells that couples it to the rest.
+/// Whether bodies of at most this radius are factorised on the last of these meshes, coarsest first.
+pub fn is_factorised<const D: usize>(meshes: &[Discretisation<D>], radius: f64) -> bool
+where
+    Dim<D>: Space<D>,
+{
+    let is_small =
+        |mesh: &Discretisation<D>| radius <= FACTORISED_CELLS * mesh.mesh.size(mesh.mesh.max_level());
+    D == 2 || meshes.len() < 2 || meshes.last().is_none_or(is_small)
+}
+
+/// The cycle on the solid, the sweep, and the operators that tell what is left.
 pub struct SolidBlock<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    space: VelocitySpace<D>,
     cycle: SolidCycle<D>,
-    /// The block's unknowns among the reduced velocities.
+    /// The cycle's unknowns among the reduced velocities.
     positions: Vec<u32>,
-    layer: Layer<D>,
+    /// `None` where the cycle, being exact, takes its place.
+    smoother: Option<PenalisedSmoother<D>>,
+    /// The operator on velocities of the cycle, and on those of the rigid levels, where the solid's viscosity multiplies nothing.
+    around_solid: CountedOperator<f64, D>,
+    around_rigid: CountedOperator<f32, D>,
+    /// The velocities of the finest rigid level.
+    rigid: VelocitySpace<D>,
     b: Vec<f64>,
     x: Vec<f64>,
-    r: Vec<f64>,
-    /// Nodal vectors with room for the twists of the rigid levels.
-    velocity: Vec<f64>,
+    /// Load and velocity on the finest rigid level.
     load: Vec<f64>,
+    velocity: Vec<f32>,
+    /// Loads of that velocity.
+    rigid_load: Vec<f32>,
+    /// What is left of the right-hand side.
+    r: Vec<f64>,
 }
 
 impl<const D: usize> SolidBlock<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The block around the nodes named in `touched`, which in `rigid` move with their bodies, the largest of which has the
-    /// given radius. `meshes` are those of the coarser levels, coarsest first.
+    /// For the nodes named in `touched`, which in `rigid` move with their bodies, the largest of which has the given radius.
+    /// `meshes` are those of the levels, coarsest first.
     pub fn new(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
         elements: &Elements<'_, D>,
         touched: &[Option<u32>],
         rigid: &VelocitySpace<D>,
-        (radius, meshes): (f64, &[Discretisation<D>]),
+        (meshes, radius): (&[Discretisation<D>], f64),
     ) -> Result<Self, StokesError> {
         let nodes = &discretisation.velocity;
-        let touched: Vec<bool> = touched.iter().map(Option::is_some).collect();
-        // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for its factorisation.
-        let around = nodes_of_cells_with(nodes, &touched);
-        let is_factorised = |mesh: &Discretisation<D>| {
-            D == 2 || radius <= FACTORISED_CELLS * mesh.mesh.size(mesh.mesh.max_level())
-        };
-        let (block, positions, cycle);
-        if is_factorised(discretisation) || meshes.is_empty() {
-            block = if D == 2 { around } else { touched };
-            let assembled = assemble_viscous_on(discretisation, system, elements, |node| block[node])?;
-            cycle = SolidCycle::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?;
-            positions = assembled.unknowns.positions;
+        let mut block: Vec<bool> = touched.iter().map(Option::is_some).collect();
+        let Solid { cycle, positions, smoother, swept } = if is_factorised(meshes, radius) {
+            // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for its factorisation.
+            if D == 2 {
+                block = nodes_of_cells_with(nodes, &block);
+            }
+            Solid::factorised(discretisation, system, elements, &block)?
         } else {
-            let is_free = |node: usize| system.space.is_free(node);
-            let solid = Numbered::new(discretisation, |node| is_free(node) && touched[node]);
-            let matrix = NodeMatrix::assembled(&solid, elements)?;
-            let inside = (0..touched.len()).filter(|&n| is_free(n) && touched[n]);
-            let ring = (0..touched.len()).filter(|&n| is_free(n) && around[n] && !touched[n]);
-            let components = |n: usize| (n * D..(n + 1) * D).map(|k| k as u32);
-            positions = inside.chain(ring).flat_map(components).collect();
-            let acting = acting(discretisation, &system.cells, &around);
-            // That of the fluid, which is all of it on nodes that the solid does not touch.
-            let mut nodal = viscous_diagonal(discretisation, &acting);
-            nodes.collect(D, |w| w * w, &mut nodal);
-            let diagonal: Vec<f64> = positions.iter().map(|&k| nodal[k as usize]).collect();
-            let cells = (&acting[..], system.cells.len());
-            let penalty = system.penalty.as_ref();
-            let operator = Restricted::new(discretisation, &system.space, cells, penalty, positions.clone());
-            let smoothed = meshes.iter().rev().take_while(|mesh| !is_factorised(mesh)).count();
-            let coarser = meshes.iter().rev().take(smoothed + 1);
-            let contrast = penalty.map_or(1.0, Penalty::contrast);
-            cycle = SolidCycle::new((operator, &diagonal), (solid, matrix), coarser, contrast)?;
-            block = around;
-        }
-        let zeros = || vec![0.0; positions.len()];
+            Solid::smoothed(discretisation, system, elements, &block, (meshes, radius))?
+        };
+        // Those with solid in them that do not move as one body are strained by rigid motions, since bodies meet there.
+        let mut strained = acting(discretisation, &system.cells, &swept);
+        let body_of = |&n: &u32| rigid.body_of(n as usize);
+        strained.retain(|c| cell_kind(nodes.cell(c.cell as usize).iter().map(body_of)) != CellKind::Rigid);
+        let (space, cell_count) = (&system.space, system.cells.len());
+        let solid = acting(discretisation, &system.cells, &block);
+        let penalty = system.penalty.as_ref();
         Ok(Self {
-            space: system.space.clone(),
-            layer: Layer::new(discretisation, system, &block, rigid),
-            b: zeros(),
-            x: zeros(),
-            r: zeros(),
+            around_solid: CountedOperator::new(discretisation, space, (&solid, cell_count), penalty),
+            around_rigid: CountedOperator::new(discretisation, space, (&strained, cell_count), penalty),
+            b: vec![0.0; positions.len()],
+            x: vec![0.0; positions.len()],
+            load: vec![0.0; rigid.dim()],
+            velocity: vec![0.0; rigid.dim()],
+            rigid_load: vec![0.0; space.full_dim()],
+            r: vec![0.0; space.full_dim()],
+            rigid: rigid.clone(),
             cycle,
             positions,
-            velocity: vec![0.0; rigid.dim()],
-            load: vec![0.0; rigid.dim()],
+            smoother,
         })
     }
 
-    /// `z = M^-1 r` where `rigid_levels(f, u)` turns the nodal load `f` into the nodal velocities `u` of the rigid levels.
-    pub fn apply(&mut self, r: &[f64], z: &mut [f64], mut rigid_levels: impl FnMut(&mut [f64], &mut [f64])) {
-        let nodal = self.space.full_dim();
-        gather(&self.positions, r, &mut self.b);
-        self.cycle.descend(&self.b, &mut self.x);
-        self.cycle.residual(&self.b, &self.x, &mut self.r);
+    /// `z = M^-1 r` where `rigid_levels(f, u)` turns the nodal load `f` into the reduced velocities `u` of the rigid levels.
+    pub fn apply(&mut self, r: &[f64], z: &mut [f64], mut rigid_levels: impl FnMut(&mut [f64], &mut [f32])) {
         z.fill(0.0);
-        add_at(&self.positions, &self.x, z);
-        self.velocity[..nodal].copy_from_slice(z);
-        self.space.nodes().distribute(D, |w| w, &mut self.velocity);
-        self.layer.apply(&self.velocity, &mut self.load[..nodal]);
-        vector::residual_from_product(&r[..nodal], &mut self.load[..nodal]);
-        self.load[nodal..].fill(0.0);
-        for (&k, &r) in self.positions.iter().zip(&self.r) {
-            self.load[k as usize] = r;
-        }
+        self.correct_solid(r, z);
+        self.around_solid.apply(z, &mut self.r);
+        vector::residual_from_product(r, &mut self.r);
 
+        let nodal = self.r.len();
+        self.load[..nodal].copy_from_slice(&self.r);
         rigid_levels(&mut self.load, &mut self.velocity);
         vector::axpy(1.0, &self.velocity[..nodal], z);
-        self.space.project(z);
-        self.layer.apply(&self.velocity, &mut self.load[..nodal]);
-        gather(&self.positions, &self.load, &mut self.b);
-        vector::residual_from_product(&self.r, &mut self.b);
-        self.cycle.ascend(&self.b, &mut self.x);
+        self.rigid.add_rigid_motions(&self.velocity, z);
+        self.rigid.expand(&mut self.velocity);
+        self.around_rigid.apply_to_field(&self.velocity, &mut self.rigid_load);
+        vector::axpy(-1.0, &self.rigid_load, &mut self.r);
+
+        match &mut self.smoother {
+            Some(smoother) => smoother.add_to(&self.r, z),
+            None => {
+                let left = std::mem::take(&mut self.r);
+                self.correct_solid(&left, z);
+                self.r = left;
+            }
+        }
+    }
+
+    /// `z += E C E^T r`.
+    fn correct_solid(&mut self, r: &[f64], z: &mut [f64]) {
+        gather(&self.positions, r, &mut self.b);
+        self.cycle.apply(&self.b, &mut self.x);
         add_at(&self.positions, &self.x, z);
     }
 
-    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and smoothing by
+    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and products with
     /// patches do not count.
     pub fn take_applications(&mut self) -> f64 {
-        self.cycle.take_applications()
-            + std::mem::take(&mut self.layer.applications) as f64 * self.layer.share
+        let smoother = self.smoother.as_mut().map_or(0.0, PenalisedSmoother::take_applications);
+        self.around_solid.take_applications() + self.around_rigid.take_applications() + smoother
     }
 }
 
-/// The cells that act on the block's nodes and do not move as one body. Those of them with solid in them are strained by
-/// rigid motions, since bodies meet there.
-struct Layer<const D: usize> {
-    operator: CellOperator<f64, D>,
-    work: Workspace<f64>,
-    /// Fraction of all cells.
-    share: f64,
-    applications: usize,
+/// What answers for the solid.
+struct Solid<const D: usize> {
+    cycle: SolidCycle<D>,
+    positions: Vec<u32>,
+    smoother: Option<PenalisedSmoother<D>>,
+    /// The nodes whose residuals are looked at after the rigid levels.
+    swept: Vec<bool>,
 }
 
-impl<const D: usize> Layer<D>
+impl<const D: usize> Solid<D>
 where
     Dim<D>: Space<D>,
 {
-    fn new(
+    fn factorised(
         discretisation: &Discretisation<D>,
         system: &StokesSystem<D>,
-        marked: &[bool],
-        rigid: &VelocitySpace<D>,
-    ) -> Self {
-        let nodes = &discretisation.velocity;
-        let strained = |cell: usize| {
-            cell_kind(nodes.cell(cell).iter().map(|&n| rigid.body_of(n as usize))) != CellKind::Rigid
-        };
-        let mut cells = acting(discretisation, &system.cells, marked);
-        cells.retain(|c| strained(c.cell as usize));
-        Self {
-            share: cells.len() as f64 / system.cells.len().max(1) as f64,
-            operator: cell_operator(discretisation, &system.space, &cells, system.penalty.as_ref()),
-            work: Workspace::default(),
-            applications: 0,
-        }
+        elements: &Elements<'_, D>,
+        block: &[bool],
+    ) -> Result<Self, StokesError> {
+        let assembled = assemble_viscous_on(discretisation, system, elements, |node| block[node])?;
+        Ok(Self {
+            cycle: SolidCycle::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?,
+            positions: assembled.unknowns.positions,
+            smoother: None,
+            swept: block.to_vec(),
+        })
     }
 
-    /// The reduced load of a velocity that fulfils the constraints, on free nodes.
-    fn apply(&mut self, velocity: &[f64], load: &mut [f64]) {
-        self.applications += 1;
-        self.operator.viscous_of_field(velocity, load, &mut self.work);
+    fn smoothed(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        elements: &Elements<'_, D>,
+        block: &[bool],
+        (meshes, radius): (&[Discretisation<D>], f64),
+    ) -> Result<Self, StokesError> {
+        let nodes = Numbered::new(discretisation, |node| system.space.is_free(node) && block[node]);
+        let matrix = NodeMatrix::assembled(&nodes, elements)?;
+        let factorised = (1..meshes.len()).rev().find(|&count| is_factorised(&meshes[..count], radius));
+        let coarser = &meshes[factorised.map_or(0, |count| count - 1)..meshes.len() - 1];
+        let swept = around_finest_cells(discretisation);
+        Ok(Self {
+            cycle: SolidCycle::below(&nodes, &matrix, coarser.iter().rev())?,
+            positions: nodes.positions(),
+            smoother: Some(PenalisedSmoother::new(discretisation, system, &swept, (&nodes, &matrix))?),
+            swept,
+        })
     }
 }

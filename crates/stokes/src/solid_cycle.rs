@@ -1,12 +1,9 @@
-//! A multigrid cycle for the penalised operator on the nodes around the solid.
+//! What corrects the penalised operator on the nodes of the solid.
 //!
-//! The rigid levels never see the viscosity of the solid. Here every level keeps it: the finest applies the operator itself,
-//! the others the Galerkin products `P^T A P` on those of their nodes that lie among the solid's, so a cell that is cut stays
-//! cut as it is. [`Patches`] smooth on all but the coarsest level, which is factorised. In 2D, where factors are small, that
-//! is the finest.
-//!
-//! The cycle runs before and after the rigid levels: whole, or where the contrast is low, cut in two halves, of which the first
-//! smooths and then corrects ([`SolidCycle::descend`]) and the second is its transpose ([`SolidCycle::ascend`]).
+//! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D, where factors are
+//! small, the operator on these nodes is factorised. In 3D a multigrid cycle answers for it on coarser meshes, with the Galerkin
+//! products `P^T A P` on those of their nodes that lie among the solid's, so a cell that is cut stays cut as it is. [`Patches`]
+//! smooth on all but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
 
 use gluey_fem::element::{split, values_1d};
 use gluey_geom::{Dim, Space};
@@ -20,7 +17,6 @@ use crate::discretisation::Discretisation;
 use crate::error::StokesError;
 use crate::node_matrix::{NodeMatrix, Prolongation};
 use crate::patches::Patches;
-use crate::restricted::Restricted;
 use crate::transfer::Evaluator;
 
 /// Applications of the patches in a sweep.
@@ -31,9 +27,6 @@ const RATIO: f64 = 4.0;
 const LANCZOS_STEPS: usize = 8;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
-/// Ratio of the viscosities of solid and fluid from which on cycles are whole. Two spheres (a/h = 3.2) take 26 in place of 29
-/// iterations at 1e2, each a quarter dearer, and 35 in place of 48 at 1e6.
-const WHOLE_FROM: f64 = 300.0;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -58,8 +51,14 @@ impl<'a, const D: usize> Numbered<'a, D> {
         new
     }
 
+    /// The components of the nodes among those of all nodes, in the order of their numbers.
+    pub fn positions(&self) -> Vec<u32> {
+        let numbered = (0..).zip(&self.number).filter(|(_, number)| **number != NONE);
+        numbered.flat_map(|(node, _): (u32, _)| node * D as u32..(node + 1) * D as u32).collect()
+    }
+
     /// The numbered nodes of each cell whose centre has a number.
-    fn cells(&self) -> impl Iterator<Item = Vec<u32>> {
+    pub fn cells(&self) -> impl Iterator<Item = Vec<u32>> {
         let nodes = &self.mesh.velocity;
         let centre = nodes.nodes_per_cell() / 2;
         let number = |node: &u32| Some(self.number[*node as usize]).filter(|&n| n != NONE);
@@ -99,15 +98,9 @@ impl<'a, const D: usize> Numbered<'a, D> {
 
 /// The levels.
 pub struct SolidCycle<const D: usize> {
-    /// Operator and smoother of the finest level, unless that is factorised.
-    finest: Option<(Restricted<f64, D>, Smoother<D>)>,
-    /// From fine to coarse.
+    /// From fine to coarse, without the finest; none where that is factorised.
     coarser: Vec<Coarse<D>>,
     direct: DirectSpd,
-    /// Residual of the finest level.
-    r: Vec<f64>,
-    /// Whether it is its own transpose.
-    is_whole: bool,
 }
 
 /// A level below the finest.
@@ -121,7 +114,7 @@ struct Coarse<const D: usize> {
 }
 
 struct Smoother<const D: usize> {
-    patches: Patches<D>,
+    patches: Patches<f64, D>,
     chebyshev: Chebyshev<f64>,
 }
 
@@ -131,79 +124,45 @@ where
 {
     /// The cycle that is a factorisation.
     pub fn factorised(matrix: &SparseMatrix, order: &[usize]) -> Result<Self, StokesError> {
-        Ok(Self {
-            finest: None,
-            coarser: Vec::new(),
-            direct: factorised(matrix, Ordering::Custom(order))?,
-            r: Vec::new(),
-            is_whole: true,
-        })
+        Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
     }
 
-    /// The cycle for an operator whose first unknowns are those at the nodes of `solid`, where it is `matrix`, and which has
-    /// this diagonal on the others. `meshes` are those of the coarser levels, fine to coarse.
-    pub fn new<'a>(
-        (mut operator, diagonal): (Restricted<f64, D>, &[f64]),
-        (solid, mut matrix): (Numbered<'a, D>, NodeMatrix<D>),
+    /// The cycle below the nodes of `solid`, on which the operator is `matrix`. `meshes` are those of the coarser levels, fine
+    /// to coarse.
+    pub fn below<'a>(
+        solid: &Numbered<'a, D>,
+        matrix: &NodeMatrix<D>,
         meshes: impl Iterator<Item = &'a Discretisation<D>>,
-        contrast: f64,
     ) -> Result<Self, StokesError> {
-        let finest = Smoother::new(&mut operator, &matrix, solid.cells(), diagonal)?;
         let mut coarser: Vec<Coarse<D>> = Vec::new();
-        let mut nodes = solid;
+        let mut last: Option<(Numbered<'a, D>, NodeMatrix<D>)> = None;
         for mesh in meshes {
+            let (nodes, matrix) = last.as_ref().map_or((solid, matrix), |(nodes, matrix)| (nodes, matrix));
             let (coarse, prolongation) = nodes.coarsened(mesh);
             let product = matrix.galerkin(&prolongation);
-            if let Some(level) = coarser.last_mut() {
-                let smoother = Smoother::new(&mut &matrix, &matrix, nodes.cells(), &matrix.diagonal())?;
+            if let (Some(level), Some((nodes, matrix))) = (coarser.last_mut(), last) {
+                let smoother = Smoother::new(&matrix, &nodes)?;
                 level.smoothed = Some((matrix, smoother));
             }
             coarser.push(Coarse::new(prolongation));
-            (matrix, nodes) = (product, coarse);
+            last = Some((coarse, product));
         }
-        let (matrix, order) = matrix.to_sparse()?;
-        let r = vec![0.0; operator.dim()];
-        Ok(Self {
-            finest: Some((operator, finest)),
-            coarser,
-            direct: factorised(&matrix, Ordering::Custom(&order))?,
-            r,
-            is_whole: contrast >= WHOLE_FROM,
-        })
+        let coarsest = last.as_ref().map_or(matrix, |last| &last.1);
+        let (matrix, order) = coarsest.to_sparse()?;
+        Ok(Self { coarser, direct: factorised(&matrix, Ordering::Custom(&order))? })
     }
+}
 
-    /// From a zero guess: smooths `A x = b`, then corrects by the coarser levels; a whole cycle smooths again.
-    pub fn descend(&mut self, b: &[f64], x: &mut [f64]) {
-        let Some((a, smoother)) = &mut self.finest else { return self.direct.apply(b, x) };
-        smoother.smooth(a, b, x, Guess::Zero);
-        residual(a, b, x, &mut self.r);
-        correct(&mut self.coarser, &mut self.direct, &self.r, x);
-        if self.is_whole {
-            smoother.smooth(a, b, x, Guess::Given);
+impl<const D: usize> Preconditioner<f64> for SolidCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, b: &[f64], x: &mut [f64]) {
+        if self.coarser.is_empty() {
+            return self.direct.apply(b, x);
         }
-    }
-
-    /// The transpose of [`SolidCycle::descend`].
-    pub fn ascend(&mut self, b: &[f64], x: &mut [f64]) {
-        let (Some((a, smoother)), false) = (&mut self.finest, self.is_whole) else {
-            return self.descend(b, x);
-        };
         x.fill(0.0);
         correct(&mut self.coarser, &mut self.direct, b, x);
-        smoother.smooth(a, b, x, Guess::Given);
-    }
-
-    /// What [`SolidCycle::descend`] left: `r = b - A x`, or zero where it solves.
-    pub fn residual(&mut self, b: &[f64], x: &[f64], r: &mut [f64]) {
-        match &mut self.finest {
-            Some((a, _)) => residual(a, b, x, r),
-            None => r.fill(0.0),
-        }
-    }
-
-    /// Applications on the finest mesh since the last call, each as its share of it.
-    pub fn take_applications(&mut self) -> f64 {
-        self.finest.as_mut().map_or(0.0, |(a, _)| a.take_applications())
     }
 }
 
@@ -214,18 +173,17 @@ impl<const D: usize> Coarse<D> {
     }
 }
 
-impl<const D: usize> Smoother<D> {
-    fn new(
-        a: &mut impl LinOp<f64>,
-        matrix: &NodeMatrix<D>,
-        cells: impl Iterator<Item = Vec<u32>>,
-        diagonal: &[f64],
-    ) -> Result<Self, StokesError> {
-        let failed = |reason| StokesError::Smoother { level: 0, reason: format!("solid: {reason}") };
-        let mut patches = Patches::new(matrix, cells, diagonal).map_err(|e| failed(e.to_string()))?;
-        let largest = estimate_lambda_max(a, &mut patches, LANCZOS_STEPS)?;
+impl<const D: usize> Smoother<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(matrix: &NodeMatrix<D>, nodes: &Numbered<'_, D>) -> Result<Self, StokesError> {
+        let diagonal = matrix.diagonal().iter().map(|d| 1.0 / d).collect();
+        let patches = Patches::new(matrix, nodes.cells(), diagonal);
+        let mut patches = patches.map_err(|e| failed(&e))?;
+        let largest = estimate_lambda_max(&mut &*matrix, &mut patches, LANCZOS_STEPS)?;
         let interval = SpectralInterval::upper_part(largest, RATIO, SAFETY);
-        Ok(Self { patches, chebyshev: Chebyshev::new(a.dim(), DEGREE, interval) })
+        Ok(Self { patches, chebyshev: Chebyshev::new(matrix.dim(), DEGREE, interval) })
     }
 
     fn smooth(&mut self, a: &mut impl LinOp<f64>, b: &[f64], x: &mut [f64], guess: Guess) {
@@ -233,8 +191,16 @@ impl<const D: usize> Smoother<D> {
     }
 }
 
+/// The error of a smoother that cannot be built in the solid.
+pub fn failed(reason: &impl std::fmt::Display) -> StokesError {
+    StokesError::Smoother { level: 0, reason: format!("solid: {reason}") }
+}
+
 /// Adds to `x` what the coarser levels make of the residual `r`.
-fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64]) {
+fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64])
+where
+    Dim<D>: Space<D>,
+{
     let Some((level, coarser)) = levels.split_first_mut() else { return };
     level.prolongation.restrict::<D>(r, &mut level.b);
     match &mut level.smoothed {

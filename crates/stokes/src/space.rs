@@ -119,6 +119,17 @@ where
         self.nodes.distribute(D, T::from_f64, nodal);
     }
 
+    /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these are.
+    pub fn add_rigid_motions<S: Scalar, T: Scalar>(&self, x: &[S], u: &mut [T]) {
+        let twists: Vec<T> = x[self.full_dim()..].iter().map(|x| T::from_f64(x.to_f64())).collect();
+        for r in &self.rigid {
+            let twist = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            for (c, value) in u[r.node as usize * D..][..D].iter_mut().enumerate() {
+                *value += twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
+            }
+        }
+    }
+
     /// `x = T^T f` in place: nodal loads become loads on the unknowns; all other nodal entries are set to zero.
     pub fn reduce<T: Scalar>(&self, f: &mut [T]) {
         let (nodal, loads) = f.split_at_mut(self.full_dim());
