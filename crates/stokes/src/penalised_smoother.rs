@@ -123,3 +123,65 @@ impl<const D: usize> Preconditioner<f32> for Parts<D> {
         self.patches.apply(r, z);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use gluey_fem::{Reference, TreeMesh};
+    use gluey_geom::{Aabb, Vector};
+    use gluey_levelset::Ball;
+    use gluey_linalg::LinOp;
+
+    use crate::element::Elements;
+    use crate::formulation::{Formulation, PaperParams};
+    use crate::point_matrices::PointMatrices;
+    use crate::problem::Problem;
+
+    /// Energies `e^T A e` of a random error on the solid and the fluid around it, before and after a sweep.
+    fn energies(viscosity_ratio: f64) -> [f64; 2] {
+        let formulation = Formulation::Paper(PaperParams { viscosity_ratio, ..PaperParams::default() });
+        let mesh = TreeMesh::refine(Aabb::unit(), [1; 3], [false; 3], 3, |_, _, _| true).unwrap();
+        let matrices = Arc::new(PointMatrices::new(formulation.quadrature()));
+        let balls = [Ball::new(Vector::<3>::repeat(0.47), 0.3)];
+        let Problem { discretisation, system, .. } =
+            Problem::new(mesh, &balls, 1.0, formulation, &matrices).unwrap();
+        let nodes = &discretisation.velocity;
+        let solid = system.penalty.as_ref().unwrap().stress.viscosities(1.0, nodes.cell_count());
+        let mut touched = vec![false; nodes.node_count()];
+        for cell in (0..nodes.cell_count()).filter(|&c| solid.of(c).0 > 0.0 || !solid.of(c).1.is_empty()) {
+            nodes.cell(cell).iter().for_each(|&n| touched[n as usize] = true);
+        }
+        let elements = Elements::new(&discretisation, &system, Reference::<3>::VELOCITY);
+        let numbered = Numbered::new(&discretisation, |n| touched[n] && system.space.is_free(n));
+        let matrix = NodeMatrix::assembled(&numbered, &elements).unwrap();
+        let smoothed = vec![true; nodes.node_count()];
+        let mut smoother =
+            PenalisedSmoother::new(&discretisation, &system, &smoothed, (&numbered, &matrix)).unwrap();
+
+        let cells = (&system.cells[..], system.cells.len());
+        let mut a = CountedOperator::new(&discretisation, &system.space, cells, system.penalty.as_ref());
+        let mut energy = |e: &[f64], load: &mut [f64]| {
+            a.apply(e, load);
+            vector::dot(e, load)
+        };
+        let mut error = vec![0.0; system.space.dim()];
+        vector::fill_pseudo_random(1, &mut error);
+        system.space.reduce(&mut error);
+        let (mut load, mut answer) = (error.clone(), vec![0.0; error.len()]);
+        let before = energy(&error, &mut load);
+        smoother.add_to(&load, &mut answer);
+        vector::axpy(-1.0, &answer, &mut error);
+        assert!(smoother.take_applications() == (DEGREE - 1) as f64);
+        [before, energy(&error, &mut load)]
+    }
+
+    #[test]
+    fn a_sweep_damps_rough_errors_whatever_the_contrast() {
+        for viscosity_ratio in [10.0, 1e3, 1e5] {
+            let [before, after] = energies(viscosity_ratio);
+            assert!(after > 0.0 && after < 0.01 * before, "{viscosity_ratio:e}: {before:e} -> {after:e}");
+        }
+    }
+}
