@@ -138,6 +138,21 @@ mod tests {
     use crate::formulation::{Formulation, PaperParams};
     use crate::point_matrices::PointMatrices;
     use crate::problem::Problem;
+    use crate::space::VelocitySpace;
+
+    /// `|x . A y - y . A x|` over `|x| |A y|` for random velocities.
+    fn asymmetry(operator: &mut CountedOperator<f32, 3>, space: &VelocitySpace<3>) -> f64 {
+        let [x, y] = [1, 2].map(|seed| {
+            let mut x = vec![0.0; space.dim()];
+            vector::fill_pseudo_random(seed, &mut x);
+            space.reduce(&mut x);
+            x
+        });
+        let (mut ax, mut ay) = (x.clone(), y.clone());
+        operator.apply(&x, &mut ax);
+        operator.apply(&y, &mut ay);
+        (vector::dot(&x, &ay) - vector::dot(&y, &ax)).abs() / (vector::norm(&x) * vector::norm(&ay))
+    }
 
     /// Energies `e^T A e` of a random error on the solid and the fluid around it, before and after a sweep.
     fn energies(viscosity_ratio: f64) -> [f64; 2] {
@@ -160,6 +175,9 @@ mod tests {
         let mut smoother =
             PenalisedSmoother::new(&discretisation, &system, &smoothed, (&numbered, &matrix)).unwrap();
 
+        let asymmetry = asymmetry(&mut smoother.operator, &system.space);
+        assert!(asymmetry < 1e-6, "{viscosity_ratio:e}: {asymmetry:e}");
+        smoother.take_applications();
         let cells = (&system.cells[..], system.cells.len());
         let mut a = CountedOperator::new(&discretisation, &system.space, cells, system.penalty.as_ref());
         let mut energy = |e: &[f64], load: &mut [f64]| {

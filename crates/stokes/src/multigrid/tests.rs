@@ -34,10 +34,15 @@ where
 {
     let mut solver = MultigridSolver::default();
     problem::<D>(formulation).prepare(&mut solver).unwrap();
-    for (index, level) in solver.cycle.unwrap().levels.iter_mut().enumerate() {
+    let mut levels = solver.cycle.unwrap().levels;
+    let finest = levels.len() - 1;
+    for (index, level) in levels.iter_mut().enumerate() {
         let space = &level.space;
-        // In 3D the finest level of a penalised solid leaves smoothing, and with it the operator, to the solid.
-        let Some(operator) = level.relaxation.as_mut().map(|r| &mut r.operator) else { continue };
+        // The finest level around a solid that is not factorised leaves its operator to the solid.
+        let Some(operator) = level.relaxation.as_mut().map(|r| &mut r.operator) else {
+            assert!(D == 3 && index == finest && matches!(formulation, Formulation::Paper(_)));
+            continue;
+        };
         let [x, y] = [1, 2].map(|seed| {
             let mut x = vec![0f32; operator.dim()];
             vector::fill_pseudo_random(seed, &mut x);
