@@ -17,7 +17,7 @@ use crate::solid_cycle::{Numbered, failed};
 use crate::system::StokesSystem;
 
 /// Applications of diagonal and patches in a sweep.
-const DEGREE: usize = 5;
+const DEGREE: usize = 4;
 /// Largest over smallest eigenvalue that a sweep damps.
 const RATIO: f64 = 5.0;
 /// Lanczos steps for the largest eigenvalue.

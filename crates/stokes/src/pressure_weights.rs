@@ -10,6 +10,10 @@
 //! 0.78 and 0.55 on the sides and in the corners of a square, 0.69, 0.46 and 0.29 on the faces, edges and in the corners of a
 //! cube. Symmetric scaling of the mass matrix by the weights takes the smallest eigenvalues of `M^-1 S` from 0.19 to 0.34 (cube, 8
 //! cells a side) and leaves the largest at 1.2. Smooth pressures hardly notice: what they have next to walls is of the order of a cell.
+//!
+//! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements ([`crate::cell_schur`]). These leave
+//! out that the solid in one cell holds the nodes of the next and are too large; the diagonal takes a node as held once any cell
+//! around it is stiff and is too small. There the weight is the geometric mean of the two, the root of the ratio.
 
 use gluey_fem::{Reference, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
@@ -17,24 +21,29 @@ use gluey_levelset::Ball;
 use gluey_linalg::SparseMatrix;
 
 use crate::assembly::pressure_expansion;
+use crate::cell_schur::PressureMatrices;
 use crate::discretisation::Discretisation;
+use crate::element::Elements;
 use crate::pressure::WeakPressures;
 use crate::space::VelocitySpace;
-use crate::system::{ActiveCell, StokesSystem, viscous_diagonal};
+use crate::system::StokesSystem;
 
 /// The least weight, for pressures that hardly any velocity sees.
 const LEAST: f64 = 0.05;
+/// The least and the largest weight in cut cells.
+const OF_CUT_CELLS: [f64; 2] = [0.25, 2.0];
 
-/// Multiplies row `q` and column `q` of `mass` by the square root of the weight of `q`, for every pressure of `system`.
+/// Multiplies row `q` and column `q` of the pressure mass matrix `mass` over the viscosity by the square root of the weight of
+/// `q`, for every pressure of `system`.
 pub fn scale_by_weights<const D: usize>(
     mass: &mut SparseMatrix,
     discretisation: &Discretisation<D>,
-    system: &StokesSystem<D>,
-    viscosity: f64,
+    (system, elements, matrices): (&StokesSystem<D>, &Elements<'_, D>, &PressureMatrices),
 ) where
     Dim<D>: Space<D>,
 {
-    let roots: Vec<f64> = weights(discretisation, system, viscosity).into_iter().map(f64::sqrt).collect();
+    let weights = weights(discretisation, (system, elements, matrices));
+    let roots: Vec<f64> = weights.into_iter().map(f64::sqrt).collect();
     let pattern = mass.pattern().clone();
     for (row, root) in roots.iter().enumerate() {
         let entries = &mut mass.values_mut()[pattern.range(row)];
@@ -47,18 +56,26 @@ pub fn scale_by_weights<const D: usize>(
 /// The weights of all pressures, one for those that are not unknowns.
 fn weights<const D: usize>(
     discretisation: &Discretisation<D>,
-    system: &StokesSystem<D>,
-    viscosity: f64,
+    (system, elements, matrices): (&StokesSystem<D>, &Elements<'_, D>, &PressureMatrices),
 ) -> Vec<f64>
 where
     Dim<D>: Space<D>,
 {
     let fixed = fixed_nodes(&system.space);
-    let near = near_fixed_nodes(discretisation, system, &fixed);
-    let mut weights = vec![1.0; near.len()];
+    let nodes_of = |index: usize| discretisation.velocity.cell(system.cells[index].cell as usize);
+    let has_fixed_nodes = |index: usize| nodes_of(index).iter().any(|&n| fixed[n as usize]);
+    let is_cut = |index: usize| elements.viscous(index).1.is_some();
+    let next_to_fixed = pressures_of(discretisation, system, has_fixed_nodes);
+    let in_cut_cells = pressures_of(discretisation, system, is_cut);
+    let special: Vec<bool> = next_to_fixed.iter().zip(&in_cut_cells).map(|(a, b)| *a || *b).collect();
+    let mut weights = vec![1.0; special.len()];
     let inside = ratio_inside::<D>();
-    for (q, ratio) in ratios(discretisation, system, viscosity, (&fixed, &near)) {
-        weights[q] = (ratio / inside).clamp(LEAST, 1.0);
+    for (q, ratio) in ratios(discretisation, (system, elements, matrices), (&fixed, &special)) {
+        let [least, most] = OF_CUT_CELLS;
+        weights[q] = match in_cut_cells[q] {
+            true => (ratio / inside).sqrt().clamp(least, most),
+            false => (ratio / inside).clamp(LEAST, 1.0),
+        };
     }
     weights
 }
@@ -71,11 +88,14 @@ where
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 2).expect("four cells a side");
     let discretisation = Discretisation::new(mesh);
     let system = without_bodies(&discretisation, 1.0);
+    let elements = Elements::new(&discretisation, &system, Reference::<D>::VELOCITY);
+    let matrices = PressureMatrices::new(&system, &elements, 1.0).expect("no cell is cut");
     let centre = Vector::<D>::repeat(0.5);
     let is_centre = |q: usize| discretisation.pressure.point(q) == centre;
     let centre: Vec<bool> = (0..system.pressure.dim()).map(is_centre).collect();
     let fixed = fixed_nodes(&system.space);
-    ratios(&discretisation, &system, 1.0, (&fixed, &centre)).next().expect("a mesh has a middle").1
+    let matrices = (&system, &elements, &matrices);
+    ratios(&discretisation, matrices, (&fixed, &centre)).next().expect("a mesh has a middle").1
 }
 
 /// The system on a mesh without the bodies.
@@ -98,34 +118,30 @@ where
     (0..space.nodes().node_count()).map(is_fixed).collect()
 }
 
-/// The unknown pressures that act on a cell with a fixed node.
-fn near_fixed_nodes<const D: usize>(
+/// The unknown pressures that act on an active cell for whose index `is_meant` holds.
+fn pressures_of<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
-    fixed: &[bool],
+    is_meant: impl Fn(usize) -> bool,
 ) -> Vec<bool>
 where
     Dim<D>: Space<D>,
 {
-    let mut near = vec![false; system.pressure.dim()];
-    for cell in &system.cells {
-        let cell = cell.cell as usize;
-        if discretisation.velocity.cell(cell).iter().any(|&n| fixed[n as usize]) {
-            discretisation.pressure.cell(cell).iter().for_each(|&q| near[q as usize] = true);
-        }
+    let mut meant = vec![false; system.pressure.dim()];
+    for (_, cell) in system.cells.iter().enumerate().filter(|(index, _)| is_meant(*index)) {
+        discretisation.pressure.cell(cell.cell as usize).iter().for_each(|&q| meant[q as usize] = true);
     }
     for constraint in system.pressure.constraints().iter().rev() {
-        let is_near = near[constraint.node as usize];
-        constraint.masters.iter().for_each(|m| near[m.0 as usize] |= is_near);
+        let is_meant = meant[constraint.node as usize];
+        constraint.masters.iter().for_each(|m| meant[m.0 as usize] |= is_meant);
     }
-    (0..near.len()).map(|q| near[q] && system.pressure.is_free(q)).collect()
+    (0..meant.len()).map(|q| meant[q] && system.pressure.is_free(q)).collect()
 }
 
 /// `s_q / m_q` for the unknown pressures in `special`. Hanging nodes count as nodes of their own.
 fn ratios<const D: usize>(
     discretisation: &Discretisation<D>,
-    system: &StokesSystem<D>,
-    viscosity: f64,
+    (system, elements, matrices): (&StokesSystem<D>, &Elements<'_, D>, &PressureMatrices),
     (fixed, special): (&[bool], &[bool]),
 ) -> impl Iterator<Item = (usize, f64)>
 where
@@ -134,37 +150,39 @@ where
     let n = Reference::<D>::VELOCITY;
     let m = Reference::<D>::PRESSURE;
     let reference = Reference::<D>::new();
-    let mut row = Row::<D>::new(viscous_diagonal(discretisation, &system.cells));
+    let mut row = Row::<D>::new(elements.viscous_diagonal(discretisation));
     let around = corners_of(discretisation, system, special);
     around.into_iter().enumerate().filter(|(_, around)| !around.is_empty()).map(move |(q, around)| {
         let mut mass = 0.0;
-        for (cell, corner, weight) in around {
-            mass += weight * weight * cell.volume * reference.pressure_mass[corner * m + corner];
+        for (index, corner, weight) in around {
+            let (scale, matrix) = matrices.of(index);
+            mass += weight * weight * scale * matrix[corner * m + corner];
+            let cell = &system.cells[index];
             let divergence = reference.divergence[corner * n..][..n].as_chunks::<D>().0;
             let nodes = discretisation.velocity.cell(cell.cell as usize);
             for (&node, divergence) in nodes.iter().zip(divergence).filter(|term| !fixed[*term.0 as usize]) {
                 row.add(node, divergence.map(|b| weight * cell.divergence * b));
             }
         }
-        (q, row.take_sum() * viscosity / mass)
+        (q, row.take_sum() / mass)
     })
 }
 
-/// The corners of active cells on which each special pressure acts: cell, corner and weight.
-fn corners_of<'a, const D: usize>(
+/// The corners of active cells on which each special pressure acts: index of the cell, corner and weight.
+fn corners_of<const D: usize>(
     discretisation: &Discretisation<D>,
-    system: &'a StokesSystem<D>,
+    system: &StokesSystem<D>,
     special: &[bool],
-) -> Vec<Vec<(&'a ActiveCell, usize, f64)>>
+) -> Vec<Vec<(usize, usize, f64)>>
 where
     Dim<D>: Space<D>,
 {
     let pressure = pressure_expansion(system);
     let mut around = vec![Vec::new(); special.len()];
-    for cell in &system.cells {
+    for (index, cell) in system.cells.iter().enumerate() {
         for (corner, &node) in discretisation.pressure.cell(cell.cell as usize).iter().enumerate() {
             for &(q, weight) in pressure.of(node as usize).iter().filter(|term| special[term.0 as usize]) {
-                around[q as usize].push((cell, corner, weight));
+                around[q as usize].push((index, corner, weight));
             }
         }
     }
@@ -203,7 +221,26 @@ impl<const D: usize> Row<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use crate::discretisation::solid_nodes;
+    use crate::formulation::{Formulation, PaperParams};
+    use crate::point_matrices::PointMatrices;
+    use crate::problem::Problem;
+
+    /// The weights of a system whose fluid has this viscosity.
+    fn weights_in<const D: usize>(
+        discretisation: &Discretisation<D>,
+        system: &StokesSystem<D>,
+        viscosity: f64,
+    ) -> Vec<f64>
+    where
+        Dim<D>: Space<D>,
+    {
+        let elements = Elements::new(discretisation, system, Reference::<D>::VELOCITY);
+        let matrices = PressureMatrices::new(system, &elements, viscosity).unwrap();
+        weights(discretisation, (system, &elements, &matrices))
+    }
 
     /// Weights by the number of walls a node lies on.
     fn weights_of_a_box<const D: usize>() -> Vec<Vec<f64>>
@@ -214,7 +251,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let system = without_bodies(&discretisation, 2.5);
         let mut by_walls = vec![Vec::new(); D + 1];
-        for (q, weight) in weights(&discretisation, &system, 2.5).into_iter().enumerate() {
+        for (q, weight) in weights_in(&discretisation, &system, 2.5).into_iter().enumerate() {
             let point = discretisation.pressure.point(q);
             by_walls[point.iter().filter(|&&x| x == 0.0 || x == 1.0).count()].push(weight);
         }
@@ -257,7 +294,7 @@ mod tests {
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], 0.0);
         let space = VelocitySpace::new(discretisation.velocity.clone(), &[ball], &solid);
         let system = StokesSystem::new(&discretisation, space, 1.0, WeakPressures::Keep, None);
-        let weights = weights(&discretisation, &system, 1.0);
+        let weights = weights_in(&discretisation, &system, 1.0);
         let mut least = 1.0f64;
         for (q, &weight) in weights.iter().enumerate() {
             assert!((LEAST..=1.0).contains(&weight));
@@ -272,5 +309,46 @@ mod tests {
     fn a_body_takes_velocities_from_the_pressures_around_it() {
         weights_are_less_near_bodies_only::<2>();
         weights_are_less_near_bodies_only::<3>();
+    }
+
+    /// The weights around a penalised ball away from the walls, those near its surface first.
+    fn around_a_penalised_ball<const D: usize>(viscosity_ratio: f64) -> [Vec<f64>; 2]
+    where
+        Dim<D>: Space<D>,
+    {
+        let formulation = Formulation::Paper(PaperParams { viscosity_ratio, ..PaperParams::default() });
+        let mesh = TreeMesh::refine(Aabb::unit(), [1; D], [false; D], 4, |_, _, _| true).unwrap();
+        let matrices = Arc::new(PointMatrices::new(formulation.quadrature()));
+        let centre = Vector::<D>::repeat(0.47);
+        let problem = Problem::new(mesh, &[Ball::new(centre, 0.22)], 2.0, formulation, &matrices).unwrap();
+        let mut around = [Vec::new(), Vec::new()];
+        for (q, weight) in weights_in(&problem.discretisation, &problem.system, 2.0).into_iter().enumerate() {
+            let point = problem.discretisation.pressure.point(q);
+            if point.iter().all(|&x| (0.1..0.9).contains(&x)) {
+                let distance = ((point - centre).norm() - 0.22).abs();
+                around[usize::from(distance > 2.0 / 16.0 * (D as f64).sqrt())].push(weight);
+            }
+        }
+        around
+    }
+
+    fn weights_near_a_surface<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let [near, far] = around_a_penalised_ball::<D>(1.0001);
+        assert!(near.iter().chain(&far).all(|w| (w - 1.0).abs() < 0.05));
+        let [near, far] = around_a_penalised_ball::<D>(1e3);
+        assert!(far.iter().all(|w| (w - 1.0).abs() < 0.05));
+        let lowered = near.iter().filter(|w| **w < 0.9).count();
+        assert!(8 * lowered > near.len(), "{lowered} of {}", near.len());
+        assert!(near.iter().all(|w| (OF_CUT_CELLS[0]..=OF_CUT_CELLS[1]).contains(w)));
+    }
+
+    /// A solid like the fluid changes nothing; a stiff one takes velocities from the pressures in the cells it cuts.
+    #[test]
+    fn a_penalised_surface_lowers_the_weights_of_its_cells() {
+        weights_near_a_surface::<2>();
+        weights_near_a_surface::<3>();
     }
 }

@@ -13,6 +13,7 @@ use gluey_linalg::{
     Chebyshev, Guess, Jacobi, LinOp, SlicedMatrix, SparseMatrix, SpectralInterval, estimate_lambda_max,
 };
 
+use crate::cell_schur::PressureMatrices;
 use crate::coarse_schur::CoarseSchur;
 use crate::discretisation::Discretisation;
 use crate::element::Elements;
@@ -92,9 +93,10 @@ pub fn pressure_matrix<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let mut mass = pressure_mass(discretisation, system, elements, viscosity)?;
+    let matrices = PressureMatrices::new(system, elements, viscosity)?;
+    let mut mass = pressure_mass(discretisation, system, &matrices)?;
+    scale_by_weights(&mut mass, discretisation, (system, elements, &matrices));
     mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
-    scale_by_weights(&mut mass, discretisation, system, viscosity);
     Ok(mass)
 }
 

@@ -13,7 +13,6 @@ use gluey_linalg::{LinOp, Pattern, Scalar, SparseMatrix, vector};
 
 use crate::cell_schur::PressureMatrices;
 use crate::discretisation::{CellKind, Discretisation, cell_kind};
-use crate::element::Elements;
 use crate::error::StokesError;
 use crate::pressure::{PressureSpace, WeakPressures};
 use crate::solid::SolidStress;
@@ -274,19 +273,16 @@ where
     }
 }
 
-/// The pressure mass matrix of the active cells over their viscosity, on free pressure nodes; other rows hold a one. Where
-/// a solid cuts a cell its matrix is that of [`PressureMatrices`].
+/// The sum of the cells' pressure matrices on free pressure nodes; other rows hold a one.
 pub fn pressure_mass<const D: usize>(
     discretisation: &Discretisation<D>,
     system: &StokesSystem<D>,
-    elements: &Elements<'_, D>,
-    viscosity: f64,
+    matrices: &PressureMatrices,
 ) -> Result<SparseMatrix, StokesError>
 where
     Dim<D>: Space<D>,
 {
     let m = Reference::<D>::PRESSURE;
-    let matrices = PressureMatrices::new(system, elements, viscosity)?;
     let expansion = crate::assembly::pressure_expansion(system);
     let unknowns = |c: &ActiveCell| {
         let nodes = discretisation.pressure.cell(c.cell as usize).iter();
