@@ -70,7 +70,7 @@ where
         let diagonal = diagonal.restricted(&positions);
         positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
         let acting = acting(discretisation, cells, &near);
-        let operator = Restricted::new(discretisation, space, (&acting, cells.len()), positions);
+        let operator = Restricted::new(discretisation, space, (&acting, cells.len()), positions, None);
         let interval = SpectralInterval::upper_part(lambda_max, RATIO, SAFETY);
         let dim = operator.dim();
         let chebyshev = Chebyshev::new(dim, DEGREE, interval);

@@ -125,13 +125,17 @@ where
 
     /// Builds what `solver` keeps for this problem.
     pub fn prepare(&self, solver: &mut (impl SaddleSolver<D> + ?Sized)) -> Result<(), StokesError> {
-        let preparation = Preparation {
+        solver.prepare(&self.discretisation, &self.system, &self.preparation())
+    }
+
+    /// What a solver is told beside the system.
+    pub fn preparation(&self) -> Preparation<'_, D> {
+        Preparation {
             bodies: &self.bodies,
             offset: self.offset,
             viscosity: self.viscosity,
             touched: self.solid.as_ref().map(|s| s.touched.as_slice()),
-        };
-        solver.prepare(&self.discretisation, &self.system, &preparation)
+        }
     }
 
     /// The field closest to `flow` that fulfils all constraints and has its values on the outer boundary: nodal

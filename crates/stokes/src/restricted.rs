@@ -103,9 +103,10 @@ where
         space: &VelocitySpace<D>,
         (acting, cell_count): (&[ActiveCell], usize),
         positions: Vec<u32>,
+        penalty: Option<&Penalty<D>>,
     ) -> Self {
         Self {
-            operator: CountedOperator::new(discretisation, space, (acting, cell_count), None),
+            operator: CountedOperator::new(discretisation, space, (acting, cell_count), penalty),
             velocity: vec![T::ZERO; space.dim()],
             load: vec![T::ZERO; space.dim()],
             positions,

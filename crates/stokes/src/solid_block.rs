@@ -8,7 +8,8 @@
 //! `z = E C E^T r`, `z += V (r - A z)`, `z += G (r - A z)`.
 //!
 //! Where the block is factorised, `G` is `E C E^T` once more and the rigid levels smooth on all meshes. Elsewhere `C` has no
-//! smoother and `V` none on the finest mesh: `G` is the smoother of the solid and of the fluid ([`PenalisedSmoother`]).
+//! smoother and `V` none on the finest mesh: `G` is the smoother of the solid and of the fluid ([`PenalisedSmoother`]), and
+//! where the cells of two bodies meet, a sweep around these comes before all others ([`FilmSmoother`]).
 //!
 //! A rigid motion costs the solid nothing, so what it leaves is the fluid's stress only: rounding errors of the motion are not
 //! multiplied by the solid's viscosity.
@@ -22,7 +23,7 @@ use crate::element::Elements;
 use crate::error::StokesError;
 use crate::level::{around_finest_cells, nodes_of_cells_with};
 use crate::node_matrix::NodeMatrix;
-use crate::penalised_smoother::PenalisedSmoother;
+use crate::penalised_smoother::{FilmSmoother, PenalisedSmoother, around_films};
 use crate::restricted::{CountedOperator, acting, add_at, gather};
 use crate::solid_cycle::{Numbered, SolidCycle};
 use crate::space::VelocitySpace;
@@ -51,7 +52,9 @@ where
     positions: Vec<u32>,
     /// `None` where the cycle, being exact, takes its place.
     smoother: Option<PenalisedSmoother<D>>,
-    /// The operator on velocities of the cycle, and on those of the rigid levels, where the solid's viscosity multiplies nothing.
+    film: Option<FilmSmoother<D>>,
+    /// The operator on velocities of the cycle and of the film, and on those of the rigid levels, where the solid's viscosity
+    /// multiplies nothing.
     around_solid: CountedOperator<f64, D>,
     around_rigid: CountedOperator<f32, D>,
     /// The velocities of the finest rigid level.
@@ -92,11 +95,15 @@ where
         } else {
             Solid::smoothed(discretisation, system, elements, &block, (meshes, radius))?
         };
+        let films = smoother.as_ref().and_then(|_| around_films(discretisation, touched));
+        let new = |nodes| FilmSmoother::new(discretisation, system, elements, (nodes, &block));
+        let film = films.as_deref().map(new).transpose()?;
         // Those with solid in them that do not move as one body are strained by rigid motions, since bodies meet there.
         let mut strained = acting(discretisation, &system.cells, &swept);
         let body_of = |&n: &u32| rigid.body_of(n as usize);
         strained.retain(|c| cell_kind(nodes.cell(c.cell as usize).iter().map(body_of)) != CellKind::Rigid);
         let (space, cell_count) = (&system.space, system.cells.len());
+        block.iter_mut().zip(films.iter().flatten()).for_each(|(is_in, film)| *is_in |= film);
         let solid = acting(discretisation, &system.cells, &block);
         let penalty = system.penalty.as_ref();
         Ok(Self {
@@ -112,13 +119,22 @@ where
             cycle,
             positions,
             smoother,
+            film,
         })
     }
 
     /// `z = M^-1 r` where `rigid_levels(f, u)` turns the nodal load `f` into the reduced velocities `u` of the rigid levels.
     pub fn apply(&mut self, r: &[f64], z: &mut [f64], mut rigid_levels: impl FnMut(&mut [f64], &mut [f32])) {
         z.fill(0.0);
-        self.correct_solid(r, z);
+        match &mut self.film {
+            Some(film) => {
+                film.add_to(r, z);
+                film.loads(z, &mut self.r);
+                vector::residual_from_product(r, &mut self.r);
+                self.correct_solid_by_rest(z);
+            }
+            None => self.correct_solid(r, z),
+        }
         self.around_solid.apply(z, &mut self.r);
         vector::residual_from_product(r, &mut self.r);
 
@@ -133,11 +149,7 @@ where
 
         match &mut self.smoother {
             Some(smoother) => smoother.add_to(&self.r, z),
-            None => {
-                let left = std::mem::take(&mut self.r);
-                self.correct_solid(&left, z);
-                self.r = left;
-            }
+            None => self.correct_solid_by_rest(z),
         }
     }
 
@@ -148,11 +160,19 @@ where
         add_at(&self.positions, &self.x, z);
     }
 
+    /// The same for what is left of the right-hand side.
+    fn correct_solid_by_rest(&mut self, z: &mut [f64]) {
+        let left = std::mem::take(&mut self.r);
+        self.correct_solid(&left, z);
+        self.r = left;
+    }
+
     /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and products with
     /// patches do not count.
     pub fn take_applications(&mut self) -> f64 {
         let smoother = self.smoother.as_mut().map_or(0.0, PenalisedSmoother::take_applications);
-        self.around_solid.take_applications() + self.around_rigid.take_applications() + smoother
+        let film = self.film.as_mut().map_or(0.0, FilmSmoother::take_applications);
+        self.around_solid.take_applications() + self.around_rigid.take_applications() + smoother + film
     }
 }
 
