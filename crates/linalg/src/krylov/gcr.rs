@@ -8,9 +8,9 @@
 //! from `c` in place of `r`, which would give the last direction again (Jiranek and Rozloznik 2010, 10.1007/s11075-009-9311-6).
 //!
 //! `Gcr<f64, f32>` takes its steps in single precision: preconditioner, operator and all vectors that are kept. They work in
-//! stages: when the residual has become smaller by `epsilon^(2/3)`, `x` is updated and the residual computed anew, both in
-//! double precision. `Z`, `C` and `R` stay, so a new stage loses nothing. The true residual decides when to stop, and
-//! reaches what double precision allows.
+//! stages: when the residual has become smaller by `epsilon^(2/3)`, or no longer becomes smaller, `x` is updated and the residual
+//! computed anew, both in double precision. `Z`, `C` and `R` stay, so a new stage loses nothing. The true residual decides when
+//! to stop, and reaches what double precision allows.
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
@@ -18,6 +18,8 @@ use crate::{LinOp, Preconditioner, Scalar, vector};
 
 /// A step from the residual that leaves more than this of it is followed by one that starts from `c`.
 const SLOW: f64 = 0.9;
+/// So many of them in a row end a stage: what is left of the residual may be rounding.
+const MOST_SLOW_STEPS: usize = 3;
 
 /// Tuning of [`Gcr`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,8 +148,8 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.triangle.clear();
     }
 
-    /// Takes steps from the true residual, of this norm, until it is small or the precision of the steps is used up: none if
-    /// the images known already leave little of it, but at least one if there was none in the `last` stage.
+    /// Takes steps from the true residual, of this norm, until it is small, the precision of the steps is used up or they no
+    /// longer help: none if the images known already leave little of it, but at least one if there was none in the `last` stage.
     fn stage(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
@@ -166,8 +168,9 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         if now <= enough && last != StageEnd::NoStep {
             return Ok(StageEnd::NoStep);
         }
-        let (mut is_slow, mut is_first) = (false, true);
+        let (mut is_slow, mut is_first, mut slow_steps) = (false, true, 0);
         while (now > enough || is_first)
+            && slow_steps < MOST_SLOW_STEPS
             && self.images.len() < self.params.restart
             && *iterations < self.params.max_iterations
         {
@@ -180,7 +183,9 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
             if step.is_none() {
                 return Ok(StageEnd::BrokeDown);
             }
-            is_slow = !is_slow && now > SLOW * before;
+            let is_stalled = now > SLOW * before;
+            slow_steps = if is_stalled { slow_steps + 1 } else { 0 };
+            is_slow = !is_slow && is_stalled;
         }
         Ok(StageEnd::Regular)
     }

@@ -16,9 +16,12 @@ fn direct_and_multigrid_agree() {
         for (gap, refinement) in [(1.0, bands(6)), (0.2, bands(7)), (0.2, resolved_gaps(6))] {
             let pair = pair_at(Vector::<2>::new(0.503, 0.497), gap, 30.0);
             let [direct, multigrid] = SOLVERS
-                .map(|s| solve(params(formulation, s, 1e-10), mesh(&refinement, &pair), &pair, &couette));
+                .map(|s| solve(params(formulation, s, 1e-11), mesh(&refinement, &pair), &pair, &couette));
             let difference = twist_distance(&direct.twists, &multigrid.twists);
-            assert!(difference < 1e-7, "{formulation:?}, gap {gap}: {difference:e}");
+            assert!(difference < 1e-8, "{formulation:?}, gap {gap}: {difference:e}");
+            // Two solves in `paper`. Rounding in single precision must not hold up the steps.
+            let count = multigrid.iteration_count;
+            assert!(count <= 60, "{formulation:?}, gap {gap}: {count}");
         }
     }
 }
