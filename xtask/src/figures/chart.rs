@@ -150,12 +150,15 @@ impl Chart {
         (x, top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min))
     }
 
-    /// Draws the marks over a frame whose upper edge is at `top`.
+    /// Draws the marks over a frame whose upper edge is at `top`, their labels where curves leave room.
     fn draw_marks(&self, canvas: &mut Canvas, top: f64, frame_height: f64) {
+        let on_curves = self.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
+        let taken = on_curves.map(|at| self.point(top, frame_height, *at)).collect::<Vec<_>>();
         for Mark { at, label } in &self.marks {
-            let (x, y) = self.point(top, frame_height, *at);
-            canvas.circle((x, y), 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
-            canvas.text(x + 6.0, y + 15.0, 15.0, "start", label);
+            let dot = self.point(top, frame_height, *at);
+            canvas.circle(dot, 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
+            let (x, y) = place_of_label(dot, &taken);
+            canvas.text(x, y + 0.35 * MARK_SIZE, MARK_SIZE, "middle", label);
         }
     }
 
@@ -179,6 +182,27 @@ impl Chart {
 }
 
 const LEGEND_COLUMNS: usize = 2;
+/// Size of the labels of dots.
+const MARK_SIZE: f64 = 15.0;
+
+/// The centre of a dot's label, in one of sixteen directions: the nearest to the dot whose distance from all `taken` points is
+/// enough, or the one with the largest.
+fn place_of_label(dot: (f64, f64), taken: &[(f64, f64)]) -> (f64, f64) {
+    const ENOUGH: f64 = 0.6 * MARK_SIZE;
+    let mut best = (dot, 0.0);
+    for distance in [0.8, 1.0, 1.2, 1.5] {
+        for direction in 0..16 {
+            let (sin, cos) = (std::f64::consts::PI * (0.25 + f64::from(direction) / 8.0)).sin_cos();
+            let place = (dot.0 + distance * MARK_SIZE * cos, dot.1 + distance * MARK_SIZE * sin);
+            let clear =
+                taken.iter().map(|p| (p.0 - place.0).hypot(p.1 - place.1)).fold(f64::INFINITY, f64::min);
+            if clear.min(ENOUGH) > best.1 {
+                best = (place, clear.min(ENOUGH));
+            }
+        }
+    }
+    best.0
+}
 
 /// Label and stroke of every curve to be named, once each.
 fn legend_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
@@ -224,4 +248,24 @@ fn tick_format(axis: &Axis) -> TickFormat {
     }
     let decimals = (0..6).find(|d| (axis.tick * 10f64.powi(*d)).fract().abs() < 1e-9).unwrap_or(6);
     TickFormat::Fixed(usize::try_from(decimals).unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_keep_away_from_curves() {
+        let distance = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1);
+        // All but a sector to the left of the dot is full.
+        let around = (0..360).map(|degree| f64::from(degree).to_radians());
+        let full = around.filter(|angle| (angle - std::f64::consts::PI).abs() > 1.0);
+        let ring = full.flat_map(|angle| [8.0, 14.0, 20.0].map(|r| (r * angle.cos(), r * angle.sin())));
+        let taken: Vec<(f64, f64)> = ring.collect();
+        let place = place_of_label((0.0, 0.0), &taken);
+        assert!(place.0 < -10.0, "{place:?}");
+        assert!(taken.iter().all(|&p| distance(p, place) > 8.0), "{place:?}");
+        // With room everywhere it is close.
+        assert!(distance(place_of_label((3.0, 4.0), &[]), (3.0, 4.0)) < MARK_SIZE);
+    }
 }
