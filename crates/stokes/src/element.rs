@@ -60,24 +60,6 @@ where
         (self.viscous[index], own)
     }
 
-    /// The diagonal of `A` in nodal velocities, as the cells add it up: boundary, bodies and hanging nodes are nodes like all
-    /// others.
-    pub fn viscous_diagonal(&self, discretisation: &Discretisation<D>) -> Vec<f64> {
-        let (nodes, n) = (&discretisation.velocity, Reference::<D>::VELOCITY);
-        let mut nodal = vec![0.0; nodes.node_count() * D];
-        for (index, cell) in self.cells().iter().enumerate() {
-            let (scale, own) = self.viscous(index);
-            for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
-                for c in 0..D {
-                    let k = (i * D + c) * (n + 1);
-                    nodal[node as usize * D + c] +=
-                        scale * self.reference.viscous[k] + own.map_or(0.0, |own| own[k]);
-                }
-            }
-        }
-        nodal
-    }
-
     fn add_penalty(&mut self, cell_count: usize) {
         let Some(penalty) = &self.system.penalty else { return };
         let mut slot = vec![usize::MAX; cell_count];

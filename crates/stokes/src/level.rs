@@ -294,7 +294,7 @@ pub fn block_diagonal<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let mut nodal = viscous_diagonal(discretisation, cells);
+    let mut nodal = viscous_diagonal(discretisation, cells.iter().map(|c| (c, c.viscous, None)));
     // The squares keep the sum positive: weights of hanging nodes may be negative.
     space.nodes().collect(D, |w| w * w, &mut nodal);
     let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();

@@ -26,7 +26,7 @@ use crate::discretisation::Discretisation;
 use crate::element::Elements;
 use crate::pressure::WeakPressures;
 use crate::space::VelocitySpace;
-use crate::system::StokesSystem;
+use crate::system::{StokesSystem, viscous_diagonal};
 
 /// The least weight, for pressures that hardly any velocity sees.
 const LEAST: f64 = 0.05;
@@ -150,7 +150,11 @@ where
     let n = Reference::<D>::VELOCITY;
     let m = Reference::<D>::PRESSURE;
     let reference = Reference::<D>::new();
-    let mut row = Row::<D>::new(elements.viscous_diagonal(discretisation));
+    let cells = elements.cells().iter().enumerate().map(|(index, cell)| {
+        let (scale, own) = elements.viscous(index);
+        (cell, scale, own)
+    });
+    let mut row = Row::<D>::new(viscous_diagonal(discretisation, cells));
     let around = corners_of(discretisation, system, special);
     around.into_iter().enumerate().filter(|(_, around)| !around.is_empty()).map(move |(q, around)| {
         let mut mass = 0.0;

@@ -85,8 +85,12 @@ where
     (0..discretisation.mesh.cell_count()).filter(|&c| kind(c) != CellKind::Rigid).map(active).collect()
 }
 
-/// The diagonal of `A` in nodal velocities, as `cells` add it up: boundary, bodies and hanging nodes are nodes like all others.
-pub fn viscous_diagonal<const D: usize>(discretisation: &Discretisation<D>, cells: &[ActiveCell]) -> Vec<f64>
+/// The diagonal of `A` in nodal velocities, as cells add it up: each with the multiple of the viscous reference matrix and the
+/// matrix of its own that it has. Boundary, bodies and hanging nodes are nodes like all others.
+pub fn viscous_diagonal<'a, const D: usize>(
+    discretisation: &Discretisation<D>,
+    cells: impl Iterator<Item = (&'a ActiveCell, f64, Option<&'a [f64]>)>,
+) -> Vec<f64>
 where
     Dim<D>: Space<D>,
 {
@@ -94,10 +98,11 @@ where
     let viscous = Reference::<D>::new().viscous;
     let n = Reference::<D>::VELOCITY;
     let mut nodal = vec![0.0; nodes.node_count() * D];
-    for cell in cells {
+    for (cell, scale, own) in cells {
         for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
             for c in 0..D {
-                nodal[node as usize * D + c] += cell.viscous * viscous[(i * D + c) * (n + 1)];
+                let k = (i * D + c) * (n + 1);
+                nodal[node as usize * D + c] += scale * viscous[k] + own.map_or(0.0, |own| own[k]);
             }
         }
     }
