@@ -54,6 +54,7 @@ where
     positions: Vec<u32>,
     /// `None` where the cycle, being exact, takes its place.
     smoother: Option<PenalisedSmoother<D>>,
+    /// `None` without films.
     film: Option<FilmSmoother<D>>,
     /// The operator on velocities of the cycle and of the film, and on those of the rigid levels, where the solid's viscosity
     /// multiplies nothing.

@@ -60,6 +60,18 @@ fn two_discs_move_as_the_reference_says_down_to_a_hundredth_of_a_radius() {
     }
 }
 
+#[test]
+fn rotation_and_spins_are_right_at_all_gaps_of_the_reference() {
+    for gap in [1.0, 0.2, 0.1, 0.01] {
+        for degrees in [0.0, 45.0] {
+            let pair = pair_at(Vector::<2>::new(0.503, 0.4985), gap, degrees);
+            let found = motion(&pair, &resolved_gaps(8), SolverKind::Direct);
+            let [_, rotation, spin] = errors(&found, &exact(gap, degrees), degrees);
+            assert!(rotation < 0.01 && spin < 0.01, "gap {gap}, {degrees} degrees: {rotation:e}, {spin:e}");
+        }
+    }
+}
+
 /// Eight positions of a pair in its cells: mean of the relative error of the normal speed, and the largest distance
 /// from that mean.
 fn normal_speed_over_positions(gap: f64, surface: u8) -> (f64, f64) {
