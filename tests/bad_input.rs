@@ -234,6 +234,11 @@ fn names_that_are_not_known() {
     refused_line(21, "hydrodynamics = \"navier\"", &["flow.hydrodynamics", "\"stokes\", \"pair-mobility\""]);
     let solver = with_line(20, "[flow]\nsolver = \"cg\"");
     refused(&solver, &["case.toml:21:", "flow.solver", "one of \"auto\", \"direct\", \"multigrid\""]);
+    refused_line(
+        29,
+        "velocity = \"centre\"",
+        &["flow.paper.velocity", "did you mean \"center\"?", "\"mean\""],
+    );
     let memory = with_line(17, "[contact]\nmemory = \"none\"");
     refused(&memory, &["case.toml:18:", "contact.memory", "one of \"paper\", \"consistent\""]);
 }

@@ -25,7 +25,7 @@ mod validate;
 pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 pub use gluey_contact::{Memory, Strategy};
 pub use gluey_motion::Scheme;
-pub use names::{Boundary, Formulation, Hydrodynamics, Solver, UnknownName};
+pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
 
 use gluey_contact::{ContactParams, Domain, Wall};
 use gluey_geom::Vector;
@@ -190,6 +190,8 @@ pub struct PaperSpec {
     pub rho: f64,
     /// Width of the viscosity ramp inside the surface, in cells.
     pub ramp: f64,
+    /// How the motion of a particle is taken from the field: `mean`, over the particle, or `center`, the paper's [11].
+    pub velocity: ParticleVelocity,
 }
 
 /// Parameters of the `rigid-dofs` formulation.
@@ -244,7 +246,7 @@ impl Default for MeshSpec {
 
 impl Default for PaperSpec {
     fn default() -> Self {
-        Self { viscosity_ratio: 1e3, uzawa_steps: 1, rho: 1.0, ramp: 1.0 }
+        Self { viscosity_ratio: 1e3, uzawa_steps: 1, rho: 1.0, ramp: 1.0, velocity: ParticleVelocity::Mean }
     }
 }
 

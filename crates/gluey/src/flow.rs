@@ -18,7 +18,7 @@ use gluey_stokes::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::case::{Case, Formulation, Solver};
+use crate::case::{Case, Formulation, ParticleVelocity, Solver};
 
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -271,6 +271,10 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
             ramp: flow.paper.ramp,
             rho: flow.paper.rho,
             uzawa_steps: flow.paper.uzawa_steps,
+            particle_velocity: match flow.paper.velocity {
+                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
+                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
+            },
             ..PaperParams::default()
         }),
     };

@@ -39,11 +39,30 @@ pub struct PaperParams {
     pub uzawa_steps: usize,
     /// Gauss points a direction in cells near a surface.
     pub quadrature: usize,
+    /// How the motion of a particle is taken from the field.
+    pub particle_velocity: ParticleVelocity,
+}
+
+/// How the motion of a particle is taken from a field that is only nearly rigid inside it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ParticleVelocity {
+    /// The rigid motion closest to the field over the particle, weighted with the solid fraction.
+    #[default]
+    WeightedMean,
+    /// The velocity at the centre, `u(X_i)` (eq. 11), and half the vorticity there.
+    Center,
 }
 
 impl Default for PaperParams {
     fn default() -> Self {
-        Self { viscosity_ratio: 1e3, ramp: 1.0, rho: 1.0, uzawa_steps: 1, quadrature: 4 }
+        Self {
+            viscosity_ratio: 1e3,
+            ramp: 1.0,
+            rho: 1.0,
+            uzawa_steps: 1,
+            quadrature: 4,
+            particle_velocity: ParticleVelocity::WeightedMean,
+        }
     }
 }
 

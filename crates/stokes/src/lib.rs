@@ -57,7 +57,7 @@ pub use direct::DirectSolver;
 pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
 pub use error::StokesError;
 pub use flow::{Flow, FlowParams, FlowSolver, SolverKind};
-pub use formulation::{Formulation, PaperParams};
+pub use formulation::{Formulation, PaperParams, ParticleVelocity};
 pub use multigrid::MultigridSolver;
 pub use point_matrices::PointMatrices;
 pub use pressure::{PressureSpace, WeakPressures};

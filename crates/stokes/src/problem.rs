@@ -13,13 +13,14 @@ use gluey_linalg::vector;
 
 use crate::discretisation::{Discretisation, solid_nodes};
 use crate::error::StokesError;
-use crate::formulation::{Formulation, PaperParams};
+use crate::formulation::{Formulation, PaperParams, ParticleVelocity};
 use crate::point_matrices::PointMatrices;
 use crate::pressure::WeakPressures;
 use crate::solid::{SolidRegion, SolidStress};
 use crate::solver::{Preparation, SaddleSolver};
 use crate::space::{SolidNodes, VelocitySpace};
 use crate::system::{Penalty, StokesSystem};
+use crate::transfer::Evaluator;
 
 /// Gauss points a direction for the body force: exact for forces of degree 5, and one order beyond what the elements
 /// resolve for others.
@@ -47,6 +48,7 @@ struct Solid<const D: usize> {
     region: SolidRegion<D>,
     touched: SolidNodes,
     matrices: Arc<PointMatrices<D>>,
+    particle_velocity: ParticleVelocity,
 }
 
 impl<const D: usize> Problem<D>
@@ -119,8 +121,10 @@ where
         let space = VelocitySpace::new::<Ball<D>>(discretisation.velocity.clone(), &[], &nowhere);
         let penalty = Penalty { factor: 1.0 - 1.0 / paper.viscosity_ratio, stress };
         let system = StokesSystem::new(&discretisation, space, viscosity, WeakPressures::Keep, Some(penalty));
-        let solid = Some(Solid { region, touched, matrices: matrices.clone() });
-        Ok(Self { discretisation, system, bodies: bodies.to_vec(), viscosity, offset: 0.0, solid })
+        let particle_velocity = paper.particle_velocity;
+        let solid = Solid { region, touched, matrices: matrices.clone(), particle_velocity };
+        let bodies = bodies.to_vec();
+        Ok(Self { discretisation, system, bodies, viscosity, offset: 0.0, solid: Some(solid) })
     }
 
     /// Builds what `solver` keeps for this problem.
@@ -180,9 +184,20 @@ where
 
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
     pub fn twists(&self, velocity: &[f64]) -> Vec<Twist<D>> {
-        match &self.solid {
-            Some(s) => s.region.twists(&self.discretisation, &self.bodies, &s.matrices, velocity),
-            None => (0..self.bodies.len()).map(|body| self.system.space.twist(velocity, body)).collect(),
+        let Some(solid) = &self.solid else {
+            return (0..self.bodies.len()).map(|body| self.system.space.twist(velocity, body)).collect();
+        };
+        match solid.particle_velocity {
+            ParticleVelocity::WeightedMean => {
+                solid.region.twists(&self.discretisation, &self.bodies, &solid.matrices, velocity)
+            }
+            ParticleVelocity::Center => {
+                let evaluator = Evaluator::new(&self.discretisation.mesh);
+                let at = |body: &Ball<D>| {
+                    evaluator.motion_at(&self.discretisation.velocity, velocity, body.center())
+                };
+                self.bodies.iter().map(at).collect()
+            }
         }
     }
 }

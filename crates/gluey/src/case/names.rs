@@ -110,6 +110,17 @@ named! {
 }
 
 named! {
+    /// How `paper` takes the motion of a particle from the field.
+    ParticleVelocity, "velocity" {
+        /// The rigid motion closest to the field over the particle.
+        #[default]
+        Mean = "mean",
+        /// Velocity and half the vorticity at the centre: the paper's `u(X_i)`.
+        Center = "center",
+    }
+}
+
+named! {
     /// Condition on the boundary of the box.
     Boundary, "boundary" {
         /// The velocity of undisturbed shear, `rate (y - y_mid) e_x`, on the whole boundary.

@@ -5,8 +5,8 @@ use gluey_levelset::Ball;
 use gluey_stokes::Formulation;
 
 use crate::support::{
-    RIGID, SOLVERS, bands, bump, couette, graded, mesh, nodal_error, paper, params, solve, strain_inside,
-    twist_distance,
+    RIGID, SOLVERS, bands, bump, couette, graded, mesh, nodal_error, paper, paper_at_center, params, solve,
+    strain_inside, twist_distance,
 };
 
 /// Size of the wrong start; tolerances are relative to the residual it leaves.
@@ -115,7 +115,7 @@ where
 
 #[test]
 fn a_rigid_motion_of_the_boundary_carries_everything() {
-    for formulation in [RIGID, paper(1e3, 2)] {
+    for formulation in [RIGID, paper(1e3, 2), paper_at_center(1e3, 2)] {
         everything_moves_as_one::<2>(formulation, 5);
         everything_moves_as_one::<3>(formulation, 3);
     }

@@ -8,7 +8,8 @@ use gluey_stokes::{
 };
 
 use crate::support::{
-    RIGID, bands, couette, mesh, pair_at, pair_motion, paper, params, solve, strain_inside, twist_distance,
+    RIGID, bands, couette, mesh, pair_at, pair_motion, paper, paper_at_center, params, solve, strain_inside,
+    twist_distance,
 };
 
 /// Size of the finest cells.
@@ -109,6 +110,40 @@ fn every_uzawa_step_makes_the_body_more_rigid() {
     assert!(strains[2] < 0.4 * strains[1] && strains[3] < 0.25 * strains[2], "{strains:?}");
     assert!(after(2.0, 4) < 0.2 * strains[2], "rho = 2: {}", after(2.0, 4));
     assert!(after(3.5, 12) < after(3.5, 4), "rho = 3.5 converges, if slowly");
+}
+
+/// Soft as the ball is, it cannot tell one side from the other: in the middle of the shear both readings of its motion
+/// are rest and half the shear rate.
+fn at_the_middle_both_velocities_agree<const D: usize>(level: u8)
+where
+    Dim<D>: Space<D>,
+{
+    let ball = [Ball::new(Vector::<D>::repeat(0.5), 0.2)];
+    let motion = |formulation: Formulation| {
+        let params = params(formulation, SolverKind::Direct, 1e-11);
+        solve(params, mesh(&bands(level), &ball), &ball, &couette).twists[0]
+    };
+    for twist in [paper(1e2, 1), paper_at_center(1e2, 1)].map(motion) {
+        assert!(twist.velocity.amax() < 1e-9, "{twist:?}");
+        assert!((twist.spin[Dim::<D>::ROT - 1] + 0.5).abs() < 1e-9, "{twist:?}");
+    }
+}
+
+#[test]
+fn mean_and_central_velocity_agree_in_the_middle_of_the_shear() {
+    at_the_middle_both_velocities_agree::<2>(6);
+    at_the_middle_both_velocities_agree::<3>(4);
+}
+
+/// Off the middle they are readings of the same nearly rigid motion, and become one as the body hardens.
+#[test]
+fn mean_and_central_velocity_become_one_as_the_body_hardens() {
+    let apart = |ratio: f64, steps: usize| {
+        let [mean, center] = [paper(ratio, steps), paper_at_center(ratio, steps)].map(|f| flow(f).twists);
+        twist_distance(&mean, &center)
+    };
+    let [soft, hard, multiplied] = [apart(1e2, 1), apart(1e4, 1), apart(1e2, 6)];
+    assert!(soft > 1e-5 && hard < 0.02 * soft && multiplied < 0.1 * soft, "{soft} {hard} {multiplied}");
 }
 
 #[test]

@@ -5,8 +5,8 @@ use gluey_fem::element::{gauss_cube, value};
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError,
-    WeakPressures,
+    Flow, FlowParams, FlowSolver, Formulation, PaperParams, ParticleVelocity, Refinement, SolverKind,
+    StokesError, WeakPressures,
 };
 use gluey_testkit::exact::StokesSolution;
 
@@ -21,6 +21,13 @@ pub const RIGID: Formulation =
 /// The paper's formulation with a viscosity ratio and a number of Uzawa steps.
 pub fn paper(viscosity_ratio: f64, uzawa_steps: usize) -> Formulation {
     Formulation::Paper(PaperParams { viscosity_ratio, uzawa_steps, ..PaperParams::default() })
+}
+
+/// As [`paper`], with the velocity at the centre as that of the particle.
+pub fn paper_at_center(viscosity_ratio: f64, uzawa_steps: usize) -> Formulation {
+    let particle_velocity = ParticleVelocity::Center;
+    let params = PaperParams { viscosity_ratio, uzawa_steps, particle_velocity, ..PaperParams::default() };
+    Formulation::Paper(params)
 }
 
 /// Parameters for unit viscosity.
