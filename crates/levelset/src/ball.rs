@@ -39,6 +39,11 @@ impl<const D: usize> Ball<D> {
     pub fn center(&self) -> &Vector<D> {
         &self.center
     }
+
+    /// Period along each axis, where there is one.
+    pub fn period(&self) -> &[Option<f64>; D] {
+        &self.period
+    }
 }
 
 impl<const D: usize> LevelSet<D> for Ball<D> {
@@ -66,7 +71,8 @@ pub fn nearest_image(distance: f64, period: Option<f64>) -> f64 {
     }
 }
 
-/// The body with the largest level set at `x`, and its value: `max_i alpha_i(x)`.
+/// The body with the largest level set at `x`, and its value: `max_i alpha_i(x)`. Of equals, the first. Asks all of them: for many
+/// bodies there is [`crate::BallTree`].
 pub fn nearest<const D: usize, B: LevelSet<D>>(bodies: &[B], x: &Vector<D>) -> Option<(usize, f64)> {
     let values = bodies.iter().map(|b| b.value(x)).enumerate();
     values.reduce(|best, next| if next.1 > best.1 { next } else { best })

@@ -13,6 +13,8 @@
 
 mod ball;
 mod mixing;
+mod tree;
 
 pub use ball::{Ball, Body, LevelSet, nearest, nearest_image};
 pub use mixing::{Ramp, ViscosityLaw};
+pub use tree::BallTree;
