@@ -81,7 +81,7 @@ where
     }
 
     fn penalised(balls: Vec<Ball<D>>, surface: u8) -> Self {
-        let paper = PaperParams::default();
+        let paper = paper();
         let discretisation = Discretisation::new(mesh(surface, 0.0, &balls));
         let ramp = Ramp::new(paper.ramp * discretisation.mesh.size(surface));
         let matrices = PointMatrices::new(paper.quadrature);
@@ -248,9 +248,14 @@ fn solvers(criterion: &mut Criterion) {
     );
 }
 
+/// The setting of the tables in `docs/benchmarks.md`: the paper's viscosity ratio, one solve.
+fn paper() -> PaperParams {
+    PaperParams { viscosity_ratio: 1e3, uzawa_steps: 1, ..PaperParams::default() }
+}
+
 /// Steps of the cases `pair-2d` and `pair-3d`; `docs/benchmarks.md` names the meshes.
 fn steps(criterion: &mut Criterion) {
-    let paper = Formulation::Paper(PaperParams::default());
+    let paper = Formulation::Paper(paper());
     let params =
         |formulation, solver| FlowParams { viscosity: VISCOSITY, formulation, solver, tolerance: TOLERANCE };
     step(criterion, "pair-2d-paper", params(paper, SolverKind::Direct), pair_2d(), (7, 0.0), 0.025);

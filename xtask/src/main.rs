@@ -13,6 +13,7 @@ use clap::{Parser, Subcommand};
 
 use reproduce::plan::FigureName;
 use reproduce::summary::Summary;
+use reproduce::verdict::{self, Kind, Outcome};
 
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask", about = "Project tasks of gluey", max_term_width = 100)]
@@ -107,9 +108,9 @@ fn reproduce_figures(arguments: ReproduceArguments) -> ExitCode {
     };
     match reproduce::reproduce(&options) {
         Ok(summary) => {
-            print_checks(&summary);
+            print_rows(&summary);
             println!("\nfigures, runs, summary.json and index.html are in {}", options.out.display());
-            print_failures(&summary)
+            print_outcome(&summary)
         }
         Err(error) => {
             eprintln!("error: {error}");
@@ -123,18 +124,41 @@ fn chosen(only: Vec<FigureName>) -> Vec<FigureName> {
     FigureName::ALL.into_iter().filter(|figure| only.is_empty() || only.contains(figure)).collect()
 }
 
-fn print_checks(summary: &Summary) {
-    for check in &summary.checks {
-        let mark = if check.ok { "ok  " } else { "FAIL" };
-        let value = check.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
-        println!("{mark} {:5} {}: {} = {value} ({})", check.figure, check.run, check.name, check.wanted);
+fn print_rows(summary: &Summary) {
+    for row in &summary.rows {
+        let mark = match (row.outcome, row.is_known(), row.kind) {
+            (Outcome::NotMeasured, _, _) => "MISSING",
+            (Outcome::No, true, _) => "no, known",
+            (Outcome::No, false, _) => "NO",
+            (Outcome::Yes, _, Kind::Guarantee) => "guaranteed",
+            (Outcome::Yes, _, _) => "yes",
+        };
+        let value = row.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
+        println!(
+            "{mark:10} {:5} {} {}: {} = {value} ({})",
+            row.figure, row.statement, row.run, row.measure, row.wanted
+        );
     }
 }
 
-/// Lists what did not work.
-fn print_failures(summary: &Summary) -> ExitCode {
+/// Counts what was found, and lists what did not work.
+fn print_outcome(summary: &Summary) -> ExitCode {
+    let (reproduced, statements) = verdict::count(&summary.rows, Kind::Paper);
+    let (held, comparisons) = verdict::count(&summary.rows, Kind::Exact);
+    println!(
+        "\nof {statements} statements of the paper {reproduced} are reproduced, {} are not; of {comparisons} comparisons \
+         with exact solutions {held} hold, {} do not",
+        statements - reproduced,
+        comparisons - held
+    );
+    for row in summary.rows.iter().filter(|row| row.is_known()) {
+        println!("known disagreement: {}: {} {}", row.id, row.statement, row.reason.unwrap_or_default());
+    }
+    for row in summary.rows.iter().filter(|row| row.is_failure()) {
+        eprintln!("error: {} does not hold and is no known disagreement: {}", row.id, row.statement);
+    }
     for failure in &summary.failures {
         eprintln!("error: {}: {}", failure.what, failure.error);
     }
-    if summary.failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if summary.succeeded() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -29,6 +29,7 @@ pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, 
 
 use gluey_contact::{ContactParams, Domain, Wall};
 use gluey_geom::Vector;
+use gluey_stokes::PaperParams;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of root cells along the shortest edge of the box.
@@ -184,7 +185,7 @@ pub struct MeshSpec {
 pub struct PaperSpec {
     /// Viscosity of the particles over that of the fluid, `r`.
     pub viscosity_ratio: f64,
-    /// Uzawa iterations a step.
+    /// Uzawa iterations per time step; with 1 the multiplier is never used, which is a penalty method and called so in reports.
     pub uzawa_steps: usize,
     /// Step of the Uzawa iteration, `0 < rho < 4`.
     pub rho: f64,
@@ -246,7 +247,8 @@ impl Default for MeshSpec {
 
 impl Default for PaperSpec {
     fn default() -> Self {
-        Self { viscosity_ratio: 1e3, uzawa_steps: 1, rho: 1.0, ramp: 1.0, velocity: ParticleVelocity::Mean }
+        let PaperParams { viscosity_ratio, uzawa_steps, rho, ramp, .. } = PaperParams::default();
+        Self { viscosity_ratio, uzawa_steps, rho, ramp, velocity: ParticleVelocity::Mean }
     }
 }
 
@@ -335,9 +337,16 @@ impl Case {
         }
     }
 
-    /// How the flow is modelled, as reports name it: the formulation, or the analytic model's name.
+    /// Whether `paper` makes a single solve, which leaves its multiplier unused.
+    fn is_penalty(&self) -> bool {
+        self.flow.formulation == Formulation::Paper && self.flow.paper.uzawa_steps == 1
+    }
+
+    /// How the flow is modelled, as reports name it: the formulation, `penalty` for `paper` with a single Uzawa step, or the
+    /// analytic model's name.
     pub fn flow_name(&self) -> &'static str {
         match self.flow.hydrodynamics {
+            Hydrodynamics::Stokes if self.is_penalty() => "penalty",
             Hydrodynamics::Stokes => self.flow.formulation.name(),
             Hydrodynamics::PairMobility => self.flow.hydrodynamics.name(),
         }

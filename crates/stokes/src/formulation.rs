@@ -7,7 +7,7 @@
 //! eqs. 9 and 10: `K(eta) u^k - B^T p^k = -1/2 K(I eta_s) lambda^(k-1)`, `B u^k = 0`, `lambda^k = lambda^(k-1) + rho u^k`,
 //! where `K(eta)` is the matrix of `int 2 eta eps(u):eps(v)`. The bilinear form carries `2 eta_s` and the update steps with
 //! `eta_s`, so it converges for `0 < rho < 4`. Each prediction starts cold (`lambda = 0`) and makes a fixed number of steps:
-//! the softness this leaves is part of the formulation.
+//! the softness this leaves is part of the formulation. One step alone never uses the multiplier: a penalty method.
 
 use crate::error::StokesError;
 use crate::pressure::WeakPressures;
@@ -27,6 +27,10 @@ pub enum Formulation {
 }
 
 /// Parameters of the `paper` formulation.
+///
+/// The default, r = 100 with two Uzawa steps and a ramp of one cell, is one setting for every mesh and dimension. The paper has
+/// r = 1e3 and says neither the number of steps nor the ramp; with that ratio cells cut by two particles lock the pair on meshes
+/// of three to six cells per radius (`docs/decisions/0019-one-setting-of-paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperParams {
     /// `r = eta_s / eta_f`.
@@ -35,7 +39,8 @@ pub struct PaperParams {
     pub ramp: f64,
     /// Step `rho` of the multiplier update, `0 < rho < 4`.
     pub rho: f64,
-    /// Number of solves a prediction, each followed by an update of the multiplier.
+    /// Number of solves per prediction, each followed by an update of the multiplier. With one the multiplier, which starts
+    /// from zero, is never used: the formulation is then a penalty method.
     pub uzawa_steps: usize,
     /// Gauss points a direction in cells near a surface.
     pub quadrature: usize,
@@ -56,10 +61,10 @@ pub enum ParticleVelocity {
 impl Default for PaperParams {
     fn default() -> Self {
         Self {
-            viscosity_ratio: 1e3,
+            viscosity_ratio: 1e2,
             ramp: 1.0,
             rho: 1.0,
-            uzawa_steps: 1,
+            uzawa_steps: 2,
             quadrature: 4,
             particle_velocity: ParticleVelocity::WeightedMean,
         }

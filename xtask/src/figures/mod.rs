@@ -10,6 +10,7 @@ mod trajectories;
 use std::collections::BTreeMap;
 
 use crate::reproduce::plan::{Approach, CaseName, FigureName, RunKey};
+use crate::reproduce::settings::Settings;
 use crate::reproduce::trajectory::Trajectory;
 use canvas::Canvas;
 use chart::{Curve, Stroke};
@@ -21,6 +22,8 @@ pub struct Data {
     pub runs: BTreeMap<RunKey, Trajectory>,
     /// Exact solutions.
     pub exact: BTreeMap<CaseName, Trajectory>,
+    /// What the runs were computed with.
+    pub settings: BTreeMap<RunKey, Settings>,
     /// The runs are those of `--quick`; the figures say so.
     pub quick: bool,
 }
@@ -50,6 +53,10 @@ impl Data {
         if self.quick {
             notes.push("Computed with --quick: coarse mesh and large time steps.".to_owned());
         }
+        let gluey = RunKey { case: figure.case(), approach: Approach::Gluey };
+        if let Some(settings) = self.settings.get(&gluey).filter(|_| !figure.approaches().is_empty()) {
+            notes.push(format!("{}.", settings.figure_note()));
+        }
         if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
             notes.push(
                 "Box periodic in *x*; rigid-dofs and exact: Couette flow on all sides, to *t* = 12."
@@ -75,6 +82,9 @@ fn stroke(approach: Approach) -> Stroke {
         Approach::Gluey => Stroke { color: "#0b4f9e", width: 1.8, dashes: None },
         Approach::Inelastic => Stroke { color: "#c8471b", width: 1.8, dashes: Some("9 4") },
         Approach::None => Stroke { color: "#1b7f4d", width: 1.8, dashes: Some("9 3 2 3") },
+        Approach::GlueyAsPrinted | Approach::GlueyAsPrintedLargeStep => {
+            Stroke { color: "#c79a00", width: 1.8, dashes: Some("1.5 1.5 6 1.5") }
+        }
         Approach::GlueyRigidDofs => Stroke { color: "#8a3ea0", width: 1.8, dashes: Some("2 2.5") },
     }
 }
@@ -88,6 +98,8 @@ pub fn legend(approach: Approach) -> &'static str {
         Approach::Gluey => "gluey contact",
         Approach::Inelastic => "inelastic collision",
         Approach::None => "no correction",
+        Approach::GlueyAsPrinted => "gluey contact as printed",
+        Approach::GlueyAsPrintedLargeStep => "gluey contact as printed, twice the time step",
         Approach::GlueyRigidDofs => "gluey contact, rigid-dofs",
     }
 }

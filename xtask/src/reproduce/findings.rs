@@ -1,12 +1,12 @@
-//! For each figure: what the paper says, and a table of the exact solution beside the runs.
+//! For each figure: its title, and a table of the exact solution beside the runs.
 
 use std::f64::consts::PI;
 
-use super::checks::{Check, Evidence};
 use super::measures::{
     self, center_deviation, closest_approach, distance_from_center, gap_deviation, time_to_turn,
 };
 use super::plan::{Approach, CaseName, FigureName, RunKey};
+use super::rows::{Evidence, RADIUS};
 use super::trajectory::Trajectory;
 use crate::figures;
 
@@ -34,55 +34,6 @@ pub fn title(figure: FigureName) -> &'static str {
     }
 }
 
-/// What the paper (Verdon et al. 2010, section 3) says about a figure.
-pub fn paper_statement(figure: FigureName) -> &'static str {
-    match figure {
-        FigureName::Fig4 | FigureName::Fig8 => "Particles of radius a = 0.05 in a unit box, shear rate 1.",
-        FigureName::Fig5 => {
-            "Without correction the particles overlap by more than 0.01 a and come apart again; gluey contact keeps them \
-             from overlapping; inelastic collisions let the distance grow."
-        }
-        FigureName::Fig6 => {
-            "Gluey contact keeps the particles on a circle, the limit of zero distance; without correction they follow \
-             it with small fluctuations; inelastic collisions throw them onto another, more elliptic orbit."
-        }
-        FigureName::Fig7a => {
-            "Without correction the spheres overlap; inelastic collisions avoid that but the encounter is no longer \
-             reversible; with gluey contact reversibility is almost recovered, the relative error of the distance at \
-             the end is 6.5 %."
-        }
-        FigureName::Fig7b => {
-            "Inelastic collisions modify the trajectories significantly; gluey contact does not."
-        }
-        FigureName::Fig9 => {
-            "Particles 1 and 2 stay together with gluey contact and without correction; inelastic collisions separate \
-             them. Without correction the third particle joins them by t = 30 (gap 2-3 below 0.01 a)."
-        }
-        FigureName::Fig10 => {
-            "Without correction the particles overlap, so that the trajectories differ from those with gluey contact, \
-             more than for two particles."
-        }
-        FigureName::Fig11 => {
-            "The trajectories with inelastic collisions are quite different: the three particles no longer stay close \
-             together."
-        }
-    }
-}
-
-/// One sentence that counts the checks of a figure; `None` if it has none.
-pub fn verdict(figure: FigureName, checks: &[Check]) -> Option<String> {
-    let own: Vec<&Check> = checks.iter().filter(|check| check.figure == figure.as_str()).collect();
-    let failed: Vec<String> =
-        own.iter().filter(|check| !check.ok).map(|check| format!("{}: {}", check.run, check.name)).collect();
-    match (own.len(), failed.len()) {
-        (0, _) => None,
-        (count, 0) => Some(format!("checks that hold: {count} of {count}.")),
-        (count, bad) => {
-            Some(format!("checks that hold: {} of {count}; not: {}.", count - bad, failed.join("; ")))
-        }
-    }
-}
-
 /// The numbers of a figure, the exact solution in the first row; `None` for set-ups.
 pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<Table> {
     let measures = measures_of(figure);
@@ -95,10 +46,9 @@ pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<Table> {
         (name.to_owned(), measures.iter().map(|(_, measure)| measure(&view)).collect())
     };
     let mut rows: Vec<_> = exact.map(|exact| row("exact", exact, None)).into_iter().collect();
-    for approach in figure.approaches() {
-        let key = RunKey { case: figure.case(), approach };
+    for key in figure.runs().into_iter().filter(|key| key.case == figure.case()) {
         if let Some(run) = evidence.data.runs.get(&key) {
-            rows.push(row(figures::legend(approach), run, Some(key)));
+            rows.push(row(figures::legend(key.approach), run, Some(key)));
         }
     }
     Some(Table { columns: measures.iter().map(|(name, _)| (*name).to_owned()).collect(), rows })
@@ -156,9 +106,6 @@ fn measures_of(figure: FigureName) -> Vec<(&'static str, Measure)> {
     }
 }
 
-/// Radius of the particles in units of the box.
-const RADIUS: f64 = 0.05;
-
 fn off_exact_to_end(view: &View<'_>) -> Option<f64> {
     off_exact(view, f64::INFINITY)
 }
@@ -179,24 +126,11 @@ mod tests {
         let mut data = Data::default();
         let exact = reference::load(&crate::workspace_root(), CaseName::Pair3d, 30.0).unwrap();
         data.exact.insert(CaseName::Pair3d, exact);
-        let table = table(FigureName::Fig7a, &Evidence { data: &data, reports: &BTreeMap::new() }).unwrap();
+        let reports = BTreeMap::new();
+        let evidence = Evidence { data: &data, reports: &reports };
+        let table = table(FigureName::Fig7a, &evidence).unwrap();
         assert_eq!(table.rows.len(), 1);
         assert_eq!(table.rows[0].1[4], Some(0.0));
         assert!((table.rows[0].1[0].unwrap() - 3.38e-3).abs() < 1e-5);
-    }
-
-    #[test]
-    fn the_verdict_names_what_fails() {
-        let check = |ok| Check {
-            figure: "fig5".to_owned(),
-            run: "pair-2d-none".to_owned(),
-            name: "smallest gap".to_owned(),
-            value: Some(1.0),
-            wanted: "at most 0".to_owned(),
-            ok,
-        };
-        assert_eq!(verdict(FigureName::Fig5, &[check(true)]).unwrap(), "checks that hold: 1 of 1.");
-        assert!(verdict(FigureName::Fig5, &[check(true), check(false)]).unwrap().contains("pair-2d-none"));
-        assert_eq!(verdict(FigureName::Fig6, &[check(true)]), None);
     }
 }

@@ -15,6 +15,14 @@ pub fn largest_gap(run: &Trajectory, pair: (usize, usize)) -> Option<f64> {
     run.gap(pair)?.iter().copied().reduce(f64::max)
 }
 
+/// The median gap D/a of a pair over the second half of the run: what it settles to.
+pub fn median_gap(run: &Trajectory, pair: (usize, usize)) -> Option<f64> {
+    let gap = run.gap(pair)?;
+    let mut late = gap[gap.len() / 2..].to_vec();
+    late.sort_by(f64::total_cmp);
+    late.get(late.len() / 2).copied()
+}
+
 /// The last gap D/a of a pair.
 pub fn last_gap(run: &Trajectory, pair: (usize, usize)) -> Option<f64> {
     run.gap(pair)?.last().copied()
@@ -63,23 +71,80 @@ pub fn closest_approach(run: &Trajectory) -> Option<f64> {
 }
 
 /// Largest relative difference of the gap of particles 1 and 2 from `exact` while the exact gap is at least `floor`
-/// radii. Both ends of the comparison are where either trajectory ends.
+/// radii. `None` if the run ends before the exact solution does.
 pub fn gap_deviation(run: &Trajectory, exact: &Trajectory, floor: f64) -> Option<f64> {
-    let (own, wanted) = (run.gap((1, 2))?, exact.gap((1, 2))?);
-    let compared = exact.times.iter().zip(wanted).filter(|(_, gap)| **gap >= floor);
-    compared.filter_map(|(&t, &gap)| Some((run.at(own, t)? - gap).abs() / gap)).reduce(f64::max)
+    let relative = |own: f64, wanted: f64| (own - wanted).abs() / wanted;
+    largest_over_exact(run, exact, exact.end(), |wanted| wanted >= floor, relative)
 }
 
-/// Largest distance between the centres of the same particle in `run` and `exact` up to time `until`, box units.
-pub fn center_deviation(run: &Trajectory, exact: &Trajectory, until: f64) -> Option<f64> {
-    let rows = exact.times.iter().enumerate().filter(|(_, t)| **t <= until + 1e-9);
+/// Largest difference of the gap of particles 1 and 2 from `exact`, in radii, up to time `until` while the exact gap is at
+/// most `ceiling` radii. `None` if the run ends earlier.
+pub fn gap_error(run: &Trajectory, exact: &Trajectory, until: f64, ceiling: f64) -> Option<f64> {
+    largest_over_exact(run, exact, until, |wanted| wanted <= ceiling, |own, wanted| (own - wanted).abs())
+}
+
+fn largest_over_exact(
+    run: &Trajectory,
+    exact: &Trajectory,
+    until: f64,
+    counts: impl Fn(f64) -> bool,
+    difference: impl Fn(f64, f64) -> f64,
+) -> Option<f64> {
+    let (own, wanted) = (run.gap((1, 2))?, exact.gap((1, 2))?);
+    let times = exact.times.iter().zip(wanted).filter(|(t, gap)| **t <= until && counts(**gap));
+    let differences = times.map(|(&t, &gap)| Some(difference(run.at(own, t)?, gap)));
+    differences.collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::max)
+}
+
+/// Largest distance between the centres of the same particle in `run` and `other` up to time `until`, box units; `None`
+/// if one of them ends earlier and `until` is finite.
+pub fn center_deviation(run: &Trajectory, other: &Trajectory, until: f64) -> Option<f64> {
+    let end = run.end().min(other.end());
+    if until.is_finite() && end < until * (1.0 - 1e-9) {
+        return None;
+    }
+    let rows = other.times.iter().enumerate().filter(|(_, t)| **t <= until.min(end) * (1.0 + 1e-9));
     let distances = rows.flat_map(|(row, &t)| {
-        (1..=exact.centers.len().min(run.centers.len())).filter_map(move |particle| {
-            let (own, wanted) = (run.center_at(particle, t)?, exact.centers[particle - 1][row]);
+        (1..=other.centers.len().min(run.centers.len())).map(move |particle| {
+            let (own, wanted) = (run.center_at(particle, t)?, other.centers[particle - 1][row]);
             Some((own[0] - wanted[0]).hypot(own[1] - wanted[1]))
         })
     });
-    distances.reduce(f64::max)
+    distances.collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::max)
+}
+
+/// The largest gap D/a of particles 1 and 2 after the time when it is smallest.
+pub fn largest_gap_after_smallest(run: &Trajectory) -> Option<f64> {
+    let gap = run.gap((1, 2))?;
+    let smallest = (0..gap.len()).min_by(|&i, &j| gap[i].total_cmp(&gap[j]))?;
+    gap[smallest..].iter().copied().reduce(f64::max)
+}
+
+/// Largest difference of the gaps D/a of particles 1 and 2 in two runs with the same time step while that of the first is
+/// positive, from the start to its first overlap.
+pub fn gap_difference_before_overlap(run: &Trajectory, other: &Trajectory) -> Option<f64> {
+    let (own, others) = (run.gap((1, 2))?, other.gap((1, 2))?);
+    let before = own.iter().zip(others).take_while(|(own, _)| **own > 0.0);
+    before.map(|(own, other)| (own - other).abs()).reduce(f64::max)
+}
+
+/// The largest gap D/a of particles 1 and 2 in `run` at the times when they touch in `other`.
+pub fn largest_gap_while_touching(run: &Trajectory, other: &Trajectory) -> Option<f64> {
+    let touching = other.times.iter().zip(other.gap((1, 2))?).filter(|(_, gap)| **gap <= CONTACT_BAND);
+    let gap = run.gap((1, 2))?;
+    touching.filter_map(|(&t, _)| run.at(gap, t)).reduce(f64::max)
+}
+
+/// Greatest over least distance of any particle from the point `(1/2, 1/2)` at times `from` and later.
+pub fn orbit_ratio(run: &Trajectory, from: f64) -> Option<f64> {
+    distance_from_center(run, from).map(|(least, greatest)| greatest / least)
+}
+
+/// Largest distance of the middle of particles 1 and 2 from the plane `y = 1/2`, box units.
+pub fn offset_of_the_pair(run: &Trajectory) -> Option<f64> {
+    let [first, second, ..] = &run.centers[..] else { return None };
+    let offsets = first.iter().zip(second).map(|(a, b)| (0.5 * (a[1] + b[1]) - 0.5).abs());
+    offsets.reduce(f64::max)
 }
 
 #[cfg(test)]

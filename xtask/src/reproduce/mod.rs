@@ -1,17 +1,20 @@
 //! `cargo xtask reproduce-figures`: makes the runs, draws the figures, says how they compare.
 
-pub mod checks;
 pub mod files;
 pub mod findings;
+pub mod known;
 pub mod measures;
 pub mod page;
 pub mod plan;
 pub mod progress;
 pub mod reference;
+pub mod rows;
 mod runner;
 pub mod schedule;
+pub mod settings;
 pub mod summary;
 pub mod trajectory;
+pub mod verdict;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,11 +23,12 @@ use std::time::Instant;
 use gluey::RunReport;
 
 use crate::figures::{self, Data};
-use checks::Evidence;
 use files::WriteError;
 use page::Section;
 use plan::{CaseName, FigureName, RunKey};
-use summary::{Failure, Summary};
+use rows::Evidence;
+use settings::Settings;
+use summary::{Failure, Run, Summary};
 use trajectory::Trajectory;
 
 /// Times shown by figures of the 2D pair end here; its exact orbit is continued to this time.
@@ -54,10 +58,12 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
     files::prepare_folder(&runs_folder)?;
 
     let mut failures = Vec::new();
-    let reports = make_runs(options, &runs_folder, &mut failures);
-    let data = load(options, &runs_folder, &reports, &mut failures);
+    let settings = settings(options, &mut failures);
+    let reports = make_runs(options, &runs_folder, &settings, &mut failures);
+    let data = Data { settings, ..load(options, &runs_folder, &reports, &mut failures) };
     let evidence = Evidence { data: &data, reports: &reports };
     let sections: Vec<Section> = options.figures.iter().map(|&figure| section(figure, &evidence)).collect();
+    let rows = rows::all(&options.figures, &evidence);
     for section in &sections {
         write_figure(&options.out, section, &mut failures)?;
     }
@@ -67,8 +73,8 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
         quick: options.quick,
         wall_s: start.elapsed().as_secs_f64(),
         figures: options.figures.iter().map(FigureName::to_string).collect(),
-        checks: checks::all(&options.figures, &evidence),
-        runs: reports.into_values().collect(),
+        rows,
+        runs: runs(reports, &data.settings),
         failures,
     };
     write_summary(&options.out, &summary)?;
@@ -76,8 +82,34 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
     Ok(summary)
 }
 
-fn make_runs(options: &Options, folder: &Path, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, RunReport> {
-    let keys = plan::runs_for(&options.figures);
+/// The settings of all runs whose case can be read.
+fn settings(options: &Options, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, Settings> {
+    let mut settings = BTreeMap::new();
+    for key in plan::runs_for(&options.figures) {
+        match runner::case(&options.root, key, options.quick) {
+            Ok(case) => drop(settings.insert(key, Settings::of(&case))),
+            Err(error) => failures.push(Failure { what: format!("run {key}"), error: runner::chain(&error) }),
+        }
+    }
+    settings
+}
+
+fn runs(reports: BTreeMap<RunKey, RunReport>, settings: &BTreeMap<RunKey, Settings>) -> Vec<Run> {
+    let run = |(key, report): (RunKey, RunReport)| {
+        Some(Run { name: key.name(), settings: settings.get(&key)?.clone(), report })
+    };
+    reports.into_iter().filter_map(run).collect()
+}
+
+/// Makes the runs whose case could be read, the longest first.
+fn make_runs(
+    options: &Options,
+    folder: &Path,
+    settings: &BTreeMap<RunKey, Settings>,
+    failures: &mut Vec<Failure>,
+) -> BTreeMap<RunKey, RunReport> {
+    let mut keys = plan::runs_for(&options.figures);
+    keys.retain(|key| settings.contains_key(key));
     let board = progress::Board::new();
     let results = schedule::in_parallel(&keys, options.jobs, |&key| {
         runner::run(&options.root, folder, key, options.quick, &board)

@@ -31,8 +31,8 @@ impl fmt::Display for CaseName {
     }
 }
 
-/// The four ways each case is computed: the paper's three strategies in its formulation, and gluey contact in the
-/// accurate one.
+/// The ways each case is computed: the paper's three strategies in its formulation, its gluey contact as printed, and gluey
+/// contact in the accurate formulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
     /// No contact model, formulation `paper`.
@@ -41,20 +41,24 @@ pub enum Approach {
     Inelastic,
     /// Gluey contact, formulation `paper`.
     Gluey,
+    /// Gluey contact to the letter of the paper: constraint of first order, memory in whole steps, velocity of a particle at
+    /// its centre; formulation `paper`.
+    GlueyAsPrinted,
+    /// The same with twice the time step, to see what the time step does; in tables only.
+    GlueyAsPrintedLargeStep,
     /// Gluey contact, formulation `rigid-dofs`.
     GlueyRigidDofs,
 }
 
 impl Approach {
-    /// All of them, in the order of legends and tables.
-    pub const ALL: [Self; 4] = [Self::Gluey, Self::Inelastic, Self::None, Self::GlueyRigidDofs];
-
     /// What stands after the case in a run's name.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::None => "none",
             Self::Inelastic => "inelastic",
             Self::Gluey => "gluey",
+            Self::GlueyAsPrinted => "gluey-as-printed",
+            Self::GlueyAsPrintedLargeStep => "gluey-as-printed-large-step",
             Self::GlueyRigidDofs => "gluey-rigid-dofs",
         }
     }
@@ -78,7 +82,7 @@ impl RunKey {
     /// A guess at the cost of the run relative to the others; only the order of the runs depends on it.
     fn cost(self) -> u32 {
         match (self.case, self.approach) {
-            (CaseName::Pair3d, Approach::GlueyRigidDofs) => 100,
+            (CaseName::Pair3d, Approach::GlueyRigidDofs | Approach::GlueyAsPrintedLargeStep) => 100,
             (CaseName::Pair3d, _) => 200,
             (CaseName::Trio2d, Approach::GlueyRigidDofs) => 60,
             (CaseName::Pair2d, Approach::GlueyRigidDofs) => 50,
@@ -157,12 +161,29 @@ impl FigureName {
 
     /// The ways of computing its case that it shows, in the order of its legend.
     pub fn approaches(self) -> Vec<Approach> {
+        use Approach::{Gluey, GlueyAsPrinted, GlueyRigidDofs, Inelastic, None};
         match self {
             Self::Fig4 | Self::Fig8 => Vec::new(),
-            Self::Fig10 => vec![Approach::Gluey, Approach::None, Approach::GlueyRigidDofs],
-            Self::Fig11 => vec![Approach::Gluey, Approach::Inelastic, Approach::GlueyRigidDofs],
-            _ => Approach::ALL.to_vec(),
+            Self::Fig5 | Self::Fig6 | Self::Fig7a | Self::Fig7b => {
+                vec![Gluey, GlueyAsPrinted, Inelastic, None, GlueyRigidDofs]
+            }
+            Self::Fig9 => vec![Gluey, Inelastic, None, GlueyRigidDofs],
+            Self::Fig10 => vec![Gluey, None, GlueyRigidDofs],
+            Self::Fig11 => vec![Gluey, Inelastic, GlueyRigidDofs],
         }
+    }
+
+    /// The runs behind its drawing and its tables.
+    pub fn runs(self) -> Vec<RunKey> {
+        let key = |case: CaseName| move |approach| RunKey { case, approach };
+        let mut runs: Vec<RunKey> = self.approaches().into_iter().map(key(self.case())).collect();
+        match self {
+            Self::Fig5 | Self::Fig7a => runs.push(key(self.case())(Approach::GlueyAsPrintedLargeStep)),
+            // How much three discs differ is told beside how much two do.
+            Self::Fig10 => runs.extend([Approach::Gluey, Approach::None].map(key(CaseName::Pair2d))),
+            _ => {}
+        }
+        runs
     }
 }
 
@@ -188,10 +209,7 @@ impl FromStr for FigureName {
 
 /// The runs these figures need, each once, the longest first.
 pub fn runs_for(figures: &[FigureName]) -> Vec<RunKey> {
-    let needed = figures.iter().flat_map(|figure| {
-        figure.approaches().into_iter().map(|approach| RunKey { case: figure.case(), approach })
-    });
-    let mut runs: Vec<RunKey> = needed.collect();
+    let mut runs: Vec<RunKey> = figures.iter().flat_map(|figure| figure.runs()).collect();
     runs.sort();
     runs.dedup();
     runs.sort_by_key(|run| std::cmp::Reverse(run.cost()));
@@ -224,16 +242,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_figures_need_twelve_runs_and_the_spheres_go_first() {
+    fn all_figures_need_sixteen_runs_and_the_spheres_go_first() {
         let runs = runs_for(&FigureName::ALL);
-        assert_eq!(runs.len(), 12);
-        assert!(runs[..4].iter().all(|run| run.case == CaseName::Pair3d));
+        assert_eq!(runs.len(), 16);
+        assert!(runs[..6].iter().all(|run| run.case == CaseName::Pair3d));
     }
 
     #[test]
     fn a_single_figure_makes_only_its_own_runs() {
-        let names: Vec<String> = runs_for(&[FigureName::Fig10]).iter().map(|run| run.name()).collect();
-        assert_eq!(names, ["trio-2d-gluey-rigid-dofs", "trio-2d-none", "trio-2d-gluey"]);
+        let names: Vec<String> = runs_for(&[FigureName::Fig11]).iter().map(|run| run.name()).collect();
+        assert_eq!(names, ["trio-2d-gluey-rigid-dofs", "trio-2d-inelastic", "trio-2d-gluey"]);
         assert!(runs_for(&[FigureName::Fig4, FigureName::Fig8]).is_empty());
     }
 

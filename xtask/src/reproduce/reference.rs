@@ -9,8 +9,6 @@ use super::trajectory::{Trajectory, TrajectoryError};
 pub const HALF_TURN_TIME: f64 = 7.769130;
 /// Time of closest approach of the 3D pair in the unit box, to 0.01.
 pub const CLOSEST_APPROACH_TIME: f64 = 8.422;
-/// Distance of each particle of the 2D doublet from the box centre.
-pub const DOUBLET_RADIUS: f64 = 0.05001;
 
 /// Name of the file under `data/reference` with the exact solution of a case.
 pub fn file_name(case: CaseName) -> &'static str {
@@ -31,6 +29,9 @@ pub fn load(root: &Path, case: CaseName, end: f64) -> Result<Trajectory, Traject
 mod tests {
     use super::super::measures;
     use super::*;
+
+    /// Distance of each particle of the 2D doublet from the box centre.
+    const DOUBLET_RADIUS: f64 = 0.05001;
 
     fn exact(case: CaseName) -> Trajectory {
         load(&crate::workspace_root(), case, 30.0).unwrap()

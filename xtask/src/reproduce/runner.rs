@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
+use gluey::case::{Memory, ParticleVelocity};
 use gluey::{Case, CaseError, Formulation, RunOptions, RunReport, Strategy};
 
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
@@ -16,13 +17,24 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     };
     let mut case = Case::load(root.join("data/cases").join(format!("{file}.toml")))?;
     case.name = key.case.to_string();
-    (case.contact.strategy, case.flow.formulation) = match key.approach {
-        Approach::None => (Strategy::None, Formulation::Paper),
-        Approach::Inelastic => (Strategy::Inelastic, Formulation::Paper),
-        Approach::Gluey => (Strategy::Gluey, Formulation::Paper),
-        Approach::GlueyRigidDofs => (Strategy::Gluey, Formulation::RigidDofs),
-    };
     case.contact.exact_gap = true;
+    case.contact.strategy = match key.approach {
+        Approach::None => Strategy::None,
+        Approach::Inelastic => Strategy::Inelastic,
+        _ => Strategy::Gluey,
+    };
+    case.flow.formulation = match key.approach {
+        Approach::GlueyRigidDofs => Formulation::RigidDofs,
+        _ => Formulation::Paper,
+    };
+    if matches!(key.approach, Approach::GlueyAsPrinted | Approach::GlueyAsPrintedLargeStep) {
+        case.contact.exact_gap = false;
+        case.contact.memory = Memory::Paper;
+        case.flow.paper.velocity = ParticleVelocity::Center;
+    }
+    if key.approach == Approach::GlueyAsPrintedLargeStep {
+        case.time.step *= 2.0;
+    }
     if quick {
         let settings = quick_settings(key.case);
         case.flow.mesh.cells_per_radius = Some(settings.cells_per_radius);

@@ -3,7 +3,8 @@
 use gluey::RunReport;
 use serde::Serialize;
 
-use super::checks::Check;
+use super::settings::Settings;
+use super::verdict::Row;
 
 /// The content of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -17,11 +18,22 @@ pub struct Summary {
     /// The figures drawn.
     pub figures: Vec<String>,
     /// The runs that succeeded.
-    pub runs: Vec<RunReport>,
+    pub runs: Vec<Run>,
     /// What did not work.
     pub failures: Vec<Failure>,
     /// What the runs show.
-    pub checks: Vec<Check>,
+    pub rows: Vec<Row>,
+}
+
+/// A run that succeeded.
+#[derive(Clone, Debug, Serialize)]
+pub struct Run {
+    /// Its name, that of its CSV file.
+    pub name: String,
+    /// What it was computed with.
+    pub settings: Settings,
+    /// Its result in numbers.
+    pub report: RunReport,
 }
 
 /// Something that did not work.
@@ -34,6 +46,11 @@ pub struct Failure {
 }
 
 impl Summary {
+    /// Whether everything was computed and every row holds or is a known disagreement.
+    pub fn succeeded(&self) -> bool {
+        self.failures.is_empty() && !self.rows.iter().any(Row::is_failure)
+    }
+
     /// As indented JSON.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self).map(|json| json + "\n")

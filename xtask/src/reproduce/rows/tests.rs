@@ -1,0 +1,90 @@
+//! Rows can fail: by a wrong run, by a missing one and by one that is too short.
+
+use super::*;
+use crate::reproduce::known::KNOWN;
+use crate::reproduce::reference;
+use crate::reproduce::settings::Settings;
+use crate::reproduce::verdict::Outcome;
+
+const RUNS: [(CaseName, f64); 3] =
+    [(CaseName::Pair2d, 30.0), (CaseName::Pair3d, 16.8), (CaseName::Trio2d, 12.0)];
+
+/// Data for [`Evidence`] with the exact solutions as if `rigid-dofs` had computed them, with a clock that is `shift` slow.
+struct Exact {
+    data: Data,
+    reports: BTreeMap<RunKey, RunReport>,
+}
+
+impl Exact {
+    fn new(shift: f64, planned_end: impl Fn(f64) -> f64) -> Self {
+        let mut data = Data::default();
+        for (case, end) in RUNS {
+            let key = RunKey { case, approach: Approach::GlueyRigidDofs };
+            let exact = reference::load(&crate::workspace_root(), case, 30.0).unwrap();
+            let mut run = exact.clone();
+            run.times.iter_mut().for_each(|t| *t *= 1.0 + shift);
+            data.runs.insert(key, run);
+            data.exact.insert(case, exact);
+            let none = String::new;
+            let (flow, contact, domain) = (none(), none(), none());
+            let end = planned_end(end);
+            let own = Settings { flow, contact, domain, cells_per_radius: 1.0, time_step: 0.1, end };
+            data.settings.insert(key, own);
+        }
+        Self { data, reports: BTreeMap::new() }
+    }
+
+    /// The rows that compare `rigid-dofs` with the exact solutions, but for the one that is read from a report.
+    fn rows(&self) -> Vec<Row> {
+        let evidence = Evidence { data: &self.data, reports: &self.reports };
+        let mut rows = all(&FigureName::ALL, &evidence);
+        rows.retain(|row| row.kind == Kind::Exact && row.run.ends_with("rigid-dofs"));
+        rows.retain(|row| row.id != "fig7a-reversibility-rigid");
+        rows
+    }
+}
+
+#[test]
+fn the_exact_solutions_agree_with_themselves() {
+    let rows = Exact::new(0.0, |end| end).rows();
+    assert_eq!(rows.len(), 10);
+    assert!(rows.iter().all(|row| row.outcome == Outcome::Yes), "{rows:#?}");
+}
+
+#[test]
+fn a_clock_ten_percent_slow_is_noticed() {
+    let rows = Exact::new(0.1, |end| end).rows();
+    // The shape of the orbit and the smallest gap do not know the time; the others do.
+    let timeless = ["fig6-circle-rigid", "fig7a-smallest-rigid"];
+    for row in rows.iter().filter(|row| !timeless.contains(&row.id)) {
+        assert_eq!(row.outcome, Outcome::No, "{row:#?}");
+    }
+}
+
+#[test]
+fn a_run_that_ends_too_early_measures_nothing() {
+    for row in Exact::new(0.0, |end| 2.0 * end).rows() {
+        assert_eq!((row.outcome, row.value), (Outcome::NotMeasured, None), "{row:#?}");
+    }
+}
+
+#[test]
+fn missing_runs_are_failures() {
+    let (data, reports) = (Data::default(), BTreeMap::new());
+    let rows = all(&FigureName::ALL, &Evidence { data: &data, reports: &reports });
+    assert!(rows.len() > 40 && rows.iter().all(Row::is_failure), "{rows:#?}");
+}
+
+#[test]
+fn every_figure_with_runs_has_statements_and_every_row_its_own_name() {
+    let (data, reports) = (Data::default(), BTreeMap::new());
+    let rows = all(&FigureName::ALL, &Evidence { data: &data, reports: &reports });
+    for figure in FigureName::ALL.into_iter().filter(|figure| !figure.approaches().is_empty()) {
+        let statements = rows.iter().filter(|row| row.figure == figure.as_str() && row.kind == Kind::Paper);
+        assert!(statements.count() >= 2, "{figure}");
+    }
+    let mut names: Vec<&str> = rows.iter().map(|row| row.id).collect();
+    names.sort_unstable();
+    assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+    assert!(KNOWN.iter().all(|known| names.contains(&known.id)), "a known disagreement about no row");
+}

@@ -1,0 +1,215 @@
+//! Rows under the figures: what is claimed, the number that decides it, and whether it is so.
+
+use serde::Serialize;
+
+use super::known::{self, Mode};
+use super::plan::FigureName;
+
+/// Why a row is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A statement of the paper: reproduced or not.
+    Paper,
+    /// A comparison with an exact solution.
+    Exact,
+    /// Holds by construction of the contact model, for any flow: no evidence, but a defect if it does not hold.
+    Guarantee,
+}
+
+/// Whether a row's number is what it should be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// It is.
+    Yes,
+    /// It is not.
+    No,
+    /// The run is missing or too short, or the number is not finite.
+    NotMeasured,
+}
+
+/// An interval of wanted values.
+#[derive(Clone, Copy, Debug)]
+pub enum Wanted {
+    /// No smaller than this.
+    AtLeast(f64),
+    /// No larger than this.
+    AtMost(f64),
+    /// From the first to the second.
+    Between(f64, f64),
+}
+
+impl Wanted {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Self::AtLeast(low) => value >= low,
+            Self::AtMost(high) => value <= high,
+            Self::Between(low, high) => (low..=high).contains(&value),
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            Self::AtLeast(low) => format!("at least {}", short(low)),
+            Self::AtMost(high) => format!("at most {}", short(high)),
+            Self::Between(low, high) => format!("between {} and {}", short(low), short(high)),
+        }
+    }
+}
+
+/// A number in few characters.
+fn short(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { format!("{value}") }
+}
+
+/// A statement with the number that decides it, before it is judged.
+#[derive(Clone, Debug)]
+pub struct Claim {
+    /// Names the row for good, such as `fig9-third-joins`.
+    pub id: &'static str,
+    /// Why it is there.
+    pub kind: Kind,
+    /// The statement.
+    pub statement: &'static str,
+    /// The run or runs it is about.
+    pub run: &'static str,
+    /// What is measured.
+    pub measure: &'static str,
+    /// The number; `None` if it could not be measured.
+    pub value: Option<f64>,
+    /// What it should be.
+    pub wanted: Wanted,
+    /// It needs the full computation: runs of `--quick` end earlier.
+    pub full_only: bool,
+}
+
+impl Claim {
+    /// The same, but left out of `--quick`.
+    pub fn full_only(self) -> Self {
+        Self { full_only: true, ..self }
+    }
+
+    /// The row that stands under `figure`.
+    pub fn judge(self, figure: FigureName, mode: Mode) -> Row {
+        let value = self.value.filter(|value| value.is_finite());
+        let outcome = match value {
+            None => Outcome::NotMeasured,
+            Some(value) if self.wanted.holds(value) => Outcome::Yes,
+            Some(_) => Outcome::No,
+        };
+        Row {
+            id: self.id,
+            figure: figure.to_string(),
+            kind: self.kind,
+            statement: self.statement,
+            run: self.run,
+            measure: self.measure,
+            value,
+            wanted: self.wanted.text(),
+            outcome,
+            reason: known::reason(self.id, mode).filter(|_| outcome == Outcome::No),
+        }
+    }
+}
+
+/// One judged row.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Names the row for good.
+    pub id: &'static str,
+    /// The figure under which it is shown.
+    pub figure: String,
+    /// Why it is there.
+    pub kind: Kind,
+    /// The statement.
+    pub statement: &'static str,
+    /// The run or runs it is about.
+    pub run: &'static str,
+    /// What is measured.
+    pub measure: &'static str,
+    /// The number; `None` if it could not be measured.
+    pub value: Option<f64>,
+    /// What it should be.
+    pub wanted: String,
+    /// Whether it is.
+    pub outcome: Outcome,
+    /// For a known disagreement, the reason.
+    pub reason: Option<&'static str>,
+}
+
+impl Row {
+    /// Whether the reproduction fails because of this row: it does not hold and is no known disagreement, or it could not
+    /// be measured at all.
+    pub fn is_failure(&self) -> bool {
+        match self.outcome {
+            Outcome::Yes => false,
+            Outcome::No => self.reason.is_none(),
+            Outcome::NotMeasured => true,
+        }
+    }
+
+    /// Whether it is a known disagreement.
+    pub fn is_known(&self) -> bool {
+        self.outcome == Outcome::No && self.reason.is_some()
+    }
+}
+
+/// How many rows of a kind hold, and how many there are.
+pub fn count(rows: &[Row], kind: Kind) -> (usize, usize) {
+    let own = rows.iter().filter(|row| row.kind == kind);
+    let held = own.clone().filter(|row| row.outcome == Outcome::Yes).count();
+    (held, own.count())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claim(value: Option<f64>, wanted: Wanted) -> Claim {
+        Claim {
+            id: "fig5-test",
+            kind: Kind::Paper,
+            statement: "It is so.",
+            run: "pair-2d-none",
+            measure: "a number",
+            value,
+            wanted,
+            full_only: false,
+        }
+    }
+
+    fn outcome(value: Option<f64>, wanted: Wanted) -> Outcome {
+        claim(value, wanted).judge(FigureName::Fig5, Mode::Full).outcome
+    }
+
+    #[test]
+    fn limits_are_inclusive_and_what_is_not_a_number_is_not_measured() {
+        assert_eq!(outcome(Some(1.0), Wanted::AtMost(1.0)), Outcome::Yes);
+        assert_eq!(outcome(Some(1.1), Wanted::AtMost(1.0)), Outcome::No);
+        assert_eq!(outcome(Some(0.9), Wanted::AtLeast(1.0)), Outcome::No);
+        assert_eq!(outcome(Some(0.5), Wanted::Between(0.0, 0.4)), Outcome::No);
+        for value in [None, Some(f64::NAN), Some(f64::INFINITY)] {
+            assert_eq!(outcome(value, Wanted::AtMost(1.0)), Outcome::NotMeasured);
+        }
+    }
+
+    #[test]
+    fn what_is_not_measured_or_unexpectedly_wrong_is_a_failure() {
+        let judged = |value| claim(value, Wanted::AtMost(1.0)).judge(FigureName::Fig5, Mode::Full);
+        assert!(judged(None).is_failure());
+        assert!(judged(Some(2.0)).is_failure());
+        assert!(!judged(Some(0.0)).is_failure());
+    }
+
+    #[test]
+    fn known_disagreements_are_no_failures_but_stay_counted_as_no() {
+        let listed = known::KNOWN.iter().find(|known| known.full.is_some()).expect("there are some");
+        let row = Claim { id: listed.id, ..claim(Some(2.0), Wanted::AtMost(1.0)) };
+        let row = row.judge(FigureName::Fig5, Mode::Full);
+        assert!(row.is_known() && !row.is_failure());
+        assert_eq!(count(&[row], Kind::Paper), (0, 1));
+        let missing = Claim { id: listed.id, ..claim(None, Wanted::AtMost(1.0)) };
+        assert!(missing.judge(FigureName::Fig5, Mode::Full).is_failure());
+    }
+}
