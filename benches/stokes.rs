@@ -15,6 +15,7 @@ use gluey_stokes::{
     PointMatrices, Preparation, Refinement, SaddleSolver, SolidRegion, SolidStress, SolverKind, StokesSystem,
     SystemOperator, VelocitySpace, WeakPressures, solid_nodes,
 };
+use gluey_testkit::packing::Packing;
 
 /// Offset of the rigid nodes in cells.
 const OFFSET: f64 = -0.1;
@@ -264,12 +265,52 @@ fn steps(criterion: &mut Criterion) {
     step(criterion, "pair-3d-rigid-dofs", params(RIGID, SolverKind::Multigrid), pair_3d(), (7, 0.0), 0.05);
 }
 
+/// Fifty spheres in a periodic cube, and as many copies of it as it takes; `docs/benchmarks.md` names the mesh.
+fn suspension(copies: usize) -> (Vec<Ball<3>>, [u32; 3], Vector<3>) {
+    let packing = Packing::<3>::fluid(50, 0.2, 1);
+    let tiles = [1, 2, 4].map(|before| if copies > before { 2 } else { 1 });
+    let extent = Vector::from(tiles.map(f64::from)) * packing.side;
+    let period = [Some(extent[0]), None, Some(extent[2])];
+    let image = |k: usize| Vector::from_fn(|d, _| (k >> d & 1) as f64 * packing.side);
+    let copy = |k: usize| packing.positions.iter().map(move |x| Ball::periodic(x + image(k), 0.48, period));
+    ((0..copies).flat_map(copy).collect(), tiles, extent)
+}
+
+/// Where the bodies are on a mesh: what must not grow faster than its cells.
+fn suspensions(criterion: &mut Criterion) {
+    let matrices = PointMatrices::new(PaperParams::default().quadrature);
+    for copies in [1, 2, 4, 8] {
+        let (balls, roots, extent) = suspension(copies);
+        let domain = Aabb { lower: Vector::zeros(), upper: extent };
+        let refinement = Refinement { coarsest: 3, surface: 5, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
+        let mesh = || refinement.mesh(domain, roots, [true, false, true], &balls).expect("a box of cubes");
+        let discretisation = Discretisation::new(mesh());
+        let (nodes, ramp) = (&discretisation.velocity, Ramp::new(discretisation.mesh.size(5)));
+        let region = SolidRegion::new(&discretisation, &balls, ramp, &matrices);
+        let velocity = vec![1.0; nodes.node_count() * 3];
+        let mut group = criterion.benchmark_group("suspension");
+        let id = |what: &str| BenchmarkId::new(what, balls.len());
+        group.throughput(Throughput::Elements(discretisation.mesh.cell_count() as u64));
+        group.bench_function(id("mesh"), |b| b.iter(&mesh));
+        group.bench_function(id("solid-nodes"), |b| {
+            b.iter(|| solid_nodes(&discretisation.mesh, nodes, &balls, OFFSET));
+        });
+        group.bench_function(id("solid-region"), |b| {
+            b.iter(|| SolidRegion::new(&discretisation, &balls, ramp, &matrices));
+        });
+        group.bench_function(id("touched-nodes"), |b| b.iter(|| region.touched_nodes(nodes, &balls)));
+        group.bench_function(id("twists"), |b| {
+            b.iter(|| region.twists(&discretisation, &balls, &matrices, &velocity));
+        });
+    }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))
         .measurement_time(Duration::from_secs(1));
-    targets = operators, cycles, solvers, steps
+    targets = operators, cycles, solvers, steps, suspensions
 }
 criterion_main!(benches);

@@ -75,6 +75,11 @@ impl<'a, const D: usize> BallTree<'a, D> {
         new
     }
 
+    /// The balls.
+    pub fn balls(&self) -> &'a [Ball<D>] {
+        self.balls
+    }
+
     /// The body with the largest level set at `x`, and its value, as [`crate::nearest`] gives them. Of equals, the first.
     pub fn nearest(&self, x: &Vector<D>) -> Option<(usize, f64)> {
         self.nearest_within(x, f64::INFINITY)

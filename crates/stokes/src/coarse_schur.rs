@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::assembly::{assemble_viscous, factorised};
 use crate::discretisation::Discretisation;
 use crate::element::Elements;
-use crate::error::StokesError;
+use crate::error::{SmallMatrix, StokesError};
 use crate::pressure_weights::without_bodies;
 use crate::schur::pressure_matrix;
 use crate::system::{StokesSystem, SystemOperator};
@@ -130,8 +130,11 @@ fn correction<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let failed =
-        |what: &str| StokesError::Smoother { level: 0, reason: format!("pressures of the box: {what}") };
+    let failed = |matrix| StokesError::BoxPressures {
+        matrix,
+        pressures: unknowns.len(),
+        cells: discretisation.mesh.cell_count(),
+    };
     let elements = Elements::new(discretisation, system, gluey_fem::Reference::<D>::VELOCITY);
     let mass = pressure_matrix(discretisation, system, &elements, viscosity)?;
     let count = unknowns.len();
@@ -139,8 +142,8 @@ where
     let mut schur = dense_schur(discretisation, system, unknowns)? + SHARE_OF_MASS * &mass;
     // Constants, which no velocity sees, get a stiffness like that of the rest.
     schur.add_scalar_mut(schur.trace() / (count * count) as f64);
-    let schur = schur.cholesky().ok_or_else(|| failed("no positive Schur complement"))?;
-    let mass = mass.cholesky().ok_or_else(|| failed("no positive mass"))?;
+    let schur = schur.cholesky().ok_or_else(|| failed(SmallMatrix::Schur))?;
+    let mass = mass.cholesky().ok_or_else(|| failed(SmallMatrix::Mass))?;
     Ok((schur.inverse() - mass.inverse()).cast())
 }
 
@@ -218,6 +221,18 @@ mod tests {
         let (xy, yx) = (product(&mut correction, &x, &y), product(&mut correction, &y, &x));
         assert!((xy - yx).abs() < 1e-4 * xy.abs(), "{xy} {yx}");
         assert!(CoarseSchur::new(&long_box(300), 2.0, None).unwrap().is_none());
+    }
+
+    /// A negative viscosity makes a negative mass.
+    #[test]
+    fn a_matrix_that_is_not_positive_is_named() {
+        let mesh = &long_box(3)[0];
+        let system = without_bodies(mesh, 2.0);
+        let unknowns: Vec<u32> = (0..system.pressure.dim() as u32).collect();
+        let refused = correction(mesh, &system, -2.0, &unknowns).err();
+        let expected =
+            StokesError::BoxPressures { matrix: SmallMatrix::Mass, pressures: 13 * 17, cells: 12 * 16 };
+        assert_eq!(refused, Some(expected));
     }
 
     #[test]

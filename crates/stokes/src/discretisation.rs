@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use gluey_fem::{Chunks, NodeMap, TreeMesh};
 
-use gluey_levelset::{LevelSet, nearest};
+use gluey_levelset::{Ball, BallTree};
 
 use crate::space::SolidNodes;
 
@@ -43,10 +43,10 @@ impl<const D: usize> Discretisation<D> {
 
 /// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size of the
 /// smallest cell at the node. A negative offset takes nodes slightly outside the surface.
-pub fn solid_nodes<const D: usize, B: LevelSet<D>>(
+pub fn solid_nodes<const D: usize>(
     mesh: &TreeMesh<D>,
     nodes: &NodeMap<D>,
-    bodies: &[B],
+    bodies: &[Ball<D>],
     offset: f64,
 ) -> SolidNodes {
     let mut finest = vec![0; nodes.node_count()];
@@ -55,9 +55,10 @@ pub fn solid_nodes<const D: usize, B: LevelSet<D>>(
             finest[node as usize] = cell.level.max(finest[node as usize]);
         }
     }
+    let bodies = BallTree::new(bodies);
     let at = |node: usize| {
         let threshold = offset * mesh.size(finest[node]);
-        nearest(bodies, &nodes.point(node)).filter(|b| b.1 >= threshold).map(|b| b.0 as u32)
+        bodies.nearest_within(&nodes.point(node), -threshold).map(|b| b.0 as u32)
     };
     (0..nodes.node_count()).map(at).collect()
 }

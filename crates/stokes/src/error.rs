@@ -1,7 +1,7 @@
 //! Why a flow could not be computed.
 
 use gluey_fem::MeshError;
-use gluey_linalg::{BlockError, DirectError, KrylovError, SparseError};
+use gluey_linalg::{BadDiagonal, BlockError, DirectError, KrylovError, SparseError};
 
 /// Failure of a Stokes solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,11 +11,26 @@ pub enum StokesError {
     Mesh(#[from] MeshError),
     /// A body is too small for the mesh.
     #[error(
-        "body {body} (radius {radius}) has too few nodes on cells of size {cell_size}: refine the mesh to cells \
-         smaller than the radius"
+        "body {} has a radius of {:.3} cells ({radius}, cells of size {cell_size}) and too few nodes: refine the mesh to \
+         cells smaller than the radius",
+        body + 1, radius / cell_size
     )]
     Unresolved {
-        /// Index of the body, from 0.
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// Its radius.
+        radius: f64,
+        /// Size of the finest cells.
+        cell_size: f64,
+    },
+    /// No quadrature point of the penalised solid belongs to a body, or so few that they fix no rotation: its motion is unknown.
+    #[error(
+        "body {} with a radius of {:.3} cells ({radius}, cells of size {cell_size}) has no solid from which to tell its \
+         motion: refine the mesh, or move it out of the body that covers it",
+        body + 1, radius / cell_size
+    )]
+    NoSolid {
+        /// Index of the body, from 0; messages count from 1.
         body: usize,
         /// Its radius.
         radius: f64,
@@ -45,14 +60,112 @@ pub enum StokesError {
     #[error(transparent)]
     Krylov(#[from] KrylovError),
     /// A level of the multigrid has an unknown without stiffness.
-    #[error("level {level} of the multigrid cannot be smoothed: {reason}")]
+    #[error("level {level} of the multigrid cannot be smoothed: {source}")]
     Smoother {
         /// Level, 0 is the coarsest.
         level: usize,
         /// What is wrong.
-        reason: String,
+        source: DiagonalError,
+    },
+    /// The fluid around a penalised solid cannot be smoothed.
+    #[error("the fluid around the solid cannot be smoothed: {0}")]
+    AroundSolid(#[source] DiagonalError),
+    /// The penalised operator on the nodes of a cell is not positive definite.
+    #[error("the solid cannot be smoothed cell by cell: {0}")]
+    SolidPatch(#[source] BlockError),
+    /// The matrix that stands for the Schur complement has a bad diagonal.
+    #[error("the mass of the pressures: {0}")]
+    PressureMass(#[source] BadDiagonal),
+    /// The pressures as large as the box cannot be answered.
+    #[error("the {matrix} of the {pressures} pressures of a mesh of {cells} cells is not positive definite")]
+    BoxPressures {
+        /// What is not positive definite.
+        matrix: SmallMatrix,
+        /// Its size.
+        pressures: usize,
+        /// Cells of the coarsest mesh.
+        cells: usize,
+    },
+    /// The pressures of a gap cannot be answered.
+    #[error(
+        "the {matrix} of the gap at {place:?}, with {pressures} pressures and {velocities} velocities, is not positive \
+         definite"
+    )]
+    GapPressures {
+        /// What is not positive definite.
+        matrix: SmallMatrix,
+        /// A node of the gap.
+        place: Vec<f64>,
+        /// Pressures of the gap.
+        pressures: usize,
+        /// Velocities that these act on.
+        velocities: usize,
     },
     /// A solve was asked for before the solver was prepared.
     #[error("the solver was not prepared for this system")]
     NotPrepared,
+}
+
+/// What has no inverse in the diagonal of an operator.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DiagonalError {
+    /// An entry is not positive.
+    #[error("the diagonal entry of node {node} is {value:e}")]
+    Node {
+        /// The node.
+        node: usize,
+        /// The entry.
+        value: f64,
+    },
+    /// The resistance of a body is not positive definite.
+    #[error("the resistance of body {}: {source}", body + 1)]
+    Body {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// What is wrong.
+        source: BlockError,
+    },
+}
+
+/// A small dense matrix of some pressures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SmallMatrix {
+    /// Stiffness of the velocities that the pressures act on.
+    Stiffness,
+    /// Schur complement.
+    Schur,
+    /// What stands for the Schur complement elsewhere.
+    Mass,
+}
+
+impl std::fmt::Display for SmallMatrix {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stiffness => "stiffness",
+            Self::Schur => "Schur complement",
+            Self::Mass => "mass",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// People count bodies from one, and think of radii in cells.
+    #[test]
+    fn messages_name_bodies_and_numbers() {
+        let (body, radius, cell_size) = (2, 0.05, 0.125);
+        for error in [
+            StokesError::Unresolved { body, radius, cell_size },
+            StokesError::NoSolid { body, radius, cell_size },
+        ] {
+            let text = error.to_string();
+            assert!(text.contains("body 3") && text.contains("0.400 cells"), "{text}");
+        }
+        let source =
+            DiagonalError::Body { body, source: BlockError::NotPositiveDefinite { pivot: 4, value: -1e-3 } };
+        let text = StokesError::Smoother { level: 5, source }.to_string();
+        assert!(["level 5", "body 3", "pivot 4", "-1e-3"].iter().all(|part| text.contains(part)), "{text}");
+    }
 }

@@ -150,7 +150,7 @@ where
         };
         let pressure = problem.pressure(&x);
         let mut velocity = problem.velocity(&lift, &x);
-        let twists = problem.twists(&velocity);
+        let twists = problem.twists(&velocity)?;
         velocity.truncate(problem.system.space.full_dim());
         self.keep_for_next(&problem, &x, &pressure, before);
         let end = (self.clock)();

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 
 use crate::assembly::{Expansion, pressure_expansion, velocity_expansion};
 use crate::discretisation::Discretisation;
-use crate::error::StokesError;
+use crate::error::{SmallMatrix, StokesError};
 use crate::system::{ActiveCell, StokesSystem};
 
 /// Larger clusters are left to the mass matrix: their dense matrices would cost more than the iterations they save.
@@ -52,7 +52,10 @@ impl GapInverse {
             velocity: velocity_expansion(&system.space),
             pressure: pressure_expansion(system),
         };
-        let blocks = forms.clusters().into_iter().filter_map(|p| forms.block(p, mass).transpose());
+        let gaps = forms.gaps();
+        let in_gaps = gaps.iter().flat_map(|gap| gap.velocities.iter().copied());
+        let cells = forms.cells_with(&marked(system.velocity_dim(), in_gaps), Forms::velocities_of);
+        let blocks = gaps.into_iter().map(|gap| forms.block(gap, &cells, mass));
         Ok(Self { blocks: blocks.collect::<Result<_, _>>()? })
     }
 
@@ -65,6 +68,12 @@ impl GapInverse {
             }
         }
     }
+}
+
+/// The pressures of a gap and the velocities that they act on, sorted.
+struct Gap {
+    pressures: Vec<u32>,
+    velocities: Vec<u32>,
 }
 
 /// The cells in terms of the unknowns.
@@ -82,43 +91,74 @@ impl<const D: usize> Forms<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    /// The pressures of the cells with a weak one; cells that share any are in one cluster.
-    fn clusters(&self) -> Vec<Vec<u32>> {
-        let weak = self.system.pressure.weak();
-        let mut clusters: Vec<Vec<u32>> = Vec::new();
-        for cell in &self.system.cells {
-            let pressures = self.pressures(cell);
-            if !self.is_fluid(cell) || !meet(&pressures, weak) {
-                continue;
-            }
-            let (mut joined, apart): (Vec<_>, Vec<_>) =
-                clusters.into_iter().partition(|cluster| meet(cluster, &pressures));
-            joined.push(pressures);
-            clusters = apart;
-            clusters.push(sorted(joined.into_iter().flatten()));
-        }
-        clusters
+    /// The gaps whose matrices are small enough.
+    fn gaps(&self) -> Vec<Gap> {
+        let clusters = self.clusters();
+        let in_clusters = marked(self.system.pressure.dim(), clusters.iter().flatten().copied());
+        let cells = self.cells_with(&in_clusters, Self::pressures_of);
+        let gap = |pressures: Vec<u32>| {
+            let acting = cells_of(&cells, &pressures);
+            let velocities =
+                acting.into_iter().flat_map(|cell| self.velocities_of(&self.system.cells[cell as usize]));
+            Gap { velocities: sorted(velocities), pressures }
+        };
+        clusters.into_iter().map(gap).filter(|gap| gap.velocities.len() <= MOST_VELOCITIES).collect()
     }
 
-    fn block(&self, pressures: Vec<u32>, mass: &SparseMatrix) -> Result<Option<Block>, StokesError> {
-        let acting = self.system.cells.iter().filter(|cell| meet(&self.pressures(cell), &pressures));
-        let velocities = sorted(acting.flat_map(|cell| self.velocities(cell)));
-        let (n, m) = (velocities.len(), pressures.len());
-        if n > MOST_VELOCITIES {
-            return Ok(None);
+    /// The pressures of the cells with a weak one; cells that share any are in one cluster.
+    fn clusters(&self) -> Vec<Vec<u32>> {
+        let weak = marked(self.system.pressure.dim(), self.system.pressure.weak().iter().copied());
+        let mut parents: Vec<u32> = (0..weak.len() as u32).collect();
+        let mut members = Vec::new();
+        for cell in self.system.cells.iter().filter(|cell| self.is_fluid(cell)) {
+            let pressures = sorted(self.pressures_of(cell));
+            if pressures.iter().any(|&q| weak[q as usize]) {
+                pressures.windows(2).for_each(|pair| join(&mut parents, pair[0], pair[1]));
+                members.extend(pressures);
+            }
         }
+        let members = sorted(members.into_iter());
+        let mut rooted: Vec<(u32, u32)> = members.into_iter().map(|q| (root(&mut parents, q), q)).collect();
+        rooted.sort_unstable();
+        rooted.chunk_by(|a, b| a.0 == b.0).map(|cluster| cluster.iter().map(|q| q.1).collect()).collect()
+    }
+
+    /// The wanted unknowns with the cells that have them among theirs, sorted.
+    fn cells_with<'b, I: Iterator<Item = u32>>(
+        &'b self,
+        wanted: &[bool],
+        unknowns: impl Fn(&'b Self, &'b ActiveCell) -> I,
+    ) -> Vec<(u32, u32)> {
+        let mut all = Vec::new();
+        for (index, cell) in self.system.cells.iter().enumerate() {
+            let wanted = unknowns(self, cell).filter(|&k| wanted[k as usize]);
+            all.extend(wanted.map(|k| (k, index as u32)));
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    fn block(&self, gap: Gap, cells: &[(u32, u32)], mass: &SparseMatrix) -> Result<Block, StokesError> {
+        let Gap { pressures, velocities } = gap;
+        let (n, m) = (velocities.len(), pressures.len());
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, m));
         let reference = Reference::<D>::new();
-        for cell in self.system.cells.iter().filter(|cell| meet(&self.velocities(cell), &velocities)) {
+        for cell in cells_of(cells, &velocities) {
+            let cell = &self.system.cells[cell as usize];
             self.add_cell(cell, &reference, (&velocities, &pressures), (&mut a, &mut b));
         }
-        let without =
-            |what| StokesError::Smoother { level: 0, reason: format!("pressures in a gap: {what}") };
-        let viscous = a.cholesky().ok_or_else(|| without("a velocity without stiffness"))?;
+        let failed = |matrix| StokesError::GapPressures {
+            matrix,
+            place: self.discretisation.pressure.point(pressures[0] as usize).data.0[0].to_vec(),
+            pressures: m,
+            velocities: n,
+        };
+        let viscous = a.cholesky().ok_or_else(|| failed(SmallMatrix::Stiffness))?;
         let share = DMatrix::from_fn(m, m, |i, j| mass.get(pressures[i] as usize, pressures[j] as usize));
         let schur = b.transpose() * viscous.solve(&b) + SHARE_OF_MASS * share;
-        let inverse = schur.cholesky().ok_or_else(|| without("no positive Schur complement"))?.inverse();
-        Ok(Some(Block { pressures, inverse }))
+        let inverse = schur.cholesky().ok_or_else(|| failed(SmallMatrix::Schur))?.inverse();
+        Ok(Block { pressures, inverse })
     }
 
     /// Adds the matrices of a cell to those between the given unknowns.
@@ -150,13 +190,13 @@ where
         nodes.flat_map(|&node| node as usize * D..(node as usize + 1) * D)
     }
 
-    fn velocities(&self, cell: &ActiveCell) -> Vec<u32> {
-        sorted(self.nodal(cell).flat_map(|k| self.velocity.of(k)).map(|term| term.0))
+    fn velocities_of(&self, cell: &ActiveCell) -> impl Iterator<Item = u32> {
+        self.nodal(cell).flat_map(|k| self.velocity.of(k)).map(|term| term.0)
     }
 
-    fn pressures(&self, cell: &ActiveCell) -> Vec<u32> {
+    fn pressures_of(&self, cell: &ActiveCell) -> impl Iterator<Item = u32> {
         let nodes = self.discretisation.pressure.cell(cell.cell as usize).iter();
-        sorted(nodes.flat_map(|&q| self.pressure.of(q as usize)).map(|term| term.0))
+        nodes.flat_map(|&q| self.pressure.of(q as usize)).map(|term| term.0)
     }
 
     fn is_fluid(&self, cell: &ActiveCell) -> bool {
@@ -172,10 +212,34 @@ fn sorted(unknowns: impl Iterator<Item = u32>) -> Vec<u32> {
     unknowns
 }
 
-/// Whether two sorted lists have an entry in common.
-fn meet(a: &[u32], b: &[u32]) -> bool {
-    let (few, many) = if a.len() < b.len() { (a, b) } else { (b, a) };
-    few.iter().any(|k| many.binary_search(k).is_ok())
+fn marked(count: usize, unknowns: impl Iterator<Item = u32>) -> Vec<bool> {
+    let mut marked = vec![false; count];
+    unknowns.for_each(|k| marked[k as usize] = true);
+    marked
+}
+
+/// The cells of some unknowns in a sorted list of unknowns with their cells.
+fn cells_of(all: &[(u32, u32)], unknowns: &[u32]) -> Vec<u32> {
+    let cells = |&k: &u32| {
+        let start = all.partition_point(|pair| pair.0 < k);
+        all[start..].iter().take_while(move |pair| pair.0 == k).map(|pair| pair.1)
+    };
+    sorted(unknowns.iter().flat_map(cells))
+}
+
+/// The representative of the set that `k` belongs to; on the way there sets become flatter.
+fn root(parents: &mut [u32], mut k: u32) -> u32 {
+    while parents[k as usize] != k {
+        let above = parents[parents[k as usize] as usize];
+        parents[k as usize] = above;
+        k = above;
+    }
+    k
+}
+
+fn join(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(parents, a), root(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
 }
 
 /// The terms of a linear form in the given unknowns, by their places.

@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, invert_spd, vector};
 
 use crate::discretisation::Discretisation;
-use crate::error::StokesError;
+use crate::error::{DiagonalError, StokesError};
 use crate::near_bodies::NearBodies;
 use crate::restricted::CountedOperator;
 use crate::space::VelocitySpace;
@@ -133,7 +133,7 @@ where
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
         let mut diagonal = block_diagonal(discretisation, space, &cells, smoothed)
-            .map_err(|reason| StokesError::Smoother { level: index, reason })?;
+            .map_err(|source| StokesError::Smoother { level: index, source })?;
         if !smooths_twists {
             diagonal.twists.fill(0.0);
         }
@@ -290,7 +290,7 @@ pub fn block_diagonal<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     smoothed: &[bool],
-) -> Result<BlockDiagonal, String>
+) -> Result<BlockDiagonal, DiagonalError>
 where
     Dim<D>: Space<D>,
 {
@@ -301,7 +301,7 @@ where
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
             true if *value > 0.0 => 1.0 / *value,
-            true => return Err(format!("diagonal entry {value:e} at node {}", k / D)),
+            true => return Err(DiagonalError::Node { node: k / D, value: f64::from(*value) }),
             false => 0.0,
         };
     }
@@ -315,7 +315,7 @@ fn twist_blocks<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     reference: &Reference<D>,
-) -> Result<Vec<f32>, String>
+) -> Result<Vec<f32>, DiagonalError>
 where
     Dim<D>: Space<D>,
 {
@@ -352,7 +352,7 @@ where
             inverses.extend(std::iter::repeat_n(0f32, rigid * rigid));
             continue;
         }
-        invert_spd(rigid, &mut block).map_err(|e| format!("body {body}: {e}"))?;
+        invert_spd(rigid, &mut block).map_err(|source| DiagonalError::Body { body, source })?;
         inverses.extend(block.iter().map(|&m| m as f32));
     }
     Ok(inverses)

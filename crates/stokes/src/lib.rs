@@ -55,7 +55,7 @@ mod warm_start;
 
 pub use direct::DirectSolver;
 pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
-pub use error::StokesError;
+pub use error::{DiagonalError, SmallMatrix, StokesError};
 pub use flow::{Flow, FlowParams, FlowSolver, SolverKind};
 pub use formulation::{Formulation, PaperParams, ParticleVelocity};
 pub use multigrid::MultigridSolver;

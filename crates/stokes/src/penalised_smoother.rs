@@ -17,7 +17,7 @@ use crate::level::{block_diagonal, nodes_of_cells_with};
 use crate::node_matrix::NodeMatrix;
 use crate::patches::Patches;
 use crate::restricted::{CountedOperator, Restricted, acting, add_at, gather};
-use crate::solid_cycle::{Numbered, failed};
+use crate::solid_cycle::Numbered;
 use crate::system::StokesSystem;
 
 /// Applications of diagonal and patches in a sweep.
@@ -48,7 +48,7 @@ where
     ) -> Result<Self, StokesError> {
         let acting = acting(discretisation, &system.cells, smoothed);
         let fluid = block_diagonal(discretisation, &system.space, &acting, smoothed);
-        let diagonal = fluid.map_err(|e| failed(&e))?.into_nodal();
+        let diagonal = fluid.map_err(StokesError::AroundSolid)?.into_nodal();
         let cells = (&acting[..], system.cells.len());
         let operator = CountedOperator::new(discretisation, &system.space, cells, system.penalty.as_ref());
         let parts = Parts::new(diagonal, solid, solid.positions(), matrix)?;
@@ -101,7 +101,7 @@ where
         let solid = Numbered::new(discretisation, |node| is_free(node) && touched[node]);
         let matrix = NodeMatrix::assembled(&solid, elements)?;
         let acting = acting(discretisation, &system.cells, film);
-        let fluid = block_diagonal(discretisation, space, &acting, film).map_err(|e| failed(&e))?;
+        let fluid = block_diagonal(discretisation, space, &acting, film).map_err(StokesError::AroundSolid)?;
         let mut diagonal = vec![0.0; positions.len()];
         gather(&positions, &fluid.into_nodal(), &mut diagonal);
         let place = |k: &u32| positions.binary_search(k).expect("the film has its solid") as u32;
@@ -205,7 +205,7 @@ where
     ) -> Result<Self, StokesError> {
         let patches = Patches::new(matrix, solid.cells(), vec![0.0; positions.len()]);
         positions.iter().for_each(|&k| diagonal[k as usize] = 0.0);
-        Ok(Self { diagonal, patches: patches.map_err(|e| failed(&e))?, positions })
+        Ok(Self { diagonal, patches: patches.map_err(StokesError::SolidPatch)?, positions })
     }
 }
 

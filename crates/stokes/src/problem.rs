@@ -114,7 +114,8 @@ where
     ) -> Result<Self, StokesError> {
         let ramp = Ramp::new(paper.ramp * finest_cell_size(&discretisation));
         let region = SolidRegion::new(&discretisation, bodies, ramp, matrices);
-        check_resolved(&discretisation, bodies, |body| region.holds(body))?;
+        let held = region.held(bodies.len());
+        check_resolved(&discretisation, bodies, |body| held[body])?;
         let stress = SolidStress::new(&discretisation, &region, matrices, viscosity * paper.viscosity_ratio);
         let touched = region.touched_nodes(&discretisation.velocity, bodies);
         let nowhere = vec![None; discretisation.velocity.node_count()];
@@ -183,9 +184,12 @@ where
     }
 
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
-    pub fn twists(&self, velocity: &[f64]) -> Vec<Twist<D>> {
+    ///
+    /// # Errors
+    /// [`StokesError::NoSolid`] for a penalised body that others cover.
+    pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         let Some(solid) = &self.solid else {
-            return (0..self.bodies.len()).map(|body| self.system.space.twist(velocity, body)).collect();
+            return Ok((0..self.bodies.len()).map(|body| self.system.space.twist(velocity, body)).collect());
         };
         match solid.particle_velocity {
             ParticleVelocity::WeightedMean => {
@@ -196,7 +200,7 @@ where
                 let at = |body: &Ball<D>| {
                     evaluator.motion_at(&self.discretisation.velocity, velocity, body.center())
                 };
-                self.bodies.iter().map(at).collect()
+                Ok(self.bodies.iter().map(at).collect())
             }
         }
     }

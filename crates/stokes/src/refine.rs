@@ -2,7 +2,10 @@
 
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Vector};
-use gluey_levelset::{Ball, Body, LevelSet};
+use gluey_levelset::{Ball, BallTree, Body, LevelSet};
+
+/// Bodies are sought this much farther than they can matter, so that rounding loses none.
+const ENOUGH: f64 = 1.0 + 1e-9;
 
 /// How a mesh follows the bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,7 @@ impl Refinement {
     ) -> Result<TreeMesh<D>, MeshError> {
         let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
         let deepest = self.surface.saturating_add(gap_levels);
+        let bodies = &BallTree::new(bodies);
         let mesh = TreeMesh::refine(domain, roots, periodic, deepest, |lower, h, level| {
             let center = lower + Vector::repeat(0.5 * h);
             level < self.coarsest
@@ -44,28 +48,43 @@ impl Refinement {
     }
 
     /// Whether a cell of size `h` comes closer to a body than the band of its children.
-    fn is_near_surface<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &[Ball<D>]) -> bool {
-        bodies.iter().any(|body| {
+    fn is_near_surface<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
+        let band = self.band * 0.5 * h;
+        bodies.any_within(center, ENOUGH * (band + half_diagonal::<D>(h)), |body| {
+            let body = &bodies.balls()[body];
             let outside = body.arm(center).map(|x| (x.abs() - 0.5 * h).max(0.0)).norm();
-            outside < body.bounding_radius() + self.band * 0.5 * h
+            outside < body.bounding_radius() + band
         })
     }
 
     /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two surfaces is
     /// their distance from each other there, for points between them and not far inside.
-    fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &[Ball<D>]) -> bool {
-        let reach = 0.5 * h * (D as f64).sqrt();
-        let near = |b: &&Ball<D>| -b.value(center) < b.bounding_radius();
-        let near: Vec<&Ball<D>> = bodies.iter().filter(near).collect();
-        near.iter().enumerate().any(|(i, first)| {
-            near[i + 1..].iter().any(|second| {
-                let (d1, d2) = (-first.value(center), -second.value(center));
+    fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
+        let reach = half_diagonal::<D>(h);
+        // What a gap that is too narrow for the cell leaves of either distance.
+        let farthest = h / self.gap_fraction + 2.0 * reach;
+        let mut near: Vec<f64> = Vec::new();
+        bodies.any_within(center, ENOUGH * farthest, |body| {
+            let body = &bodies.balls()[body];
+            let distance = -body.value(center);
+            if distance < body.bounding_radius() {
+                near.push(distance);
+            }
+            false
+        });
+        near.iter().enumerate().any(|(i, &d1)| {
+            near[i + 1..].iter().any(|&d2| {
                 let width = (d1 + d2 - 2.0 * reach).max(0.0);
                 let between = d1.max(d2) <= width + 2.0 * reach;
                 between && h > self.gap_fraction * width
             })
         })
     }
+}
+
+/// Distance from the centre of a cell to its corners.
+fn half_diagonal<const D: usize>(h: f64) -> f64 {
+    0.5 * h * (D as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -64,8 +64,7 @@ where
         let coarse = CoarseSchur::new(meshes, viscosity, before.and_then(|before| before.coarse))?;
         let diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
         let mut mass = SlicedMatrix::new(&mass);
-        let mut jacobi = Jacobi::new(&diagonal)
-            .map_err(|e| StokesError::Smoother { level: 0, reason: format!("pressure mass: {e}") })?;
+        let mut jacobi = Jacobi::new(&diagonal).map_err(StokesError::PressureMass)?;
         let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
         let chebyshev = Chebyshev::new(mass.dim(), steps(interval), interval);

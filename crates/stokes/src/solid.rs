@@ -10,9 +10,10 @@ use std::sync::Arc;
 use gluey_fem::cells::{CellData, CellOperator, Workspace};
 use gluey_fem::{Chunks, NodeMap};
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
-use gluey_levelset::{Ball, Body, Ramp, nearest};
+use gluey_levelset::{Ball, BallTree, Body, Ramp};
 
 use crate::discretisation::Discretisation;
+use crate::error::StokesError;
 use crate::point_matrices::PointMatrices;
 
 /// Solid fraction `I` in a cell, and the body it belongs to.
@@ -77,18 +78,16 @@ where
         ramp: Ramp,
         matrices: &PointMatrices<D>,
     ) -> Self {
+        let bodies = BallTree::new(bodies);
         let mut cells = Vec::new();
         for (cell, c) in discretisation.mesh.cells().iter().enumerate() {
             let (lower, h) = (discretisation.mesh.lower_corner(c), discretisation.cell_size(cell));
             let center = lower + Vector::repeat(0.5 * h);
             let reach = 0.5 * h * (D as f64).sqrt();
-            let Some((body, alpha)) = nearest(bodies, &center) else { continue };
-            if alpha < -reach {
-                continue;
-            }
+            let Some((body, _)) = bodies.nearest_within(&center, reach) else { continue };
             let at = |x: &[f64; D]| {
                 let x = lower + Vector::from_fn(|d, _| h * x[d]);
-                nearest(bodies, &x).map_or(0.0, |b| ramp.fraction(b.1))
+                bodies.nearest_within(&x, 0.0).map_or(0.0, |b| ramp.fraction(b.1))
             };
             let mut fraction: Vec<f64> = matrices.points().map(|p| at(p.0)).collect();
             if fraction.iter().any(|&f| f > 0.0) {
@@ -101,17 +100,20 @@ where
         Self { cells: Arc::new(cells) }
     }
 
-    /// Whether a body has any cell.
-    pub fn holds(&self, body: usize) -> bool {
-        self.cells.iter().any(|c| c.body as usize == body)
+    /// Whether each of `count` bodies has any cell.
+    pub fn held(&self, count: usize) -> Vec<bool> {
+        let mut held = vec![false; count];
+        self.cells.iter().for_each(|c| held[c.body as usize] = true);
+        held
     }
 
     /// The nodes of all cells with any solid in them, each with the body nearest to it.
     pub fn touched_nodes(&self, nodes: &NodeMap<D>, bodies: &[Ball<D>]) -> Vec<Option<u32>> {
+        let bodies = BallTree::new(bodies);
         let mut touched = vec![None; nodes.node_count()];
         for solid in self.cells.iter() {
             for &node in nodes.cell(solid.cell as usize) {
-                let body = nearest(bodies, &nodes.point(node as usize)).map(|b| b.0 as u32);
+                let body = bodies.nearest(&nodes.point(node as usize)).map(|b| b.0 as u32);
                 touched[node as usize] = body;
             }
         }
@@ -120,20 +122,25 @@ where
 
     /// The rigid motions closest to a velocity field in the `I`-weighted mean: `U = int I u / int I` and the spin from
     /// the angular momentum, `int I r x u = J w` with `J` the `I`-weighted inertia.
+    ///
+    /// # Errors
+    /// [`StokesError::NoSolid`] for a body that is the nearest at no quadrature point of the solid, or at too few of them.
     pub fn twists(
         &self,
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         matrices: &PointMatrices<D>,
         velocity: &[f64],
-    ) -> Vec<Twist<D>> {
+    ) -> Result<Vec<Twist<D>>, StokesError> {
         let mut moments = vec![Moments::<D>::new(); bodies.len()];
+        let tree = BallTree::new(bodies);
         for solid in self.cells.iter() {
             let cell = solid.cell as usize;
             let c = &discretisation.mesh.cells()[cell];
             let (lower, h) = (discretisation.mesh.lower_corner(c), discretisation.cell_size(cell));
             let nodes = discretisation.velocity.cell(cell);
-            for (q, (x, weight, shapes)) in matrices.points().enumerate() {
+            let solid_points = matrices.points().enumerate().filter(|(q, _)| solid.fraction(*q) > 0.0);
+            for (q, (x, weight, shapes)) in solid_points {
                 let mut u = Vector::<D>::zeros();
                 for (&node, &shape) in nodes.iter().zip(shapes) {
                     for d in 0..D {
@@ -141,12 +148,17 @@ where
                     }
                 }
                 let position = lower + Vector::from_fn(|d, _| h * x[d]);
-                let Some((body, _)) = nearest(bodies, &position) else { continue };
+                let Some((body, _)) = tree.nearest(&position) else { continue };
                 let weight = weight * h.powi(D as i32) * solid.fraction(q);
                 moments[body].add(weight, &bodies[body].arm(&position), &u);
             }
         }
-        moments.iter().map(Moments::twist).collect()
+        let cell_size = discretisation.mesh.size(discretisation.mesh.max_level());
+        let twist = |(body, moments): (usize, &Moments<D>)| {
+            let radius = bodies[body].bounding_radius();
+            moments.twist().ok_or(StokesError::NoSolid { body, radius, cell_size })
+        };
+        moments.iter().enumerate().map(twist).collect()
     }
 }
 
@@ -185,22 +197,23 @@ where
         self.angular += Dim::<D>::moment(arm, u) * weight;
     }
 
-    /// Velocity and spin about the centroid of the weights, the velocity then moved to the reference point.
-    fn twist(&self) -> Twist<D> {
+    /// Velocity and spin about the centroid of the weights, the velocity then moved to the reference point; `None` where the
+    /// weights do not fix them.
+    fn twist(&self) -> Option<Twist<D>> {
         if self.mass <= 0.0 {
-            return Twist::default();
+            return None;
         }
         let (mean, centroid) = (self.momentum / self.mass, self.first / self.mass);
         let second = self.second - centroid * centroid.transpose() * self.mass;
         let mut angular = self.angular;
         angular += -(Dim::<D>::moment(&centroid, &mean) * self.mass);
-        let spin = solve_inertia::<D>(&second, &angular);
-        Twist { velocity: mean - Dim::<D>::cross_spin(&spin, &centroid), spin }
+        let spin = solve_inertia::<D>(&second, &angular)?;
+        Some(Twist { velocity: mean - Dim::<D>::cross_spin(&spin, &centroid), spin })
     }
 }
 
-/// Solves `J w = l` with `J = tr(S) 1 - S`.
-fn solve_inertia<const D: usize>(second: &Matrix<D>, angular: &Spin<D>) -> Spin<D>
+/// Solves `J w = l` with `J = tr(S) 1 - S`, if that is positive definite.
+fn solve_inertia<const D: usize>(second: &Matrix<D>, angular: &Spin<D>) -> Option<Spin<D>>
 where
     Dim<D>: Space<D>,
 {
@@ -210,13 +223,10 @@ where
         diagonal - if rot == 1 { 0.0 } else { second[(i, j)] }
     });
     let load = nalgebra::DVector::from_fn(rot, |i, _| angular[i]);
+    let solution = inertia.cholesky()?.solve(&load);
     let mut spin = Dim::<D>::zero_spin();
-    if let Some(solution) = inertia.cholesky().map(|c| c.solve(&load)) {
-        for k in 0..rot {
-            spin[k] = solution[k];
-        }
-    }
-    spin
+    (0..rot).for_each(|k| spin[k] = solution[k]);
+    Some(spin)
 }
 
 impl<const D: usize> SolidStress<D> {

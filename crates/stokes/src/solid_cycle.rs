@@ -180,7 +180,7 @@ where
     fn new(matrix: &NodeMatrix<D>, nodes: &Numbered<'_, D>) -> Result<Self, StokesError> {
         let diagonal = matrix.diagonal().iter().map(|d| 1.0 / d).collect();
         let patches = Patches::new(matrix, nodes.cells(), diagonal);
-        let mut patches = patches.map_err(|e| failed(&e))?;
+        let mut patches = patches.map_err(StokesError::SolidPatch)?;
         let largest = estimate_lambda_max(&mut &*matrix, &mut patches, LANCZOS_STEPS)?;
         let interval = SpectralInterval::upper_part(largest, RATIO, SAFETY);
         Ok(Self { patches, chebyshev: Chebyshev::new(matrix.dim(), DEGREE, interval) })
@@ -189,11 +189,6 @@ where
     fn smooth(&mut self, a: &mut impl LinOp<f64>, b: &[f64], x: &mut [f64], guess: Guess) {
         self.chebyshev.smooth(a, &mut self.patches, b, x, guess);
     }
-}
-
-/// The error of a smoother that cannot be built in the solid.
-pub fn failed(reason: &impl std::fmt::Display) -> StokesError {
-    StokesError::Smoother { level: 0, reason: format!("solid: {reason}") }
 }
 
 /// Adds to `x` what the coarser levels make of the residual `r`.

@@ -155,7 +155,7 @@ where
     let stopwatch = Stopwatch::start();
     let report = solver.solve(&problem.system, &b, &mut x, options.tolerance)?;
     let times = stopwatch.stop();
-    let twists = problem.twists(&problem.velocity(&lift, &x));
+    let twists = problem.twists(&problem.velocity(&lift, &x))?;
     Ok(Solved { report, times, residual_rel: residual_rel(&problem.system, &b, &x), twists })
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use gluey_fem::element::{split, value};
 use gluey_geom::{Dim, Space, Vector};
-use gluey_levelset::{Ball, Ramp, ViscosityLaw, nearest};
+use gluey_levelset::{Ball, BallTree, Ramp, ViscosityLaw};
 use gluey_motion::Fields;
 use gluey_stokes::{Flow, FlowParams, Formulation};
 
@@ -16,6 +16,7 @@ where
 {
     let mesh = &flow.discretisation.mesh;
     let nodes = &flow.discretisation.velocity;
+    let balls = &BallTree::new(balls);
     let mut fields = Fields::default();
     let mut point_of: BTreeMap<(u32, [bool; D]), u32> = BTreeMap::new();
     for (index, cell) in mesh.cells().iter().enumerate() {
@@ -38,7 +39,7 @@ where
 fn push_point<const D: usize>(
     fields: &mut Fields<D>,
     flow: &Flow<D>,
-    balls: &[Ball<D>],
+    balls: &BallTree<'_, D>,
     params: &FlowParams,
     (cell, node): (usize, usize),
     x: &Vector<D>,
@@ -52,7 +53,7 @@ fn push_point<const D: usize>(
     };
     let pressure = flow.discretisation.pressure.cell(cell).iter().enumerate();
     let pressure = pressure.map(|(q, &n)| value::<D>(1, q, local) * flow.pressure[n as usize]).sum();
-    let alpha = nearest(balls, x).map_or(f64::NEG_INFINITY, |b| b.1);
+    let alpha = balls.nearest(x).map_or(f64::NEG_INFINITY, |b| b.1);
     fields.points.push(*x);
     fields.velocity.push(at_node(&flow.velocity));
     fields.multiplier.push(at_node(&flow.multiplier));

@@ -47,6 +47,23 @@ fn a_body_that_is_nowhere_is_refused() {
     }
 }
 
+/// A disc in another, but for a sliver: a cell in the sliver is its own, but no quadrature point is. A field read there would
+/// leave the disc at rest while everything around it moves.
+#[test]
+fn a_body_that_another_hides_is_refused() {
+    let (cell, center) = (1.0 / 32.0, Vector::<2>::new(0.4, 0.5 + 1.0 / 64.0));
+    let hidden = center + Vector::<2>::new(0.2 - 2.0 * cell + 1e-6, 0.0);
+    let bodies = [Ball::new(center, 0.2), Ball::new(hidden, 2.0 * cell)];
+    let refused = try_solve(
+        params(paper(1e2, 1), SolverKind::Direct, 1e-8),
+        mesh(&bands(5), &bodies),
+        &bodies,
+        &couette,
+    );
+    let expected = StokesError::NoSolid { body: 1, radius: 2.0 * cell, cell_size: cell };
+    assert_eq!(refused.err(), Some(expected));
+}
+
 #[test]
 fn parameters_out_of_range_are_named() {
     let good = params(RIGID, SolverKind::Direct, 1e-8);
