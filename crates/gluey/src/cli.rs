@@ -9,7 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions};
 
 use crate::diagnostic::Diagnosed;
-use crate::terminal::Reporter;
+use crate::terminal::{Reporter, say};
 
 /// What a shell reports for a program ended by Ctrl-C.
 const INTERRUPTED: u8 = 130;
@@ -47,7 +47,8 @@ pub struct RunArguments {
     /// Write fields, particles and contacts for ParaView every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
-    /// Write a checkpoint every N steps (one is written at Ctrl-C in any case).
+    /// Write a checkpoint every N steps (one is written at Ctrl-C, at a request to terminate and
+    /// when a step fails in any case).
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     checkpoint_every: Option<usize>,
     /// Go on from a checkpoint of the same case.
@@ -99,7 +100,7 @@ impl RunArguments {
     }
 }
 
-/// A flag that the first Ctrl-C sets; the second ends the program at once.
+/// A flag that the first Ctrl-C sets, or the first request to terminate or hang up; the second ends the program at once.
 fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let shared = flag.clone();
@@ -107,10 +108,10 @@ fn interrupt_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::Relaxed) {
             process::exit(i32::from(INTERRUPTED));
         }
-        eprintln!("stopping after this step; once more to stop at once");
+        say("stopping after this step; once more to stop at once");
     });
     if let Err(error) = installed {
-        eprintln!("Ctrl-C will end the program without a checkpoint: {error}");
+        say(&format!("Ctrl-C will end the program without a checkpoint: {error}"));
     }
     flag
 }
