@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, Parser, Subcommand};
+use gluey::output::vtk::{Precision, VtkEncoding};
 use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions};
 
 use crate::diagnostic::Diagnosed;
@@ -47,6 +48,12 @@ pub struct RunArguments {
     /// Write fields, particles and contacts for ParaView every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
+    /// Compression of the files for ParaView, from 0 (none) over 1 (fast) to 9 (small).
+    #[arg(long, value_name = "LEVEL", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=9))]
+    vtk_compression: u32,
+    /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
+    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double)]
+    vtk_precision: Precision,
     /// Write a checkpoint every N steps (one is written at Ctrl-C, at a request to terminate and
     /// when a step fails in any case).
     #[arg(long, value_name = "N", value_parser = at_least_one)]
@@ -91,7 +98,11 @@ impl RunArguments {
         let stem = case.file_stem();
         RunOptions {
             csv: self.out.join(format!("{stem}.csv")),
-            vtk: self.vtk.map(|every| VtkOptions { folder: self.out.join(format!("{stem}-vtk")), every }),
+            vtk: self.vtk.map(|every| VtkOptions {
+                folder: self.out.join(format!("{stem}-vtk")),
+                every,
+                encoding: VtkEncoding { compression: self.vtk_compression, precision: self.vtk_precision },
+            }),
             checkpoint: Some(self.out.join(format!("{stem}.checkpoint"))),
             checkpoint_every: self.checkpoint_every,
             resume: self.resume.clone(),

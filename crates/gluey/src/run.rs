@@ -21,7 +21,7 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::flow::{StokesFlow, stokes_flow};
 use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
-use crate::output::vtk::{Frame, VtkWriter};
+use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
 use crate::output::{Claim, OutputError, set_aside};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
@@ -92,7 +92,7 @@ where
     simulation: Simulation<D, H, PairContact<D>>,
     measures: Measures<D>,
     csv: CsvWriter<D>,
-    vtk: Option<(usize, VtkWriter)>,
+    vtk: Option<(usize, FrameWriter<D>)>,
     checkpoints: Option<CheckpointFile>,
     /// The run before the step that is being done, where checkpoints are written.
     last_good: Option<Checkpoint<D>>,
@@ -162,6 +162,7 @@ where
         if let Err(error) = self.all_steps() {
             return Err(self.keep_last_good(error));
         }
+        self.vtk.take().map_or(Ok(()), |(_, frames)| frames.finish())?;
         let wall_s = self.wall_s();
         let flow = self.simulation.statistics();
         self.csv.finish()?;
@@ -201,15 +202,11 @@ where
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
         match &mut self.vtk {
-            Some((every, writer)) if step.is_multiple_of(*every) => writer.write(&Frame {
-                step,
-                time,
-                particles,
-                twists,
-                contacts: simulation.contacts(),
-                domain,
-                fields: simulation.fields().as_ref(),
-            })?,
+            Some((every, frames)) if step.is_multiple_of(*every) => {
+                let (contacts, fields) = (simulation.contacts(), None);
+                let frame = Frame { step, time, particles, twists, contacts, domain, fields };
+                frames.write(&frame, simulation.fields())?;
+            }
             _ => {}
         }
         Ok(())
@@ -282,6 +279,7 @@ where
     fn save(&mut self) -> Result<(), OutputError> {
         let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
         self.csv.sync()?;
+        self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
         file.write(checkpoint, self.case, self.progress)
     }
 
@@ -349,10 +347,18 @@ impl CheckpointFile {
 }
 
 /// The writer and its interval; of the steps done, those with files stay listed.
-fn vtk_writer(options: &VtkOptions, step: usize, dt: f64) -> Result<(usize, VtkWriter), OutputError> {
+fn vtk_writer<const D: usize>(
+    options: &VtkOptions,
+    step: usize,
+    dt: f64,
+) -> Result<(usize, FrameWriter<D>), OutputError>
+where
+    Dim<D>: Space<D>,
+{
     let every = options.every.max(1);
     let done: Vec<(usize, f64)> = (0..step).step_by(every).map(|step| (step, step as f64 * dt)).collect();
-    Ok((every, VtkWriter::create(&options.folder, &done)?))
+    let writer = VtkWriter::create(&options.folder, &done)?.encoded(options.encoding);
+    Ok((every, FrameWriter::new(writer)?))
 }
 
 /// The particles of a checked case.

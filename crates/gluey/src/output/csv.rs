@@ -204,11 +204,11 @@ fn gap_lines<const D: usize>(row: &Row<'_, D>, near: &[PairGap], cutoff: f64) ->
 where
     Dim<D>: Space<D>,
 {
-    let a = row.mean_radius();
+    let (a, time) = (row.mean_radius(), format!("{:.16e}", row.time));
     let mut text = String::new();
     let mut add = |first: usize, second: usize, gap: f64, partner: &str| {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{:.16e},{},{},{:.16e},{partner}", row.time, first + 1, second + 1, gap / a);
+        let _ = writeln!(text, "{time},{},{},{:.16e},{partner}", first + 1, second + 1, gap / a);
     };
     for &PairGap { first, second, gap } in near {
         add(first, second, gap, if row.is_direct(first, second) { "particle" } else { "image" });

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::output::vtk::VtkEncoding;
+
 /// What a run writes, and where.
 #[derive(Clone, Debug, Default)]
 pub struct RunOptions {
@@ -28,6 +30,15 @@ pub struct VtkOptions {
     pub folder: PathBuf,
     /// Steps between files, at least 1.
     pub every: usize,
+    /// How numbers are stored.
+    pub encoding: VtkEncoding,
+}
+
+impl VtkOptions {
+    /// Exact numbers every so many steps.
+    pub fn new(folder: impl Into<PathBuf>, every: usize) -> Self {
+        Self { folder: folder.into(), every, encoding: VtkEncoding::default() }
+    }
 }
 
 impl RunOptions {
