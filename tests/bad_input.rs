@@ -292,6 +292,8 @@ fn arguments_that_make_no_sense() {
         (["--formulation", "soft"], "`soft` is not a known formulation"),
         (["--vtk", "0"], "must be at least 1"),
         (["--checkpoint-every", "often"], "must be a whole number"),
+        (["--vtk-compression", "10"], "10 is not in 0..=9"),
+        (["--vtk-precision", "f16"], "expected `f32` or `f64`"),
     ] {
         let (code, stderr) = gluey(folder.path(), &[["run", "case.toml"], arguments].concat());
         assert_eq!(code, Some(2), "{stderr}");

@@ -93,6 +93,31 @@ fn a_wall_holds_what_is_pressed_against_it() {
     }
 }
 
+/// The run up to the last good step is not lost: it can be ended there.
+#[test]
+fn a_particle_that_leaves_the_box_leaves_a_checkpoint() {
+    let folder = TempDir::new().expect("a folder");
+    let checkpoint = folder.path().join("c.checkpoint");
+    let csv = folder.path().join("t.csv");
+    let options = RunOptions { checkpoint: Some(checkpoint.clone()), ..RunOptions::csv(&csv) };
+    let mut case = squeezed("none");
+    let good = match run(&case, &options, &Silent) {
+        Err(RunError::Stopped { step, checkpoint: path, cause }) => {
+            assert_eq!(path, checkpoint);
+            assert!(
+                matches!(*cause, RunError::LeftBox { particle: 1, step: failed, .. } if failed == step + 1)
+            );
+            step
+        }
+        other => panic!("{other:?}"),
+    };
+    let rows = std::fs::read_to_string(folder.path().join("t.csv.partial-1")).expect("rows");
+    case.time.end = good as f64 * case.time.step;
+    let report = run(&case, &RunOptions { resume: Some(checkpoint), ..options }, &Silent);
+    assert_eq!(report.unwrap_or_else(|error| panic!("{error}")).steps, good);
+    assert_eq!(std::fs::read_to_string(csv).expect("a trajectory"), rows);
+}
+
 #[test]
 fn particles_that_overlap_across_the_border_are_refused() {
     let text = |boundary: &str| {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use gluey::output::vtk::{Frame, VtkWriter};
+use gluey::output::vtk::{Frame, Precision, VtkEncoding, VtkWriter};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
@@ -115,6 +115,39 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     assert_eq!(numbers(data, "lambda"), fields.multiplier.iter().flat_map(three).collect::<Vec<_>>());
 }
 
+/// What is read back does not depend on the compression, and on the precision as far as it must.
+#[test]
+fn every_encoding_reads_back() {
+    let folder = TempDir::new().expect("a folder");
+    // More than a block of numbers.
+    let count = 20_000;
+    let particles: Vec<_> =
+        (0..count).map(|n| Particle::new(Vector::<3>::repeat(n as f64 / 3.0), 0.1 + n as f64)).collect();
+    let twists = vec![Twist::default(); count];
+    let radii: Vec<f64> = particles.iter().map(|particle| particle.radius).collect();
+    let mut sizes = Vec::new();
+    for (compression, precision) in
+        [(0, Precision::Double), (1, Precision::Double), (9, Precision::Double), (1, Precision::Single)]
+    {
+        let encoding = VtkEncoding { compression, precision };
+        let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder").encoded(encoding);
+        let (contacts, domain, fields) = (&[], &Domain::default(), None);
+        let frame =
+            Frame { step: 0, time: 0.0, particles: &particles, twists: &twists, contacts, domain, fields };
+        writer.write(&frame).expect("files");
+        let path = folder.path().join("particles-000000.vtu");
+        let read_back = numbers(&read(&path).data.point, "radius");
+        match precision {
+            Precision::Double => assert_eq!(read_back, radii),
+            Precision::Single => {
+                assert!(read_back.iter().zip(&radii).all(|(x, y)| (x - y).abs() <= 1e-7 * y))
+            }
+        }
+        sizes.push(fs::metadata(path).expect("a file").len());
+    }
+    assert!(sizes[1] < sizes[0] && sizes[2] <= sizes[1] && sizes[3] < sizes[1], "{sizes:?}");
+}
+
 #[test]
 fn quadratic_cells() {
     cells_have_vtks_order_of_nodes::<2>(CellType::BiquadraticQuad, &QUAD_EDGES, &[]);
@@ -204,7 +237,7 @@ fn runs_leave_a_collection_of_all_times() {
     let mut case = Case::load(file).expect("a case");
     case.time.end = 1.0;
     let folder = TempDir::new().expect("a folder");
-    let vtk = VtkOptions { folder: folder.path().join("vtk"), every: 8 };
+    let vtk = VtkOptions::new(folder.path().join("vtk"), 8);
     let options = RunOptions { vtk: Some(vtk), ..RunOptions::csv(folder.path().join("t.csv")) };
     run(&case, &options, &Silent).unwrap_or_else(|error| panic!("{error}"));
     let collection = fs::read_to_string(folder.path().join("vtk/particles.pvd")).expect("a collection");

@@ -59,7 +59,7 @@ pub mod solver;
 pub use domain::{Domain, Wall};
 pub use error::{ContactError, Quantity};
 pub use key::{PairKey, Partner};
-pub use memory::{ContactState, PairState};
+pub use memory::{ContactState, MemoryError, PairState};
 pub use mobility::{Mobility, StokesDrag, WithFixed};
 pub use model::{Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};

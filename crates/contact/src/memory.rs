@@ -15,6 +15,18 @@ pub struct PairState {
     pub lambda: f64,
 }
 
+/// A memory that no step leaves behind.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the memory of {pair}: gamma {gamma} must be finite and at most 0, lambda {lambda} must be finite")]
+pub struct MemoryError {
+    /// The pair.
+    pub pair: PairKey,
+    /// Its gamma; unit: length^2.
+    pub gamma: f64,
+    /// Its force; unit: length^2/time.
+    pub lambda: f64,
+}
+
 /// The memory of a contact model: pairs with `gamma < 0` or a force, sorted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactState {
@@ -31,11 +43,19 @@ impl ContactState {
         }
     }
 
-    /// Gamma and the last force of no pair are positive and unknown: sorts, clips and drops what says nothing.
-    pub(crate) fn tidy(&mut self) {
+    /// The same sorted, without pairs that say nothing and without repetitions.
+    ///
+    /// # Errors
+    /// If a gamma is positive, or a number is not finite.
+    pub(crate) fn checked(mut self) -> Result<Self, MemoryError> {
+        let is_good = |state: &PairState| state.gamma <= 0.0 && (state.gamma + state.lambda).is_finite();
+        if let Some(&PairState { pair, gamma, lambda }) = self.pairs.iter().find(|state| !is_good(state)) {
+            return Err(MemoryError { pair, gamma, lambda });
+        }
         self.pairs.retain(|state| state.gamma < 0.0 || state.lambda != 0.0);
         self.pairs.sort_unstable_by_key(|state| state.pair);
         self.pairs.dedup_by_key(|state| state.pair);
+        Ok(self)
     }
 }
 

@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Twist, Vector};
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactError, ContactState, Domain, PairKey, Quantity, Wall};
+use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry a particle.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +38,8 @@ where
     /// Everything the next step depends on.
     fn checkpoint(&self) -> ContactState;
 
-    /// Goes on from a checkpoint.
-    fn resume(&mut self, state: ContactState);
+    /// Goes on from a checkpoint; on an error the memory is as before.
+    fn resume(&mut self, state: ContactState) -> Result<(), MemoryError>;
 
     /// Tells that the flow was reversed, so that remembered forces change their sign.
     fn reverse(&mut self);

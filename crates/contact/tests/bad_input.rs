@@ -35,7 +35,7 @@ fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
     let mut input = input();
     change(&mut input);
     let mut contact = PairContact::new(input.params);
-    contact.resume(input.state);
+    contact.resume(input.state).expect("a memory");
     let before = contact.checkpoint();
     let mut twists = input.twists.clone();
     let step = StepGeometry {
@@ -134,6 +134,24 @@ fn too_few_linearisations_are_told() {
         input.twists[1].velocity.y = 5.0;
     });
     assert!(matches!(error, ContactError::GapNotClosed { passes: 1, .. }), "{error}");
+}
+
+/// A memory that pulls, or is no number, came from elsewhere: resuming keeps what was there.
+#[test]
+fn memories_that_no_step_leaves_are_refused() {
+    let pair = PairKey::new(0, 1);
+    let good = ContactState { pairs: vec![PairState { pair, gamma: -1.0, lambda: 0.5 }] };
+    for (gamma, lambda) in
+        [(1e-9, 0.0), (f64::NAN, 0.0), (f64::NEG_INFINITY, 0.0), (-1.0, f64::NAN), (0.0, f64::INFINITY)]
+    {
+        let mut contact = PairContact::<2>::new(ContactParams::default());
+        contact.resume(good.clone()).expect("a memory");
+        let bad = ContactState { pairs: vec![PairState { pair, gamma, lambda }] };
+        let error = contact.resume(bad).expect_err("must be refused");
+        assert_eq!(error.pair, pair);
+        assert!(error.to_string().contains("particles 0 and 1"), "{error}");
+        assert_eq!(contact.checkpoint(), good);
+    }
 }
 
 #[test]

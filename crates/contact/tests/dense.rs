@@ -135,7 +135,7 @@ fn a_resumed_run_goes_on_bit_for_bit() {
     let state = straight.contact.checkpoint();
     let middle = Packing { positions: straight.positions.clone(), side: packing.side };
     let mut resumed = Suspension::new(&middle, law(Strategy::Gluey));
-    resumed.contact.resume(state);
+    resumed.contact.resume(state).expect("a memory");
     for _ in 0..10 {
         straight.step(0.002);
         resumed.step(0.002);

@@ -130,7 +130,7 @@ fn a_checkpoint_in_contact_resumes_bit_for_bit() {
         let bytes = postcard::to_stdvec(&(state, through.integrator.clone())).expect("serialises");
         let mut resumed = Encounter::new(0.05, law, Scheme::AdamsBashforth2, 0.05);
         let (state, integrator): (ContactState, _) = postcard::from_bytes(&bytes).expect("comes back");
-        resumed.contact.resume(state);
+        resumed.contact.resume(state).expect("a memory");
         (resumed.integrator, resumed.particles) = (integrator, through.particles);
         through.run(8.0);
         resumed.run(8.0);

@@ -85,7 +85,7 @@ where
     /// Corrected velocities, and the model for its contacts.
     fn solve(&self, params: ContactParams) -> (Vec<Vector<D>>, PairContact<D>) {
         let mut contact = PairContact::new(params);
-        contact.resume(self.memory());
+        contact.resume(self.memory()).expect("a memory");
         let mut twists = self.twists();
         contact.correct(&self.step(), &mut twists).expect("a good step");
         (twists.iter().map(|twist| twist.velocity).collect(), contact)
@@ -396,7 +396,7 @@ fn contact_forces_balance_so_a_common_velocity_makes_no_difference() {
     let packing = Packing::<2>::new(5, 0.01, 5);
     let (expected, _) = packing.solve(params(SolverKind::ActiveSet));
     let mut contact = PairContact::with_mobility(params(SolverKind::ActiveSet), Coupled);
-    contact.resume(packing.memory());
+    contact.resume(packing.memory()).expect("a memory");
     let mut twists = packing.twists();
     contact.correct(&packing.step(), &mut twists).expect("a good step");
     for (twist, velocity) in twists.iter().zip(expected) {

@@ -1,5 +1,7 @@
 //! Checkpoints: everything a run needs to go on, bit for bit, as if it had never stopped.
 //!
+//! Rows of output are not in it, but how far their files had come ([`CsvMarks`]).
+//!
 //! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and the rest:
 //! a [`Checkpoint`] in postcard encoding, compressed by zstd. It carries the case, so that it cannot be taken for one
 //! of another case.
@@ -13,14 +15,15 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Case;
+use crate::output::csv::CsvMarks;
 use crate::output::{OutputError, write_atomically};
 use crate::phases::PhaseTable;
-use crate::simulation::SimulationState;
-use crate::trajectory::Trajectory;
+use crate::run::HydrodynamicsError;
+use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast; the payload is small.
@@ -35,8 +38,8 @@ where
 {
     /// Particles, history, contact memory, warm start of the flow.
     pub state: SimulationState<D>,
-    /// All rows of output so far.
-    pub trajectory: Trajectory<D>,
+    /// How far the files of rows had come.
+    pub output: CsvMarks,
     /// Wall time so far, phase by phase.
     pub phases: PhaseTable,
     /// Wall time so far, in seconds.
@@ -82,6 +85,22 @@ pub enum CheckpointError {
         /// The first line in which the cases differ.
         difference: CaseDifference,
     },
+    /// The case cannot be written down, to compare it.
+    #[error("{}: cannot be compared with the case", path.display())]
+    CaseText {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: toml::ser::Error,
+    },
+    /// The simulation cannot go on from it.
+    #[error("{}: does not fit the case", path.display())]
+    Unfit {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: RestoreError<HydrodynamicsError>,
+    },
 }
 
 /// The first line in which two cases differ.
@@ -109,7 +128,7 @@ where
     pub fn write(&self, case: &Case, path: &Path) -> Result<(), OutputError> {
         let encode = || -> io::Result<Vec<u8>> {
             let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
-            let payload = Payload { case: canonical(case), run };
+            let payload = Payload { case: canonical(case).map_err(io::Error::other)?, run };
             let bytes = postcard::to_stdvec(&payload).map_err(io::Error::other)?;
             zstd::encode_all(bytes.as_slice(), COMPRESSION_LEVEL)
         };
@@ -146,22 +165,22 @@ where
         let payload: Option<Payload> =
             zstd::decode_all(body).ok().and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let Some(payload) = payload else { return Err(CheckpointError::Damaged { path }) };
-        if let Some(difference) = difference(&payload.case, &canonical(case)) {
+        let given = match canonical(case) {
+            Ok(given) => given,
+            Err(source) => return Err(CheckpointError::CaseText { path, source }),
+        };
+        if let Some(difference) = difference(&payload.case, &given) {
             return Err(CheckpointError::OtherCase { path, difference });
         }
-        match postcard::from_bytes::<Self>(&payload.run) {
-            Ok(checkpoint) if checkpoint.trajectory.is_consistent() => Ok(checkpoint),
-            _ => Err(CheckpointError::Damaged { path }),
-        }
+        postcard::from_bytes(&payload.run).map_err(|_| CheckpointError::Damaged { path })
     }
 }
 
 /// The case as text, without its end.
-fn canonical(case: &Case) -> String {
+fn canonical(case: &Case) -> Result<String, toml::ser::Error> {
     let mut case = case.clone();
     case.time.end = 0.0;
-    // Tables of numbers and names always serialise.
-    toml::to_string(&case).unwrap_or_default()
+    toml::to_string(&case)
 }
 
 fn difference(saved: &str, given: &str) -> Option<CaseDifference> {

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, Parser, Subcommand};
+use gluey::output::vtk::{Precision, VtkEncoding};
 use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions};
 
 use crate::diagnostic::Diagnosed;
-use crate::terminal::Reporter;
+use crate::terminal::{Reporter, say};
 
 /// What a shell reports for a program ended by Ctrl-C.
 const INTERRUPTED: u8 = 130;
@@ -47,7 +48,14 @@ pub struct RunArguments {
     /// Write fields, particles and contacts for ParaView every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
-    /// Write a checkpoint every N steps (one is written at Ctrl-C in any case).
+    /// Compression of the files for ParaView, from 0 (none) over 1 (fast) to 9 (small).
+    #[arg(long, value_name = "LEVEL", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=9))]
+    vtk_compression: u32,
+    /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
+    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double)]
+    vtk_precision: Precision,
+    /// Write a checkpoint every N steps (one is written at Ctrl-C, at a request to terminate and
+    /// when a step fails in any case).
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     checkpoint_every: Option<usize>,
     /// Go on from a checkpoint of the same case.
@@ -90,7 +98,11 @@ impl RunArguments {
         let stem = case.file_stem();
         RunOptions {
             csv: self.out.join(format!("{stem}.csv")),
-            vtk: self.vtk.map(|every| VtkOptions { folder: self.out.join(format!("{stem}-vtk")), every }),
+            vtk: self.vtk.map(|every| VtkOptions {
+                folder: self.out.join(format!("{stem}-vtk")),
+                every,
+                encoding: VtkEncoding { compression: self.vtk_compression, precision: self.vtk_precision },
+            }),
             checkpoint: Some(self.out.join(format!("{stem}.checkpoint"))),
             checkpoint_every: self.checkpoint_every,
             resume: self.resume.clone(),
@@ -99,7 +111,7 @@ impl RunArguments {
     }
 }
 
-/// A flag that the first Ctrl-C sets; the second ends the program at once.
+/// A flag that the first Ctrl-C sets, or the first request to terminate or hang up; the second ends the program at once.
 fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let shared = flag.clone();
@@ -107,10 +119,10 @@ fn interrupt_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::Relaxed) {
             process::exit(i32::from(INTERRUPTED));
         }
-        eprintln!("stopping after this step; once more to stop at once");
+        say("stopping after this step; once more to stop at once");
     });
     if let Err(error) = installed {
-        eprintln!("Ctrl-C will end the program without a checkpoint: {error}");
+        say(&format!("Ctrl-C will end the program without a checkpoint: {error}"));
     }
     flag
 }

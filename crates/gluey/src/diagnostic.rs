@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use gluey::case::CaseIssue;
-use gluey::{CaseError, CheckpointError, RunError};
+use gluey::{CaseError, CheckpointError, RowsError, RunError};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -25,22 +25,7 @@ pub fn install() {
 impl Diagnosed {
     /// Adds what helps with `error`, which came from running the case file `case`.
     pub fn new(error: RunError, case: &Path) -> Self {
-        let hint = match &error {
-            RunError::Interrupted { checkpoint: Some(checkpoint), .. } => Some(format!(
-                "to go on: gluey run {} --resume {} (with the same options)",
-                case.display(),
-                checkpoint.display()
-            )),
-            RunError::Output(_) => Some("choose a folder that can be written to with --out DIR".into()),
-            RunError::Checkpoint(CheckpointError::OtherCase { .. }) => {
-                Some("resume with the case file, strategy and formulation of the interrupted run".into())
-            }
-            RunError::Checkpoint(_) => Some("start without --resume".into()),
-            RunError::LeftBox { .. } => Some("end the run earlier, or take a larger box; contact keeps particles from its walls (y), not from open sides".into()),
-            RunError::Case(CaseError::Invalid(issue)) => Some(issue.problem.hint()),
-            RunError::Case(CaseError::Read { .. }) => Some("give the path of a case file".into()),
-            _ => None,
-        };
+        let hint = hint(&error, case);
         let issue = match &error {
             RunError::Case(CaseError::Invalid(issue)) if !issue.text.is_empty() => Some(issue),
             _ => None,
@@ -49,6 +34,50 @@ impl Diagnosed {
             issue.map(|issue| NamedSource::new(issue.file.display().to_string(), issue.text.clone()));
         let label = issue.map(|issue| label(issue));
         Self { hint, source, label, error }
+    }
+}
+
+/// What to do about `error`.
+fn hint(error: &RunError, case: &Path) -> Option<String> {
+    let go_on = |checkpoint: &Path| {
+        format!("gluey run {} --resume {} (with the same options)", case.display(), checkpoint.display())
+    };
+    Some(match error {
+        RunError::Interrupted { checkpoint: Some(checkpoint), .. } => {
+            format!("to go on: {}", go_on(checkpoint))
+        }
+        RunError::Stopped { checkpoint, cause, .. } => {
+            let cure = hint(cause, case).map_or(String::new(), |cure| format!("{cure}; "));
+            format!("{cure}then, to go on: {}", go_on(checkpoint))
+        }
+        RunError::Output(_) => "choose a folder that can be written to with --out DIR".into(),
+        RunError::InUse(_) => {
+            "wait until that run has ended, end it, or write elsewhere with --out DIR".into()
+        }
+        RunError::Rows(error) => rows_hint(error),
+        RunError::Checkpoint(CheckpointError::OtherCase { .. }) => {
+            "resume with the case file, strategy and formulation of the interrupted run".into()
+        }
+        RunError::Checkpoint(_) => "start without --resume".into(),
+        RunError::LeftBox { .. } => {
+            "end the run earlier, or take a larger box; contact keeps particles from its walls \
+                                     (y), not from open sides"
+                .into()
+        }
+        RunError::Case(CaseError::Invalid(issue)) => issue.problem.hint(),
+        RunError::Case(CaseError::Read { .. }) => "give the path of a case file".into(),
+        _ => return None,
+    })
+}
+
+fn rows_hint(error: &RowsError) -> String {
+    match error {
+        RowsError::Differs { path, line } => format!(
+            "rows behind the checkpoint came from another program or machine: to compute them anew, delete line {line} of \
+             {} and those after it",
+            path.display()
+        ),
+        _ => "give the --out DIR of the run that wrote the checkpoint, or start without --resume".into(),
     }
 }
 

@@ -10,10 +10,10 @@ use std::time::Instant;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, FlowStatistics, Hydrodynamics};
+use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 use gluey_stokes::{
     Flow, FlowParams, FlowSolver, NodalFields, PaperParams, Refinement, SolverKind, StokesError,
-    WeakPressures,
+    WarmStartError, WeakPressures,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -34,6 +34,20 @@ pub enum FlowError {
         /// Edge lengths.
         extent: Vec<f64>,
     },
+    /// What the next prediction starts from could not be turned into bytes or back.
+    #[error("the flow to start from cannot be stored or read")]
+    Stored(#[from] postcard::Error),
+    /// A flow to start from that is of other particles.
+    #[error("the flow to start from is one around {saved} particles, not {present}")]
+    Particles {
+        /// Particles of the stored flow.
+        saved: usize,
+        /// Particles here.
+        present: usize,
+    },
+    /// A flow to start from that is of another mesh.
+    #[error(transparent)]
+    WarmStart(#[from] WarmStartError),
 }
 
 impl From<MeshError> for FlowError {
@@ -182,29 +196,27 @@ where
         Some(fields::fields(flow, &self.last_balls, &self.params))
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        let Some((last, before)) = self.solver.warm_start() else { return Vec::new() };
+    fn checkpoint(&self) -> Result<Vec<u8>, FlowError> {
+        let Some((last, before)) = self.solver.warm_start() else { return Ok(Vec::new()) };
         let centers = self.last_balls.iter().map(|b| *b.center()).collect();
         let state = WarmStart { centers, last: last.clone().into(), before: before.cloned().map(Into::into) };
-        postcard::to_allocvec(&state).unwrap_or_default()
+        Ok(postcard::to_allocvec(&state)?)
     }
 
-    fn resume(&mut self, state: &[u8]) -> bool {
+    fn resume(&mut self, state: &[u8]) -> Result<(), ResumeError<FlowError>> {
         if state.is_empty() {
-            return true;
+            return Ok(());
         }
-        let Ok(state) = postcard::from_bytes::<WarmStart<D>>(state) else { return false };
-        if state.centers.len() != self.radii.len() {
-            return false;
+        let WarmStart { centers, last, before } = postcard::from_bytes(state).map_err(FlowError::from)?;
+        let (saved, present) = (centers.len(), self.radii.len());
+        if saved != present {
+            return Err(FlowError::Particles { saved, present }.into());
         }
-        let balls = self.balls(state.centers.into_iter());
-        match self.mesh(&balls) {
-            Ok(mesh) => {
-                self.last_balls = balls;
-                self.solver.set_warm_start(mesh, state.last.into(), state.before.map(Into::into))
-            }
-            Err(_) => false,
-        }
+        let balls = self.balls(centers.into_iter());
+        let mesh = self.mesh(&balls)?;
+        self.solver.set_warm_start(mesh, last.into(), before.map(Into::into)).map_err(FlowError::from)?;
+        self.last_balls = balls;
+        Ok(())
     }
 }
 

@@ -19,7 +19,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(failure) => {
-            eprintln!("{:?}", miette::Report::new(*failure.diagnostic));
+            terminal::say(&format!("{:?}", miette::Report::new(*failure.diagnostic)));
             ExitCode::from(failure.exit_code)
         }
     }

@@ -1,14 +1,22 @@
-//! What a run leaves on disk. Nothing appears under its final name before it is complete.
+//! What a run leaves on disk. Nothing appears under its final name before it is complete, nothing is deleted that the
+//! run did not make, and what another run is writing is not touched.
 
+mod claim;
 pub mod csv;
+mod draft;
 mod pvd;
 pub mod vtk;
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+
+pub(crate) use claim::Claim;
+pub use claim::ClaimError;
+pub use draft::{Mark, RowsError};
 
 /// A file could not be written.
 #[derive(Debug, Error)]
@@ -29,38 +37,96 @@ impl OutputError {
     }
 }
 
-/// The name a file has while it is not complete.
-pub(crate) fn partial(path: &Path) -> PathBuf {
+/// `path` with something behind its name.
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
-    name.push(".partial");
+    name.push(suffix);
     PathBuf::from(name)
 }
 
-/// Creates the folder of `path` if it is missing, and makes sure that a file can be written there.
-pub(crate) fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
+/// The name of draft `number` of `path`: what it is called while it is not complete.
+fn draft_path(path: &Path, number: u32) -> PathBuf {
+    with_suffix(path, &format!(".partial-{number}"))
+}
+
+/// Creates the first draft of `path` that is not there yet.
+fn create_draft(path: &Path) -> io::Result<(u32, File)> {
+    for number in 1..u32::MAX {
+        match File::options().read(true).write(true).create_new(true).open(draft_path(path, number)) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            opened => return opened.map(|file| (number, file)),
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
+}
+
+/// All drafts of `path`, sorted by name.
+pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let Some(name) = path.file_name() else { return Ok(Vec::new()) };
+    let prefix = format!("{}.partial-", name.to_string_lossy());
+    let is_draft = |name: &OsStr| {
+        let number = name.to_str().and_then(|name| name.strip_prefix(&prefix));
+        number.is_some_and(|number| number.parse::<u32>().is_ok())
+    };
+    let list = || -> io::Result<Vec<PathBuf>> {
+        let entries = fs::read_dir(folder_of(path))?.collect::<io::Result<Vec<_>>>()?;
+        let names = entries.iter().map(fs::DirEntry::file_name).filter(|name| is_draft(name));
+        let mut drafts: Vec<PathBuf> = names.map(|name| path.with_file_name(name)).collect();
+        drafts.sort();
+        Ok(drafts)
+    };
+    list().map_err(|error| OutputError::new(folder_of(path), "list the folder", error))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Creates the folder of `path` if it is missing, and makes sure that `path` can be a file in it.
+fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
     if path.file_name().is_none() || path.is_dir() {
         let source = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file");
         return Err(OutputError::new(path, "write the file", source));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(|error| OutputError::new(folder, "create the folder", error))?;
-    let probe = partial(path);
-    File::options()
-        .create(true)
-        .append(true)
-        .open(&probe)
-        .and_then(|_| fs::remove_file(&probe))
-        .map_err(|error| OutputError::new(folder, "write into the folder", error))
+    let folder = folder_of(path);
+    fs::create_dir_all(folder).map_err(|error| OutputError::new(folder, "create the folder", error))
+}
+
+/// Gives a complete draft its name, for good: after a power failure it is there, too.
+fn rename(draft: &Path, path: &Path) -> io::Result<()> {
+    fs::rename(draft, path)?;
+    sync_folder_of(path)
+}
+
+/// Folders can be opened, and so be written back, on Unix only.
+fn sync_folder_of(path: &Path) -> io::Result<()> {
+    if cfg!(unix) { File::open(folder_of(path))?.sync_all() } else { Ok(()) }
 }
 
 /// Writes `bytes` so that `path` holds either all of them or what it held before.
 pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let draft = partial(path);
     let write = || {
-        let mut file = File::create(&draft)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&draft, path)
+        let (number, mut file) = create_draft(path)?;
+        let draft = draft_path(path, number);
+        let written =
+            file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| rename(&draft, path));
+        if written.is_err() {
+            // Half a file is of no use; that it stays is the lesser fault.
+            let _ = fs::remove_file(&draft);
+        }
+        written
     };
     write().map_err(|error| OutputError::new(path, "write the file", error))
+}
+
+/// Puts a file of an earlier run out of the way, as the first `<path>.earlier-K` that is not there yet; `None` if there
+/// is no such file.
+pub(crate) fn set_aside(path: &Path) -> Result<Option<PathBuf>, OutputError> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let names = (1..u32::MAX).map(|number| with_suffix(path, &format!(".earlier-{number}")));
+    let Some(free) = names.into_iter().find(|name| !name.exists()) else { return Ok(None) };
+    rename(path, &free).map_err(|error| OutputError::new(path, "set the file aside", error))?;
+    Ok(Some(free))
 }

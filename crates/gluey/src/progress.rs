@@ -1,4 +1,7 @@
-//! How a run tells where it is.
+//! How a run tells where it is, and what it came upon.
+
+use std::fmt;
+use std::path::PathBuf;
 
 /// Where a run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +24,61 @@ pub struct ProgressState<'a> {
 pub trait Progress: Sync {
     /// Takes note of where the run is; called from the thread of the run, and expected to return at once.
     fn report(&self, state: &ProgressState<'_>);
+
+    /// Takes note of something that is no error but should be known; called as [`Progress::report`] is.
+    fn notice(&self, _: &Notice) {}
+}
+
+/// Something a run came upon that is no error but should be known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// Earlier runs left rows of results that they did not complete.
+    EarlierDrafts {
+        /// The files; they are left as they are.
+        drafts: Vec<PathBuf>,
+    },
+    /// The checkpoint of an earlier run was renamed, for a run whose drafts are still there may want to go on from it.
+    CheckpointSetAside {
+        /// Its old name.
+        from: PathBuf,
+        /// Its new name.
+        to: PathBuf,
+    },
+    /// The file system knows no locks: nothing keeps two runs from writing the same results.
+    NotLocked {
+        /// The lock file.
+        lock: PathBuf,
+    },
+    /// A run failed, and a checkpoint of its last good step could not be written.
+    NoCheckpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EarlierDrafts { drafts } => {
+                write!(f, "left by earlier runs, and kept as they are:")?;
+                drafts.iter().try_for_each(|draft| write!(f, " {}", draft.display()))?;
+                write!(f, " (--resume goes on with the one that the checkpoint belongs to)")
+            }
+            Self::CheckpointSetAside { from, to } => {
+                write!(f, "{}: the checkpoint of an earlier run is now {}", from.display(), to.display())
+            }
+            Self::NotLocked { lock } => write!(
+                f,
+                "{}: the file system knows no locks; see to it that no other run writes the same results",
+                lock.display()
+            ),
+            Self::NoCheckpoint { path, reason } => {
+                write!(f, "{}: no checkpoint of the last good step: {reason}", path.display())
+            }
+        }
+    }
 }
 
 /// Takes no note of anything.

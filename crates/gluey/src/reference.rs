@@ -2,11 +2,11 @@
 //!
 //! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came from.
 
-use gluey_geom::{Dim, Space};
+use gluey_geom::Vector;
 
 use crate::case::Case;
 use crate::interpolate::cubic;
-use crate::trajectory::{Row, Trajectory};
+use crate::trajectory::PairHistory;
 
 /// Names a case may give as its `reference`.
 pub const NAMES: &[&str] =
@@ -106,28 +106,10 @@ impl Reference {
         })
     }
 
-    /// The distance of `trajectory` from this reference; `None` if they have no time in common.
-    pub fn compare<const D: usize>(&self, trajectory: &Trajectory<D>) -> Option<Deviation>
-    where
-        Dim<D>: Space<D>,
-    {
-        let end = self.times.last()?.min(*trajectory.times().last()?);
-        let errors = trajectory.rows().filter(|row| row.time <= end).filter_map(|row| self.error(&row));
-        let max_abs_error_over_a = errors.reduce(f64::max)?;
-        let gap = cubic(&self.times, |index| self.gap[index], end)?;
-        let found = (trajectory.particle_count() > 1).then(|| trajectory.gap_at(0, 1, end)).flatten();
-        let end_gap_rel_error = found.map(|found| (found / RADIUS - gap).abs() / gap.abs());
-        Some(Deviation { end_gap_rel_error, max_abs_error_over_a })
-    }
-
-    /// Largest distance of a centre from its reference at the time of `row`, in radii.
-    fn error<const D: usize>(&self, row: &Row<'_, D>) -> Option<f64>
-    where
-        Dim<D>: Space<D>,
-    {
-        let at = |column: &[f64]| cubic(&self.times, |index| column[index], row.time);
-        let distances = row
-            .positions
+    /// Largest distance of a centre from its reference at `time`, in radii.
+    fn error<const D: usize>(&self, time: f64, centers: &[Vector<D>]) -> Option<f64> {
+        let at = |column: &[f64]| cubic(&self.times, |index| column[index], time);
+        let distances = centers
             .iter()
             .zip(&self.centers)
             .map(|(center, [x, y])| Some((center[0] - at(x)?).hypot(center[1] - at(y)?) / RADIUS));
@@ -135,10 +117,40 @@ impl Reference {
     }
 }
 
+/// A run beside a [`Reference`], row by row.
+#[derive(Clone, Debug)]
+pub(crate) struct Comparison {
+    reference: Reference,
+    max_abs_error_over_a: Option<f64>,
+}
+
+impl Comparison {
+    /// No rows yet.
+    pub fn new(reference: Reference) -> Self {
+        Self { reference, max_abs_error_over_a: None }
+    }
+
+    /// Adds a row.
+    pub fn add<const D: usize>(&mut self, time: f64, centers: &[Vector<D>]) {
+        if self.reference.times.last().is_some_and(|&end| time <= end) {
+            let errors = [self.max_abs_error_over_a, self.reference.error(time, centers)];
+            self.max_abs_error_over_a = errors.into_iter().flatten().reduce(f64::max);
+        }
+    }
+
+    /// The distance of all rows, in which particles 1 and 2 were as `pair` says; `None` if there is no time in common.
+    pub fn deviation(&self, pair: &PairHistory) -> Option<Deviation> {
+        let max_abs_error_over_a = self.max_abs_error_over_a?;
+        let times = &self.reference.times;
+        let end = times.last()?.min(pair.end()?);
+        let gap = cubic(times, |index| self.reference.gap[index], end)?;
+        let end_gap_rel_error = pair.gap_at(end).map(|found| (found / RADIUS - gap).abs() / gap.abs());
+        Some(Deviation { end_gap_rel_error, max_abs_error_over_a })
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use gluey_geom::{Particle, Twist, Vector};
-
     use super::*;
 
     #[test]
@@ -154,15 +166,17 @@ mod tests {
     fn a_reference_does_not_deviate_from_itself() {
         let reference = Reference::named("pair2d_trajectory").expect("known");
         let shifted = |shift: f64| {
-            let mut trajectory = Trajectory::<2>::new(vec![RADIUS; 2], [None; 2]);
-            for row in 0..reference.times.len() {
+            let mut comparison = Comparison::new(reference.clone());
+            let mut pair = PairHistory::default();
+            for (row, &time) in reference.times.iter().enumerate() {
                 let center = |n: usize| {
                     Vector::<2>::new(reference.centers[n][0][row], reference.centers[n][1][row] + shift)
                 };
-                let particles = [Particle::new(center(0), RADIUS), Particle::new(center(1), RADIUS)];
-                trajectory.push(reference.times[row], &particles, &[Twist::default(); 2]);
+                let centers = [center(0), center(1)];
+                comparison.add(time, &centers);
+                pair.push(time, [&centers[0], &centers[1]], [RADIUS; 2], &[None; 2]);
             }
-            reference.compare(&trajectory).expect("a common time")
+            comparison.deviation(&pair).expect("a common time")
         };
         assert!(shifted(0.0).max_abs_error_over_a < 1e-9);
         assert!(shifted(0.0).end_gap_rel_error.expect("a pair") < 1e-4);

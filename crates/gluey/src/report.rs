@@ -2,15 +2,13 @@
 
 use std::fmt;
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::FlowStatistics;
 use serde::Serialize;
 
 use crate::case::{Case, Strategy};
-use crate::interpolate::cubic;
+use crate::measures::Measures;
 use crate::phases::PhaseTable;
-use crate::reference::Reference;
-use crate::trajectory::Trajectory;
+use crate::trajectory::PairHistory;
 
 /// Gaps below this many radii are contact, and no measure of anything.
 const TOUCHING_OVER_A: f64 = 1e-8;
@@ -51,42 +49,27 @@ pub struct RunReport {
 }
 
 impl RunReport {
-    /// Measures a trajectory of `case`.
+    /// The report of a run of `case`.
     pub(crate) fn of<const D: usize>(
         case: &Case,
-        trajectory: &Trajectory<D>,
+        measures: &Measures<D>,
         flow: &FlowStatistics,
         wall_s: f64,
         phases: &PhaseTable,
-    ) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
-        let a = trajectory.mean_radius();
-        let deviation = case
-            .reference
-            .as_deref()
-            .and_then(Reference::named)
-            .and_then(|reference| reference.compare(trajectory));
-        let reversibility_error = match case.time.reverse_at {
-            None => reversibility_error(trajectory),
-            Some(_) => None,
-        };
+    ) -> Self {
+        let (a, pair) = (measures.mean_radius(), measures.pair());
+        let deviation = measures.deviation();
         Self {
             case: case.name.clone(),
             strategy: case.contact.strategy,
             formulation: case.flow_name().to_owned(),
-            steps: trajectory.len().saturating_sub(1),
+            steps: measures.row_count().saturating_sub(1),
             wall_s,
             cells: flow.cell_count,
             dofs: flow.dof_count,
-            min_gap_over_a: trajectory
-                .rows()
-                .filter_map(|row| row.smallest_gap())
-                .reduce(f64::min)
-                .map(|gap| gap / a),
-            end_gap_over_a: end_gap(trajectory).map(|gap| gap / a),
-            reversibility_error,
+            min_gap_over_a: measures.smallest_gap_over_a(),
+            end_gap_over_a: pair.end_gap().map(|gap| gap / a),
+            reversibility_error: case.time.reverse_at.map_or_else(|| reversibility_error(pair, a), |_| None),
             reference: case.reference.clone(),
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),
@@ -95,58 +78,21 @@ impl RunReport {
     }
 }
 
-/// Gap of particles 1 and 2 at the end.
-fn end_gap<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
-    let last = trajectory.len().checked_sub(1)?;
-    (trajectory.particle_count() > 1).then(|| trajectory.row(last).gap(0, 1))
-}
-
-/// `|D(t* + s) - D(t* - s)| / D(t* - s)` of particles 1 and 2 at the end of the run: `t*` is the last time when their line
-/// of centres is at 90 degrees to the flow and `s = t_end - t*`, or a little less where `t* - s` would lie before the
-/// start. An exact encounter has none: it is its own mirror image in time.
+/// `|D(t* + s) - D(t* - s)| / D(t* - s)` at the end of the run: `t*` is the last time when the line of centres is at 90
+/// degrees to the flow and `s = t_end - t*`, or a little less where `t* - s` would lie before the start. An exact
+/// encounter has none: it is its own mirror image in time.
 ///
-/// `None` for fewer than two particles, without such a time, where more than a twentieth of `s` would have to be cut, and
-/// where the surfaces touch at `t* - s`.
-fn reversibility_error<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
-    let end = *trajectory.times().last()?;
-    let crossing = last_crossing(trajectory)?;
+/// `None` without such a time, where more than a twentieth of `s` would have to be cut, and where the surfaces touch at
+/// `t* - s`. `a` is the mean radius.
+fn reversibility_error(pair: &PairHistory, a: f64) -> Option<f64> {
+    let end = pair.end()?;
+    let crossing = pair.last_crossing()?;
     let after = end - crossing;
     let reach = Some(after.min(crossing)).filter(|reach| *reach >= 0.95 * after)?;
-    let last = trajectory.gap_at(0, 1, (crossing + reach).min(end))?;
-    let mirrored = trajectory.gap_at(0, 1, (crossing - reach).max(0.0))?;
+    let last = pair.gap_at((crossing + reach).min(end))?;
+    let mirrored = pair.gap_at((crossing - reach).max(0.0))?;
     let error = (last - mirrored).abs() / mirrored;
-    (mirrored > TOUCHING_OVER_A * trajectory.mean_radius()).then_some(error)
-}
-
-/// The last time when particles 1 and 2 are abreast in x.
-fn last_crossing<const D: usize>(trajectory: &Trajectory<D>) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
-    if trajectory.particle_count() < 2 {
-        return None;
-    }
-    let times = trajectory.times();
-    let along = |index: usize| {
-        let positions = trajectory.row(index).positions;
-        positions[1][0] - positions[0][0]
-    };
-    let crosses = |index: usize| (along(index) > 0.0) != (along(index + 1) > 0.0);
-    let index = (0..times.len().saturating_sub(1)).rev().find(|&index| crosses(index))?;
-    let (mut before, mut after) = (times[index], times[index + 1]);
-    // Bisection to the last bit or so.
-    for _ in 0..60 {
-        let middle = 0.5 * (before + after);
-        let same_side = (cubic(times, along, middle)? > 0.0) == (along(index) > 0.0);
-        *(if same_side { &mut before } else { &mut after }) = middle;
-    }
-    Some(0.5 * (before + after))
+    (mirrored > TOUCHING_OVER_A * a).then_some(error)
 }
 
 impl fmt::Display for RunReport {
@@ -179,43 +125,42 @@ fn write_number(f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>) -> f
 
 #[cfg(test)]
 mod tests {
-    use gluey_geom::{Particle, Twist, Vector};
+    use gluey_geom::Vector;
 
     use super::*;
 
     const A: f64 = 0.05;
 
     /// Particle 2 passes above particle 1 at `t = 5`, at the distance `above(t)` in y.
-    fn passing(end: f64, above: impl Fn(f64) -> f64) -> Trajectory<2> {
-        let mut trajectory = Trajectory::new(vec![A; 2], [None; 2]);
+    fn passing(end: f64, above: impl Fn(f64) -> f64) -> PairHistory {
+        let mut pair = PairHistory::default();
         let mut t = 0.0;
         while t <= end {
             let other = Vector::<2>::new(0.1 * (t - 5.0), above(t));
-            let particles = [Particle::new(Vector::zeros(), A), Particle::new(other, A)];
-            trajectory.push(t, &particles, &[Twist::default(); 2]);
+            pair.push(t, [&Vector::zeros(), &other], [A; 2], &[None; 2]);
             t += 0.1;
         }
-        trajectory
+        pair
     }
 
     #[test]
     fn a_symmetric_passage_is_reversible() {
-        let error = reversibility_error(&passing(9.03, |_| 0.11)).expect("a mirror time");
+        let error = reversibility_error(&passing(9.03, |_| 0.11), A).expect("a mirror time");
         assert!(error < 1e-4, "{error}");
     }
 
     #[test]
     fn a_passage_that_ends_elsewhere_is_not() {
-        let trajectory = passing(9.03, |t| if t < 5.0 { 0.11 } else { 0.3 });
-        let error = reversibility_error(&trajectory).expect("a mirror time");
+        let pair = passing(9.03, |t| if t < 5.0 { 0.11 } else { 0.3 });
+        let error = reversibility_error(&pair, A).expect("a mirror time");
         let gap = |y: f64| 0.4f64.hypot(y) - 2.0 * A;
         assert!((error - (gap(0.3) - gap(0.11)) / gap(0.11)).abs() < 1e-3, "{error}");
     }
 
     #[test]
     fn without_a_mirror_time_there_is_no_such_error() {
-        assert_eq!(reversibility_error(&passing(4.0, |_| 0.11)), None);
-        assert_eq!(reversibility_error(&passing(11.0, |_| 0.11)), None);
-        assert_eq!(reversibility_error(&Trajectory::<2>::new(vec![A], [None; 2])), None);
+        assert_eq!(reversibility_error(&passing(4.0, |_| 0.11), A), None);
+        assert_eq!(reversibility_error(&passing(11.0, |_| 0.11), A), None);
+        assert_eq!(reversibility_error(&PairHistory::default(), A), None);
     }
 }

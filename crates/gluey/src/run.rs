@@ -2,138 +2,39 @@
 //!
 //! The dimension of a case is matched here and nowhere else: below, everything is compiled for it.
 
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+mod error;
+mod options;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use gluey_contact::{ContactModel, PairContact};
 use gluey_geom::{Dim, Particle, Space, Vector};
-use gluey_motion::{LinearFlow, PairMobility, PairMobilityError};
-use thiserror::Error;
+use gluey_motion::{LinearFlow, PairMobility};
 
-use crate::case::{Case, CaseError, Hydrodynamics};
+pub use error::{HydrodynamicsError, RunError};
+pub use options::{RunOptions, VtkOptions};
+
+use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::flow::{FlowError, StokesFlow, stokes_flow};
-use crate::output::csv::CsvWriter;
-use crate::output::vtk::{Frame, VtkWriter};
-use crate::output::{OutputError, prepare_folder_of};
-use crate::progress::{Progress, ProgressState};
+use crate::flow::{StokesFlow, stokes_flow};
+use crate::measures::{self, Measures};
+use crate::output::csv::{CsvWriter, earlier_drafts};
+use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
+use crate::output::{Claim, OutputError, set_aside};
+use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
-use crate::simulation::{Simulation, StepError};
-use crate::trajectory::Trajectory;
+use crate::simulation::{RestoreError, Simulation, StepError};
+use crate::trajectory::Row;
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
 
-/// What a run writes, and where.
-#[derive(Clone, Debug, Default)]
-pub struct RunOptions {
-    /// The trajectory, one row a step; its folder is created when missing.
-    pub csv: PathBuf,
-    /// Fields and particles for ParaView.
-    pub vtk: Option<VtkOptions>,
-    /// Where to write checkpoints: at interrupts, and as often as `checkpoint_every` says.
-    pub checkpoint: Option<PathBuf>,
-    /// Steps between checkpoints, at least 1.
-    pub checkpoint_every: Option<usize>,
-    /// A checkpoint of the same case to go on from.
-    pub resume: Option<PathBuf>,
-    /// Set from outside to stop after the current step.
-    pub interrupt: Option<Arc<AtomicBool>>,
-}
-
-/// Output for ParaView.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct VtkOptions {
-    /// Folder for the files.
-    pub folder: PathBuf,
-    /// Steps between files, at least 1.
-    pub every: usize,
-}
-
-impl RunOptions {
-    /// Writes the trajectory to `csv` and nothing else.
-    pub fn csv(csv: impl Into<PathBuf>) -> Self {
-        Self { csv: csv.into(), ..Self::default() }
-    }
-}
-
-/// The flow could not be computed.
-#[derive(Debug, Error)]
-pub enum HydrodynamicsError {
-    /// By the analytic model of two spheres.
-    #[error(transparent)]
-    PairMobility(#[from] PairMobilityError),
-    /// By the finite-element solver.
-    #[error(transparent)]
-    Flow(#[from] FlowError),
-    /// The model does not exist in this dimension.
-    #[error("there is no {hydrodynamics} hydrodynamics in {dimension}D")]
-    Unfit {
-        /// The model.
-        hydrodynamics: Hydrodynamics,
-        /// The dimension.
-        dimension: usize,
-    },
-}
-
-impl HydrodynamicsError {
-    fn unfit(case: &Case) -> Self {
-        Self::Unfit { hydrodynamics: case.flow.hydrodynamics, dimension: case.dimension }
-    }
-}
-
-/// A run came to nothing.
-#[derive(Debug, Error)]
-pub enum RunError {
-    /// The case makes no sense.
-    #[error(transparent)]
-    Case(#[from] CaseError),
-    /// Something could not be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// A checkpoint could not be used.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// The flow could not be set up.
-    #[error("the flow could not be set up")]
-    Flow(#[from] HydrodynamicsError),
-    /// A step failed.
-    #[error(transparent)]
-    Step(#[from] StepError<HydrodynamicsError>),
-    /// A particle touched the boundary of the box, where the flow is prescribed.
-    #[error(
-        "particle {particle} reached the boundary of the box in step {step} (t = {time}): it sticks out by {excess:.3e}"
-    )]
-    LeftBox {
-        /// Its number, from 1.
-        particle: usize,
-        /// Steps done.
-        step: usize,
-        /// Time.
-        time: f64,
-        /// How far.
-        excess: f64,
-    },
-    /// The run was asked to stop.
-    #[error("interrupted after step {step} of {steps} (t = {time})")]
-    Interrupted {
-        /// Steps done.
-        step: usize,
-        /// Steps in all.
-        steps: usize,
-        /// Time reached.
-        time: f64,
-        /// Where the run can go on from.
-        checkpoint: Option<PathBuf>,
-    },
-}
-
 /// Runs `case`, writes what `options` ask for and reports to `progress`.
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
-    prepare_outputs(options)?;
+    let _claims = claim_outputs(options, progress)?;
     match case.dimension {
         2 => run_2d(case, options, progress),
         _ => run_3d(case, options, progress),
@@ -169,11 +70,15 @@ fn pair_mobility(case: &Case) -> PairMobility {
     PairMobility::new(shear).with_gap_offset(case.flow.pair_mobility.gap_offset)
 }
 
-/// Finds out before the first step whether files can be written.
-fn prepare_outputs(options: &RunOptions) -> Result<(), OutputError> {
-    prepare_folder_of(&options.csv)?;
-    options.checkpoint.as_deref().map_or(Ok(()), prepare_folder_of)?;
-    options.vtk.as_ref().map_or(Ok(()), |vtk| prepare_folder_of(&vtk.folder.join("fields.pvd")))
+/// Makes sure before the first step that files can be written, and that no other run writes them.
+fn claim_outputs(options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
+    let vtk = options.vtk.as_ref().map(|vtk| vtk.folder.as_path());
+    let results = [Some(options.csv.as_path()), options.checkpoint.as_deref(), vtk];
+    let claims = results.into_iter().flatten().map(Claim::new).collect::<Result<Vec<_>, _>>()?;
+    for lock in claims.iter().filter_map(Claim::unguarded) {
+        progress.notice(&Notice::NotLocked { lock: lock.to_owned() });
+    }
+    Ok(claims)
 }
 
 /// A run on its way.
@@ -185,9 +90,12 @@ where
     options: &'a RunOptions,
     progress: &'a dyn Progress,
     simulation: Simulation<D, H, PairContact<D>>,
-    trajectory: Trajectory<D>,
-    csv: CsvWriter,
-    vtk: Option<(usize, VtkWriter)>,
+    measures: Measures<D>,
+    csv: CsvWriter<D>,
+    vtk: Option<(usize, FrameWriter<D>)>,
+    checkpoints: Option<CheckpointFile>,
+    /// The run before the step that is being done, where checkpoints are written.
+    last_good: Option<Checkpoint<D>>,
     started: Instant,
     first_step: usize,
     wall_before_s: f64,
@@ -207,36 +115,42 @@ where
         progress: &'a dyn Progress,
         hydrodynamics: H,
     ) -> Result<Self, RunError> {
-        let particles = particles(case);
-        let surroundings = case.surroundings();
-        let radii = particles.iter().map(|particle| particle.radius).collect();
-        let mut trajectory = Trajectory::new(radii, surroundings.periods);
-        let contact = PairContact::new(case.contact.params()).within(surroundings);
-        let mut simulation =
-            Simulation::new(particles, case.time.scheme, case.time.step, hydrodynamics, contact);
-        let mut wall_before_s = 0.0;
-        if let Some(path) = &options.resume {
-            let checkpoint = Checkpoint::read(case, path)?;
-            trajectory = checkpoint.trajectory;
-            wall_before_s = checkpoint.wall_s;
-            *simulation.phases_mut() = checkpoint.phases;
-            if !simulation.restore(checkpoint.state) {
-                return Err(CheckpointError::Damaged { path: path.clone() }.into());
+        let contact = PairContact::new(case.contact.params()).within(case.surroundings());
+        let (scheme, dt) = (case.time.scheme, case.time.step);
+        let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+        let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
+        let drafts = earlier_drafts(&options.csv, case.particles.len())?;
+        let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
+        let csv = match &options.resume {
+            None => {
+                if !drafts.is_empty() {
+                    progress.notice(&Notice::EarlierDrafts { drafts });
+                }
+                CsvWriter::create(&options.csv, case.particles.len())?
             }
-        }
-        let mut csv = CsvWriter::create::<D>(&options.csv, case.particles.len())?;
-        csv.write_all(&trajectory)?;
-        let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, trajectory.times())).transpose()?;
+            Some(path) => {
+                let checkpoint = Checkpoint::read(case, path)?;
+                wall_before_s = checkpoint.wall_s;
+                *simulation.phases_mut() = checkpoint.phases;
+                let restored = simulation.restore(checkpoint.state).map_err(RestoreError::widen);
+                restored.map_err(|source| CheckpointError::Unfit { path: path.clone(), source })?;
+                let visit = |row: &measures::Instant<D>| measures.add(row);
+                CsvWriter::resume(&options.csv, &checkpoint.output, case.particles.len(), visit)?
+            }
+        };
         let first_step = simulation.step_index();
-        let started = Instant::now();
+        let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, dt)).transpose()?;
+        let (started, last_good) = (Instant::now(), None);
         Ok(Self {
             case,
             options,
             progress,
             simulation,
-            trajectory,
+            measures,
             csv,
             vtk,
+            checkpoints,
+            last_good,
             started,
             first_step,
             wall_before_s,
@@ -245,16 +159,25 @@ where
 
     /// Runs to the end.
     fn finish(mut self) -> Result<RunReport, RunError> {
-        while self.simulation.step_index() < self.case.step_count() {
-            self.observe()?;
-            self.advance()?;
-            self.save_if_due()?;
+        if let Err(error) = self.all_steps() {
+            return Err(self.keep_last_good(error));
         }
-        self.observe()?;
+        self.vtk.take().map_or(Ok(()), |(_, frames)| frames.finish())?;
         let wall_s = self.wall_s();
         let flow = self.simulation.statistics();
         self.csv.finish()?;
-        Ok(RunReport::of(self.case, &self.trajectory, &flow, wall_s, self.simulation.phases()))
+        Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
+    }
+
+    fn all_steps(&mut self) -> Result<(), RunError> {
+        self.remember()?;
+        while self.simulation.step_index() < self.case.step_count() {
+            self.observe()?;
+            self.advance()?;
+            self.remember()?;
+            self.save_if_due()?;
+        }
+        self.observe()
     }
 
     /// Computes the velocities here and now, and writes them down.
@@ -270,23 +193,23 @@ where
         Ok(())
     }
 
-    fn write(&mut self) -> Result<(), OutputError> {
+    fn write(&mut self) -> Result<(), RunError> {
         let simulation = &self.simulation;
         let (step, time) = (simulation.step_index(), simulation.time());
-        self.trajectory.push(time, simulation.particles(), simulation.twists());
-        self.csv.write(&self.trajectory.row(self.trajectory.len() - 1))?;
+        let (particles, twists) = (simulation.particles(), simulation.twists());
+        let domain = simulation.contact().domain();
+        let smallest_gap_over_a = self.csv.write(&Row { time, particles, twists, domain })?;
+        let centers = particles.iter().map(|particle| particle.pose.position).collect();
+        self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
         match &mut self.vtk {
-            Some((every, writer)) if step.is_multiple_of(*every) => writer.write(&Frame {
-                step,
-                time,
-                particles: simulation.particles(),
-                twists: simulation.twists(),
-                contacts: simulation.contacts(),
-                domain: simulation.contact().domain(),
-                fields: simulation.fields().as_ref(),
-            }),
-            _ => Ok(()),
+            Some((every, frames)) if step.is_multiple_of(*every) => {
+                let (contacts, fields) = (simulation.contacts(), None);
+                let frame = Frame { step, time, particles, twists, contacts, domain, fields };
+                frames.write(&frame, simulation.fields())?;
+            }
+            _ => {}
         }
+        Ok(())
     }
 
     /// Moves the particles, and reverses the shear when it is time.
@@ -327,8 +250,8 @@ where
         let interrupted =
             self.options.interrupt.as_ref().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed));
         let due = self.options.checkpoint_every.is_some_and(|every| step.is_multiple_of(every.max(1)));
-        if let Some(path) = self.options.checkpoint.as_ref().filter(|_| interrupted || due) {
-            self.checkpoint().write(self.case, path)?;
+        if interrupted || due {
+            self.save()?;
         }
         match interrupted && step < steps {
             true => {
@@ -339,12 +262,40 @@ where
         }
     }
 
-    fn checkpoint(&self) -> Checkpoint<D> {
-        Checkpoint {
-            state: self.simulation.state(),
-            trajectory: self.trajectory.clone(),
-            phases: self.simulation.phases().clone(),
-            wall_s: self.wall_s(),
+    /// Keeps the run as it is between two steps: a step that fails has already changed what the next would start from.
+    fn remember(&mut self) -> Result<(), RunError> {
+        if self.checkpoints.is_some() {
+            self.last_good = Some(Checkpoint {
+                state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
+                output: self.csv.marks(),
+                phases: self.simulation.phases().clone(),
+                wall_s: self.wall_s(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Writes what was remembered, after what it counts on.
+    fn save(&mut self) -> Result<(), OutputError> {
+        let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
+        self.csv.sync()?;
+        self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
+        file.write(checkpoint, self.case, self.progress)
+    }
+
+    /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good step.
+    fn keep_last_good(&mut self, error: RunError) -> RunError {
+        let is_curable = matches!(error, RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_));
+        let step = self.last_good.as_ref().map_or(0, |checkpoint| checkpoint.state.step);
+        let Some(path) = self.options.checkpoint.clone().filter(|_| is_curable && step > 0) else {
+            return error;
+        };
+        match self.save() {
+            Ok(()) => RunError::Stopped { step, checkpoint: path, cause: Box::new(error) },
+            Err(reason) => {
+                self.progress.notice(&Notice::NoCheckpoint { path, reason: reason.source.to_string() });
+                error
+            }
         }
     }
 
@@ -362,11 +313,52 @@ where
     }
 }
 
+/// Where a run writes its checkpoints.
+struct CheckpointFile {
+    path: PathBuf,
+    /// Whether an earlier run, whose drafts are still there, may want to go on from the file that is there.
+    is_wanted: bool,
+}
+
+impl CheckpointFile {
+    fn new(options: &RunOptions, has_drafts: bool) -> Option<Self> {
+        let path = options.checkpoint.clone()?;
+        let full = |path: &Path| path.canonicalize().ok();
+        let goes_on = options.resume.as_deref().is_some_and(|resume| full(resume) == full(&path));
+        Some(Self { path, is_wanted: has_drafts && !goes_on })
+    }
+
+    fn write<const D: usize>(
+        &mut self,
+        checkpoint: &Checkpoint<D>,
+        case: &Case,
+        progress: &dyn Progress,
+    ) -> Result<(), OutputError>
+    where
+        Dim<D>: Space<D>,
+    {
+        if std::mem::take(&mut self.is_wanted)
+            && let Some(to) = set_aside(&self.path)?
+        {
+            progress.notice(&Notice::CheckpointSetAside { from: self.path.clone(), to });
+        }
+        checkpoint.write(case, &self.path)
+    }
+}
+
 /// The writer and its interval; of the steps done, those with files stay listed.
-fn vtk_writer(options: &VtkOptions, times: &[f64]) -> Result<(usize, VtkWriter), OutputError> {
+fn vtk_writer<const D: usize>(
+    options: &VtkOptions,
+    step: usize,
+    dt: f64,
+) -> Result<(usize, FrameWriter<D>), OutputError>
+where
+    Dim<D>: Space<D>,
+{
     let every = options.every.max(1);
-    let done: Vec<(usize, f64)> = times.iter().copied().enumerate().step_by(every).collect();
-    Ok((every, VtkWriter::create(&options.folder, &done)?))
+    let done: Vec<(usize, f64)> = (0..step).step_by(every).map(|step| (step, step as f64 * dt)).collect();
+    let writer = VtkWriter::create(&options.folder, &done)?.encoded(options.encoding);
+    Ok((every, FrameWriter::new(writer)?))
 }
 
 /// The particles of a checked case.

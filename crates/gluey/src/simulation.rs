@@ -1,8 +1,8 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
-use gluey_contact::{Contact, ContactError, ContactModel, ContactState, StepGeometry};
+use gluey_contact::{Contact, ContactError, ContactModel, ContactState, MemoryError, StepGeometry};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
-use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, Integrator, Scheme};
+use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, Integrator, ResumeError, Scheme};
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
@@ -89,6 +89,36 @@ impl<E: std::error::Error + 'static> StepError<E> {
             Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
             Self::Contact { step, time, source } => StepError::Contact { step, time, source },
             Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
+        }
+    }
+}
+
+/// A simulation cannot go on from a state.
+#[derive(Debug, Error)]
+pub enum RestoreError<E: std::error::Error + 'static> {
+    /// It is of other particles.
+    #[error("the state is one of {saved} particles, which are not the {present} particles here")]
+    Particles {
+        /// Particles of the state.
+        saved: usize,
+        /// Particles of the simulation.
+        present: usize,
+    },
+    /// Its flow does not fit.
+    #[error(transparent)]
+    Flow(#[from] ResumeError<E>),
+    /// Its contacts are none.
+    #[error(transparent)]
+    Contact(#[from] MemoryError),
+}
+
+impl<E: std::error::Error + 'static> RestoreError<E> {
+    /// The same for a wider type of flow errors.
+    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> RestoreError<W> {
+        match self {
+            Self::Particles { saved, present } => RestoreError::Particles { saved, present },
+            Self::Flow(error) => RestoreError::Flow(error.widen()),
+            Self::Contact(error) => RestoreError::Contact(error),
         }
     }
 }
@@ -255,31 +285,38 @@ where
     }
 
     /// What [`Simulation::restore`] needs; taken between steps.
-    pub fn state(&self) -> SimulationState<D> {
-        SimulationState {
+    ///
+    /// # Errors
+    /// If the flow cannot store what it starts from.
+    pub fn state(&self) -> Result<SimulationState<D>, H::Error> {
+        Ok(SimulationState {
             step: self.step,
             reversed: self.reversed,
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
             contact: self.contact.checkpoint(),
-            hydrodynamics: self.hydrodynamics.checkpoint(),
-        }
+            hydrodynamics: self.hydrodynamics.checkpoint()?,
+        })
     }
 
-    /// Goes on from `state`; `false`, and unchanged but for the flow, if it is not of a simulation like this one.
-    pub fn restore(&mut self, state: SimulationState<D>) -> bool {
-        let same_radii =
-            state.particles.iter().map(|particle| particle.radius).eq(self.radii.iter().copied());
-        if !same_radii || !self.hydrodynamics.resume(&state.hydrodynamics) {
-            return false;
+    /// Goes on from `state`.
+    ///
+    /// # Errors
+    /// If it is not of a simulation like this one, which is unchanged then but for the flow.
+    pub fn restore(&mut self, state: SimulationState<D>) -> Result<(), RestoreError<H::Error>> {
+        let radii = state.particles.iter().map(|particle| particle.radius);
+        if !radii.eq(self.radii.iter().copied()) {
+            let (saved, present) = (state.particles.len(), self.radii.len());
+            return Err(RestoreError::Particles { saved, present });
         }
+        self.hydrodynamics.resume(&state.hydrodynamics)?;
+        self.contact.resume(state.contact)?;
         self.hydrodynamics.set_shear_factor(if state.reversed { -1.0 } else { 1.0 });
         self.step = state.step;
         self.reversed = state.reversed;
         self.particles = state.particles;
         self.integrator = state.integrator;
-        self.contact.resume(state.contact);
-        true
+        Ok(())
     }
 
     /// Books the time of a prediction on the phases that the flow names, and the rest on "flow".

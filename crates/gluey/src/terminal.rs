@@ -1,10 +1,10 @@
 //! Progress and results in words: a bar on a terminal, plain lines in a log.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, Write, stderr, stdout};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use gluey::{Progress, ProgressState, RunReport};
+use gluey::{Notice, Progress, ProgressState, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Time between lines of a log.
@@ -58,11 +58,23 @@ impl Progress for Reporter {
                 let Ok(mut last) = last.lock() else { return };
                 if last.elapsed() >= LOG_INTERVAL {
                     *last = Instant::now();
-                    eprintln!("{name}: step {}/{} {}", state.step, state.steps, summary(state));
+                    say(&format!("{name}: step {}/{} {}", state.step, state.steps, summary(state)));
                 }
             }
         }
     }
+
+    fn notice(&self, notice: &Notice) {
+        match self {
+            Self::Bar(bar) => bar.suspend(|| say(&notice.to_string())),
+            Self::Log { name, .. } => say(&format!("{name}: {notice}")),
+        }
+    }
+}
+
+/// Writes a line for people. That nobody listens any more, as when a terminal was closed, must not end a run.
+pub fn say(line: &str) {
+    let _ = writeln!(stderr(), "{line}");
 }
 
 fn summary(state: &ProgressState<'_>) -> String {
@@ -85,12 +97,14 @@ fn duration(seconds: f64) -> String {
 
 /// Prints what came out, and where the time went.
 pub fn print_report(report: &RunReport) {
-    print!("{report}");
     let total: f64 = report.phases.iter().map(|(_, seconds)| seconds).sum();
-    println!("  phase                seconds   share");
+    let mut text = format!("{report}  phase                seconds   share\n");
     for (name, seconds) in &report.phases {
-        println!("  {name:<18} {seconds:>9.3} {:>6.1} %", 100.0 * seconds / total.max(f64::MIN_POSITIVE));
+        let share = 100.0 * seconds / total.max(f64::MIN_POSITIVE);
+        text.push_str(&format!("  {name:<18} {seconds:>9.3} {share:>6.1} %\n"));
     }
+    // All results are on disk: that nobody reads this is no failure.
+    let _ = stdout().write_all(text.as_bytes());
 }
 
 #[cfg(test)]

@@ -1,27 +1,12 @@
-//! Everything the particles did, step by step.
+//! One instant of a run, and what of all instants the report needs.
 
-use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
+use gluey_contact::Domain;
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::nearest_image;
-use serde::{Deserialize, Serialize};
 
 use crate::interpolate::cubic;
 
-/// Positions and spins of all particles at the start of every step and at the end of the run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct Trajectory<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    radii: Vec<f64>,
-    /// Length of the period in each direction that has one.
-    periods: Vec<Option<f64>>,
-    times: Vec<f64>,
-    positions: Vec<Vector<D>>,
-    spins: Vec<Spin<D>>,
-}
-
-/// One instant of a [`Trajectory`].
+/// Where particles are at one instant, and how they move.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a, const D: usize>
 where
@@ -29,106 +14,101 @@ where
 {
     /// Time.
     pub time: f64,
-    /// Radii, one a particle.
-    pub radii: &'a [f64],
-    /// Length of the period in each direction that has one.
-    pub periods: &'a [Option<f64>],
-    /// Centres, one a particle; they are not brought back into the period.
-    pub positions: &'a [Vector<D>],
-    /// Spins, one a particle.
-    pub spins: &'a [Spin<D>],
+    /// Particles; their centres are not brought back into the period.
+    pub particles: &'a [Particle<D>],
+    /// Their velocities and spins.
+    pub twists: &'a [Twist<D>],
+    /// Their walls and periods.
+    pub domain: &'a Domain<D>,
 }
 
 impl<const D: usize> Row<'_, D>
 where
     Dim<D>: Space<D>,
 {
+    /// Mean radius of the particles.
+    pub fn mean_radius(&self) -> f64 {
+        self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64
+    }
+
     /// Gap between the surfaces of two particles, of their nearest images (Verdon et al. 2010, eq. 14).
     pub fn gap(&self, first: usize, second: usize) -> f64 {
-        let direct = self.positions[second] - self.positions[first];
-        let nearest = Vector::<D>::from_fn(|d, _| nearest_image(direct[d], self.periods[d]));
-        nearest.norm() - (self.radii[first] + self.radii[second])
+        let [one, other] = [first, second].map(|particle| &self.particles[particle]);
+        let distance = separation(&one.pose.position, &other.pose.position, &self.domain.periods).norm();
+        distance - (one.radius + other.radius)
+    }
+
+    /// Whether the nearest image of a particle is the particle itself.
+    pub fn is_direct(&self, first: usize, second: usize) -> bool {
+        let [one, other] = [first, second].map(|particle| &self.particles[particle].pose.position);
+        separation(one, other, &self.domain.periods) == other - one
     }
 
     /// All pairs, `(0, 1), (0, 2), (1, 2), ...` in the order 12, 13, ..., 23, ... of the output.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
-        let count = self.radii.len();
+        let count = self.particles.len();
         (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
-    }
-
-    /// The smallest gap of all pairs; `None` for fewer than two particles.
-    pub fn smallest_gap(&self) -> Option<f64> {
-        self.pairs().map(|(first, second)| self.gap(first, second)).reduce(f64::min)
     }
 }
 
-impl<const D: usize> Trajectory<D>
-where
-    Dim<D>: Space<D>,
-{
-    /// No rows yet, for particles of these radii in a space of these periods.
-    pub fn new(radii: Vec<f64>, periods: [Option<f64>; D]) -> Self {
-        Self { radii, periods: periods.to_vec(), times: Vec::new(), positions: Vec::new(), spins: Vec::new() }
-    }
+/// Vector from one point to the nearest image of another.
+fn separation<const D: usize>(one: &Vector<D>, other: &Vector<D>, periods: &[Option<f64>; D]) -> Vector<D> {
+    let direct = other - one;
+    Vector::from_fn(|axis, _| nearest_image(direct[axis], periods[axis]))
+}
 
-    /// Adds the state at `time`, later than all before.
-    pub fn push(&mut self, time: f64, particles: &[Particle<D>], twists: &[Twist<D>]) {
+/// What the report needs of particles 1 and 2, at every instant: three numbers a row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct PairHistory {
+    times: Vec<f64>,
+    gaps: Vec<f64>,
+    /// How far particle 2 is ahead of particle 1 in x.
+    ahead: Vec<f64>,
+}
+
+impl PairHistory {
+    /// Adds the instant `time`, later than all before, at which two particles of radii `radii` are at `centers`.
+    pub fn push<const D: usize>(
+        &mut self,
+        time: f64,
+        centers: [&Vector<D>; 2],
+        radii: [f64; 2],
+        periods: &[Option<f64>; D],
+    ) {
+        let [one, other] = centers;
         self.times.push(time);
-        self.positions.extend(particles.iter().map(|particle| particle.pose.position));
-        self.spins.extend(twists.iter().map(|twist| twist.spin));
+        // The same expression as in `Row::gap`, so that both are equal bit for bit.
+        self.gaps.push(separation(one, other, periods).norm() - (radii[0] + radii[1]));
+        self.ahead.push(other[0] - one[0]);
     }
 
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.times.len()
+    /// Gap at the end.
+    pub fn end_gap(&self) -> Option<f64> {
+        self.gaps.last().copied()
     }
 
-    /// Whether there are no rows.
-    pub fn is_empty(&self) -> bool {
-        self.times.is_empty()
+    /// Last time.
+    pub fn end(&self) -> Option<f64> {
+        self.times.last().copied()
     }
 
-    /// Number of particles.
-    pub fn particle_count(&self) -> usize {
-        self.radii.len()
+    /// Gap at time `t`, interpolated between rows.
+    pub fn gap_at(&self, t: f64) -> Option<f64> {
+        cubic(&self.times, |index| self.gaps[index], t)
     }
 
-    /// Times of all rows, ascending.
-    pub fn times(&self) -> &[f64] {
-        &self.times
-    }
-
-    /// Mean radius of the particles.
-    pub fn mean_radius(&self) -> f64 {
-        self.radii.iter().sum::<f64>() / self.radii.len() as f64
-    }
-
-    /// Row `index`, from 0.
-    pub fn row(&self, index: usize) -> Row<'_, D> {
-        let count = self.radii.len();
-        let range = index * count..(index + 1) * count;
-        Row {
-            time: self.times[index],
-            radii: &self.radii,
-            periods: &self.periods,
-            positions: &self.positions[range.clone()],
-            spins: &self.spins[range],
+    /// The last time when the particles are abreast in x.
+    pub fn last_crossing(&self) -> Option<f64> {
+        let (times, ahead) = (&self.times, &self.ahead);
+        let crosses = |index: usize| (ahead[index] > 0.0) != (ahead[index + 1] > 0.0);
+        let index = (0..times.len().saturating_sub(1)).rev().find(|&index| crosses(index))?;
+        let (mut before, mut after) = (times[index], times[index + 1]);
+        // Bisection to the last bit or so.
+        for _ in 0..60 {
+            let middle = 0.5 * (before + after);
+            let same_side = (cubic(times, |i| ahead[i], middle)? > 0.0) == (ahead[index] > 0.0);
+            *(if same_side { &mut before } else { &mut after }) = middle;
         }
-    }
-
-    /// All rows in order.
-    pub fn rows(&self) -> impl Iterator<Item = Row<'_, D>> {
-        (0..self.len()).map(|index| self.row(index))
-    }
-
-    /// Gap of a pair at time `t`, interpolated between rows.
-    pub fn gap_at(&self, first: usize, second: usize, t: f64) -> Option<f64> {
-        cubic(&self.times, |index| self.row(index).gap(first, second), t)
-    }
-
-    /// Whether the parts fit together, as they do unless they came from a damaged file.
-    pub fn is_consistent(&self) -> bool {
-        let entries = self.times.len().checked_mul(self.radii.len());
-        entries == Some(self.positions.len()) && entries == Some(self.spins.len()) && self.periods.len() == D
+        Some(0.5 * (before + after))
     }
 }

@@ -33,13 +33,40 @@ where
     }
 
     /// Everything beyond the particles that the next prediction depends on (warm starts), as bytes.
-    fn checkpoint(&self) -> Vec<u8> {
-        Vec::new()
+    fn checkpoint(&self) -> Result<Vec<u8>, Self::Error> {
+        Ok(Vec::new())
     }
 
-    /// Restores what [`Hydrodynamics::checkpoint`] gave; `false` if the bytes do not fit this model.
-    fn resume(&mut self, state: &[u8]) -> bool {
-        state.is_empty()
+    /// Restores what [`Hydrodynamics::checkpoint`] gave; on an error nothing has changed.
+    fn resume(&mut self, state: &[u8]) -> Result<(), ResumeError<Self::Error>> {
+        match state.len() {
+            0 => Ok(()),
+            bytes => Err(ResumeError::Foreign { bytes }),
+        }
+    }
+}
+
+/// A model cannot go on from what was kept.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ResumeError<E: std::error::Error + 'static> {
+    /// The model depends on nothing but the particles.
+    #[error("{bytes} bytes were kept for the flow, whose model keeps none: they are of another model")]
+    Foreign {
+        /// How many.
+        bytes: usize,
+    },
+    /// The model says why.
+    #[error(transparent)]
+    Model(#[from] E),
+}
+
+impl<E: std::error::Error + 'static> ResumeError<E> {
+    /// The same for a wider type of flow errors.
+    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> ResumeError<W> {
+        match self {
+            Self::Foreign { bytes } => ResumeError::Foreign { bytes },
+            Self::Model(error) => ResumeError::Model(error.into()),
+        }
     }
 }
 

@@ -32,7 +32,7 @@ mod linear_flow;
 mod mobility_table;
 mod pair_mobility;
 
-pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics};
+pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};

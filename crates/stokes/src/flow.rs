@@ -16,7 +16,7 @@ use crate::point_matrices::PointMatrices;
 use crate::problem::{Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport};
 use crate::system::StokesSystem;
-use crate::warm_start::{NodalFields, WarmStart};
+use crate::warm_start::{NodalFields, WarmStart, WarmStartError};
 
 /// Which linear solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -212,19 +212,18 @@ where
         self.warm_start.as_ref().map(WarmStart::fields)
     }
 
-    /// Restores what [`FlowSolver::warm_start`] gave, on the mesh it belongs to; `false` if the lengths do not fit.
+    /// Restores what [`FlowSolver::warm_start`] gave, on the mesh it belongs to.
+    ///
+    /// # Errors
+    /// If the lengths do not fit; the solver is as before then.
     pub fn set_warm_start(
         &mut self,
         mesh: TreeMesh<D>,
         last: NodalFields,
         before: Option<NodalFields>,
-    ) -> bool {
-        let restored = WarmStart::restore(mesh, last, before);
-        let fits = restored.is_some();
-        if fits {
-            self.warm_start = restored;
-        }
-        fits
+    ) -> Result<(), WarmStartError> {
+        self.warm_start = Some(WarmStart::restore(mesh, last, before)?);
+        Ok(())
     }
 
     /// What the solve starts from, and the last flow on its mesh; zero and nothing at the first step.

@@ -68,4 +68,4 @@ pub use solver::{Preparation, SaddleSolver, SolveReport};
 pub use space::{SolidNodes, VelocitySpace};
 pub use system::{ActiveCell, Penalty, StokesSystem, SystemOperator};
 pub use transfer::Evaluator;
-pub use warm_start::NodalFields;
+pub use warm_start::{NodalFields, WarmStartError};

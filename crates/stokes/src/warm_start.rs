@@ -25,6 +25,22 @@ pub struct NodalFields {
     pub pressure: Vec<f64>,
 }
 
+/// Stored fields that do not belong to a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{velocities} velocities and {pressures} pressures were kept, but the mesh has {velocity_count} and {pressure_count}"
+)]
+pub struct WarmStartError {
+    /// Numbers kept for velocities.
+    pub velocities: usize,
+    /// Numbers kept for pressures.
+    pub pressures: usize,
+    /// Velocity components of the mesh.
+    pub velocity_count: usize,
+    /// Pressures of the mesh.
+    pub pressure_count: usize,
+}
+
 /// The last flow's deviation from the undisturbed one, and the one before.
 #[derive(Clone, Debug)]
 pub(crate) struct WarmStart<const D: usize>
@@ -45,15 +61,25 @@ where
         Self { discretisation, last, before }
     }
 
-    /// As [`WarmStart::new`] for stored fields; `None` if their lengths do not fit the mesh.
-    pub fn restore(mesh: TreeMesh<D>, last: NodalFields, before: Option<NodalFields>) -> Option<Self> {
+    /// As [`WarmStart::new`] for stored fields.
+    ///
+    /// # Errors
+    /// If their lengths do not fit the mesh.
+    pub fn restore(
+        mesh: TreeMesh<D>,
+        last: NodalFields,
+        before: Option<NodalFields>,
+    ) -> Result<Self, WarmStartError> {
         let discretisation = Discretisation::new(mesh);
-        let fits = |fields: &NodalFields| {
-            fields.velocity.len() == discretisation.velocity.node_count() * D
-                && fields.pressure.len() == discretisation.pressure.node_count()
-        };
-        let fit = fits(&last) && before.as_ref().is_none_or(fits);
-        fit.then_some(Self { discretisation, last, before })
+        let velocity_count = discretisation.velocity.node_count() * D;
+        let pressure_count = discretisation.pressure.node_count();
+        for NodalFields { velocity, pressure } in std::iter::once(&last).chain(&before) {
+            let (velocities, pressures) = (velocity.len(), pressure.len());
+            if (velocities, pressures) != (velocity_count, pressure_count) {
+                return Err(WarmStartError { velocities, pressures, velocity_count, pressure_count });
+            }
+        }
+        Ok(Self { discretisation, last, before })
     }
 
     /// The last flow, and the one before on the same mesh.

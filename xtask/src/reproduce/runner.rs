@@ -44,7 +44,7 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     Ok(case)
 }
 
-/// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.part` holds what a failed run wrote.
+/// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.partial-1` holds what a failed run wrote.
 pub fn run(root: &Path, folder: &Path, key: RunKey, quick: bool, board: &Board) -> Result<RunReport, String> {
     let line = board.start(key);
     let result = run_to_files(root, folder, key, quick, &line);
@@ -63,11 +63,8 @@ fn run_to_files(
     line: &dyn gluey::Progress,
 ) -> Result<RunReport, String> {
     let csv = folder.join(format!("{key}.csv"));
-    let part = folder.join(format!("{key}.csv.part"));
     let case = case(root, key, quick).map_err(|error| chain(&error))?;
-    let report = gluey::run(&case, &RunOptions::csv(&part), line).map_err(|error| chain(&error))?;
-    std::fs::rename(&part, &csv).map_err(|error| format!("cannot write {}: {error}", csv.display()))?;
-    Ok(report)
+    gluey::run(&case, &RunOptions::csv(csv), line).map_err(|error| chain(&error))
 }
 
 /// An error with its causes.

@@ -11,8 +11,8 @@ use crate::model::validate;
 use crate::project::{Failure, Setting, Work};
 use crate::rows::Row;
 use crate::{
-    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, Mobility,
-    PairState, StepGeometry, StokesDrag, Strategy, WorstPair,
+    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, MemoryError,
+    Mobility, PairState, StepGeometry, StokesDrag, Strategy, WorstPair,
 };
 
 /// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
@@ -154,10 +154,10 @@ where
         self.state.clone()
     }
 
-    fn resume(&mut self, state: ContactState) {
-        self.state = state;
-        self.state.tidy();
+    fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
+        self.state = state.checked()?;
         self.contacts.clear();
+        Ok(())
     }
 
     fn reverse(&mut self) {

@@ -7,8 +7,8 @@ use super::{Shape, ShapeStep};
 use crate::broadphase::{BestOf, Broadphase};
 use crate::model::{is_positive, validate_sizes};
 use crate::{
-    Contact, ContactError, ContactParams, ContactReport, ContactState, Mobility, PairKey, PairState, Partner,
-    Quantity, StokesDrag, Strategy,
+    Contact, ContactError, ContactParams, ContactReport, ContactState, MemoryError, Mobility, PairKey,
+    PairState, Partner, Quantity, StokesDrag, Strategy,
 };
 
 /// Contacts between shapes by one of the strategies `none`, `inelastic` and `gluey`.
@@ -57,11 +57,11 @@ impl<const D: usize, M: Mobility<D>> ShapeContact<D, M> {
         self.state.clone()
     }
 
-    /// Goes on from a checkpoint.
-    pub fn resume(&mut self, state: ContactState) {
-        self.state = state;
-        self.state.tidy();
+    /// Goes on from a checkpoint; on an error the memory is as before.
+    pub fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
+        self.state = state.checked()?;
         self.contacts.clear();
+        Ok(())
     }
 
     /// Tells that the flow was reversed, so that remembered forces change their sign.

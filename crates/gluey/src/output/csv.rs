@@ -1,71 +1,142 @@
 //! The trajectory as comma-separated values, one row a step.
 //!
-//! Columns: `t`, the centres `x1,y1[,z1],x2,...`, the gaps `gap12_over_a,gap13_over_a,...` of all pairs in mean
-//! radii, the spins `omega1,...` (2D) or `omega1x,omega1y,omega1z,...` (3D). Numbers have 17 significant digits, so
-//! they read back exactly.
+//! Columns: `t`, the centres `x1,y1[,z1],x2,...`, gaps in mean radii `a`, the spins `omega1,...` (2D) or
+//! `omega1x,omega1y,omega1z,...` (3D). Numbers have 17 significant digits, so they read back exactly.
+//!
+//! Up to nine particles every pair has a column, `gap12_over_a,gap13_over_a,...,gap23_over_a,...`. From ten on there is one
+//! column `min_gap_over_a`, the smallest gap of all pairs, and a second file `<stem>-gaps.csv` lists what is near: a row
+//! `t,i,j,gap_over_a,partner` for each gap of at most [`GAP_CUTOFF_OVER_A`]. Particles count from 1. The partner `j` is a
+//! `particle`, the nearest periodic `image` of one, or a `wall` (1 below, 2 above).
 
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Space};
+use gluey_geom::{Dim, Space, Vector};
+use serde::{Deserialize, Serialize};
 
-use super::{OutputError, partial};
-use crate::trajectory::{Row, Trajectory};
+use super::draft::{Draft, Mark, RowsError};
+use super::{OutputError, drafts};
+use crate::measures::Instant;
+use crate::near_pairs::{NearPairs, PairGap};
+use crate::trajectory::Row;
+
+/// Gaps up to this many mean radii are listed one by one where pairs have no columns.
+pub const GAP_CUTOFF_OVER_A: f64 = 1.0;
+
+/// Most particles of which every pair has a column.
+pub const MOST_WITH_PAIR_COLUMNS: usize = 9;
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// Writes rows as they come to `<path>.partial`, and gives the file its name when it is complete.
+/// The first line of the file of near pairs.
+const GAPS_HEADER: &str = "t,i,j,gap_over_a,partner";
+
+/// How far the files of a run had come, for checkpoints.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CsvMarks {
+    /// The trajectory.
+    pub rows: Mark,
+    /// The near pairs, where they have a file.
+    pub gaps: Option<Mark>,
+}
+
+/// Writes rows as they come to `<path>.partial-K`, with the first `K` that no earlier run left, and gives the file its
+/// name when it is complete; the file of near pairs likewise.
 #[derive(Debug)]
-pub struct CsvWriter {
-    path: PathBuf,
-    file: BufWriter<File>,
+pub struct CsvWriter<const D: usize> {
+    rows: Draft,
+    gaps: Option<Draft>,
+    near: NearPairs<D>,
 }
 
-impl CsvWriter {
-    /// Starts the file with a header for particles of a `D`-dimensional run.
-    pub fn create<const D: usize>(path: &Path, particle_count: usize) -> Result<Self, OutputError>
-    where
-        Dim<D>: Space<D>,
-    {
-        let create = || {
-            let mut file = BufWriter::new(File::create(partial(path))?);
-            writeln!(file, "{}", header::<D>(particle_count))?;
-            Ok(Self { path: path.to_owned(), file })
+impl<const D: usize> CsvWriter<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Starts the files of a run of so many particles.
+    pub fn create(path: &Path, particle_count: usize) -> Result<Self, RowsError> {
+        let mut rows = Draft::create(path)?;
+        rows.write(&format!("{}\n", header::<D>(particle_count)))?;
+        let create = |path: PathBuf| -> Result<Draft, RowsError> {
+            let mut gaps = Draft::create(&path)?;
+            gaps.write(&format!("{GAPS_HEADER}\n"))?;
+            Ok(gaps)
         };
-        create().map_err(|error| OutputError::new(path, "create the file", error))
+        let gaps = gaps_path(path, particle_count).map(create).transpose()?;
+        Ok(Self { rows, gaps, near: NearPairs::new() })
     }
 
-    /// Adds one row; it is on disk when this returns.
-    pub fn write<const D: usize>(&mut self, row: &Row<'_, D>) -> Result<(), OutputError>
-    where
-        Dim<D>: Space<D>,
-    {
-        writeln!(self.file, "{}", line(row))
-            .and_then(|()| self.file.flush())
-            .map_err(|error| OutputError::new(&self.path, "write a row", error))
+    /// Goes on with the files of a run of so many particles at `marks`; `visit` sees the rows up to there. Rows behind them
+    /// stay, and are compared with those that are written.
+    pub(crate) fn resume(
+        path: &Path,
+        marks: &CsvMarks,
+        particle_count: usize,
+        mut visit: impl FnMut(&Instant<D>),
+    ) -> Result<Self, RowsError> {
+        let mut rows = Draft::resume(path, &marks.rows)?;
+        let gaps = gaps_path(path, particle_count).zip(marks.gaps.as_ref());
+        let gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
+        rows.visit(|line, text| match line {
+            1 => text == header::<D>(particle_count),
+            _ => parse(text, particle_count).map(|instant| visit(&instant)).is_some(),
+        })?;
+        Ok(Self { rows, gaps, near: NearPairs::new() })
     }
 
-    /// Adds all rows of `trajectory`.
-    pub fn write_all<const D: usize>(&mut self, trajectory: &Trajectory<D>) -> Result<(), OutputError>
-    where
-        Dim<D>: Space<D>,
-    {
-        trajectory.rows().try_for_each(|row| self.write(&row))
+    /// Adds one row, which is with the operating system when this returns, and gives the smallest gap of any pair in mean
+    /// radii, if there is one.
+    pub fn write(&mut self, row: &Row<'_, D>) -> Result<Option<f64>, RowsError> {
+        let a = row.mean_radius();
+        let smallest = match &mut self.gaps {
+            None => row.pairs().map(|(first, second)| row.gap(first, second)).reduce(f64::min),
+            Some(gaps) => {
+                let cutoff = GAP_CUTOFF_OVER_A * a;
+                let near = self.near.within(row, cutoff);
+                gaps.write(&gap_lines(row, &near, cutoff))?;
+                self.near.smallest(row, &near, cutoff)
+            }
+        };
+        let smallest = smallest.map(|gap| gap / a);
+        self.rows.write(&line(row, smallest))?;
+        Ok(smallest)
     }
 
-    /// Gives the complete file its name.
+    /// How far the files have come.
+    pub(crate) fn marks(&self) -> CsvMarks {
+        CsvMarks { rows: self.rows.mark(), gaps: self.gaps.as_ref().map(Draft::mark) }
+    }
+
+    /// Makes sure that what the files hold outlives a power failure.
+    pub(crate) fn sync(&self) -> Result<(), OutputError> {
+        self.rows.sync()?;
+        self.gaps.as_ref().map_or(Ok(()), Draft::sync)
+    }
+
+    /// Gives the complete files their names.
     pub fn finish(self) -> Result<(), OutputError> {
-        let rename = |file: BufWriter<File>| -> io::Result<()> {
-            file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-            fs::rename(partial(&self.path), &self.path)
-        };
-        rename(self.file).map_err(|error| OutputError::new(&self.path, "complete the file", error))
+        self.gaps.map_or(Ok(()), Draft::finish)?;
+        self.rows.finish()
     }
 }
 
-/// The first line of the file.
+/// Drafts that earlier runs of so many particles left.
+pub(crate) fn earlier_drafts(path: &Path, particle_count: usize) -> Result<Vec<PathBuf>, OutputError> {
+    let mut earlier = drafts(path)?;
+    if let Some(gaps) = gaps_path(path, particle_count) {
+        earlier.extend(drafts(&gaps)?);
+    }
+    Ok(earlier)
+}
+
+/// The file of near pairs of so many particles, where pairs have no columns.
+fn gaps_path(path: &Path, particle_count: usize) -> Option<PathBuf> {
+    let mut name = path.file_stem()?.to_owned();
+    name.push("-gaps.csv");
+    (particle_count > MOST_WITH_PAIR_COLUMNS).then(|| path.with_file_name(name))
+}
+
+/// The first line of the trajectory.
 pub fn header<const D: usize>(particle_count: usize) -> String
 where
     Dim<D>: Space<D>,
@@ -74,8 +145,11 @@ where
     for particle in 1..=particle_count {
         names.extend(AXES[..D].iter().map(|axis| format!("{axis}{particle}")));
     }
-    for first in 1..=particle_count {
-        names.extend((first + 1..=particle_count).map(|second| gap_name(first, second, particle_count)));
+    if particle_count > MOST_WITH_PAIR_COLUMNS {
+        names.push("min_gap_over_a".to_owned());
+    } else {
+        let pairs = (1..=particle_count).flat_map(|i| (i + 1..=particle_count).map(move |j| (i, j)));
+        names.extend(pairs.map(|(first, second)| format!("gap{first}{second}_over_a")));
     }
     for particle in 1..=particle_count {
         match Dim::<D>::ROT {
@@ -86,33 +160,74 @@ where
     names.join(",")
 }
 
-/// `gap12_over_a`; with ten particles or more the numbers are kept apart, `gap1_12_over_a`.
-fn gap_name(first: usize, second: usize, particle_count: usize) -> String {
-    match particle_count < 10 {
-        true => format!("gap{first}{second}_over_a"),
-        false => format!("gap{first}_{second}_over_a"),
-    }
-}
-
-fn line<const D: usize>(row: &Row<'_, D>) -> String
+fn line<const D: usize>(row: &Row<'_, D>, smallest_gap_over_a: Option<f64>) -> String
 where
     Dim<D>: Space<D>,
 {
-    let mean_radius = row.radii.iter().sum::<f64>() / row.radii.len() as f64;
+    let a = row.mean_radius();
     let mut text = format!("{:.16e}", row.time);
     let mut add = |number: f64| {
         // Writing to a string cannot fail.
         let _ = write!(text, ",{number:.16e}");
     };
-    row.positions.iter().flat_map(|center| center.iter()).for_each(|&x| add(x));
-    row.pairs().for_each(|(first, second)| add(row.gap(first, second) / mean_radius));
-    row.spins.iter().flat_map(Dim::<D>::spin_slice).for_each(|&w| add(w));
+    row.particles.iter().flat_map(|particle| particle.pose.position.iter()).for_each(|&x| add(x));
+    if row.particles.len() > MOST_WITH_PAIR_COLUMNS {
+        smallest_gap_over_a.into_iter().for_each(&mut add);
+    } else {
+        row.pairs().for_each(|(first, second)| add(row.gap(first, second) / a));
+    }
+    row.twists.iter().flat_map(|twist| Dim::<D>::spin_slice(&twist.spin)).for_each(|&w| add(w));
+    text.push('\n');
+    text
+}
+
+/// Reads a row of so many particles back.
+fn parse<const D: usize>(text: &str, particle_count: usize) -> Option<Instant<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let numbers: Vec<f64> = text.split(',').map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
+    let pair_count = particle_count * particle_count.saturating_sub(1) / 2;
+    let gap_count = if particle_count > MOST_WITH_PAIR_COLUMNS { 1 } else { pair_count };
+    let (time, rest) = numbers.split_first()?;
+    let (centers, rest) = rest.split_at_checked(D * particle_count)?;
+    let (gaps, spins) = rest.split_at_checked(gap_count)?;
+    (spins.len() == Dim::<D>::ROT * particle_count).then(|| Instant {
+        time: *time,
+        centers: centers.chunks(D).map(Vector::from_column_slice).collect(),
+        smallest_gap_over_a: gaps.iter().copied().reduce(f64::min),
+    })
+}
+
+/// The rows of near pairs and near walls.
+fn gap_lines<const D: usize>(row: &Row<'_, D>, near: &[PairGap], cutoff: f64) -> String
+where
+    Dim<D>: Space<D>,
+{
+    let (a, time) = (row.mean_radius(), format!("{:.16e}", row.time));
+    let mut text = String::new();
+    let mut add = |first: usize, second: usize, gap: f64, partner: &str| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{time},{},{},{:.16e},{partner}", first + 1, second + 1, gap / a);
+    };
+    for &PairGap { first, second, gap } in near {
+        add(first, second, gap, if row.is_direct(first, second) { "particle" } else { "image" });
+    }
+    for (number, wall) in row.domain.walls.iter().enumerate() {
+        for (index, particle) in row.particles.iter().enumerate() {
+            let gap = wall.distance(&particle.pose.position) - particle.radius;
+            if gap <= cutoff {
+                add(index, number, gap, "wall");
+            }
+        }
+    }
     text
 }
 
 #[cfg(test)]
 mod tests {
-    use gluey_geom::{Particle, Twist, Vector};
+    use gluey_contact::{Domain, Wall};
+    use gluey_geom::{Particle, Twist};
 
     use super::*;
 
@@ -124,29 +239,58 @@ mod tests {
             "t,x1,y1,z1,x2,y2,z2,gap12_over_a,omega1x,omega1y,omega1z,omega2x,omega2y,omega2z"
         );
         assert!(header::<2>(3).contains(",gap12_over_a,gap13_over_a,gap23_over_a,"));
-        assert!(header::<2>(12).contains(",gap1_12_over_a,"));
+        assert!(header::<2>(9).contains(",gap89_over_a,omega1"));
+        assert!(header::<2>(10).contains(",y10,min_gap_over_a,omega1,"));
     }
 
-    fn rows_have_a_number_for_every_name<const D: usize>()
+    fn rows_read_back<const D: usize>()
     where
         Dim<D>: Space<D>,
     {
-        for count in 1..4 {
-            let mut trajectory = Trajectory::<D>::new(vec![0.1; count], [None; D]);
+        for count in [1, 2, 3, 9, 10, 12] {
             let particles: Vec<_> =
                 (0..count).map(|n| Particle::new(Vector::<D>::repeat(n as f64 / 3.0), 0.1)).collect();
-            trajectory.push(0.1, &particles, &vec![Twist::default(); count]);
-            let line = line(&trajectory.row(0));
+            let (twists, domain) = (vec![Twist::default(); count], Domain::default());
+            let row = Row { time: 0.1, particles: &particles, twists: &twists, domain: &domain };
+            let a = row.mean_radius();
+            let smallest_gap_over_a = row.pairs().map(|(i, j)| row.gap(i, j) / a).reduce(f64::min);
+            let line = line(&row, smallest_gap_over_a);
             assert_eq!(line.split(',').count(), header::<D>(count).split(',').count());
-            let numbers: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
-            assert_eq!(numbers[0], 0.1);
-            assert_eq!(numbers[D * count], particles[count - 1].pose.position[D - 1]);
+            let centers = particles.iter().map(|particle| particle.pose.position).collect();
+            let expected = Instant { time: 0.1, centers, smallest_gap_over_a };
+            assert_eq!(parse(line.trim_end(), count), Some(expected));
+            assert_eq!(parse::<D>(&line.replacen(',', "", 1), count), None);
+            assert_eq!(parse::<D>("0.1,0.2", count), None);
         }
     }
 
     #[test]
-    fn rows_fit_the_header() {
-        rows_have_a_number_for_every_name::<2>();
-        rows_have_a_number_for_every_name::<3>();
+    fn rows_read_back_exactly() {
+        rows_read_back::<2>();
+        rows_read_back::<3>();
+    }
+
+    #[test]
+    fn many_particles_have_a_file_of_near_pairs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("t.csv");
+        // Ten discs a radius apart along x, but for the last two, in a channel; the first sees the last across the border.
+        let at = |n: usize| Vector::<2>::new(3.0 * n as f64 + f64::from(n == 9), 2.5);
+        let particles: Vec<_> = (0..10).map(|n| Particle::new(at(n), 1.0)).collect();
+        let floor = Wall::new(&Vector::<2>::new(0.0, 1.0), &Vector::<2>::y());
+        let domain = Domain::default().with_period(0, 30.5).with_wall(floor);
+        let twists = vec![Twist::default(); 10];
+        let mut writer = CsvWriter::create(&path, 10).expect("files");
+        let row = Row { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
+        assert_eq!(writer.write(&row).expect("a row"), Some(0.5));
+        writer.finish().expect("complete");
+        let text = std::fs::read_to_string(folder.path().join("t-gaps.csv")).expect("near pairs");
+        let lines: Vec<&str> = text.lines().collect();
+        let half = "5.0000000000000000e-1";
+        assert_eq!(lines[0], GAPS_HEADER);
+        assert_eq!(lines[1], format!("{half},1,2,1.0000000000000000e0,particle"));
+        assert_eq!(lines[2], format!("{half},1,10,{half},image"));
+        assert_eq!(lines[10], format!("{half},1,1,{half},wall"));
+        assert_eq!(lines.len(), 1 + 8 + 1 + 10);
     }
 }

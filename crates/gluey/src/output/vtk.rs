@@ -5,22 +5,21 @@
 //! centre to centre, to the centre of an image across a periodic border, or to the foot point on a wall: gamma, lambda,
 //! gap; and a vertex for every particle, so that the file is readable when nothing touches).
 
-use std::io;
+mod background;
+mod xml;
+
 use std::path::{Path, PathBuf};
 
 use gluey_contact::{Contact, Domain, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version,
-    VertexNumbers, Vtk,
-};
-use vtkio::xml::Compressor;
 
 use super::{OutputError, prepare_folder_of, pvd, write_atomically};
 
-/// Fast; higher levels gain a few percent.
-const COMPRESSION_LEVEL: u32 = 1;
+pub(crate) use background::FrameWriter;
+use xml::{Array, CellType, Piece};
+pub use xml::{Precision, UnknownPrecision, VtkEncoding};
+
 /// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's order:
 /// corners, edges, centre.
 const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
@@ -54,6 +53,7 @@ where
 #[derive(Debug)]
 pub struct VtkWriter {
     folder: PathBuf,
+    encoding: VtkEncoding,
     series: [Series; 3],
 }
 
@@ -73,7 +73,13 @@ impl VtkWriter {
             let entries = done.iter().map(|&(step, time)| (time, file_name(name, step)));
             Series { name, entries: entries.filter(|(_, file)| folder.join(file).is_file()).collect() }
         });
-        Ok(Self { folder: folder.to_owned(), series })
+        Ok(Self { folder: folder.to_owned(), encoding: VtkEncoding::default(), series })
+    }
+
+    /// The same with other numbers in the files.
+    pub fn encoded(mut self, encoding: VtkEncoding) -> Self {
+        self.encoding = encoding;
+        self
     }
 
     /// Writes one instant.
@@ -88,7 +94,7 @@ impl VtkWriter {
         ];
         for (series, piece) in self.series.iter_mut().zip(pieces) {
             if let Some(piece) = piece {
-                series.add(&self.folder, frame.step, frame.time, piece)?;
+                series.add(&self.folder, frame.step, frame.time, &piece, self.encoding)?;
             }
         }
         Ok(())
@@ -101,10 +107,14 @@ impl Series {
         folder: &Path,
         step: usize,
         time: f64,
-        piece: UnstructuredGridPiece,
+        piece: &Piece,
+        encoding: VtkEncoding,
     ) -> Result<(), OutputError> {
         let file = file_name(self.name, step);
-        write_piece(&folder.join(&file), piece)?;
+        let path = folder.join(&file);
+        let text = xml::document(piece, encoding);
+        let text = text.map_err(|error| OutputError::new(&path, "encode the file", error))?;
+        write_atomically(&path, text.as_bytes())?;
         self.entries.push((time, file));
         pvd::write(&folder.join(format!("{}.pvd", self.name)), &self.entries)
     }
@@ -114,49 +124,47 @@ fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
 }
 
-fn fields_piece<const D: usize>(fields: &Fields<D>) -> UnstructuredGridPiece {
+fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
     let (order, cell_type): (&[usize], _) = match D {
         2 => (&QUAD_ORDER, CellType::BiquadraticQuad),
         _ => (&HEXAHEDRON_ORDER, CellType::TriquadraticHexahedron),
     };
     let cells = fields.cells.chunks_exact(order.len());
     let count = cells.len();
-    let connectivity = cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect();
-    let offsets = (1..=count).map(|cell| (cell * order.len()) as u64).collect();
-    let point = vec![
-        vectors("velocity", &fields.velocity),
-        scalars("pressure", fields.pressure.clone()),
-        scalars("viscosity", fields.viscosity.clone()),
-        scalars("level_set", fields.level_set.clone()),
-        vectors("lambda", &fields.multiplier),
-    ];
-    UnstructuredGridPiece {
-        points: in_space(&fields.points).into(),
-        cells: cell_list(connectivity, offsets, vec![cell_type; count]),
-        data: Attributes { point, cell: Vec::new() },
+    Piece {
+        points: in_space(&fields.points),
+        connectivity: cells.flat_map(|cell| order.iter().map(|&node| i64::from(cell[node]))).collect(),
+        offsets: (1..=count).map(|cell| (cell * order.len()) as i64).collect(),
+        types: vec![cell_type; count],
+        of_points: vec![
+            vectors("velocity", &fields.velocity),
+            scalars("pressure", fields.pressure.clone()),
+            scalars("viscosity", fields.viscosity.clone()),
+            scalars("level_set", fields.level_set.clone()),
+            vectors("lambda", &fields.multiplier),
+        ],
+        of_cells: Vec::new(),
     }
 }
 
-fn particles_piece<const D: usize>(particles: &[Particle<D>], twists: &[Twist<D>]) -> UnstructuredGridPiece
+fn particles_piece<const D: usize>(particles: &[Particle<D>], twists: &[Twist<D>]) -> Piece
 where
     Dim<D>: Space<D>,
 {
     let count = particles.len();
     let velocities: Vec<Vector<D>> = twists.iter().map(|twist| twist.velocity).collect();
     let spins: Vec<f64> = twists.iter().flat_map(|twist| spin_in_space::<D>(&twist.spin)).collect();
-    let point = vec![
-        scalars("radius", particles.iter().map(|particle| particle.radius).collect()),
-        vectors("velocity", &velocities),
-        Attribute::generic("spin", 3).with_data(spins),
-    ];
-    UnstructuredGridPiece {
-        points: in_space(&centers(particles)).into(),
-        cells: cell_list(
-            (0..count as u64).collect(),
-            (1..=count as u64).collect(),
-            vec![CellType::Vertex; count],
-        ),
-        data: Attributes { point, cell: Vec::new() },
+    Piece {
+        points: in_space(&centers(particles)),
+        connectivity: (0..count as i64).collect(),
+        offsets: (1..=count as i64).collect(),
+        types: vec![CellType::Vertex; count],
+        of_points: vec![
+            scalars("radius", particles.iter().map(|particle| particle.radius).collect()),
+            vectors("velocity", &velocities),
+            Array { name: "spin", components: 3, values: spins },
+        ],
+        of_cells: Vec::new(),
     }
 }
 
@@ -166,53 +174,45 @@ fn contacts_piece<const D: usize>(
     particles: &[Particle<D>],
     contacts: &[Contact],
     domain: &Domain<D>,
-) -> UnstructuredGridPiece
+) -> Piece
 where
     Dim<D>: Space<D>,
 {
     let count = particles.len();
     let mut points = centers(particles);
-    let mut connectivity: Vec<u64> = (0..count as u64).collect();
+    let mut connectivity: Vec<i64> = (0..count as i64).collect();
     for Contact { pair, .. } in contacts {
         let second = match (pair.second, pair.branch(&points[..count], domain)) {
-            (Partner::Particle { index, image: [0, 0, 0] }, _) => u64::from(index),
+            (Partner::Particle { index, image: [0, 0, 0] }, _) => i64::from(index),
             (_, branch) => {
                 points.push(points[pair.first as usize] + branch.unwrap_or_else(Vector::zeros));
-                points.len() as u64 - 1
+                points.len() as i64 - 1
             }
         };
-        connectivity.extend([u64::from(pair.first), second]);
+        connectivity.extend([i64::from(pair.first), second]);
     }
-    let mut offsets: Vec<u64> = (1..=count as u64).collect();
-    offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as u64));
+    let mut offsets: Vec<i64> = (1..=count as i64).collect();
+    offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as i64));
     let mut types = vec![CellType::Vertex; count];
     types.resize(count + contacts.len(), CellType::Line);
     // Vertices carry zeros.
     let of_lines = |value: fn(&Contact) -> f64| -> Vec<f64> {
         std::iter::repeat_n(0.0, count).chain(contacts.iter().map(value)).collect()
     };
-    let cell = vec![
+    let of_cells = vec![
         scalars("gamma", of_lines(|contact| contact.gamma)),
         scalars("lambda", of_lines(|contact| contact.lambda)),
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
-    UnstructuredGridPiece {
-        points: in_space(&points).into(),
-        cells: cell_list(connectivity, offsets, types),
-        data: Attributes { point: Vec::new(), cell },
-    }
+    Piece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
 }
 
-fn cell_list(connectivity: Vec<u64>, offsets: Vec<u64>, types: Vec<CellType>) -> Cells {
-    Cells { cell_verts: VertexNumbers::XML { connectivity, offsets }, types }
+fn scalars(name: &'static str, values: Vec<f64>) -> Array {
+    Array { name, components: 1, values }
 }
 
-fn scalars(name: &str, values: Vec<f64>) -> Attribute {
-    Attribute::generic(name, 1).with_data(values)
-}
-
-fn vectors<const D: usize>(name: &str, values: &[Vector<D>]) -> Attribute {
-    Attribute::generic(name, 3).with_data(in_space(values))
+fn vectors<const D: usize>(name: &'static str, values: &[Vector<D>]) -> Array {
+    Array { name, components: 3, values: in_space(values) }
 }
 
 /// VTK's vectors have three components.
@@ -236,28 +236,4 @@ where
     Dim<D>: Space<D>,
 {
     particles.iter().map(|particle| particle.pose.position).collect()
-}
-
-fn write_piece(path: &Path, piece: UnstructuredGridPiece) -> Result<(), OutputError> {
-    let vtk = Vtk {
-        version: Version::new_xml(1, 0),
-        title: String::new(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(piece),
-        file_path: None,
-    };
-    let mut bytes = Vec::new();
-    let encoded = vtk
-        .try_into_xml_format(Compressor::ZLib, COMPRESSION_LEVEL)
-        .and_then(|file| file.write(&mut bytes))
-        .map_err(|error| io::Error::other(error.to_string()))
-        .and_then(|()| String::from_utf8(bytes).map_err(io::Error::other));
-    let text = encoded.map_err(|error| OutputError::new(path, "encode the file", error))?;
-    write_atomically(path, signed_indices(&text).as_bytes())
-}
-
-/// vtkio writes node numbers as unsigned; with those, numpy (in meshio) ends up with floating-point indices. Numbers
-/// below 2^63 have the same bytes in both types, and the data themselves are base64, which holds no `<`.
-fn signed_indices(text: &str) -> String {
-    text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
 }

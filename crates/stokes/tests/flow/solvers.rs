@@ -170,8 +170,9 @@ fn the_last_flows_are_a_good_start_for_the_next() {
         assert!(twist_distance(&warm.twists, &cold.twists) < 1e-8);
 
         let mut resumed = FlowSolver::<2>::new(parameters, no_clock).unwrap();
-        assert!(!resumed.set_warm_start(mesh(&bands(6), &at(1)), last.clone(), before.clone()));
-        assert!(resumed.set_warm_start(mesh(&bands(7), &at(1)), last, before));
+        let refused = resumed.set_warm_start(mesh(&bands(6), &at(1)), last.clone(), before.clone());
+        assert_eq!(refused.unwrap_err().velocities, last.velocity.len());
+        resumed.set_warm_start(mesh(&bands(7), &at(1)), last, before).unwrap();
         assert!(bits(&run(&mut resumed, 2)) == bits(&warm), "resumed and uninterrupted runs differ");
     }
 }

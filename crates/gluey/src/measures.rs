@@ -1,0 +1,83 @@
+//! What a run is measured by, row by row as it goes on: the rows themselves are on disk only.
+
+use gluey_geom::Vector;
+
+use crate::case::Case;
+use crate::reference::{Comparison, Deviation, Reference};
+use crate::trajectory::PairHistory;
+
+/// What the measures need of a row; a resumed run reads it from its file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Instant<const D: usize> {
+    /// Time.
+    pub time: f64,
+    /// Centres of all particles.
+    pub centers: Vec<Vector<D>>,
+    /// The smallest gap of any pair, in mean radii; `None` for a single particle.
+    pub smallest_gap_over_a: Option<f64>,
+}
+
+/// The measures of all rows so far.
+#[derive(Clone, Debug)]
+pub(crate) struct Measures<const D: usize> {
+    radii: Vec<f64>,
+    periods: [Option<f64>; D],
+    row_count: usize,
+    smallest_gap_over_a: Option<f64>,
+    pair: PairHistory,
+    comparison: Option<Comparison>,
+}
+
+impl<const D: usize> Measures<D> {
+    /// No rows yet of a run of `case`.
+    pub fn new(case: &Case) -> Self {
+        let reference = case.reference.as_deref().and_then(Reference::named);
+        Self {
+            radii: case.particles.iter().map(|particle| particle.radius).collect(),
+            periods: case.surroundings().periods,
+            row_count: 0,
+            smallest_gap_over_a: None,
+            pair: PairHistory::default(),
+            comparison: reference.map(Comparison::new),
+        }
+    }
+
+    /// Adds a row, later than all before.
+    pub fn add(&mut self, instant: &Instant<D>) {
+        let Instant { time, centers, smallest_gap_over_a } = instant;
+        self.row_count += 1;
+        let gaps = [self.smallest_gap_over_a, *smallest_gap_over_a];
+        self.smallest_gap_over_a = gaps.into_iter().flatten().reduce(f64::min);
+        if let ([one, other, ..], [first, second, ..]) = (&centers[..], &self.radii[..]) {
+            self.pair.push(*time, [one, other], [*first, *second], &self.periods);
+        }
+        if let Some(comparison) = &mut self.comparison {
+            comparison.add(*time, centers);
+        }
+    }
+
+    /// Number of rows.
+    pub fn row_count(&self) -> usize {
+        self.row_count
+    }
+
+    /// Mean radius of the particles.
+    pub fn mean_radius(&self) -> f64 {
+        self.radii.iter().sum::<f64>() / self.radii.len() as f64
+    }
+
+    /// The smallest gap of any pair in any row, in mean radii.
+    pub fn smallest_gap_over_a(&self) -> Option<f64> {
+        self.smallest_gap_over_a
+    }
+
+    /// Particles 1 and 2 in all rows; no rows for a single particle.
+    pub fn pair(&self) -> &PairHistory {
+        &self.pair
+    }
+
+    /// How far the run is from the reference of its case.
+    pub fn deviation(&self) -> Option<Deviation> {
+        self.comparison.as_ref()?.deviation(&self.pair)
+    }
+}

@@ -1,0 +1,191 @@
+//! Writes frames in a thread of its own, beside the next step.
+//!
+//! One frame may wait while another is written. What fails shows at the next frame, checkpoint or end.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use gluey_contact::{Contact, Domain};
+use gluey_geom::{Dim, Particle, Space, Twist};
+use gluey_motion::Fields;
+
+use super::{Frame, VtkWriter};
+use crate::output::OutputError;
+
+/// Frames that may wait.
+const QUEUE: usize = 1;
+
+/// A frame that outlives its step.
+struct Kept<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    step: usize,
+    time: f64,
+    particles: Vec<Particle<D>>,
+    twists: Vec<Twist<D>>,
+    contacts: Vec<Contact>,
+    domain: Domain<D>,
+    fields: Option<Fields<D>>,
+}
+
+enum Message<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    Frame(Box<Kept<D>>),
+    /// An answer is due when all frames before are on disk.
+    Flush(SyncSender<()>),
+}
+
+/// A [`VtkWriter`] in a thread of its own; frames keep their order.
+#[derive(Debug)]
+pub(crate) struct FrameWriter<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    folder: PathBuf,
+    queue: Option<SyncSender<Message<D>>>,
+    thread: Option<JoinHandle<Result<(), OutputError>>>,
+}
+
+impl<const D: usize> FrameWriter<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Starts the thread.
+    pub fn new(writer: VtkWriter) -> Result<Self, OutputError> {
+        let folder = writer.folder.clone();
+        let (queue, messages) = sync_channel(QUEUE);
+        let thread = thread::Builder::new().name("frames".to_owned()).spawn(move || serve(writer, messages));
+        let thread =
+            thread.map_err(|error| OutputError::new(&folder, "start a thread for the folder", error))?;
+        Ok(Self { folder, queue: Some(queue), thread: Some(thread) })
+    }
+
+    /// Has a frame written; waits while two others are on their way.
+    pub fn write(&mut self, frame: &Frame<'_, D>, fields: Option<Fields<D>>) -> Result<(), OutputError> {
+        self.send(Message::Frame(Box::new(Kept {
+            step: frame.step,
+            time: frame.time,
+            particles: frame.particles.to_vec(),
+            twists: frame.twists.to_vec(),
+            contacts: frame.contacts.to_vec(),
+            domain: frame.domain.clone(),
+            fields,
+        })))
+    }
+
+    /// Returns when all frames are on disk.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        let (answer, answered) = sync_channel(1);
+        self.send(Message::Flush(answer))?;
+        answered.recv().or_else(|_| self.failure())
+    }
+
+    /// Ends the thread when all frames are on disk.
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        self.end()
+    }
+
+    fn send(&mut self, message: Message<D>) -> Result<(), OutputError> {
+        let sent = self.queue.as_ref().map(|queue| queue.send(message));
+        if matches!(sent, Some(Ok(()))) { Ok(()) } else { self.failure() }
+    }
+
+    /// The error that ended the thread before it was told to.
+    fn failure(&mut self) -> Result<(), OutputError> {
+        self.end()?;
+        let lost = io::Error::other("an earlier frame could not be written");
+        Err(OutputError::new(&self.folder, "write into the folder", lost))
+    }
+
+    fn end(&mut self) -> Result<(), OutputError> {
+        self.queue = None;
+        match self.thread.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(outcome)) => outcome,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+        }
+    }
+}
+
+impl<const D: usize> Drop for FrameWriter<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Frames on their way are written, also when the run has failed otherwise.
+    fn drop(&mut self) {
+        self.queue = None;
+        if let Some(thread) = self.thread.take() {
+            // The run fails for another reason, which is told.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<Message<D>>) -> Result<(), OutputError>
+where
+    Dim<D>: Space<D>,
+{
+    for message in messages {
+        match message {
+            Message::Frame(frame) => writer.write(&Frame {
+                step: frame.step,
+                time: frame.time,
+                particles: &frame.particles,
+                twists: &frame.twists,
+                contacts: &frame.contacts,
+                domain: &frame.domain,
+                fields: frame.fields.as_ref(),
+            })?,
+            // Whoever asked has gone if this fails.
+            Message::Flush(answer) => drop(answer.send(())),
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame<'a>(step: usize, particles: &'a [Particle<2>], domain: &'a Domain<2>) -> Frame<'a, 2> {
+        let (twists, contacts) = (&[][..], &[][..]);
+        Frame { step, time: step as f64, particles, twists, contacts, domain, fields: None }
+    }
+
+    #[test]
+    fn frames_keep_their_order_and_are_there_when_flushed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::default();
+        let mut frames =
+            FrameWriter::new(VtkWriter::create(folder.path(), &[]).expect("a folder")).expect("a thread");
+        for step in 0..5 {
+            frames.write(&frame(step, &[], &domain), None).expect("a frame");
+        }
+        frames.flush().expect("on disk");
+        let list = std::fs::read_to_string(folder.path().join("particles.pvd")).expect("a collection");
+        let places: Vec<_> = (0..5).map(|step| list.find(&format!("particles-00000{step}.vtu"))).collect();
+        assert!(places.is_sorted() && places[0].is_some(), "{list}");
+        frames.finish().expect("on disk");
+    }
+
+    #[test]
+    fn a_frame_that_cannot_be_written_is_told() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::default();
+        // Where a file should be there is a folder.
+        std::fs::create_dir(folder.path().join("particles-000001.vtu")).expect("a folder");
+        let writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
+        let mut frames = FrameWriter::new(writer).expect("a thread");
+        frames.write(&frame(0, &[], &domain), None).expect("a frame");
+        frames.write(&frame(1, &[], &domain), None).expect("not known yet");
+        let error = frames.flush().expect_err("a frame is missing");
+        assert!(error.path.ends_with("particles-000001.vtu"), "{error}");
+        assert!(frames.flush().is_err(), "the frame is still missing");
+        assert!(frames.write(&frame(2, &[], &domain), None).is_err());
+    }
+}

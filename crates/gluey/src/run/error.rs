@@ -1,0 +1,121 @@
+//! Why a run came to nothing.
+
+use std::path::PathBuf;
+
+use gluey_motion::PairMobilityError;
+use thiserror::Error;
+
+use crate::case::{Case, CaseError, Hydrodynamics};
+use crate::checkpoint::CheckpointError;
+use crate::flow::FlowError;
+use crate::output::{ClaimError, OutputError, RowsError};
+use crate::simulation::StepError;
+
+/// The flow could not be computed.
+#[derive(Debug, Error)]
+pub enum HydrodynamicsError {
+    /// By the analytic model of two spheres.
+    #[error(transparent)]
+    PairMobility(#[from] PairMobilityError),
+    /// By the finite-element solver.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// The model does not exist in this dimension.
+    #[error("there is no {hydrodynamics} hydrodynamics in {dimension}D")]
+    Unfit {
+        /// The model.
+        hydrodynamics: Hydrodynamics,
+        /// The dimension.
+        dimension: usize,
+    },
+}
+
+impl HydrodynamicsError {
+    pub(super) fn unfit(case: &Case) -> Self {
+        Self::Unfit { hydrodynamics: case.flow.hydrodynamics, dimension: case.dimension }
+    }
+}
+
+/// A run came to nothing.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The case makes no sense.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// Something could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Another run is writing the same results.
+    #[error(transparent)]
+    InUse(ClaimError),
+    /// Rows on disk could not be gone on with.
+    #[error(transparent)]
+    Rows(RowsError),
+    /// A checkpoint could not be used.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The flow could not be set up.
+    #[error("the flow could not be set up")]
+    Flow(#[from] HydrodynamicsError),
+    /// What the next step starts from could not be kept.
+    #[error("the flow could not be kept for a checkpoint")]
+    Store(#[source] HydrodynamicsError),
+    /// A step failed.
+    #[error(transparent)]
+    Step(#[from] StepError<HydrodynamicsError>),
+    /// A particle touched the boundary of the box, where the flow is prescribed.
+    #[error(
+        "particle {particle} reached the boundary of the box in step {step} (t = {time}): it sticks out by {excess:.3e}"
+    )]
+    LeftBox {
+        /// Its number, from 1.
+        particle: usize,
+        /// Steps done.
+        step: usize,
+        /// Time.
+        time: f64,
+        /// How far.
+        excess: f64,
+    },
+    /// The run was asked to stop.
+    #[error("interrupted after step {step} of {steps} (t = {time})")]
+    Interrupted {
+        /// Steps done.
+        step: usize,
+        /// Steps in all.
+        steps: usize,
+        /// Time reached.
+        time: f64,
+        /// Where the run can go on from.
+        checkpoint: Option<PathBuf>,
+    },
+    /// The run failed, and can go on from the last good step.
+    #[error("the run stopped; {} holds it after {step} good steps", checkpoint.display())]
+    Stopped {
+        /// Steps done.
+        step: usize,
+        /// Where the run can go on from.
+        checkpoint: PathBuf,
+        /// What failed.
+        #[source]
+        cause: Box<RunError>,
+    },
+}
+
+impl From<ClaimError> for RunError {
+    fn from(error: ClaimError) -> Self {
+        match error {
+            ClaimError::Output(error) => Self::Output(error),
+            in_use => Self::InUse(in_use),
+        }
+    }
+}
+
+impl From<RowsError> for RunError {
+    fn from(error: RowsError) -> Self {
+        match error {
+            RowsError::Output(error) => Self::Output(error),
+            other => Self::Rows(other),
+        }
+    }
+}

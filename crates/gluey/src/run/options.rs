@@ -1,0 +1,49 @@
+//! What a run writes, and where.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::output::vtk::VtkEncoding;
+
+/// What a run writes, and where.
+#[derive(Clone, Debug, Default)]
+pub struct RunOptions {
+    /// The trajectory, one row a step; its folder is created when missing.
+    pub csv: PathBuf,
+    /// Fields and particles for ParaView.
+    pub vtk: Option<VtkOptions>,
+    /// Where to write checkpoints: at interrupts, and as often as `checkpoint_every` says.
+    pub checkpoint: Option<PathBuf>,
+    /// Steps between checkpoints, at least 1.
+    pub checkpoint_every: Option<usize>,
+    /// A checkpoint of the same case to go on from.
+    pub resume: Option<PathBuf>,
+    /// Set from outside to stop after the current step.
+    pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+/// Output for ParaView.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VtkOptions {
+    /// Folder for the files.
+    pub folder: PathBuf,
+    /// Steps between files, at least 1.
+    pub every: usize,
+    /// How numbers are stored.
+    pub encoding: VtkEncoding,
+}
+
+impl VtkOptions {
+    /// Exact numbers every so many steps.
+    pub fn new(folder: impl Into<PathBuf>, every: usize) -> Self {
+        Self { folder: folder.into(), every, encoding: VtkEncoding::default() }
+    }
+}
+
+impl RunOptions {
+    /// Writes the trajectory to `csv` and nothing else.
+    pub fn csv(csv: impl Into<PathBuf>) -> Self {
+        Self { csv: csv.into(), ..Self::default() }
+    }
+}

@@ -1,0 +1,197 @@
+//! Runs that are killed, told to stop or started twice lose no row that was written.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+const STEM: &str = "out/pair-3d-mobility-gluey";
+
+/// A folder with a case of so many steps, 100 000 of which take about a second.
+fn folder(step_count: u32) -> TempDir {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
+    let step = 15.75 / f64::from(step_count);
+    let case = fs::read_to_string(file).expect("a case");
+    let case =
+        case.replace("step = 0.05", &format!("step = {step}")).replace("reference = ", "# reference = ");
+    let folder = TempDir::new().expect("a folder");
+    fs::write(folder.path().join("long.toml"), case).expect("a file");
+    folder
+}
+
+fn gluey(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+    command.current_dir(folder).args(["run", "long.toml"]).args(arguments).stdout(Stdio::null());
+    command
+}
+
+/// Waits until a run has written some rows.
+fn wait_for_rows(path: &Path) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while fs::metadata(path).map_or(0, |file| file.len()) < 10_000 {
+        assert!(Instant::now() < deadline, "the run does not get going");
+        sleep(Duration::from_millis(5));
+    }
+}
+
+fn in_folder(folder: &Path, suffix: &str) -> PathBuf {
+    folder.join(format!("{STEM}{suffix}"))
+}
+
+/// A run that writes rows, and the end of it.
+struct Started(Child);
+
+impl Started {
+    fn new(folder: &Path) -> Self {
+        let run = Self(gluey(folder, &[]).stderr(Stdio::piped()).spawn().expect("it runs"));
+        wait_for_rows(&in_folder(folder, ".csv.partial-1"));
+        run
+    }
+
+    fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([name, &self.0.id().to_string()]).status();
+        assert!(sent.expect("a signal").success());
+    }
+}
+
+impl Drop for Started {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The step is finished, a checkpoint written, the way to go on told.
+#[test]
+fn every_request_to_stop_leaves_a_checkpoint_to_go_on_from() {
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let folder = folder(10_000_000);
+        let mut run = Started::new(folder.path());
+        run.signal(signal);
+        let mut stderr = String::new();
+        let mut pipe = run.0.stderr.take().expect("piped");
+        std::io::Read::read_to_string(&mut pipe, &mut stderr).expect("text");
+        assert_eq!(run.0.wait().expect("it ends").code(), Some(130), "{signal}: {stderr}");
+        assert!(stderr.contains("interrupted after step"), "{stderr}");
+        let checkpoint = format!("{STEM}.checkpoint");
+        assert!(stderr.contains(&format!("gluey run long.toml --resume {checkpoint}")), "{stderr}");
+        assert!(folder.path().join(checkpoint).is_file(), "{signal}");
+    }
+}
+
+/// A terminal that was closed takes nothing that is written to it.
+#[test]
+fn a_run_that_nobody_listens_to_leaves_a_checkpoint() {
+    let folder = folder(10_000_000);
+    let mut run = Started::new(folder.path());
+    drop(run.0.stderr.take());
+    run.signal("-HUP");
+    assert_eq!(run.0.wait().expect("it ends").code(), Some(130));
+    assert!(in_folder(folder.path(), ".checkpoint").is_file());
+}
+
+#[test]
+fn results_that_are_being_written_are_refused() {
+    let folder = folder(10_000_000);
+    let run = Started::new(folder.path());
+    let second = gluey(folder.path(), &[]).output().expect("it runs");
+    let stderr = String::from_utf8_lossy(&second.stderr);
+    assert_eq!(second.status.code(), Some(1), "{stderr}");
+    let holder = format!("{STEM}.csv: in use by the run of process {}", run.0.id());
+    assert!(stderr.contains(&holder) && stderr.contains("--out DIR"), "{stderr}");
+    assert!(!in_folder(folder.path(), ".csv.partial-2").exists(), "the second run wrote rows");
+    // Another strategy has results of its own.
+    let end = fs::read_to_string(folder.path().join("long.toml")).expect("a case");
+    fs::write(folder.path().join("long.toml"), end.replace("end = 15.75", "end = 0.01")).expect("a file");
+    let beside = gluey(folder.path(), &["--strategy", "inelastic"]).output().expect("it runs");
+    assert!(beside.status.success(), "{}", String::from_utf8_lossy(&beside.stderr));
+}
+
+/// A start that comes to nothing takes nothing away.
+#[test]
+fn a_failing_start_leaves_the_rows_of_a_killed_run() {
+    let folder = folder(10_000_000);
+    drop(Started::new(folder.path()));
+    let draft = in_folder(folder.path(), ".csv.partial-1");
+    let rows = fs::read(&draft).expect("rows");
+    let failed = gluey(folder.path(), &["--resume", "nowhere"]).output().expect("it runs");
+    assert_eq!(failed.status.code(), Some(1));
+    assert!(fs::read(&draft).expect("rows") == rows, "rows were lost");
+    let mut fresh = gluey(folder.path(), &[]).stderr(Stdio::piped()).spawn().expect("it runs");
+    wait_for_rows(&in_folder(folder.path(), ".csv.partial-2"));
+    fresh.kill().expect("killed");
+    let output = fresh.wait_with_output().expect("it ends");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("left by earlier runs") && stderr.contains(".csv.partial-1"), "{stderr}");
+    assert!(fs::read(&draft).expect("rows") == rows, "rows were lost");
+}
+
+/// Whole lines of all files of rows in a folder.
+fn rows(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = fs::read_dir(folder.join("out")).into_iter().flatten();
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let is_of_rows = |path: &PathBuf| {
+        let name = path.to_string_lossy();
+        name.contains(".csv") && !name.ends_with(".lock")
+    };
+    let whole = |path: PathBuf| {
+        let mut bytes = fs::read(&path).expect("rows");
+        bytes.truncate(bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |place| place + 1));
+        (path, bytes)
+    };
+    paths.filter(is_of_rows).map(whole).collect()
+}
+
+/// Numbers below `most`, in no order.
+fn numbers(mut state: u64) -> impl FnMut(u64) -> u64 {
+    move |most| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) % most
+    }
+}
+
+/// `kill -9` at twenty moments, each followed by another start, anew or from the last checkpoint.
+#[test]
+fn no_row_is_lost_to_twenty_kills() {
+    let folder = folder(100_000);
+    let folder = folder.path();
+    let checkpoint = format!("{STEM}.checkpoint");
+    let mut next = numbers(7);
+    let mut resumed = 0;
+    for _ in 0..20 {
+        let before = rows(folder);
+        let resume = folder.join(&checkpoint).exists() && next(3) > 0;
+        let arguments = ["--checkpoint-every", "1000", "--resume", &checkpoint];
+        let mut command = gluey(folder, &arguments[..if resume { 4 } else { 2 }]);
+        let mut run = command.stderr(Stdio::null()).spawn().expect("it runs");
+        sleep(Duration::from_millis(next(200)));
+        run.kill().expect("killed");
+        run.wait().expect("it ends");
+        resumed += usize::from(resume);
+        let after = rows(folder);
+        for (path, lines) in &before {
+            let complete = in_folder(folder, ".csv");
+            let kept = [path, &complete].into_iter().filter_map(|path| after.get(path));
+            assert!(
+                kept.into_iter().any(|kept| kept.starts_with(lines)),
+                "{}: rows were lost",
+                path.display()
+            );
+        }
+    }
+    assert!(resumed > 5, "only {resumed} runs were resumed");
+    let last = gluey(folder, &["--resume", &checkpoint]).output().expect("it runs");
+    assert!(last.status.success(), "{}", String::from_utf8_lossy(&last.stderr));
+    let whole = gluey(folder, &["--out", "whole"]).output().expect("it runs");
+    assert!(whole.status.success());
+    let read = |folder_name: &str| {
+        fs::read(folder.join(folder_name).join("pair-3d-mobility-gluey.csv")).expect("a trajectory")
+    };
+    assert!(read("out") == read("whole"), "the run that was killed ends otherwise");
+}
