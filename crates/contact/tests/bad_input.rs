@@ -2,7 +2,7 @@
 
 use gluey_contact::{
     ContactError, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState, Quantity,
-    StepGeometry, Strategy,
+    SolverKind, StepGeometry, Strategy,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -173,9 +173,13 @@ fn nothing_is_no_error() {
 }
 
 #[test]
-fn strategies_have_names() {
+fn strategies_and_solvers_have_names() {
     for strategy in Strategy::ALL {
         assert_eq!(strategy.to_string().parse(), Ok(strategy));
     }
     assert!("sticky".parse::<Strategy>().is_err());
+    for (solver, name) in SolverKind::ALL.into_iter().zip(SolverKind::NAMES) {
+        assert_eq!((solver.to_string().as_str(), name.parse()), (name, Ok(solver)));
+    }
+    assert!("newton".parse::<SolverKind>().is_err());
 }
