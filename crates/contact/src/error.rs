@@ -35,17 +35,17 @@ pub enum ContactError {
         dt: f64,
     },
     /// A radius that is zero, negative or not finite.
-    #[error("particle {particle} has the radius {radius}: it must be positive and finite")]
+    #[error("particle {} has the radius {radius}: it must be positive and finite", .particle + 1)]
     BadRadius {
-        /// Index of the particle.
+        /// Index of the particle, from 0; messages count from 1.
         particle: usize,
         /// Its radius.
         radius: f64,
     },
     /// A position, velocity or drift that is infinite or not a number.
-    #[error("particle {particle}: its {quantity} is not finite")]
+    #[error("particle {}: its {quantity} is not finite", .particle + 1)]
     NotFinite {
-        /// Index of the particle.
+        /// Index of the particle, from 0; messages count from 1.
         particle: usize,
         /// Which of its vectors.
         quantity: Quantity,
@@ -95,14 +95,15 @@ pub enum ContactError {
         gap: f64,
     },
     /// A wall whose normal is no unit vector, or that is not finite.
-    #[error("wall {wall} needs a normal of length 1, a finite offset and a finite speed")]
+    #[error("wall {} needs a normal of length 1, a finite offset and a finite speed", .wall + 1)]
     BadWall {
-        /// Index of the wall.
+        /// Index of the wall, from 0; messages count from 1.
         wall: usize,
     },
     /// A period that is zero, negative, not finite, or tiny beside the positions.
     #[error(
-        "the period {period} in direction {direction} must be positive, and at least 1e-8 of all positions"
+        "the period {period} along {} must be positive, and at least 1e-8 of all positions",
+        axis(*.direction)
     )]
     BadPeriod {
         /// Direction, from 0.
@@ -112,11 +113,13 @@ pub enum ContactError {
     },
     /// A particle that would meet its own images.
     #[error(
-        "particle {particle} of radius {radius} is too large for the period {period} in direction {direction}: \
-         its diameter must not exceed half a period"
+        "particle {} of radius {radius} is too large for the period {period} along {}: \
+         its diameter must not exceed half a period",
+        .particle + 1,
+        axis(*.direction)
     )]
     ParticleTooLarge {
-        /// Index of the particle.
+        /// Index of the particle, from 0; messages count from 1.
         particle: usize,
         /// Its radius.
         radius: f64,
@@ -127,10 +130,11 @@ pub enum ContactError {
     },
     /// A particle that crosses half a period in a step, so that contacts could not be told from those of its images.
     #[error(
-        "particle {particle} moves by {displacement} against the others in a step: more than half the period {period}"
+        "particle {} moves by {displacement} against the others in a step: more than half the period {period}",
+        .particle + 1
     )]
     TooFast {
-        /// Index of the particle.
+        /// Index of the particle, from 0; messages count from 1.
         particle: usize,
         /// Displacement less the mean motion.
         displacement: f64,
@@ -218,6 +222,11 @@ impl std::fmt::Display for Quantity {
             Self::Drift => "drift",
         })
     }
+}
+
+/// Name of a direction.
+fn axis(direction: usize) -> char {
+    ['x', 'y', 'z'].get(direction).copied().unwrap_or('?')
 }
 
 /// The first few contacts of a list.

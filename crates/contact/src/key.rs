@@ -85,16 +85,19 @@ impl PairKey {
     }
 }
 
+/// Particles and walls are counted from 1, as in case files and tables.
 impl fmt::Display for PairKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = |index: u32| u64::from(index) + 1;
+        let first = number(self.first);
         match self.second {
             Partner::Particle { index, image: [0, 0, 0] } => {
-                write!(f, "particles {} and {index}", self.first)
+                write!(f, "particles {first} and {}", number(index))
             }
             Partner::Particle { index, image } => {
-                write!(f, "particles {} and {index} (its image {image:?})", self.first)
+                write!(f, "particles {first} and {} (its image {image:?})", number(index))
             }
-            Partner::Wall(wall) => write!(f, "particle {} and wall {wall}", self.first),
+            Partner::Wall(wall) => write!(f, "particle {first} and wall {}", number(wall)),
         }
     }
 }

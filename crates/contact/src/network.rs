@@ -151,7 +151,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
 
     /// Writes a table, one row a contact, as comma-separated values with a header:
     ///
-    /// `first`, `partner` (`particle` or `wall`), `second` (its number), `image_x`, ..., `lambda`, `gamma`, `gap`,
+    /// `first` (number of the particle, from 1), `partner` (`particle` or `wall`), `second` (its number, from 1), `image_x`, ..., `lambda`, `gamma`, `gap`,
     /// `normal_x`, ..., `point_x`, .... Numbers are written so that they are read back exactly.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let axes = &["x", "y", "z"][..D];
@@ -165,7 +165,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
                 Partner::Wall(wall) => ("wall", wall, [0; 3]),
             };
             let ContactArm { normal, point, .. } = self.arm(contact);
-            write!(out, "{},{kind},{second}", pair.first)?;
+            write!(out, "{},{kind},{}", u64::from(pair.first) + 1, u64::from(second) + 1)?;
             image[..D].iter().try_for_each(|n| write!(out, ",{n}"))?;
             write!(out, ",{lambda},{gamma},{gap}")?;
             normal.iter().chain(point.iter()).try_for_each(|x| write!(out, ",{x}"))?;

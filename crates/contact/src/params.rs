@@ -4,7 +4,7 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use crate::solver::{Accelerated, ActiveSet, ProjectionSolver, Uzawa};
+use crate::solver::{Accelerated, ActiveSet, Auto, ProjectionSolver, Uzawa};
 
 /// What happens when particles would overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,11 +73,13 @@ pub enum Memory {
 }
 
 /// Which method solves the projection; all give the same velocities.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverKind {
-    /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
+    /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where that is slow.
     #[default]
+    Auto,
+    /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
     Uzawa,
     /// Accelerated projected gradients (Nesterov, with restarts). For many contacts and few digits.
     Accelerated,
@@ -86,13 +88,44 @@ pub enum SolverKind {
 }
 
 impl SolverKind {
+    /// All solvers.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Uzawa, Self::Accelerated, Self::ActiveSet];
+    /// Their names, in the same order.
+    pub const NAMES: [&str; 4] = ["auto", "uzawa", "accelerated", "active-set"];
+
     /// The method of this name.
     pub(crate) fn method(self) -> &'static dyn ProjectionSolver {
         match self {
+            Self::Auto => &Auto,
             Self::Uzawa => &Uzawa,
             Self::Accelerated => &Accelerated,
             Self::ActiveSet => &ActiveSet,
         }
+    }
+}
+
+impl fmt::Display for SolverKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(Self::NAMES[*self as usize])
+    }
+}
+
+/// A name of a solver that is none of ours.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown contact solver `{name}`: expected `auto`, `uzawa`, `accelerated` or `active-set`")]
+pub struct UnknownSolver {
+    /// What was asked for.
+    pub name: String,
+}
+
+impl FromStr for SolverKind {
+    type Err = UnknownSolver;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSolver> {
+        Self::ALL
+            .into_iter()
+            .find(|solver| solver.to_string() == name)
+            .ok_or_else(|| UnknownSolver { name: name.to_owned() })
     }
 }
 
@@ -130,7 +163,7 @@ impl Default for ContactParams {
             memory: Memory::Paper,
             gamma_min: None,
             threshold: 1e-4,
-            solver: SolverKind::Uzawa,
+            solver: SolverKind::Auto,
             tolerance: 1e-13,
             iteration_limit: 500_000,
             pass_limit: 100,

@@ -2,7 +2,7 @@
 
 use gluey_contact::{
     ContactError, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState, Quantity,
-    StepGeometry, Strategy,
+    SolverKind, StepGeometry, Strategy,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -74,6 +74,33 @@ fn particles_are_named() {
     assert_eq!(refuse(|i| i.drift[0].x = f64::INFINITY), not_finite(0, Quantity::Drift));
 }
 
+/// Indices in errors are from 0, numbers in messages from 1, as in case files.
+#[test]
+fn messages_count_from_one() {
+    let message = |error: ContactError| error.to_string();
+    let pair = PairKey::new(0, 6);
+    for (text, expected) in [
+        (message(ContactError::BadRadius { particle: 0, radius: -1.0 }), "particle 1 has the radius -1"),
+        (
+            message(ContactError::NotFinite { particle: 2, quantity: Quantity::Drift }),
+            "particle 3: its drift",
+        ),
+        (message(ContactError::BadWall { wall: 1 }), "wall 2 needs"),
+        (message(ContactError::BadPeriod { direction: 2, period: 0.0 }), "the period 0 along z"),
+        (
+            message(ContactError::ParticleTooLarge { particle: 0, radius: 1.0, direction: 0, period: 2.0 }),
+            "particle 1 of radius 1 is too large for the period 2 along x",
+        ),
+        (message(ContactError::TooFast { particle: 9, displacement: 3.0, period: 2.0 }), "particle 10 moves"),
+        (message(ContactError::Entangled { pair }), "the cores of particles 1 and 7"),
+        (message(ContactError::Wrapped { pair, gap: 3.0 }), "the gap of particles 1 and 7"),
+        (PairKey::across(0, 1, [1, 0, 0]).to_string(), "particles 1 and 2 (its image [1, 0, 0])"),
+        (PairKey::wall(3, 0).to_string(), "particle 4 and wall 1"),
+    ] {
+        assert!(text.starts_with(expected), "{text}");
+    }
+}
+
 #[test]
 fn coincident_centres_are_named() {
     for strategy in [Strategy::VelocityCorrection, Strategy::Inelastic, Strategy::Gluey] {
@@ -83,7 +110,7 @@ fn coincident_centres_are_named() {
             input.twists[2] = input.twists[0];
         });
         assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{strategy}");
-        assert_eq!(error.to_string(), "the centres of particles 0 and 2 coincide");
+        assert_eq!(error.to_string(), "the centres of particles 1 and 3 coincide");
     }
 }
 
@@ -164,9 +191,13 @@ fn nothing_is_no_error() {
 }
 
 #[test]
-fn strategies_have_names() {
+fn strategies_and_solvers_have_names() {
     for strategy in Strategy::ALL {
         assert_eq!(strategy.to_string().parse(), Ok(strategy));
     }
     assert!("sticky".parse::<Strategy>().is_err());
+    for (solver, name) in SolverKind::ALL.into_iter().zip(SolverKind::NAMES) {
+        assert_eq!((solver.to_string().as_str(), name.parse()), (name, Ok(solver)));
+    }
+    assert!("newton".parse::<SolverKind>().is_err());
 }

@@ -152,9 +152,10 @@ fn two_discs_and_walls() {
         "first partner second image_x image_y lambda gamma gap normal_x normal_y point_x point_y"
     );
     let number = |row: usize, column: usize| rows[row][column].parse::<f64>().expect("a number");
-    assert_eq!(rows[1][..5], ["0", "particle", "1", "0", "0"]);
-    assert_eq!(rows[2][..5], ["0", "wall", "0", "0", "0"]);
-    assert_eq!(rows[3][..5], ["1", "wall", "1", "0", "0"]);
+    // Numbers are counted from 1.
+    assert_eq!(rows[1][..5], ["1", "particle", "2", "0", "0"]);
+    assert_eq!(rows[2][..5], ["1", "wall", "1", "0", "0"]);
+    assert_eq!(rows[3][..5], ["2", "wall", "2", "0", "0"]);
     for (row, contact) in contacts.iter().enumerate() {
         let values = [contact.lambda, contact.gamma, contact.gap];
         assert_eq!([5, 6, 7].map(|column| number(row + 1, column)), values, "read back exactly");

@@ -13,7 +13,7 @@ use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 const RATE: f64 = 0.15;
-const SOLVERS: [SolverKind; 3] = [SolverKind::Uzawa, SolverKind::Accelerated, SolverKind::ActiveSet];
+const SOLVERS: [SolverKind; 4] = SolverKind::ALL;
 
 /// The two particles of a pair.
 fn ends(pair: PairKey) -> (usize, usize) {
@@ -271,7 +271,7 @@ where
             packing.glued.clear();
         }
         // Uzawa's iterations go like the square of the size.
-        let solver = if side <= 5 { SOLVERS[seed as usize % 3] } else { SolverKind::ActiveSet };
+        let solver = if side <= 5 { SOLVERS[seed as usize % 4] } else { SolverKind::Auto };
         let count = check_interior_point(&packing, solver);
         (fewest, most) = (fewest.min(count), most.max(count));
     }

@@ -16,7 +16,7 @@ fn a_steady_step_allocates_nothing() {
     // The allocations of this one thread are counted.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     for strategy in [Strategy::Inelastic, Strategy::Gluey] {
-        for solver in [SolverKind::Uzawa, SolverKind::Accelerated, SolverKind::ActiveSet] {
+        for solver in SolverKind::ALL {
             pool.install(|| check(&packing, strategy, solver));
         }
     }

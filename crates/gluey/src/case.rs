@@ -23,7 +23,7 @@ mod suggest;
 mod validate;
 
 pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
-pub use gluey_contact::{Memory, Strategy};
+pub use gluey_contact::{Memory, SolverKind as ContactSolver, Strategy};
 pub use gluey_motion::Scheme;
 pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
 
@@ -126,6 +126,12 @@ pub struct ContactSpec {
     pub gamma_min: Option<f64>,
     /// Gap kept by the strategy `velocity-correction`, relative to the mean radius of the pair.
     pub threshold: f64,
+    /// How contact forces are solved for: `auto` (a closed form for one contact, Uzawa's method for two, the active set for more),
+    /// `uzawa` (the paper's; slow for clusters), `accelerated` or `active-set`. All give the same velocities.
+    pub solver: ContactSolver,
+    /// Residual at which contact forces are accepted, relative to the smallest radius (or the largest displacement in a step,
+    /// if that is larger): from 1e-15 to 1e-3. It is the overlap that is left.
+    pub tolerance: f64,
 }
 
 impl ContactSpec {
@@ -137,6 +143,8 @@ impl ContactSpec {
             memory: self.memory,
             gamma_min: self.gamma_min,
             threshold: self.threshold,
+            solver: self.solver,
+            tolerance: self.tolerance,
             ..ContactParams::default()
         }
     }
@@ -219,8 +227,17 @@ pub struct PairMobilitySpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        let ContactParams { strategy, gamma_min, threshold, .. } = ContactParams::default();
-        Self { strategy, exact_gap: true, memory: Memory::Consistent, gamma_min, threshold }
+        let ContactParams { strategy, gamma_min, threshold, solver, tolerance, .. } =
+            ContactParams::default();
+        Self {
+            strategy,
+            exact_gap: true,
+            memory: Memory::Consistent,
+            gamma_min,
+            threshold,
+            solver,
+            tolerance,
+        }
     }
 }
 

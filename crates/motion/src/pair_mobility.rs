@@ -26,7 +26,7 @@ pub enum PairMobilityError {
         second: f64,
     },
     /// The line of centres has no direction.
-    #[error("the centres of particles 0 and 1 are a distance {distance} apart: no line of centres")]
+    #[error("the centres of particles 1 and 2 are a distance {distance} apart: no line of centres")]
     NoDirection {
         /// Zero or not a number.
         distance: f64,

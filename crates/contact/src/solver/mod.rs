@@ -10,18 +10,21 @@
 //!
 //! | solver | where |
 //! |---|---|
+//! | [`Auto`] | takes the best of the others for the number of contacts |
 //! | [`Uzawa`] | one or two contacts; the paper's |
 //! | [`Accelerated`] | many contacts, few digits |
 //! | [`ActiveSet`] | many contacts, many digits |
 
 mod accelerated;
 mod active_set;
+mod auto;
 mod contradiction;
 mod spectrum;
 mod uzawa;
 
 pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
+pub use auto::Auto;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 

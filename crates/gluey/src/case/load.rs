@@ -9,7 +9,9 @@ use toml::de::{DeTable, DeValue};
 use super::error::{CaseError, CaseIssue, Key, Problem};
 use super::suggest::closest;
 use super::validate::{Violation, check};
-use super::{Boundary, Case, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
+use super::{
+    Boundary, Case, ContactSolver, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName,
+};
 
 /// Names of choices that other crates own, in their order.
 const STRATEGIES: &[&str] = &["none", "velocity-correction", "inelastic", "gluey"];
@@ -157,6 +159,7 @@ fn unknown_name(found: String, known: &[String]) -> Option<Problem> {
     let lists: [(&'static str, &'static [&'static str]); 8] = [
         ("strategy", STRATEGIES),
         ("memory", MEMORIES),
+        ("contact solver", &ContactSolver::NAMES),
         ("formulation", Formulation::NAMES),
         ("hydrodynamics", Hydrodynamics::NAMES),
         ("solver", Solver::NAMES),

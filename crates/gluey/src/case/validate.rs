@@ -157,6 +157,9 @@ fn check_contact(case: &Case, key: &Key) -> Check {
     if !(contact.threshold >= 0.0 && contact.threshold < 1.0) {
         return out_of_range(contact.threshold, "from 0 to less than 1", key.name("threshold"));
     }
+    if !(1e-15..=1e-3).contains(&contact.tolerance) {
+        return out_of_range(contact.tolerance, "from 1e-15 to 1e-3", key.name("tolerance"));
+    }
     match contact.gamma_min {
         Some(floor) if !(floor < 0.0 && floor.is_finite()) => {
             out_of_range(floor, "less than 0", key.name("gamma_min"))
