@@ -156,7 +156,7 @@ fn in_words(expected: &str) -> String {
 
 /// The list of names that serde offers, matched with the choice it belongs to.
 fn unknown_name(found: String, known: &[String]) -> Option<Problem> {
-    let lists: [(&'static str, &'static [&'static str]); 8] = [
+    let lists: [(&'static str, &'static [&'static str]); 9] = [
         ("strategy", STRATEGIES),
         ("memory", MEMORIES),
         ("contact solver", &ContactSolver::NAMES),
