@@ -83,7 +83,8 @@ fn on_the_way_back() {
     resumes_bit_by_bit(&case, 200);
 }
 
-/// Five steps of the finite-element flow on a coarse mesh; the iterative solver starts from the last step's solution.
+/// Five steps of the finite-element flow on a coarse mesh; the iterative solver starts from the last step's
+/// solution.
 #[test]
 fn with_the_finite_element_flow() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");

@@ -2,9 +2,9 @@
 //!
 //! Rows of output are not in it, but how far their files had come ([`CsvMarks`]).
 //!
-//! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and the rest:
-//! a [`Checkpoint`] in postcard encoding, compressed by zstd. It carries the case, so that it cannot be taken for one
-//! of another case.
+//! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and
+//! the rest: a [`Checkpoint`] in postcard encoding, compressed by zstd. It carries the case, so that it
+//! cannot be taken for one of another case.
 
 use std::fs;
 use std::io;

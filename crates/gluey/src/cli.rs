@@ -36,7 +36,8 @@ pub enum Command {
 pub struct RunArguments {
     /// The case file.
     case: PathBuf,
-    /// What keeps particles from overlapping, instead of the case's choice: none, velocity-correction, inelastic, gluey.
+    /// What keeps particles from overlapping, instead of the case's choice: none, velocity-correction,
+    /// inelastic, gluey.
     #[arg(long)]
     strategy: Option<Strategy>,
     /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs.
@@ -49,7 +50,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
     /// Compression of the files for ParaView, from 0 (none) over 1 (fast) to 9 (small).
-    #[arg(long, value_name = "LEVEL", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=9))]
+    #[arg(long, value_name = "LEVEL", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=9))]
     vtk_compression: u32,
     /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
     #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double)]
@@ -111,7 +113,8 @@ impl RunArguments {
     }
 }
 
-/// A flag that the first Ctrl-C sets, or the first request to terminate or hang up; the second ends the program at once.
+/// A flag that the first Ctrl-C sets, or the first request to terminate or hang up; the second ends the
+/// program at once.
 fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let shared = flag.clone();

@@ -59,11 +59,13 @@ where
         gaps.filter(|pair| pair.gap <= reach).collect()
     }
 
-    /// The smallest gap of all pairs, exactly; `None` for fewer than two particles. `near` holds the pairs up to `reach`.
+    /// The smallest gap of all pairs, exactly; `None` for fewer than two particles. `near` holds the pairs up
+    /// to `reach`.
     pub fn smallest(&mut self, row: &Row<'_, D>, near: &[PairGap], mut reach: f64) -> Option<f64> {
         let smallest = |pairs: &[PairGap]| pairs.iter().map(|pair| pair.gap).reduce(f64::min);
         let mut found = smallest(near);
-        // No pair is nearer than `reach`, so within twice that a particle has few neighbours, however many there are.
+        // No pair is nearer than `reach`, so within twice that a particle has few neighbours, however many
+        // there are.
         while found.is_none() && row.particles.len() > 1 && reach < f64::MAX {
             reach *= 2.0;
             found = smallest(&self.within(row, reach));
@@ -93,7 +95,8 @@ where
         }
     }
 
-    /// Images of all balls so far, one period up or down an axis: as far as nearest images are from the period.
+    /// Images of all balls so far, one period up or down an axis: as far as nearest images are from the
+    /// period.
     fn add_images(&mut self, axis: usize, period: f64, margin: f64) {
         for ball in 0..self.centers.len() {
             for shift in [-period, period] {

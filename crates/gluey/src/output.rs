@@ -1,5 +1,5 @@
-//! What a run leaves on disk. Nothing appears under its final name before it is complete, nothing is deleted that the
-//! run did not make, and what another run is writing is not touched.
+//! What a run leaves on disk. Nothing appears under its final name before it is complete, nothing is deleted
+//! that the run did not make, and what another run is writing is not touched.
 
 mod claim;
 pub mod csv;
@@ -119,8 +119,8 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputEr
     write().map_err(|error| OutputError::new(path, "write the file", error))
 }
 
-/// Puts a file of an earlier run out of the way, as the first `<path>.earlier-K` that is not there yet; `None` if there
-/// is no such file.
+/// Puts a file of an earlier run out of the way, as the first `<path>.earlier-K` that is not there yet;
+/// `None` if there is no such file.
 pub(crate) fn set_aside(path: &Path) -> Result<Option<PathBuf>, OutputError> {
     if !path.exists() {
         return Ok(None);

@@ -37,7 +37,8 @@ pub enum Notice {
         /// The files; they are left as they are.
         drafts: Vec<PathBuf>,
     },
-    /// The checkpoint of an earlier run was renamed, for a run whose drafts are still there may want to go on from it.
+    /// The checkpoint of an earlier run was renamed, for a run whose drafts are still there may want to go on
+    /// from it.
     CheckpointSetAside {
         /// Its old name.
         from: PathBuf,

@@ -1,6 +1,7 @@
 //! Reference solutions compiled into the program, so that it compares from any folder.
 //!
-//! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came from.
+//! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came
+//! from.
 
 use gluey_geom::Vector;
 
@@ -138,7 +139,8 @@ impl Comparison {
         }
     }
 
-    /// The distance of all rows, in which particles 1 and 2 were as `pair` says; `None` if there is no time in common.
+    /// The distance of all rows, in which particles 1 and 2 were as `pair` says; `None` if there is no time
+    /// in common.
     pub fn deviation(&self, pair: &PairHistory) -> Option<Deviation> {
         let max_abs_error_over_a = self.max_abs_error_over_a?;
         let times = &self.reference.times;

@@ -34,9 +34,9 @@ pub struct RunReport {
     pub min_gap_over_a: Option<f64>,
     /// Gap of particles 1 and 2 at the end; `None` for a single particle.
     pub end_gap_over_a: Option<f64>,
-    /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of particles 1 and 2, with `t*` the last time when their
-    /// line of centres is at 90 degrees to the flow; `None` where that mirror time is not in the run, where they touch
-    /// at it, and with a reversal of the shear.
+    /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of particles 1 and 2, with `t*` the last time when
+    /// their line of centres is at 90 degrees to the flow; `None` where that mirror time is not in the run,
+    /// where they touch at it, and with a reversal of the shear.
     pub reversibility_error: Option<f64>,
     /// Name of the reference solution.
     pub reference: Option<String>,
@@ -78,12 +78,12 @@ impl RunReport {
     }
 }
 
-/// `|D(t* + s) - D(t* - s)| / D(t* - s)` at the end of the run: `t*` is the last time when the line of centres is at 90
-/// degrees to the flow and `s = t_end - t*`, or a little less where `t* - s` would lie before the start. An exact
-/// encounter has none: it is its own mirror image in time.
+/// `|D(t* + s) - D(t* - s)| / D(t* - s)` at the end of the run: `t*` is the last time when the line of
+/// centres is at 90 degrees to the flow and `s = t_end - t*`, or a little less where `t* - s` would lie
+/// before the start. An exact encounter has none: it is its own mirror image in time.
 ///
-/// `None` without such a time, where more than a twentieth of `s` would have to be cut, and where the surfaces touch at
-/// `t* - s`. `a` is the mean radius.
+/// `None` without such a time, where more than a twentieth of `s` would have to be cut, and where the
+/// surfaces touch at `t* - s`. `a` is the mean radius.
 fn reversibility_error(pair: &PairHistory, a: f64) -> Option<f64> {
     let end = pair.end()?;
     let crossing = pair.last_crossing()?;

@@ -131,11 +131,7 @@ where
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?;
                 wall_before_s = checkpoint.wall_s;
-                *simulation.phases_mut() = checkpoint.phases;
-                let restored = simulation.restore(checkpoint.state).map_err(RestoreError::widen);
-                restored.map_err(|source| CheckpointError::Unfit { path: path.clone(), source })?;
-                let visit = |row: &measures::Instant<D>| measures.add(row);
-                CsvWriter::resume(&options.csv, &checkpoint.output, case.particles.len(), visit)?
+                go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?
             }
         };
         let first_step = simulation.step_index();
@@ -224,8 +220,8 @@ where
         Ok(())
     }
 
-    /// The finite-element flow has no meaning for particles that stick out of the box. Contact keeps them from its walls,
-    /// but not from the sides that Couette flow passes through.
+    /// The finite-element flow has no meaning for particles that stick out of the box. Contact keeps them
+    /// from its walls, but not from the sides that Couette flow passes through.
     fn check_inside(&self) -> Result<(), RunError> {
         if self.case.flow.hydrodynamics != Hydrodynamics::Stokes {
             return Ok(());
@@ -262,7 +258,8 @@ where
         }
     }
 
-    /// Keeps the run as it is between two steps: a step that fails has already changed what the next would start from.
+    /// Keeps the run as it is between two steps: a step that fails has already changed what the next would
+    /// start from.
     fn remember(&mut self) -> Result<(), RunError> {
         if self.checkpoints.is_some() {
             self.last_good = Some(Checkpoint {
@@ -283,7 +280,8 @@ where
         file.write(checkpoint, self.case, self.progress)
     }
 
-    /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good step.
+    /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good
+    /// step.
     fn keep_last_good(&mut self, error: RunError) -> RunError {
         let is_curable = matches!(error, RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_));
         let step = self.last_good.as_ref().map_or(0, |checkpoint| checkpoint.state.step);
@@ -311,6 +309,28 @@ where
     fn wall_s(&self) -> f64 {
         self.wall_before_s + self.started.elapsed().as_secs_f64()
     }
+}
+
+/// Brings a simulation and its measures to where `checkpoint`, which was read from `path`, is, and gives the
+/// files of rows that belong to it.
+fn go_on<const D: usize, H>(
+    simulation: &mut Simulation<D, H, PairContact<D>>,
+    measures: &mut Measures<D>,
+    checkpoint: Checkpoint<D>,
+    [path, csv]: [&Path; 2],
+) -> Result<CsvWriter<D>, RunError>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+    HydrodynamicsError: From<H::Error>,
+{
+    let Checkpoint { state, output, phases, .. } = checkpoint;
+    *simulation.phases_mut() = phases;
+    let restored = simulation.restore(state).map_err(RestoreError::widen);
+    restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
+    let count = simulation.particles().len();
+    Ok(CsvWriter::resume(csv, &output, count, |row| measures.add(row))?)
 }
 
 /// Where a run writes its checkpoints.

@@ -67,7 +67,8 @@ pub(crate) struct PairHistory {
 }
 
 impl PairHistory {
-    /// Adds the instant `time`, later than all before, at which two particles of radii `radii` are at `centers`.
+    /// Adds the instant `time`, later than all before, at which two particles of radii `radii` are at
+    /// `centers`.
     pub fn push<const D: usize>(
         &mut self,
         time: f64,

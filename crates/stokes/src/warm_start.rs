@@ -28,7 +28,8 @@ pub struct NodalFields {
 /// Stored fields that do not belong to a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{velocities} velocities and {pressures} pressures were kept, but the mesh has {velocity_count} and {pressure_count}"
+    "{velocities} velocities and {pressures} pressures were kept, but the mesh has {velocity_count} and \
+     {pressure_count}"
 )]
 pub struct WarmStartError {
     /// Numbers kept for velocities.

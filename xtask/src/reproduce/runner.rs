@@ -9,7 +9,8 @@ use gluey::{Case, CaseError, Formulation, RunOptions, RunReport, Strategy};
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
 use super::progress::{Board, duration};
 
-/// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact solution.
+/// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact
+/// solution.
 pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     let file = match (key.case, key.approach) {
         (CaseName::Trio2d, Approach::GlueyRigidDofs) => "trio-2d-couette".to_owned(),
@@ -44,7 +45,8 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     Ok(case)
 }
 
-/// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.partial-1` holds what a failed run wrote.
+/// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.partial-1` holds what a failed
+/// run wrote.
 pub fn run(root: &Path, folder: &Path, key: RunKey, quick: bool, board: &Board) -> Result<RunReport, String> {
     let line = board.start(key);
     let result = run_to_files(root, folder, key, quick, &line);

@@ -1,7 +1,7 @@
 //! Who writes which results: a locked file `<result>.lock` for as long as a run lasts.
 //!
-//! The lock belongs to the open file and ends with its process, however that ends; a lock file left behind by a process
-//! that was killed is nobody's.
+//! The lock belongs to the open file and ends with its process, however that ends; a lock file left behind by
+//! a process that was killed is nobody's.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Write};

@@ -3,10 +3,11 @@
 //! Columns: `t`, the centres `x1,y1[,z1],x2,...`, gaps in mean radii `a`, the spins `omega1,...` (2D) or
 //! `omega1x,omega1y,omega1z,...` (3D). Numbers have 17 significant digits, so they read back exactly.
 //!
-//! Up to nine particles every pair has a column, `gap12_over_a,gap13_over_a,...,gap23_over_a,...`. From ten on there is one
-//! column `min_gap_over_a`, the smallest gap of all pairs, and a second file `<stem>-gaps.csv` lists what is near: a row
-//! `t,i,j,gap_over_a,partner` for each gap of at most [`GAP_CUTOFF_OVER_A`]. Particles count from 1. The partner `j` is a
-//! `particle`, the nearest periodic `image` of one, or a `wall` (1 below, 2 above).
+//! Up to nine particles every pair has a column, `gap12_over_a,gap13_over_a,...,gap23_over_a,...`. From ten
+//! on there is one column `min_gap_over_a`, the smallest gap of all pairs, and a second file
+//! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,partner` for each gap of at most
+//! [`GAP_CUTOFF_OVER_A`]. Particles count from 1. The partner `j` is a `particle`, the nearest periodic
+//! `image` of one, or a `wall` (1 below, 2 above).
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -40,8 +41,8 @@ pub struct CsvMarks {
     pub gaps: Option<Mark>,
 }
 
-/// Writes rows as they come to `<path>.partial-K`, with the first `K` that no earlier run left, and gives the file its
-/// name when it is complete; the file of near pairs likewise.
+/// Writes rows as they come to `<path>.partial-K`, with the first `K` that no earlier run left, and gives the
+/// file its name when it is complete; the file of near pairs likewise.
 #[derive(Debug)]
 pub struct CsvWriter<const D: usize> {
     rows: Draft,
@@ -66,8 +67,8 @@ where
         Ok(Self { rows, gaps, near: NearPairs::new() })
     }
 
-    /// Goes on with the files of a run of so many particles at `marks`; `visit` sees the rows up to there. Rows behind them
-    /// stay, and are compared with those that are written.
+    /// Goes on with the files of a run of so many particles at `marks`; `visit` sees the rows up to there.
+    /// Rows behind them stay, and are compared with those that are written.
     pub(crate) fn resume(
         path: &Path,
         marks: &CsvMarks,
@@ -84,8 +85,8 @@ where
         Ok(Self { rows, gaps, near: NearPairs::new() })
     }
 
-    /// Adds one row, which is with the operating system when this returns, and gives the smallest gap of any pair in mean
-    /// radii, if there is one.
+    /// Adds one row, which is with the operating system when this returns, and gives the smallest gap of any
+    /// pair in mean radii, if there is one.
     pub fn write(&mut self, row: &Row<'_, D>) -> Result<Option<f64>, RowsError> {
         let a = row.mean_radius();
         let smallest = match &mut self.gaps {
@@ -274,7 +275,8 @@ mod tests {
     fn many_particles_have_a_file_of_near_pairs() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("t.csv");
-        // Ten discs a radius apart along x, but for the last two, in a channel; the first sees the last across the border.
+        // Ten discs a radius apart along x, but for the last two, in a channel; the first sees the last
+        // across the border.
         let at = |n: usize| Vector::<2>::new(3.0 * n as f64 + f64::from(n == 9), 2.5);
         let particles: Vec<_> = (0..10).map(|n| Particle::new(at(n), 1.0)).collect();
         let floor = Wall::new(&Vector::<2>::new(0.0, 1.0), &Vector::<2>::y());

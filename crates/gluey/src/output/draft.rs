@@ -1,7 +1,7 @@
 //! A text file that grows line by line, and goes on growing after its writer was killed.
 //!
-//! A [`Mark`] in a checkpoint says how far the file had come. A run that resumes keeps all whole lines behind the mark:
-//! what it writes there is compared with them, byte by byte, until there are no more.
+//! A [`Mark`] in a checkpoint says how far the file had come. A run that resumes keeps all whole lines behind
+//! the mark: what it writes there is compared with them, byte by byte, until there are no more.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -97,8 +97,9 @@ impl Draft {
         })
     }
 
-    /// Goes on at `mark` with the draft that was marked, of which only half a last line is taken away. Where its run was
-    /// completed, the rows are copied to a new draft; the complete file stays until this run replaces it.
+    /// Goes on at `mark` with the draft that was marked, of which only half a last line is taken away. Where
+    /// its run was completed, the rows are copied to a new draft; the complete file stays until this run
+    /// replaces it.
     pub fn resume(complete: &Path, mark: &Mark) -> Result<Self, RowsError> {
         let path = draft_path(complete, mark.draft);
         let failed = |error| OutputError::new(complete, "go on with the file", error);
@@ -185,8 +186,8 @@ impl Draft {
         self.file.sync_data().map_err(|error| OutputError::new(&self.path, "write the file", error))
     }
 
-    /// Gives the complete file its name. Where an earlier run had come further than this one goes, its rows stay in the
-    /// draft.
+    /// Gives the complete file its name. Where an earlier run had come further than this one goes, its rows
+    /// stay in the draft.
     pub fn finish(self) -> Result<(), OutputError> {
         let finish = || -> io::Result<()> {
             if self.bytes == self.on_disk {

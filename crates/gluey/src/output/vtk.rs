@@ -1,9 +1,11 @@
-//! Fields, particles and contacts for ParaView, VTK and meshio: compressed `.vtu` files and `.pvd` collections.
+//! Fields, particles and contacts for ParaView, VTK and meshio: compressed `.vtu` files and `.pvd`
+//! collections.
 //!
-//! Three series a run: `fields` (velocity, pressure, viscosity, level set and rigidity multiplier at the nodes of
-//! quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for each contact, from
-//! centre to centre, to the centre of an image across a periodic border, or to the foot point on a wall: gamma, lambda,
-//! gap; and a vertex for every particle, so that the file is readable when nothing touches).
+//! Three series a run: `fields` (velocity, pressure, viscosity, level set and rigidity multiplier at the
+//! nodes of quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for
+//! each contact, from centre to centre, to the centre of an image across a periodic border, or to the foot
+//! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
+//! nothing touches).
 
 mod background;
 mod xml;
@@ -20,8 +22,8 @@ pub(crate) use background::FrameWriter;
 use xml::{Array, CellType, Piece};
 pub use xml::{Precision, UnknownPrecision, VtkEncoding};
 
-/// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's order:
-/// corners, edges, centre.
+/// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's
+/// order: corners, edges, centre.
 const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
 /// The same for a triquadratic hexahedron (type 29): corners, edges, faces -x +x -y +y -z +z, centre.
 const HEXAHEDRON_ORDER: [usize; 27] =
@@ -65,8 +67,8 @@ struct Series {
 }
 
 impl VtkWriter {
-    /// Prepares `folder`. Of the steps already done when a run goes on from a checkpoint, given as `(step, time)`,
-    /// those with a file in the folder stay in the collections.
+    /// Prepares `folder`. Of the steps already done when a run goes on from a checkpoint, given as `(step,
+    /// time)`, those with a file in the folder stay in the collections.
     pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, OutputError> {
         prepare_folder_of(&folder.join("fields.pvd"))?;
         let series = ["fields", "particles", "contacts"].map(|name| {
@@ -168,8 +170,8 @@ where
     }
 }
 
-/// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images follow the
-/// centres, without a vertex.
+/// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images
+/// follow the centres, without a vertex.
 fn contacts_piece<const D: usize>(
     particles: &[Particle<D>],
     contacts: &[Contact],

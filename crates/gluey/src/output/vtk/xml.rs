@@ -1,8 +1,8 @@
-//! One `.vtu` file as text: an unstructured grid in VTK's XML format with inline binary data (VTK file formats, 2023, section
-//! "XML file formats").
+//! One `.vtu` file as text: an unstructured grid in VTK's XML format with inline binary data (VTK file
+//! formats, 2023, section "XML file formats").
 //!
-//! Every array is base64: a header of 64-bit numbers, then the little-endian values, in zlib blocks where they are
-//! compressed.
+//! Every array is base64: a header of 64-bit numbers, then the little-endian values, in zlib blocks where
+//! they are compressed.
 
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
@@ -172,8 +172,8 @@ impl File {
         Ok(())
     }
 
-    /// The header: number of blocks, their size, that of a last partial one, then the size of each when compressed. Header
-    /// and blocks are encoded one after the other.
+    /// The header: number of blocks, their size, that of a last partial one, then the size of each when
+    /// compressed. Header and blocks are encoded one after the other.
     fn compressed(&mut self, data: &[u8], level: u32) -> io::Result<()> {
         let count = data.len().div_ceil(BLOCK);
         let mut header = vec![count as u64, BLOCK as u64, (data.len() % BLOCK) as u64];
