@@ -183,7 +183,8 @@ pub struct MeshSpec {
     pub cells_per_radius: Option<f64>,
     /// Cells are at least `2^-coarsest_level` of the box.
     pub coarsest_level: u32,
-    /// Cells of the finest level kept on either side of each particle's surface.
+    /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside save little and, in
+    /// `paper`, where the interior carries strain and multiplier, change velocities.
     pub band: f64,
 }
 

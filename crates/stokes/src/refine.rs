@@ -14,7 +14,8 @@ pub struct Refinement {
     pub coarsest: u8,
     /// Level of the cells at the surfaces.
     pub surface: u8,
-    /// Cells of each level are kept to this many cell sizes from a body.
+    /// Cells of each level are kept to this many cell sizes outside a body, and everywhere inside it: what a coarse interior
+    /// would save is little, see `docs/decisions/0018-band.md`.
     pub band: f64,
     /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for none.
     pub gap_fraction: f64,
@@ -90,6 +91,30 @@ fn half_diagonal<const D: usize>(h: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Cells at most `band` of their size from a body are of the finest level, inside it as deep as it goes; farther ones are not.
+    fn fine_cells_fill_bodies_and_their_bands<const D: usize>() {
+        let ball = Ball::new(Vector::<D>::repeat(0.47), 0.2);
+        let refinement = Refinement { coarsest: 2, surface: 5, band: 1.5, gap_fraction: 0.0, gap_levels: 0 };
+        let mesh = refinement.mesh(Aabb::unit(), [1; D], [false; D], &[ball]).unwrap();
+        let mut deepest = 0.0f64;
+        for cell in mesh.cells() {
+            let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
+            let alpha = ball.value(&(lower + Vector::repeat(0.5 * h)));
+            deepest = deepest.max(alpha);
+            let (near, far) =
+                (alpha >= -1.5 * mesh.size(5), alpha < -1.5 * mesh.size(5) - 4.0 * half_diagonal::<D>(h));
+            assert!(!near || cell.level == 5, "level {} at {alpha}", cell.level);
+            assert!(!far || cell.level < 5, "level {} at {alpha}", cell.level);
+        }
+        assert!(deepest > 0.17 && mesh.cells().iter().any(|cell| cell.level < 4));
+    }
+
+    #[test]
+    fn the_band_of_fine_cells_is_outside_and_the_interior_is_as_fine() {
+        fine_cells_fill_bodies_and_their_bands::<2>();
+        fine_cells_fill_bodies_and_their_bands::<3>();
+    }
 
     #[test]
     fn gaps_are_resolved_and_the_rest_is_not() {
