@@ -120,12 +120,12 @@ pub fn largest_gap_after_smallest(run: &Trajectory) -> Option<f64> {
     gap[smallest..].iter().copied().reduce(f64::max)
 }
 
-/// Largest difference of the gaps D/a of particles 1 and 2 in two runs with the same time step while that of the first is
-/// positive, from the start to its first overlap.
-pub fn gap_difference_before_overlap(run: &Trajectory, other: &Trajectory) -> Option<f64> {
+/// Largest difference of the gaps D/a of particles 1 and 2 in two runs with the same time step, over all times when that of
+/// the first is positive.
+pub fn gap_difference_while_apart(run: &Trajectory, other: &Trajectory) -> Option<f64> {
     let (own, others) = (run.gap((1, 2))?, other.gap((1, 2))?);
-    let before = own.iter().zip(others).take_while(|(own, _)| **own > 0.0);
-    before.map(|(own, other)| (own - other).abs()).reduce(f64::max)
+    let apart = own.iter().zip(others).filter(|(own, _)| **own > 0.0);
+    apart.map(|(own, other)| (own - other).abs()).reduce(f64::max)
 }
 
 /// The largest gap D/a of particles 1 and 2 in `run` at the times when they touch in `other`.
