@@ -3,13 +3,15 @@
 //! Rows of output are not in it, but how far their files had come ([`CsvMarks`]).
 //!
 //! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and
-//! the rest: a [`Checkpoint`] in postcard encoding, compressed by zstd. It carries the case, so that it
+//! the rest: a [`Checkpoint`] in postcard encoding, compressed by zlib. It carries the case, so that it
 //! cannot be taken for one of another case.
 
 use std::fs;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use flate2::Compression;
+use flate2::read::{ZlibDecoder, ZlibEncoder};
 use gluey_geom::{Dim, Space};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -26,8 +28,8 @@ const MAGIC: &[u8; 8] = b"gluey-ck";
 const VERSION: u32 = 5;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
-/// Fast; the payload is small.
-const COMPRESSION_LEVEL: i32 = 3;
+/// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
+const COMPRESSION_LEVEL: u32 = 1;
 
 /// A run between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,7 +132,9 @@ where
             let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
             let payload = Payload { case: canonical(case).map_err(io::Error::other)?, run };
             let bytes = postcard::to_stdvec(&payload).map_err(io::Error::other)?;
-            zstd::encode_all(bytes.as_slice(), COMPRESSION_LEVEL)
+            let mut body = Vec::new();
+            ZlibEncoder::new(bytes.as_slice(), Compression::new(COMPRESSION_LEVEL)).read_to_end(&mut body)?;
+            Ok(body)
         };
         let body = encode().map_err(|error| OutputError::new(path, "encode the checkpoint", error))?;
         let mut file = MAGIC.to_vec();
@@ -162,8 +166,7 @@ where
         if blake3::hash(body).as_bytes() != digest {
             return Err(CheckpointError::Damaged { path });
         }
-        let payload: Option<Payload> =
-            zstd::decode_all(body).ok().and_then(|bytes| postcard::from_bytes(&bytes).ok());
+        let payload: Option<Payload> = inflated(body).and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let Some(payload) = payload else { return Err(CheckpointError::Damaged { path }) };
         let given = match canonical(case) {
             Ok(given) => given,
@@ -174,6 +177,13 @@ where
         }
         postcard::from_bytes(&payload.run).map_err(|_| CheckpointError::Damaged { path })
     }
+}
+
+/// What was compressed; `None` if it was not.
+fn inflated(body: &[u8]) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    ZlibDecoder::new(body).read_to_end(&mut bytes).ok()?;
+    Some(bytes)
 }
 
 /// The case as text, without its end.

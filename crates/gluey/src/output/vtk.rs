@@ -19,7 +19,8 @@ use gluey_motion::Fields;
 use super::{OutputError, prepare_folder_of, pvd, write_atomically};
 
 pub(crate) use background::FrameWriter;
-use xml::{Array, CellType, Piece};
+use vtkio::model::CellType;
+use xml::{Array, Piece};
 pub use xml::{Precision, UnknownPrecision, VtkEncoding};
 
 /// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's
@@ -96,7 +97,7 @@ impl VtkWriter {
         ];
         for (series, piece) in self.series.iter_mut().zip(pieces) {
             if let Some(piece) = piece {
-                series.add(&self.folder, frame.step, frame.time, &piece, self.encoding)?;
+                series.add(&self.folder, frame.step, frame.time, piece, self.encoding)?;
             }
         }
         Ok(())
@@ -109,7 +110,7 @@ impl Series {
         folder: &Path,
         step: usize,
         time: f64,
-        piece: &Piece,
+        piece: Piece,
         encoding: VtkEncoding,
     ) -> Result<(), OutputError> {
         let file = file_name(self.name, step);
@@ -135,8 +136,8 @@ fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
     let count = cells.len();
     Piece {
         points: in_space(&fields.points),
-        connectivity: cells.flat_map(|cell| order.iter().map(|&node| i64::from(cell[node]))).collect(),
-        offsets: (1..=count).map(|cell| (cell * order.len()) as i64).collect(),
+        connectivity: cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect(),
+        offsets: (1..=count).map(|cell| (cell * order.len()) as u64).collect(),
         types: vec![cell_type; count],
         of_points: vec![
             vectors("velocity", &fields.velocity),
@@ -158,8 +159,8 @@ where
     let spins: Vec<f64> = twists.iter().flat_map(|twist| spin_in_space::<D>(&twist.spin)).collect();
     Piece {
         points: in_space(&centers(particles)),
-        connectivity: (0..count as i64).collect(),
-        offsets: (1..=count as i64).collect(),
+        connectivity: (0..count as u64).collect(),
+        offsets: (1..=count as u64).collect(),
         types: vec![CellType::Vertex; count],
         of_points: vec![
             scalars("radius", particles.iter().map(|particle| particle.radius).collect()),
@@ -182,19 +183,19 @@ where
 {
     let count = particles.len();
     let mut points = centers(particles);
-    let mut connectivity: Vec<i64> = (0..count as i64).collect();
+    let mut connectivity: Vec<u64> = (0..count as u64).collect();
     for Contact { pair, .. } in contacts {
         let second = match (pair.second, pair.branch(&points[..count], domain)) {
-            (Partner::Particle { index, image: [0, 0, 0] }, _) => i64::from(index),
+            (Partner::Particle { index, image: [0, 0, 0] }, _) => u64::from(index),
             (_, branch) => {
                 points.push(points[pair.first as usize] + branch.unwrap_or_else(Vector::zeros));
-                points.len() as i64 - 1
+                points.len() as u64 - 1
             }
         };
-        connectivity.extend([i64::from(pair.first), second]);
+        connectivity.extend([u64::from(pair.first), second]);
     }
-    let mut offsets: Vec<i64> = (1..=count as i64).collect();
-    offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as i64));
+    let mut offsets: Vec<u64> = (1..=count as u64).collect();
+    offsets.extend((1..=contacts.len()).map(|line| (count + 2 * line) as u64));
     let mut types = vec![CellType::Vertex; count];
     types.resize(count + contacts.len(), CellType::Line);
     // Vertices carry zeros.

@@ -4,15 +4,23 @@
 //! Every array is base64: a header of 64-bit numbers, then the little-endian values, in zlib blocks where
 //! they are compressed.
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::io::{self, Write};
 use std::str::FromStr;
 
 use base64::engine::{Engine, general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
+use vtkio::IOBuffer;
+use vtkio::model::{
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version,
+    VertexNumbers, Vtk,
+};
+use vtkio::xml::Compressor;
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
+/// Bytes of the number that stands before uncompressed data.
+const SIZE_LENGTH: usize = 8;
 
 /// How numbers are stored in the files for ParaView.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,128 +73,122 @@ impl FromStr for Precision {
     }
 }
 
-/// VTK's numbers of cell types.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum CellType {
-    Vertex = 1,
-    Line = 3,
-    BiquadraticQuad = 28,
-    TriquadraticHexahedron = 29,
-}
-
 /// Numbers at points or cells.
 pub(super) struct Array {
     pub name: &'static str,
-    /// Numbers a point or cell.
-    pub components: usize,
+    /// Numbers per point or cell.
+    pub components: u32,
     pub values: Vec<f64>,
 }
 
 /// A grid and what is known at its points and cells.
 pub(super) struct Piece {
-    /// Three coordinates a point.
+    /// Three coordinates per point.
     pub points: Vec<f64>,
     /// Points of all cells.
-    pub connectivity: Vec<i64>,
+    pub connectivity: Vec<u64>,
     /// Where each cell ends in `connectivity`.
-    pub offsets: Vec<i64>,
+    pub offsets: Vec<u64>,
     pub types: Vec<CellType>,
     pub of_points: Vec<Array>,
     pub of_cells: Vec<Array>,
 }
 
-/// The file that holds `piece`.
-pub(super) fn document(piece: &Piece, encoding: VtkEncoding) -> io::Result<String> {
-    let compressor = match encoding.compression {
-        0 => "",
-        _ => " compressor=\"vtkZLibDataCompressor\"",
+/// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in blocks,
+/// since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears 32 kB.
+pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+    let vtk = Vtk {
+        version: Version::new_xml(1, 0),
+        title: String::new(),
+        byte_order: ByteOrder::LittleEndian,
+        data: DataSet::inline(grid(piece, encoding.precision)),
+        file_path: None,
     };
-    let mut file = File { text: String::new(), encoding };
-    file.add(format_args!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-         header_type=\"UInt64\"{compressor}>\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-        piece.points.len() / 3,
-        piece.types.len()
-    ));
-    file.section("PointData", |file| file.arrays(&piece.of_points))?;
-    file.section("CellData", |file| file.arrays(&piece.of_cells))?;
-    file.section("Points", |file| file.reals("points", 3, &piece.points))?;
-    file.section("Cells", |file| {
-        file.array("Int64", "connectivity", 1, &bytes(&piece.connectivity, i64::to_le_bytes))?;
-        file.array("Int64", "offsets", 1, &bytes(&piece.offsets, i64::to_le_bytes))?;
-        let types: Vec<u8> = piece.types.iter().map(|&cell| cell as u8).collect();
-        file.array("UInt8", "types", 1, &types)
-    })?;
-    file.add(format_args!("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"));
-    Ok(file.text)
-}
-
-fn bytes<T: Copy, const N: usize>(values: &[T], to_bytes: fn(T) -> [u8; N]) -> Vec<u8> {
-    values.iter().flat_map(|&value| to_bytes(value)).collect()
-}
-
-/// A file on its way.
-struct File {
-    text: String,
-    encoding: VtkEncoding,
-}
-
-impl File {
-    fn add(&mut self, text: fmt::Arguments<'_>) {
-        // Writing to a string cannot fail.
-        let _ = self.text.write_fmt(text);
-    }
-
-    fn section(&mut self, name: &str, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
-        self.add(format_args!("<{name}>\n"));
-        fill(self)?;
-        self.add(format_args!("</{name}>\n"));
-        Ok(())
-    }
-
-    fn arrays(&mut self, arrays: &[Array]) -> io::Result<()> {
-        arrays.iter().try_for_each(|array| self.reals(array.name, array.components, &array.values))
-    }
-
-    fn reals(&mut self, name: &str, components: usize, values: &[f64]) -> io::Result<()> {
-        match self.encoding.precision {
-            Precision::Double => self.array("Float64", name, components, &bytes(values, f64::to_le_bytes)),
-            Precision::Single => {
-                self.array("Float32", name, components, &bytes(values, |x| (x as f32).to_le_bytes()))
+    let mut bytes = Vec::new();
+    vtk.try_into_xml_format(Compressor::None, 0)
+        .and_then(|mut file| {
+            if encoding.compression > 0 {
+                file.compressor = Compressor::ZLib;
             }
-        }
+            file.write(&mut bytes)
+        })
+        .map_err(|error| io::Error::other(error.to_string()))?;
+    let text = String::from_utf8(bytes).map_err(io::Error::other)?;
+    match encoding.compression {
+        0 => Ok(signed_indices(&text)),
+        level => compressed_arrays(&signed_indices(&text), level.min(9)),
     }
+}
 
-    fn array(&mut self, kind: &str, name: &str, components: usize, data: &[u8]) -> io::Result<()> {
-        self.add(format_args!(
-            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">"
-        ));
-        match self.encoding.compression {
-            0 => {
-                let size = (data.len() as u64).to_le_bytes();
-                STANDARD.encode_string([&size, data].concat(), &mut self.text);
-            }
-            level => self.compressed(data, level.min(9))?,
-        }
-        self.add(format_args!("</DataArray>\n"));
-        Ok(())
+fn grid(piece: Piece, precision: Precision) -> UnstructuredGridPiece {
+    let attributes = |arrays: Vec<Array>| -> Vec<Attribute> {
+        let attribute = |array: Array| {
+            let components = array.components;
+            Attribute::generic(array.name, components).with_data(reals(array.values, precision))
+        };
+        arrays.into_iter().map(attribute).collect()
+    };
+    UnstructuredGridPiece {
+        points: reals(piece.points, precision),
+        cells: Cells {
+            cell_verts: VertexNumbers::XML { connectivity: piece.connectivity, offsets: piece.offsets },
+            types: piece.types,
+        },
+        data: Attributes { point: attributes(piece.of_points), cell: attributes(piece.of_cells) },
     }
+}
 
-    /// The header: number of blocks, their size, that of a last partial one, then the size of each when
-    /// compressed. Header and blocks are encoded one after the other.
-    fn compressed(&mut self, data: &[u8], level: u32) -> io::Result<()> {
-        let count = data.len().div_ceil(BLOCK);
-        let mut header = vec![count as u64, BLOCK as u64, (data.len() % BLOCK) as u64];
-        let mut blocks = Vec::new();
-        for block in data.chunks(BLOCK) {
-            let start = blocks.len();
-            let mut encoder = ZlibEncoder::new(blocks, Compression::new(level));
-            encoder.write_all(block)?;
-            blocks = encoder.finish()?;
-            header.push((blocks.len() - start) as u64);
-        }
-        STANDARD.encode_string(bytes(&header, u64::to_le_bytes), &mut self.text);
-        STANDARD.encode_string(blocks, &mut self.text);
-        Ok(())
+fn reals(values: Vec<f64>, precision: Precision) -> IOBuffer {
+    match precision {
+        Precision::Double => values.into(),
+        Precision::Single => values.into_iter().map(|x| x as f32).collect::<Vec<f32>>().into(),
     }
+}
+
+/// vtkio writes node numbers as unsigned; with those, numpy (in meshio) ends up with floating-point indices. Numbers
+/// below 2^63 have the same bytes in both types, and the data themselves are base64, which holds no `<`.
+fn signed_indices(text: &str) -> String {
+    text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
+}
+
+/// The same file with its arrays compressed: base64 of the size in 8 bytes and the data, as vtkio wrote it, becomes base64
+/// of compressed blocks.
+fn compressed_arrays(text: &str, level: u32) -> io::Result<String> {
+    let mut file = String::with_capacity(text.len() / 2);
+    let mut rest = text;
+    while let Some(start) = rest.find("<DataArray") {
+        let (before, array) = rest.split_at(start);
+        file.push_str(before);
+        let Some(open) = array.find('>') else { return Err(io::ErrorKind::InvalidData.into()) };
+        let (tag, content) = array.split_at(open + 1);
+        file.push_str(tag);
+        rest = content;
+        if !tag.ends_with("/>") {
+            let end = content.find('<').unwrap_or(content.len());
+            let data = STANDARD.decode(content[..end].trim()).map_err(io::Error::other)?;
+            compress(data.get(SIZE_LENGTH..).unwrap_or_default(), level, &mut file)?;
+            rest = &content[end..];
+        }
+    }
+    file.push_str(rest);
+    Ok(file)
+}
+
+/// The header: number of blocks, their size, that of a last partial one, then the size of each when compressed. Header
+/// and blocks are encoded one after the other.
+fn compress(data: &[u8], level: u32, file: &mut String) -> io::Result<()> {
+    let count = data.len().div_ceil(BLOCK);
+    let mut header = vec![count as u64, BLOCK as u64, (data.len() % BLOCK) as u64];
+    let mut blocks = Vec::new();
+    for block in data.chunks(BLOCK) {
+        let start = blocks.len();
+        let mut encoder = ZlibEncoder::new(blocks, Compression::new(level));
+        encoder.write_all(block)?;
+        blocks = encoder.finish()?;
+        header.push((blocks.len() - start) as u64);
+    }
+    let header: Vec<u8> = header.into_iter().flat_map(u64::to_le_bytes).collect();
+    STANDARD.encode_string(header, file);
+    STANDARD.encode_string(blocks, file);
+    Ok(())
 }
