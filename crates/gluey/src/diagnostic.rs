@@ -38,6 +38,9 @@ impl Diagnosed {
             RunError::Checkpoint(_) => Some("start without --resume".into()),
             RunError::LeftBox { .. } => Some("end the run earlier, or take a larger box; contact keeps particles from its walls (y), not from open sides".into()),
             RunError::Case(CaseError::Invalid(issue)) => Some(issue.problem.hint()),
+            RunError::Case(CaseError::TooLarge(_)) => Some(
+                "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into(),
+            ),
             RunError::Case(CaseError::Read { .. }) => Some("give the path of a case file".into()),
             _ => None,
         };

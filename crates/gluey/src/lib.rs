@@ -23,6 +23,7 @@ pub mod case;
 mod checkpoint;
 pub mod flow;
 mod interpolate;
+pub mod memory;
 pub mod output;
 mod phases;
 pub mod progress;

@@ -133,6 +133,7 @@ pub enum RunError {
 /// Runs `case`, writes what `options` ask for and reports to `progress`.
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
+    crate::memory::check(case)?;
     prepare_outputs(options)?;
     match case.dimension {
         2 => run_2d(case, options, progress),
