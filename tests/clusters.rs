@@ -94,7 +94,7 @@ fn the_solver_of_contact_does_not_change_the_motion() {
 
 #[test]
 fn a_solver_that_does_not_converge_is_an_error_with_its_numbers() {
-    let mut case = chain(200);
+    let mut case = chain(400);
     case.contact.solver = SolverKind::Uzawa;
     case.time.end = case.time.step;
     let folder = tempfile::TempDir::new().expect("a folder");
