@@ -170,6 +170,13 @@ fn overlapping_starts() {
     let key = "particles[1].position = [0.36, 0.525, 0.5]";
     refused_line(11, "position = [0.36, 0.525, 0.5]", &[key, message, "at least 0.1 is needed"]);
     refused_line(11, "position = [0.3, 0.525, 0.5]", &["gap -1.000000e-1"]);
+    // All pairs are told at once.
+    let third = |x: f64| format!("[[particles]]\nposition = [{x}, 0.475, 0.5]\nradius = 0.05\n");
+    let crowd = GOOD.to_owned() + &third(0.71) + &third(0.2) + &third(0.21);
+    refused(
+        &crowd,
+        &["particles 2 and 3 overlap at the start: gap -9.000000e-2; so do 4 and 5", "case.toml:31:"],
+    );
 }
 
 #[test]
@@ -204,6 +211,8 @@ fn numbers_that_are_not_positive() {
     refused_line(9, "radius = 0", &["particles[0].radius = 0", "greater than 0"]);
     refused_line(12, "radius = -0.05", &["particles[1].radius = -0.05", "greater than 0"]);
     refused_line(23, "tolerance = 0", &["flow.tolerance = 0", "between 0 and 0.1"]);
+    let loose = with_line(17, "[contact]\ntolerance = 0.1");
+    refused(&loose, &["case.toml:18:", "contact.tolerance = 0.1", "a number from 1e-15 to 1e-3"]);
     refused_line(25, "cells_per_radius = 0", &["flow.mesh.cells_per_radius", "a number of 1 or more"]);
 }
 
@@ -241,6 +250,9 @@ fn names_that_are_not_known() {
     );
     let memory = with_line(17, "[contact]\nmemory = \"none\"");
     refused(&memory, &["case.toml:18:", "contact.memory", "one of \"paper\", \"consistent\""]);
+    let contact = with_line(17, "[contact]\nsolver = \"gauss\"");
+    let all = "one of \"auto\", \"uzawa\", \"accelerated\", \"active-set\"";
+    refused(&contact, &["case.toml:18:", "contact.solver", "`gauss` is not a known contact solver", all]);
 }
 
 #[test]
@@ -257,8 +269,34 @@ fn choices_that_do_not_fit_together() {
         &["case.toml:2:", "`pair4d` is not a known reference", "pair3d_trajectory_box"],
     );
     refused(&reference("pair2d_trajectory"), &["case.toml:2:", "but the case has dimension 3"]);
-    let moved = reference("pair3d_trajectory_box").replace("0.525", "0.53");
-    refused(&moved, &["case.toml:2:", "particle 1", "(0.3, 0.53)", "(0.3, 0.525)"]);
+}
+
+/// What a reference was not computed for would look like an error of the run.
+#[test]
+fn references_of_something_else() {
+    let with = |name: &str| with_line(1, &format!("name = \"pair\"\nreference = \"{name}\""));
+    let (unbounded, boxed) = (with("pair3d_trajectory_unbounded"), with("pair3d_trajectory_box"));
+    let stokes = |text: &str| text.replace("hydrodynamics = \"pair-mobility\"", "hydrodynamics = \"stokes\"");
+    refused(
+        &boxed,
+        &["case.toml:2:", "flow.hydrodynamics = \"stokes\"", "but the case has \"pair-mobility\""],
+    );
+    refused(&stokes(&unbounded), &["flow.hydrodynamics = \"pair-mobility\"", "has \"stokes\""]);
+    let boxed = stokes(&boxed);
+    let periodic = boxed.replace("\"couette\"", "\"periodic\"");
+    refused(&periodic, &["case.toml:2:", "needs domain.boundary = \"couette\"", "has \"periodic\""]);
+    let wide = boxed.replace("upper = [1.0, 1.0, 1.0]", "upper = [2.0, 1.0, 1.0]");
+    refused(&wide, &["the unit box, from 0 to 1", "a box from [0.0, 0.0, 0.0] to [2.0, 1.0, 1.0]"]);
+    let high = unbounded.replace("upper = [1.0, 1.0, 1.0]", "upper = [1.0, 2.0, 1.0]");
+    refused(&high, &["a box whose middle is at y = 0.5", "its middle at y = 1"]);
+    let (wanted, moved) = ("particle 1 of radius 0.05 at [0.3, 0.525, 0.5]", "0.53, 0.5]");
+    refused(&unbounded.replace("0.525, 0.5]", moved), &[wanted, "radius 0.05 at [0.3, 0.53, 0.5]"]);
+    let deep = unbounded.replace("0.525, 0.5]", "0.525, 0.6]");
+    refused(&deep, &[wanted, "radius 0.05 at [0.3, 0.525, 0.6]"]);
+    let fast = unbounded.replace("shear_rate = 1.0", "shear_rate = 2.0");
+    refused(&fast, &["needs shear_rate = 1, but the case has 2"]);
+    let reversed = unbounded.replace("[time]\n", "[time]\nreverse_at = 1.0\n");
+    refused(&reversed, &["a shear that is not reversed", "time.reverse_at"]);
 }
 
 #[test]

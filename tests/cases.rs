@@ -7,6 +7,11 @@ use gluey::case::Hydrodynamics;
 use gluey::{Case, RunOptions, Silent, run};
 use tempfile::TempDir;
 
+/// Largest distance from the reference, in radii, after two steps on a coarse mesh: three times what is measured. A case whose
+/// particles do not move at all, or move backwards, is ten times as far away.
+const LIMITS: [(&str, f64); 4] =
+    [("pair-2d", 3.6e-3), ("pair-3d", 4.2e-4), ("pair-3d-mobility", 2.9e-5), ("trio-2d-couette", 1.7e-3)];
+
 fn case_files() -> Vec<PathBuf> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases");
     let entries = fs::read_dir(folder).expect("the folder of cases");
@@ -58,7 +63,9 @@ fn every_case_runs_its_first_steps() {
         assert_eq!(report.cells > 0, case.flow.hydrodynamics == Hydrodynamics::Stokes);
         assert!(report.min_gap_over_a.is_some_and(f64::is_finite));
         assert_eq!(report.max_abs_error_over_a.is_some(), case.reference.is_some());
-        assert!(report.max_abs_error_over_a.is_none_or(|error| error < 0.1), "{report}");
+        let limit = LIMITS.iter().find(|(name, _)| *name == case.name).map(|(_, limit)| *limit);
+        assert_eq!(limit.is_some(), case.reference.is_some(), "{} needs a limit", case.name);
+        assert!(report.max_abs_error_over_a.is_none_or(|error| Some(error) < limit), "{report}");
         let rows = fs::read_to_string(&csv).expect("a trajectory");
         assert_eq!(rows.lines().count(), 1 + 3);
         assert!(rows.lines().skip(1).all(|row| row.split(',').all(|cell| cell.parse::<f64>().is_ok())));

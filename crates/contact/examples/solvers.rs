@@ -13,7 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Solvers that are compared.
-const SOLVERS: [(&str, SolverKind); 3] = [
+const SOLVERS: [(&str, SolverKind); 4] = [
+    ("auto", SolverKind::Auto),
     ("uzawa", SolverKind::Uzawa),
     ("accelerated", SolverKind::Accelerated),
     ("active set", SolverKind::ActiveSet),
@@ -100,7 +101,12 @@ where
                     if name == "uzawa" && count > 60 {
                         continue;
                     }
-                    let (seconds, outcome) = solve(&positions, kind, solver, iteration_limit);
+                    let (seconds, outcome) = solve(
+                        &positions,
+                        kind,
+                        solver,
+                        if solver == SolverKind::Auto { 500_000 } else { iteration_limit },
+                    );
                     let told = match outcome {
                         Ok(report) => {
                             rows = report.pair_count;

@@ -7,7 +7,7 @@ use gluey_geom::Vector;
 
 use crate::islands::{Island, Islands, Slot};
 use crate::rows::{GROUND, Row};
-use crate::solver::{GapOperator, Projection, ProjectionSolver, SolveFailure, SolveReport};
+use crate::solver::{Factor, GapOperator, Projection, ProjectionSolver, SolveFailure, SolveReport};
 use crate::{ContactParams, Mobility, StepGeometry};
 
 /// What all islands of a step share.
@@ -399,5 +399,23 @@ impl<const D: usize, M: Mobility<D>> GapOperator for Operator<'_, D, M> {
             let apart = self.velocities[arrow.head as usize] - self.velocities[arrow.tail as usize];
             *gap = arrow.normal.dot(&apart);
         }
+    }
+
+    /// With the roots of the weights, which are squared in `A`; none for a mobility that joins all particles.
+    fn factor(&self) -> Option<Factor> {
+        if M::COUPLED {
+            return None;
+        }
+        let mut factor = Factor::new(D * self.slots.len());
+        for arrow in self.arrows {
+            // What does not move has no degrees of freedom.
+            let end = |slot: u32, sign: f64| {
+                let root = sign * self.weights[slot as usize].sqrt();
+                let entries = (0..D).map(move |d| (D * slot as usize + d, root * arrow.normal[d]));
+                entries.filter(|(_, value)| *value != 0.0)
+            };
+            factor.push(end(arrow.tail, -1.0).chain(end(arrow.head, 1.0)));
+        }
+        Some(factor)
     }
 }

@@ -184,6 +184,34 @@ fn velocities_are_optimal() {
     check_optimality::<3>(3);
 }
 
+/// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods so long.
+fn check_jammed<const D: usize>(side: usize)
+where
+    Dim<D>: Space<D>,
+{
+    let mut packing = Packing::<D>::new(side, 0.0025, 17);
+    packing.make_triangular();
+    packing.glued.clear();
+    let centre = packing.positions.iter().sum::<Vector<D>>() / packing.positions.len() as f64;
+    packing.predicted = packing.positions.iter().map(|x| centre - x).collect();
+    let (velocities, contact) = packing.solve(params(SolverKind::Auto));
+    assert_optimal(&packing, &velocities, &contact);
+    assert!(10 * contact.contacts().len() > 8 * D * packing.positions.len(), "{}", contact.contacts().len());
+    let exact = ContactParams { exact_gap: true, ..params(SolverKind::Auto) };
+    let (velocities, _) = packing.solve(exact);
+    let end = |i: usize| packing.positions[i] + (velocities[i] * RATE + packing.drift[i]);
+    for (pair, ..) in packing.rows() {
+        let (i, j) = ends(pair);
+        assert!((end(j) - end(i)).norm() > packing.radii[i] + packing.radii[j] - 1e-12, "{pair}");
+    }
+}
+
+#[test]
+fn jammed_clusters_are_solved_for() {
+    check_jammed::<2>(10);
+    check_jammed::<3>(5);
+}
+
 /// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs' constraints.
 fn interior_point<const D: usize>(packing: &Packing<D>) -> Vec<f64>
 where

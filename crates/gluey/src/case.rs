@@ -19,10 +19,11 @@
 mod error;
 mod load;
 mod names;
+pub(crate) mod neighbours;
 mod suggest;
 mod validate;
 
-pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
+pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem, TooLarge};
 pub use gluey_contact::{Memory, SolverKind as ContactSolver, Strategy};
 pub use gluey_motion::Scheme;
 pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
@@ -297,7 +298,7 @@ impl Case {
     /// The finest level of the tree over this box; `None` for a box that is not made of cubes.
     pub(crate) fn finest_level(&self) -> Option<u32> {
         let most = self.root_cells()?.into_iter().max()?;
-        FINEST_LEVEL.checked_sub(most.next_power_of_two().ilog2())
+        FINEST_LEVEL.checked_sub(most.checked_next_power_of_two()?.ilog2())
     }
 
     /// Lower corner of the box, one coordinate a dimension.
@@ -333,14 +334,15 @@ impl Case {
     }
 
     /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the mesh. `None`
-    /// if it takes more than 16 of them along the shortest edge.
+    /// if it takes more than 16 of them along the shortest edge, or more than a tree can number along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let edges: Vec<f64> =
             self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect();
         let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);
         let counts = |along_shortest: u32| -> Option<Vec<u32>> {
             let exact = edges.iter().map(|edge| edge / shortest * f64::from(along_shortest));
-            let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count;
+            let most = f64::from(1u32 << FINEST_LEVEL);
+            let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count && count <= most;
             exact.map(|count| whole(count).then(|| count.round() as u32)).collect()
         };
         (1..=MOST_ROOTS).find_map(counts)

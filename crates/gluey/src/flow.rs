@@ -3,6 +3,7 @@
 //! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves the Stokes
 //! problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x`, and reads off the twists.
 
+mod estimate;
 mod fields;
 
 use std::time::Instant;
@@ -19,6 +20,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::{Case, Formulation, ParticleVelocity, Solver};
+
+pub use estimate::MeshEstimate;
 
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -117,7 +120,7 @@ where
     Ok(StokesFlow {
         solver: FlowSolver::new(params, seconds)?,
         params,
-        refinement: refinement::<D>(case, domain.extent()[0] / f64::from(roots[0]), &radii),
+        refinement: refinement(case, domain.extent()[0] / f64::from(roots[0]), &radii),
         domain,
         roots,
         periods: std::array::from_fn(|axis| case.period(axis)),
@@ -233,14 +236,15 @@ fn root_cells<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<[u32; D],
 }
 
 /// Level at which `cells` cells fit into the smallest radius, and what else the mesh follows.
-fn refinement<const D: usize>(case: &Case, root_size: f64, radii: &[f64]) -> Refinement {
+fn refinement(case: &Case, root_size: f64, radii: &[f64]) -> Refinement {
     let flow = &case.flow;
     let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
     let cells = case.cells_per_radius();
     let surface = (cells * root_size / smallest * (1.0 - 1e-9)).log2().ceil().max(0.0) as u8;
     let rigid = flow.formulation == Formulation::RigidDofs;
     let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
-    let gap_levels = flow.rigid_dofs.gap_levels.unwrap_or(default_gap_levels(D)).min(levels_left);
+    let gap_levels =
+        flow.rigid_dofs.gap_levels.unwrap_or(default_gap_levels(case.dimension)).min(levels_left);
     Refinement {
         coarsest: flow.mesh.coarsest_level.min(u32::from(surface)) as u8,
         surface,

@@ -24,6 +24,7 @@ mod checkpoint;
 pub mod flow;
 mod interpolate;
 mod measures;
+pub mod memory;
 mod near_pairs;
 pub mod output;
 mod phases;

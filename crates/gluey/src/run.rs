@@ -34,6 +34,7 @@ const ROUNDING: f64 = 1e-10;
 /// Runs `case`, writes what `options` ask for and reports to `progress`.
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
+    crate::memory::check(case)?;
     let _claims = claim_outputs(options, progress)?;
     match case.dimension {
         2 => run_2d(case, options, progress),

@@ -19,12 +19,16 @@ mod accelerated;
 mod active_set;
 mod auto;
 mod contradiction;
+mod envelope;
+mod factor;
+mod newton;
 mod spectrum;
 mod uzawa;
 
 pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
 pub use auto::Auto;
+pub use factor::Factor;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 
@@ -34,6 +38,11 @@ use contradiction::Watch;
 pub trait GapOperator {
     /// Writes into `gaps` how far `forces` open each gap.
     fn apply(&mut self, forces: &[f64], gaps: &mut [f64]);
+
+    /// `R` with `A = R R^T`, if it is known and sparse: one row a contact, one column a degree of freedom.
+    fn factor(&self) -> Option<Factor> {
+        None
+    }
 }
 
 /// One projection problem.

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::names::UnknownName;
+use crate::flow::MeshEstimate;
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -23,6 +24,29 @@ pub enum CaseError {
     /// The file was read, but something in it is wrong.
     #[error(transparent)]
     Invalid(Box<CaseIssue>),
+    /// Nothing in it is wrong, but its mesh does not fit into this machine.
+    #[error(transparent)]
+    TooLarge(TooLarge),
+}
+
+/// A case that needs more memory than there is.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error(
+    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {:.1} GB of memory; {}",
+    .estimate.cell_count, .estimate.unknown_count, .estimate.bytes / 1e9, there(*.available)
+)]
+pub struct TooLarge {
+    /// What it would need.
+    pub estimate: MeshEstimate,
+    /// Bytes there are, if that is known.
+    pub available: Option<u64>,
+}
+
+fn there(available: Option<u64>) -> String {
+    match available {
+        Some(bytes) => format!("{:.1} GB are there", bytes as f64 / 1e9),
+        None => "at most 2^32 - 1 can be numbered".into(),
+    }
 }
 
 /// One thing that is wrong in a case file, and where.
@@ -234,7 +258,7 @@ pub enum Problem {
         range: (f64, f64),
     },
     /// Two particles that overlap at the start.
-    #[error("particles {first} and {second} overlap at the start: gap {gap:.6e}")]
+    #[error("particles {first} and {second} overlap at the start: gap {gap:.6e}{}", more(others))]
     Overlap {
         /// Number of the first particle, from 1.
         first: usize,
@@ -246,6 +270,8 @@ pub enum Problem {
         distance: f64,
         /// Sum of the radii.
         contact_distance: f64,
+        /// Numbers of the other pairs that overlap.
+        others: Vec<(usize, usize)>,
     },
     /// No particles at all.
     #[error("no particles")]
@@ -288,7 +314,7 @@ pub enum Problem {
         /// The choice.
         choice: String,
         /// What it needs.
-        needs: &'static str,
+        needs: String,
         /// What the case has.
         found: String,
     },
@@ -312,7 +338,7 @@ impl Problem {
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
             Self::UnevenBox { .. } => {
-                "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2".into()
+                "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than 2^18".into()
             }
             Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
             Self::PeriodTooShort { period, axis, .. } => {
@@ -333,6 +359,18 @@ impl Problem {
             Self::Unfit { needs, .. } => format!("it needs {needs}"),
             Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
         }
+    }
+}
+
+/// The first few of further pairs that overlap.
+fn more(others: &[(usize, usize)]) -> String {
+    const SHOWN: usize = 9;
+    let shown = others.iter().take(SHOWN).map(|(first, second)| format!("{first} and {second}"));
+    let list = shown.collect::<Vec<_>>().join(", ");
+    match others.len() {
+        0 => String::new(),
+        count if count <= SHOWN => format!("; so do {list}"),
+        count => format!("; so do {list} and {} more pairs", count - SHOWN),
     }
 }
 

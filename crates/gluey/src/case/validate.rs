@@ -1,11 +1,10 @@
 //! What a case must satisfy beyond its types.
 
-use gluey_levelset::nearest_image;
-
 use super::Case;
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
-use crate::reference::{self, Reference};
+use super::neighbours::{Neighbours, nearer_than};
+use crate::reference::{self, Mismatch, Reference};
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,10 +51,7 @@ fn check_reference(case: &Case, key: Key) -> Check {
         return fail(key, Problem::UnknownName(problem));
     };
     match table.mismatch(case) {
-        Some(found) => {
-            let needs = "the particles, dimension and shear rate it was computed for";
-            fail(key, Problem::Unfit { choice: name.clone(), needs, found })
-        }
+        Some(Mismatch { needs, found }) => fail(key, Problem::Unfit { choice: name.clone(), needs, found }),
         None => Ok(()),
     }
 }
@@ -121,20 +117,14 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
 }
 
 fn check_overlaps(case: &Case, key: &Key) -> Check {
-    for (second, b) in case.particles.iter().enumerate() {
-        for (first, a) in case.particles[..second].iter().enumerate() {
-            let along = |(d, (x, y)): (usize, (&f64, &f64))| nearest_image(x - y, case.period(d)).powi(2);
-            let squares = a.position.iter().zip(&b.position).enumerate().map(along);
-            let distance = squares.sum::<f64>().sqrt();
-            let contact_distance = a.radius + b.radius;
-            if distance < contact_distance {
-                let (first, gap) = (first + 1, distance - contact_distance);
-                let problem = Problem::Overlap { first, second: second + 1, gap, distance, contact_distance };
-                return fail(key.index(second).name("position"), problem);
-            }
-        }
-    }
-    Ok(())
+    let overlapping = nearer_than(case, 0.0);
+    let Some(Neighbours { first, second, distance, contact_distance }) = overlapping.first().copied() else {
+        return Ok(());
+    };
+    let others = overlapping[1..].iter().map(|pair| (pair.first + 1, pair.second + 1)).collect();
+    let (gap, key) = (distance - contact_distance, key.index(second).name("position"));
+    let (first, second) = (first + 1, second + 1);
+    fail(key, Problem::Overlap { first, second, gap, distance, contact_distance, others })
 }
 
 fn check_time(case: &Case, key: &Key) -> Check {
@@ -249,7 +239,7 @@ fn check_paper(case: &Case, key: &Key) -> Check {
 /// The analytic model knows two equal spheres in unbounded shear.
 fn check_pair_mobility(case: &Case, key: Key) -> Check {
     let choice = Hydrodynamics::PairMobility.name().to_owned();
-    let needs = "dimension 3 and two particles of equal radius";
+    let needs = "dimension 3 and two particles of equal radius".to_owned();
     let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
     let found = match (case.dimension, radii.as_slice()) {
         (3, [a, b]) if a == b => return Ok(()),

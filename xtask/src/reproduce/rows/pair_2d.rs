@@ -111,13 +111,13 @@ fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig5-half-turn-rigid",
             "pair-2d-gluey-rigid-dofs",
             measured(name, half_turn(Approach::GlueyRigidDofs)),
-            band(0.0048),
+            band(evidence.limit(0.0048, 0.013)),
         ),
         exact(
             "fig5-distance-rigid",
             "pair-2d-gluey-rigid-dofs",
             measured("largest error of D/a", rigid.and_then(error)),
-            Wanted::AtMost(1.4e-3),
+            Wanted::AtMost(evidence.limit(1.4e-3, 5.7e-3)),
         ),
     ]
 }
@@ -157,7 +157,7 @@ pub fn orbits(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig6-circle-rigid",
             "pair-2d-gluey-rigid-dofs",
             measured(whole, ratio(Approach::GlueyRigidDofs, 0.0)),
-            Wanted::AtMost(1.0006),
+            Wanted::AtMost(evidence.limit(1.0006, 1.0026)),
         ),
     ]
 }

@@ -1,0 +1,183 @@
+//! How large the mesh of a case will be, before it is built.
+//!
+//! Every level of the tree refines the cells that meet a ball a little larger than each particle. A ball of radius `R h` at a random
+//! place meets on average (Steiner 1840, on parallel bodies)
+//!
+//! `pi R^2 + 4 R + 1` squares or `4/3 pi R^3 + 3 pi R^2 + 6 R + 1` cubes of edge `h`,
+//!
+//! and no more than fill the box. Gaps between particles add those in the lens where they are narrower than their cells. The mesh that is
+//! built has 0.6 to 1.6 times as many cells (`tests/estimate.rs`: the shipped cases, and sixty at random).
+
+use std::f64::consts::PI;
+
+use gluey_geom::{Dim, Particle, Space};
+use gluey_stokes::Refinement;
+
+use super::{FlowError, StokesFlow, refinement};
+use crate::case::neighbours::{Neighbours, nearer_than};
+use crate::case::{Case, Formulation, Hydrodynamics, Solver};
+
+/// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
+const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
+/// Cells across a gap that are refined because of it, those inside the particles included.
+const GAP_THICKNESS: f64 = 2.6;
+
+/// Expected size of the first mesh of a case, and of its solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshEstimate {
+    /// Cells.
+    pub cell_count: f64,
+    /// Unknowns: velocity and pressure nodes.
+    pub unknown_count: f64,
+    /// Memory of a run; unit: bytes.
+    pub bytes: f64,
+}
+
+impl MeshEstimate {
+    /// The estimate for a checked case; `None` if its flow has no mesh. Takes as long as looking at each particle once a level.
+    pub fn of(case: &Case) -> Option<Self> {
+        if case.flow.hydrodynamics != Hydrodynamics::Stokes {
+            return None;
+        }
+        let tree = Tree::of(case)?;
+        let cell_count = tree.cell_count(case);
+        let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
+        Some(Self { cell_count, unknown_count, bytes: memory(case, &tree, cell_count) })
+    }
+}
+
+impl<const D: usize> StokesFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Number of cells of the mesh around `particles`, which is built for it.
+    ///
+    /// # Errors
+    /// [`FlowError`] if the box cannot be meshed.
+    pub fn cell_count(&self, particles: &[Particle<D>]) -> Result<usize, FlowError> {
+        let balls = self.balls(particles.iter().map(|particle| particle.pose.position));
+        Ok(self.mesh(&balls)?.cell_count())
+    }
+}
+
+/// The tree of a case as far as it matters here.
+struct Tree {
+    dimension: i32,
+    root_count: f64,
+    root_size: f64,
+    refinement: Refinement,
+}
+
+impl Tree {
+    fn of(case: &Case) -> Option<Self> {
+        let roots = case.root_cells()?;
+        let root_size = (case.upper()[0] - case.lower()[0]) / f64::from(roots[0]);
+        let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
+        Some(Self {
+            dimension: case.dimension as i32,
+            root_count: roots.iter().map(|&count| f64::from(count)).product(),
+            root_size,
+            refinement: refinement(case, root_size, &radii),
+        })
+    }
+
+    /// Edge of the cells of a level.
+    fn size(&self, level: i32) -> f64 {
+        self.root_size * 0.5f64.powi(level)
+    }
+
+    /// Leaves: the roots, and for each refined cell its children less itself.
+    fn cell_count(&self, case: &Case) -> f64 {
+        let surface = i32::from(self.refinement.surface);
+        let near = (0..surface).map(|level| self.near_surfaces(case, level));
+        let refined: f64 = near.sum::<f64>() + self.in_gaps(case);
+        self.root_count + refined * (2f64.powi(self.dimension) - 1.0)
+    }
+
+    /// Leaves inside particles, which have the size of those at the surfaces.
+    fn cells_inside(&self, case: &Case) -> f64 {
+        let size = self.size(i32::from(self.refinement.surface));
+        let ball = if self.dimension == 2 { PI } else { 4.0 / 3.0 * PI };
+        case.particles.iter().map(|particle| ball * (particle.radius / size).powi(self.dimension)).sum()
+    }
+
+    /// Refined cells of a level above that of the surfaces.
+    fn near_surfaces(&self, case: &Case, level: i32) -> f64 {
+        let most = self.root_count * 2f64.powi(self.dimension * level);
+        if level < i32::from(self.refinement.coarsest) {
+            return most;
+        }
+        let size = self.size(level);
+        let finest = i32::from(self.refinement.surface) - 1;
+        // Neighbouring leaves differ by one level: the balls of the finest refined level, with a cell more for every level above.
+        let balance = self.refinement.band * 0.5 * self.size(finest) + (size - self.size(finest));
+        let beyond = (self.refinement.band * 0.5 * size).max(balance);
+        let met = |radius: f64| cells_met(self.dimension, (radius + beyond) / size);
+        case.particles.iter().map(|particle| met(particle.radius)).sum::<f64>().min(most)
+    }
+
+    /// Refined cells of the levels beyond that of the surfaces.
+    fn in_gaps(&self, case: &Case) -> f64 {
+        let Refinement { surface, gap_fraction, gap_levels, .. } = self.refinement;
+        if gap_fraction <= 0.0 || gap_levels == 0 {
+            return 0.0;
+        }
+        let widest = |size: f64| size * (1.0 / gap_fraction + f64::from(self.dimension).sqrt());
+        let pairs = nearer_than(case, widest(self.size(i32::from(surface))));
+        let levels = (0..i32::from(gap_levels)).map(|level| i32::from(surface) + level);
+        levels
+            .map(|level| {
+                let size = self.size(level);
+                let most = self.root_count * 2f64.powi(self.dimension * level);
+                pairs.iter().map(|pair| self.in_gap(case, pair, size, widest(size))).sum::<f64>().min(most)
+            })
+            .sum()
+    }
+
+    /// Cells of a size in the lens where the distance of two surfaces, `gap + r^2 (1/a + 1/b) / 2` at the distance `r` from their
+    /// axis, is less than `widest`.
+    fn in_gap(&self, case: &Case, pair: &Neighbours, size: f64, widest: f64) -> f64 {
+        let [a, b] = [pair.first, pair.second].map(|particle| case.particles[particle].radius);
+        let excess = widest - (pair.distance - pair.contact_distance).max(0.0);
+        if excess <= 0.0 {
+            return 0.0;
+        }
+        let radius = (2.0 * excess / (1.0 / a + 1.0 / b)).sqrt().min(1.5 * a.min(b)) / size;
+        GAP_THICKNESS
+            * if self.dimension == 2 { 2.0 * radius + 1.0 } else { PI * radius * radius + 4.0 * radius + 1.0 }
+    }
+}
+
+/// Cells that a ball meets on average, whose radius is so many cells.
+fn cells_met(dimension: i32, radius: f64) -> f64 {
+    match dimension {
+        2 => PI * radius * radius + 4.0 * radius + 1.0,
+        _ => 4.0 / 3.0 * PI * radius.powi(3) + 3.0 * PI * radius * radius + 6.0 * radius + 1.0,
+    }
+}
+
+/// Memory that a run takes, in bytes (measured: see `docs/benchmarks.md`).
+fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
+    let direct = match case.flow.solver {
+        Solver::Direct => true,
+        Solver::Multigrid => false,
+        Solver::Auto => case.dimension == 2,
+    };
+    let rigid = case.flow.formulation == Formulation::RigidDofs;
+    let per_cell = UNKNOWNS_PER_CELL[case.dimension - 2];
+    if direct {
+        // What is inside rigid particles is eliminated.
+        let inside = if rigid { tree.cells_inside(case) } else { 0.0 };
+        let solved = (per_cell * (cell_count - inside)).max(1e3);
+        return match case.dimension {
+            2 => solved * 185.0 * solved.log2(),
+            _ => solved * 450.0 * solved.cbrt(),
+        };
+    }
+    let per_unknown = match (case.dimension, rigid) {
+        (_, true) => 500.0,
+        (2, false) => 2400.0,
+        (_, false) => 1400.0,
+    };
+    per_unknown * per_cell * cell_count
+}

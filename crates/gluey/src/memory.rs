@@ -1,0 +1,123 @@
+//! Whether a run fits into the memory of the machine: found out before anything is allocated.
+
+use std::fs;
+use std::path::Path;
+
+use crate::case::{Case, CaseError, TooLarge};
+use crate::flow::MeshEstimate;
+
+/// Nodes and cells are numbered in 32 bits.
+const MOST_UNKNOWNS: f64 = u32::MAX as f64;
+
+/// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how much there is, only the
+/// first is checked.
+pub(crate) fn check(case: &Case) -> Result<(), CaseError> {
+    let available = available();
+    match MeshEstimate::of(case) {
+        Some(estimate) if !fits(&estimate, available) => {
+            Err(CaseError::TooLarge(TooLarge { estimate, available }))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn fits(estimate: &MeshEstimate, available: Option<u64>) -> bool {
+    let enough = available.is_none_or(|bytes| estimate.bytes <= bytes as f64);
+    enough && estimate.unknown_count <= MOST_UNKNOWNS
+}
+
+/// Bytes this process may still take: what the machine has left, and what its control groups leave it. Linux only.
+pub fn available() -> Option<u64> {
+    let read = |path: &Path| fs::read_to_string(path).ok();
+    let machine = read(Path::new("/proc/meminfo")).and_then(|text| mem_available(&text));
+    let groups = read(Path::new("/proc/self/cgroup")).unwrap_or_default();
+    let limits = group_folders(&groups).into_iter().filter_map(|folder| group_rest(&folder, read));
+    machine.into_iter().chain(limits).min()
+}
+
+/// `MemAvailable:  1234 kB`.
+fn mem_available(text: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+/// Folders of the control groups this process is in, their parents and the root: version 2 (`0::/a/b`) and the memory controller of
+/// version 1 (`4:memory:/a/b`). In a container the group's path may not be there, the root is.
+fn group_folders(text: &str) -> Vec<String> {
+    let mut folders = Vec::new();
+    for line in text.lines() {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let (Some(controllers), Some(path)) = (parts.next(), parts.next()) else { continue };
+        let root = match controllers {
+            "" => "/sys/fs/cgroup",
+            _ if controllers.split(',').any(|name| name == "memory") => "/sys/fs/cgroup/memory",
+            _ => continue,
+        };
+        let names: Vec<&str> = path.split('/').filter(|name| !name.is_empty()).collect();
+        for depth in 0..=names.len() {
+            folders.push([&[root], &names[..depth]].concat().join("/"));
+        }
+    }
+    folders
+}
+
+/// Limit less usage of a control group; `None` without a limit.
+fn group_rest(folder: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> {
+    let number = |file: &str| -> Option<u64> { read(&Path::new(folder).join(file))?.trim().parse().ok() };
+    let [limit, usage] =
+        [("memory.max", "memory.current"), ("memory.limit_in_bytes", "memory.usage_in_bytes")]
+            .into_iter()
+            .find_map(|(limit, usage)| Some([number(limit)?, number(usage).unwrap_or(0)]))?;
+    Some(limit.saturating_sub(usage))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_of_the_machine_is_read() {
+        let text = "MemTotal:       24689764 kB\nMemFree:  9 kB\nMemAvailable:   22000000 kB\n";
+        assert_eq!(mem_available(text), Some(22_000_000 * 1024));
+        assert_eq!(mem_available("MemAvailable: much\n"), None);
+        assert_eq!(mem_available(""), None);
+    }
+
+    #[test]
+    fn groups_are_found_with_their_parents() {
+        assert_eq!(
+            group_folders("0::/jobs/7\n"),
+            ["/sys/fs/cgroup", "/sys/fs/cgroup/jobs", "/sys/fs/cgroup/jobs/7"]
+        );
+        let old = "5:cpu,cpuacct:/x\n4:hugetlb,memory:/y\nnonsense\n";
+        assert_eq!(group_folders(old), ["/sys/fs/cgroup/memory", "/sys/fs/cgroup/memory/y"]);
+    }
+
+    #[test]
+    fn a_group_leaves_its_limit_less_what_is_used() {
+        let files = |limit: &'static str, usage: &'static str| {
+            move |path: &Path| match path.to_str()? {
+                "g/memory.max" => Some(limit.to_owned()),
+                "g/memory.current" => Some(usage.to_owned()),
+                _ => None,
+            }
+        };
+        assert_eq!(group_rest("g", files("1000\n", "300\n")), Some(700));
+        assert_eq!(group_rest("g", files("1000\n", "3000\n")), Some(0));
+        assert_eq!(group_rest("g", files("max\n", "3000\n")), None);
+        assert_eq!(group_rest("h", files("1000\n", "300\n")), None);
+    }
+
+    #[test]
+    fn what_is_too_large_does_not_fit() {
+        let estimate = |unknown_count: f64| MeshEstimate {
+            cell_count: unknown_count / 10.0,
+            unknown_count,
+            bytes: 1e3 * unknown_count,
+        };
+        assert!(fits(&estimate(1e6), Some(2_000_000_000)) && !fits(&estimate(1e6), Some(900_000_000)));
+        assert!(fits(&estimate(1e9), None) && !fits(&estimate(5e9), None));
+        assert!(!fits(&estimate(f64::INFINITY), Some(u64::MAX)));
+    }
+}

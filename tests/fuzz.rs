@@ -1,0 +1,277 @@
+//! Mutated case files, from text to the first mesh: whatever stands in them is either refused with a message or can be set up.
+//!
+//! `GLUEY_FUZZ_COUNT=1000000 cargo test --release -p gluey --test fuzz` tries more of them than usual. The seed is fixed: the same
+//! texts on every machine.
+
+use std::panic::catch_unwind;
+
+use gluey::Case;
+use gluey::flow::{MeshEstimate, stokes_flow};
+use gluey_geom::{Dim, Particle, Space, Vector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SHIPPED: [&str; 5] = [
+    include_str!("../data/cases/pair-2d.toml"),
+    include_str!("../data/cases/pair-3d.toml"),
+    include_str!("../data/cases/pair-3d-mobility.toml"),
+    include_str!("../data/cases/trio-2d.toml"),
+    include_str!("../data/cases/trio-2d-couette.toml"),
+];
+
+/// Every key there is.
+const FULL: &str = r#"name = "full"
+dimension = 2
+shear_rate = 1.0
+[domain]
+lower = [0.0, 0.0]
+upper = [2.0, 1.0]
+boundary = "periodic"
+[[particles]]
+position = [0.451, 0.51]
+radius = 0.05
+[[particles]]
+position = [1.549, 0.49]
+radius = 0.08
+[time]
+step = 0.025
+end = 30.0
+scheme = "adams-bashforth-2"
+reverse_at = 8.0
+[contact]
+strategy = "gluey"
+exact_gap = true
+memory = "consistent"
+gamma_min = -1.0
+threshold = 1e-4
+solver = "auto"
+tolerance = 1e-13
+[flow]
+hydrodynamics = "stokes"
+formulation = "rigid-dofs"
+solver = "auto"
+tolerance = 1e-6
+[flow.mesh]
+cells_per_radius = 3.2
+coarsest_level = 3
+band = 2.0
+[flow.paper]
+viscosity_ratio = 1e3
+uzawa_steps = 1
+rho = 1.0
+ramp = 1.0
+[flow.rigid-dofs]
+offset = -0.1
+gap_fraction = 1.0
+gap_levels = 2
+[flow.pair-mobility]
+gap_offset = 0.0
+"#;
+
+const NUMBERS: &[&str] = &[
+    "0",
+    "-0.0",
+    "1",
+    "-1",
+    "2",
+    "3",
+    "16",
+    "17",
+    "0.5",
+    "1.5",
+    "0.1",
+    "1e-9",
+    "1e-17",
+    "1e-200",
+    "5e-324",
+    "1e5",
+    "65536.0",
+    "262144.0",
+    "262145.0",
+    "4e9",
+    "4294967296",
+    "4294967295.0",
+    "1e15",
+    "1e18",
+    "1e100",
+    "1e200",
+    "1.7e308",
+    "-1.7e308",
+    "nan",
+    "inf",
+    "-inf",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "9223372036854775808",
+    "0.3333333333333333",
+    "0.1000000000000001",
+    "1_000",
+    "0x10",
+    "1e",
+    "--1",
+];
+const VALUES: &[&str] = &[
+    "true",
+    "\"\"",
+    "\"gluey\"",
+    "\"none\"",
+    "\"periodic\"",
+    "\"couette\"",
+    "\"pair-mobility\"",
+    "\"stokes\"",
+    "\"paper\"",
+    "\"rigid-dofs\"",
+    "\"direct\"",
+    "\"uzawa\"",
+    "\"velocity-correction\"",
+    "[]",
+    "[[]]",
+    "{}",
+    "[1e300, 1e-300]",
+    "[nan, 0.5]",
+    "[0.5, 0.5, 0.5]",
+    "1979-05-27",
+    "'''x'''",
+    "\"\\u0000\"",
+    "",
+    "\"trio2d_trajectory\"",
+    "\"pair3d_trajectory_box\"",
+];
+
+/// Cells that are few enough to build the mesh.
+const FEW_CELLS: f64 = 4000.0;
+
+fn pick<T: Copy>(random: &mut ChaCha8Rng, from: &[T]) -> T {
+    from[random.random_range(0..from.len())]
+}
+
+/// Where numbers begin and end.
+fn numbers(text: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut start = None;
+    for (at, c) in text.char_indices().chain([(text.len(), ' ')]) {
+        let belongs = c.is_ascii_digit() || (start.is_some() && matches!(c, '.' | 'e' | '-'));
+        match (belongs, start) {
+            (true, None) => start = Some(at),
+            (false, Some(begin)) => {
+                found.push((begin, at));
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn mutate(text: &str, random: &mut ChaCha8Rng) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let at = random.random_range(0..lines.len().max(1));
+    if lines.is_empty() {
+        return "name".into();
+    }
+    match random.random_range(0..16) {
+        0..=7 => {
+            let places = numbers(text);
+            if places.is_empty() {
+                return text.to_owned();
+            }
+            let (start, end) = pick(random, &places);
+            return [&text[..start], pick(random, NUMBERS), &text[end..]].concat();
+        }
+        8 => _ = lines.remove(at),
+        9 => lines.insert(at, lines[at].clone()),
+        10 => {
+            let name = lines[at].split('=').next().unwrap_or("").to_owned();
+            lines[at] = lines[at].replacen(&name, pick(random, &["x =", "radius =", "é ", "[", "name"]), 1);
+        }
+        11 | 12 => {
+            let name = lines[at].split('=').next().unwrap_or("").to_owned();
+            lines[at] = format!("{name}= {}", pick(random, VALUES));
+        }
+        13 => {
+            let other = random.random_range(0..lines.len());
+            lines.swap(at, other);
+        }
+        14 => lines.truncate(at),
+        _ => {
+            let mut bytes = text.as_bytes().to_vec();
+            let at = random.random_range(0..bytes.len());
+            bytes[at] = random.random_range(0..=255);
+            return String::from_utf8_lossy(&bytes).into_owned();
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Sets up the first mesh, if it is small; whether it was.
+fn set_up<const D: usize>(case: &Case, estimate: &MeshEstimate) -> bool
+where
+    Dim<D>: Space<D>,
+{
+    let particles: Vec<Particle<D>> = case
+        .particles
+        .iter()
+        .map(|spec| Particle::new(Vector::from_fn(|d, _| spec.position[d]), spec.radius))
+        .collect();
+    if estimate.cell_count > FEW_CELLS {
+        return false;
+    }
+    // Refused with a typed error, or built: both are answers.
+    if let Ok(cells) = stokes_flow::<D>(case).and_then(|flow| flow.cell_count(&particles)) {
+        let ratio = cells as f64 / estimate.cell_count;
+        assert!((0.3..3.0).contains(&ratio), "{cells} cells, {estimate:?}");
+    }
+    true
+}
+
+/// How far a text comes: 0 refused, 1 read, 2 a mesh was built.
+fn follow(text: &str) -> usize {
+    let case = match Case::parse(text, "fuzz.toml") {
+        Ok(case) => case,
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.starts_with("fuzz.toml:"), "{message}");
+            return 0;
+        }
+    };
+    case.check().expect("a case that was read can be checked again");
+    assert!(case.step_count() <= 1_000_000_001 && case.mean_radius() > 0.0);
+    assert!(!case.file_stem().is_empty());
+    let Some(estimate) = MeshEstimate::of(&case) else { return 1 };
+    assert!(estimate.cell_count >= 1.0 && estimate.bytes >= 0.0, "{estimate:?}");
+    let is_built = match case.dimension {
+        2 => set_up::<2>(&case, &estimate),
+        _ => set_up::<3>(&case, &estimate),
+    };
+    1 + usize::from(is_built)
+}
+
+#[test]
+fn no_text_panics() {
+    let count = std::env::var("GLUEY_FUZZ_COUNT").ok().and_then(|text| text.parse().ok()).unwrap_or(6000);
+    let mut random = ChaCha8Rng::seed_from_u64(2010);
+    let mut reached = [0; 3];
+    for number in 0..count {
+        let base = if number % 2 == 0 { FULL } else { SHIPPED[number / 2 % SHIPPED.len()] };
+        let mut text = base.to_owned();
+        for _ in 0..random.random_range(1..=3) {
+            text = mutate(&text, &mut random);
+        }
+        match catch_unwind(|| follow(&text)) {
+            Ok(stage) => reached[stage] += 1,
+            Err(_) => panic!("text {number}:\n{text}"),
+        }
+    }
+    println!("{reached:?} refused, read, built");
+    // Neither all refused nor all accepted.
+    assert!(reached.iter().all(|&texts| texts > count / 100), "{reached:?}");
+}
+
+#[test]
+fn a_box_longer_than_a_tree_can_number_is_refused() {
+    for length in ["4e9", "262145.0", "1e300"] {
+        let text = FULL.replace("upper = [2.0, 1.0]", &format!("upper = [{length}, 1.0]"));
+        let message = Case::parse(&text, "long.toml").expect_err("too long").to_string();
+        assert!(message.contains("not a small number of cubes"), "{message}");
+    }
+}
