@@ -30,7 +30,7 @@ enum Task {
     BenchStokes(bench_stokes::Options),
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
-    /// Formatting, lints and all tests.
+    /// Formatting, lints, all tests and a quick reproduction of the figures.
     Ci,
 }
 
