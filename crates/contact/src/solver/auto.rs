@@ -1,4 +1,4 @@
-//! The solver for any number of contacts: which of the others is best was measured (docs/decisions/0018-contact-solver.md).
+//! The solver for any number of contacts: which of the others is best was measured (docs/decisions/0020-contact-solver.md).
 
 use super::newton::improve;
 use super::{
