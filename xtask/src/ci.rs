@@ -20,7 +20,14 @@ const STEPS: [&[&str]; 4] = [
     &["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"],
     &["test", "--release", "--workspace"],
     &[
-        "run", "--release", "--package", "xtask", "--", "reproduce-figures", "--quick", "--out",
+        "run",
+        "--release",
+        "--package",
+        "xtask",
+        "--",
+        "reproduce-figures",
+        "--quick",
+        "--out",
         "target/figures-quick",
     ],
 ];

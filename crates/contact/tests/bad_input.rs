@@ -176,7 +176,7 @@ fn memories_that_no_step_leaves_are_refused() {
         let bad = ContactState { pairs: vec![PairState { pair, gamma, lambda }] };
         let error = contact.resume(bad).expect_err("must be refused");
         assert_eq!(error.pair, pair);
-        assert!(error.to_string().contains("particles 0 and 1"), "{error}");
+        assert!(error.to_string().contains("particles 1 and 2"), "{error}");
         assert_eq!(contact.checkpoint(), good);
     }
 }

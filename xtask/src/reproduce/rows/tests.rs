@@ -54,8 +54,8 @@ fn the_exact_solutions_agree_with_themselves() {
 #[test]
 fn a_clock_ten_percent_slow_is_noticed() {
     let rows = Exact::new(0.1, |end| end).rows();
-    // The shape of the orbit and the smallest gap do not know the time; the others do.
-    let timeless = ["fig6-circle-rigid", "fig7a-smallest-rigid"];
+    // The shape of the orbit and the smallest gap do not know the time, and the doublet's gap varies by 4e-5 a only.
+    let timeless = ["fig5-distance-rigid", "fig6-circle-rigid", "fig7a-smallest-rigid"];
     for row in rows.iter().filter(|row| !timeless.contains(&row.id)) {
         assert_eq!(row.outcome, Outcome::No, "{row:#?}");
     }
