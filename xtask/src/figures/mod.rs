@@ -55,7 +55,7 @@ impl Data {
         }
         let gluey = RunKey { case: figure.case(), approach: Approach::Gluey };
         if let Some(settings) = self.settings.get(&gluey).filter(|_| !figure.approaches().is_empty()) {
-            notes.push(format!("{}.", settings.figure_note()));
+            notes.extend(settings.figure_notes());
         }
         if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
             notes.push(

@@ -37,10 +37,10 @@ impl Settings {
         }
     }
 
-    /// What the note of a figure says.
-    pub fn figure_note(&self) -> String {
+    /// What the notes of a figure say, one string per line.
+    pub fn figure_notes(&self) -> [String; 2] {
         let Self { flow, cells_per_radius, time_step, .. } = self;
-        format!("{flow}; *a*/*h* = {cells_per_radius}, time step {time_step}")
+        [format!("{flow};"), format!("*a*/*h* = {cells_per_radius}, time step {time_step}.")]
     }
 
     /// All in one line.
