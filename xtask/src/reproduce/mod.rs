@@ -85,7 +85,7 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
 /// The settings of all runs whose case can be read.
 fn settings(options: &Options, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, Settings> {
     let mut settings = BTreeMap::new();
-    for key in plan::runs_for(&options.figures) {
+    for key in plan::runs_for(&options.figures, options.quick) {
         match runner::case(&options.root, key, options.quick) {
             Ok(case) => drop(settings.insert(key, Settings::of(&case))),
             Err(error) => failures.push(Failure { what: format!("run {key}"), error: runner::chain(&error) }),
@@ -108,7 +108,7 @@ fn make_runs(
     settings: &BTreeMap<RunKey, Settings>,
     failures: &mut Vec<Failure>,
 ) -> BTreeMap<RunKey, RunReport> {
-    let mut keys = plan::runs_for(&options.figures);
+    let mut keys = plan::runs_for(&options.figures, options.quick);
     keys.retain(|key| settings.contains_key(key));
     let board = progress::Board::new();
     let results = schedule::in_parallel(&keys, options.jobs, |&key| {

@@ -39,6 +39,9 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     if quick {
         let settings = quick_settings(key.case);
         case.flow.mesh.cells_per_radius = Some(settings.cells_per_radius);
+        if case.flow.formulation == Formulation::Paper {
+            case.flow.tolerance = settings.paper_tolerance;
+        }
         case.time.step *= settings.step_factor;
         case.time.end = case.time.end.min(settings.latest_end);
     }

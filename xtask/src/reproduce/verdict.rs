@@ -80,7 +80,7 @@ pub struct Claim {
     pub value: Option<f64>,
     /// What it should be.
     pub wanted: Wanted,
-    /// It needs the full computation: runs of `--quick` end earlier.
+    /// It needs the full computation: runs of `--quick` end earlier and take larger steps.
     pub full_only: bool,
 }
 

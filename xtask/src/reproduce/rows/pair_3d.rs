@@ -71,7 +71,8 @@ fn strategies(evidence: &Evidence<'_>) -> Vec<Claim> {
                 as_printed.zip(large_step).map(|(own, large)| own / large),
             ),
             Wanted::AtMost(0.75),
-        ),
+        )
+        .full_only(),
     ]
 }
 
