@@ -1,11 +1,11 @@
-//! `xtask bench-stokes` prints one line of JSON that holds together, and refuses bad options.
+//! `bench-stokes` prints one line of JSON that holds together, and refuses bad options.
 
 use std::process::{Command, Output};
 
 use serde_json::Value;
 
 fn bench(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_xtask")).arg("bench-stokes").args(arguments).output().expect("it runs")
+    Command::new(env!("CARGO_BIN_EXE_bench-stokes")).args(arguments).output().expect("it runs")
 }
 
 /// The report of a run that must succeed: one line, and nothing beside it where no terminal is.

@@ -1,11 +1,12 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask bench-stokes`, `cargo xtask tidy`, `cargo xtask ci`.
 
-mod bench_stokes;
+mod bench;
 mod ci;
 mod figures;
 mod reproduce;
 mod tidy;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -27,7 +28,12 @@ enum Task {
     /// Compute and draw the figures of Verdon et al. (2010).
     ReproduceFigures(ReproduceArguments),
     /// Time one solve of the Stokes core and print one line of JSON.
-    BenchStokes(bench_stokes::Options),
+    #[command(disable_help_flag = true)]
+    BenchStokes {
+        /// Options of the measurement; `--help` tells them.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
     /// Formatting, lints, all tests and a quick reproduction of the figures.
@@ -53,7 +59,7 @@ struct ReproduceArguments {
 fn main() -> ExitCode {
     match Arguments::parse().task {
         Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
-        Task::BenchStokes(options) => bench_stokes(&options),
+        Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }
@@ -65,18 +71,6 @@ fn tidy() -> ExitCode {
             offences.iter().for_each(|offence| eprintln!("{offence}"));
             if offences.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
-        Err(error) => outcome(Err(error)),
-    }
-}
-
-fn bench_stokes(options: &bench_stokes::Options) -> ExitCode {
-    let line = bench_stokes::run(options).map(|report| serde_json::to_string(&report));
-    match line {
-        Ok(Ok(line)) => {
-            println!("{line}");
-            ExitCode::SUCCESS
-        }
-        Ok(Err(error)) => outcome(Err(error)),
         Err(error) => outcome(Err(error)),
     }
 }

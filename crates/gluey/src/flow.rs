@@ -12,6 +12,7 @@ use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
+pub use gluey_stokes::default_offset;
 use gluey_stokes::{
     Flow, FlowParams, FlowSolver, NodalFields, PaperParams, Refinement, SolverKind, StokesError,
     WarmStartError, WeakPressures,
@@ -267,12 +268,6 @@ pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f
 /// in 3D, where they spoil the convergence of the solver.
 pub fn default_gap_levels(dimension: usize) -> u32 {
     if dimension == 2 { 9 } else { 0 }
-}
-
-/// Offset of the rigid nodes in cells where a case does not state one. In 3D, where films are not resolved, a larger one
-/// makes up for the resistance of the film.
-pub fn default_offset(dimension: usize) -> f64 {
-    if dimension == 2 { -0.1 } else { -0.2 }
 }
 
 fn flow_params<const D: usize>(case: &Case) -> FlowParams {

@@ -71,6 +71,12 @@ impl Default for PaperParams {
     }
 }
 
+/// Offset of the rigid nodes in cells that suits a dimension. In 3D, where films are not resolved, a larger one makes up for the
+/// resistance of the film.
+pub fn default_offset(dimension: usize) -> f64 {
+    if dimension == 2 { -0.1 } else { -0.2 }
+}
+
 impl Formulation {
     /// Gauss points a direction with which the solid is integrated.
     pub fn quadrature(&self) -> usize {

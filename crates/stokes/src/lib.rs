@@ -57,7 +57,7 @@ pub use direct::DirectSolver;
 pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
 pub use error::{DiagonalError, SmallMatrix, StokesError};
 pub use flow::{Flow, FlowParams, FlowSolver, SolverKind};
-pub use formulation::{Formulation, PaperParams, ParticleVelocity};
+pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
 pub use multigrid::MultigridSolver;
 pub use point_matrices::PointMatrices;
 pub use pressure::{PressureSpace, WeakPressures};

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::cases::Case;
-use super::options::FormulationName;
+use crate::cases::Case;
+use crate::options::FormulationName;
 
 /// One measurement. What the system does not tell is `null`.
 #[derive(Debug, Serialize)]

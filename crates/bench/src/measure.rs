@@ -1,12 +1,7 @@
-//! `cargo xtask bench-stokes`: one timed solve of the Stokes core in a unit box, told in one line of JSON.
+//! One timed solve of the Stokes core in a unit box.
 //!
-//! All cases have the Couette velocity `u = (y - 1/2) e_x` on the whole boundary and viscosity 1 in the fluid; [`cases`]
+//! All cases have the Couette velocity `u = (y - 1/2) e_x` on the whole boundary and viscosity 1 in the fluid; [`crate::cases`]
 //! says what is inside. The guess is zero and the tolerance relative to the residual it leaves.
-
-mod cases;
-mod machine;
-mod options;
-mod report;
 
 use std::io::IsTerminal;
 use std::sync::Arc;
@@ -20,9 +15,10 @@ use gluey_stokes::{
     StokesSystem, SystemOperator,
 };
 
-use machine::{Stopwatch, Times};
-pub use options::Options;
-pub use report::Report;
+use crate::machine::{Stopwatch, Times};
+use crate::options::Options;
+use crate::report::Report;
+use crate::{cases, machine};
 
 /// Viscosity of the fluid.
 const VISCOSITY: f64 = 1.0;

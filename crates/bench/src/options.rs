@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use gluey_stokes::{Formulation, PaperParams, WeakPressures};
 use serde::Serialize;
 
-use super::cases::Case;
+use crate::cases::Case;
 
 /// The command line of `bench-stokes`.
 #[derive(clap::Args, Debug)]
@@ -60,7 +60,7 @@ impl Options {
     pub fn formulation(&self, dimension: usize) -> Formulation {
         match self.formulation {
             FormulationName::RigidDofs => Formulation::RigidDofs {
-                offset: gluey::flow::default_offset(dimension),
+                offset: gluey_stokes::default_offset(dimension),
                 weak_pressures: WeakPressures::Aggregate,
             },
             FormulationName::Paper => Formulation::Paper(PaperParams {

@@ -1,0 +1,45 @@
+//! `cargo xtask bench-stokes`: one timed solve of the Stokes core in a unit box, told in one line of JSON.
+//!
+//! A package of its own, since whoever reproduces the figures need not wait until a second copy of the solver is compiled.
+
+mod cases;
+mod machine;
+mod measure;
+mod options;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use options::Options;
+
+/// Time one solve of the Stokes core and print one line of JSON.
+#[derive(Parser)]
+#[command(bin_name = "cargo xtask bench-stokes", max_term_width = 100)]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+}
+
+fn main() -> ExitCode {
+    match measure::run(&Arguments::parse().options) {
+        Ok(report) => print(&report),
+        Err(error) => fail(&error),
+    }
+}
+
+fn print(report: &report::Report) -> ExitCode {
+    match serde_json::to_string(report) {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => fail(&error),
+    }
+}
+
+fn fail(error: &dyn std::error::Error) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::FAILURE
+}
