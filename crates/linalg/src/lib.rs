@@ -17,32 +17,27 @@
 //!
 //! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order ([`parallel`]), so
 //! equal input gives equal bits for any number of threads.
+//!
+//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`], operators,
+//! small dense matrices, sparse matrices, direct solvers, Krylov methods, smoothers.
 
-mod block;
-mod blocked;
-mod chebyshev;
+mod dense;
 mod direct;
-mod exchange;
 mod krylov;
 mod operator;
 pub mod parallel;
 mod scalar;
-mod sliced;
+mod smoother;
 mod sparse;
-mod spectrum;
 pub mod vector;
 
-pub use block::{BlockError, BlockJacobi, BlockJacobiError, invert_general, invert_spd};
-pub use blocked::{BlockGroups, BlockPattern};
-pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
+pub use dense::{BlockError, BlockJacobi, BlockJacobiError, DenseSymmetric, invert_general, invert_spd};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
-pub use exchange::DenseSymmetric;
-pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference};
+pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
 pub use scalar::Scalar;
-pub use sliced::SlicedMatrix;
-pub use sparse::{Pattern, SparseError, SparseMatrix};
-pub use spectrum::estimate_lambda_max;
+pub use smoother::{Chebyshev, Guess, SpectralInterval};
+pub use sparse::{BlockGroups, BlockPattern, Pattern, SlicedMatrix, SparseError, SparseMatrix};

@@ -17,7 +17,9 @@ use faer::sparse::linalg::cholesky::IntranodeLbltRef;
 
 use super::refinement::{Refinement, rounding_norm};
 use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
-use crate::{Preconditioner, SparseMatrix, vector};
+use crate::operator::Preconditioner;
+use crate::sparse::SparseMatrix;
+use crate::vector;
 
 /// When [`DirectIndefinite`] regularises zero diagonal entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

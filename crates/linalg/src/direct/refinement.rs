@@ -1,7 +1,8 @@
 //! Iterative refinement with a true residual (Wilkinson 1963; Skeel 1980, 10.1090/S0025-5718-1980-0572859-4).
 
 use super::DirectError;
-use crate::{SparseMatrix, vector};
+use crate::sparse::SparseMatrix;
+use crate::vector;
 
 /// Tuning of the refinement after a direct solve.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,8 +6,9 @@
 //! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified between
 //! groups; the pass over `w` that subtracts one group takes the scalar products with the next.
 
+use crate::scalar::Scalar;
 use crate::vector::{BLOCK, axpy_block, dot_block};
-use crate::{Scalar, parallel, vector};
+use crate::{parallel, vector};
 
 /// Vectors that one pass over `w` is orthogonalised against.
 const GROUP: usize = 8;

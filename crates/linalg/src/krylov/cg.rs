@@ -2,7 +2,9 @@
 //! operators and fixed, positive definite preconditioners.
 
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
-use crate::{LinOp, Preconditioner, Scalar, vector};
+use crate::operator::{LinOp, Preconditioner};
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// Tuning of [`Cg`].
 #[derive(Clone, Copy, Debug, PartialEq)]

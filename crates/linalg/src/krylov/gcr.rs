@@ -14,7 +14,9 @@
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
-use crate::{LinOp, Preconditioner, Scalar, vector};
+use crate::operator::{LinOp, Preconditioner};
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// A step from the residual that leaves more than this of it is followed by one that starts from `c`.
 const SLOW: f64 = 0.9;

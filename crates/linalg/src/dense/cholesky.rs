@@ -1,6 +1,7 @@
 //! Small dense matrices, stored row by row, and the block-Jacobi preconditioner made of their inverses.
 
-use crate::{Preconditioner, Scalar};
+use crate::operator::Preconditioner;
+use crate::scalar::Scalar;
 
 /// Why a dense block has no inverse.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

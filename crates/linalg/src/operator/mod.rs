@@ -1,6 +1,7 @@
 //! What iterative methods ask of a matrix and of its approximate inverse, and the simplest of these.
 
-use crate::{Scalar, vector};
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// A square linear operator that is known by its action on vectors of `T`.
 pub trait LinOp<T> {

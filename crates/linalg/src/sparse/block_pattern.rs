@@ -5,8 +5,8 @@
 
 use std::sync::Arc;
 
-use crate::direct::{DirectError, minimum_degree};
-use crate::{Pattern, Scalar, SparseError, SparseMatrix};
+use super::{Pattern, SparseError, SparseMatrix};
+use crate::scalar::Scalar;
 
 /// Groups of blocks that are coupled with each other; a group is typically the blocks of a cell.
 #[derive(Clone, Debug, Default)]
@@ -63,12 +63,18 @@ impl BlockPattern {
         &self.pattern
     }
 
+    /// Couplings of the blocks.
+    pub(crate) fn blocks(&self) -> &Pattern {
+        &self.blocks
+    }
+
     /// The unknowns of a group of blocks, block after block.
     pub fn unknowns_of(&self, group: &[usize]) -> impl Iterator<Item = usize> {
         group.iter().flat_map(|&block| self.range(block))
     }
 
-    fn range(&self, block: usize) -> std::ops::Range<usize> {
+    /// The unknowns of a block.
+    pub(crate) fn range(&self, block: usize) -> std::ops::Range<usize> {
         self.first[block] as usize..self.first[block + 1] as usize
     }
 
@@ -100,13 +106,6 @@ impl BlockPattern {
                 }
             }
         }
-    }
-
-    /// An order of elimination of the unknowns by approximate minimum degree (Amestoy, Davis and Duff 1996) of whole
-    /// blocks, for [`crate::Ordering::Custom`].
-    pub fn minimum_degree(&self) -> Result<Vec<usize>, DirectError> {
-        let order = minimum_degree(&self.blocks)?;
-        Ok(order.into_iter().flat_map(|block| self.range(block)).collect())
     }
 }
 
@@ -161,7 +160,6 @@ fn visits(row_count: usize, groups: &[&[usize]]) -> (Vec<Visit>, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{DirectIndefinite, IndefiniteParams, Ordering, Symbolic};
 
     const FIRST: [u32; 5] = [0, 2, 3, 6, 8];
     const GROUPS: [&[usize]; 3] = [&[0, 2], &[3, 1, 2], &[0, 3]];
@@ -208,24 +206,5 @@ mod tests {
         groups.push([0, 2]);
         let refused = BlockPattern::new(vec![0, 1, 3], groups);
         assert!(matches!(refused, Err(SparseError::OutOfRange { row: 2, .. })));
-    }
-
-    #[test]
-    fn blocks_are_eliminated_whole() {
-        let blocked = blocked();
-        let order = blocked.minimum_degree().expect("fits");
-        let place = |unknown: usize| order.iter().position(|&u| u == unknown).expect("a permutation");
-        for range in (0..4).map(|block| blocked.range(block)) {
-            assert!(range.clone().all(|u| place(u) == place(range.start) + u - range.start));
-        }
-        let matrix = filled(&blocked);
-        let symbolic = Symbolic::new(matrix.pattern().clone(), Ordering::Custom(&order)).expect("symmetric");
-        let mut factor =
-            DirectIndefinite::new(Arc::new(symbolic), IndefiniteParams::default()).expect("fits");
-        factor.factorise(matrix.values()).expect("regular");
-        let (mut b, mut x) = ([0.0; 8], [0.0; 8]);
-        matrix.multiply(&[1.0; 8], &mut b);
-        factor.solve(&b, &mut x).expect("converges");
-        assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-12));
     }
 }

@@ -1,7 +1,10 @@
 //! The largest eigenvalue of a preconditioned operator, from the Lanczos matrix that conjugate gradients builds
 //! (Golub and Van Loan 2013, section 11.3).
 
-use crate::{KrylovError, LinOp, Preconditioner, Scalar, vector};
+use super::KrylovError;
+use crate::operator::{LinOp, Preconditioner};
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// Estimate of the largest eigenvalue of `M^-1 A`, both symmetric positive definite, from `iterations` steps.
 ///

@@ -5,6 +5,7 @@
 //! that broke down can never pass for a solution.
 
 mod indefinite;
+mod ordering;
 mod refinement;
 mod spd;
 
@@ -16,14 +17,15 @@ use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{MatMut, Par, Side};
 
-use crate::{Pattern, SparseError, vector};
+use crate::sparse::{Pattern, SparseError};
+use crate::vector;
 
 /// Results must not depend on the number of threads, so faer is never given more than this one.
 const PAR: Par = Par::Seq;
@@ -184,18 +186,6 @@ fn analyse(
     };
     factorize_symbolic_cholesky(faer_pattern(pattern), SIDE, ordering, params)
         .map_err(|_| DirectError::OutOfMemory { dim: pattern.row_count() })
-}
-
-/// The row eliminated in each place by approximate minimum degree (Amestoy, Davis and Duff 1996).
-pub(crate) fn minimum_degree(pattern: &Pattern) -> Result<Vec<usize>, DirectError> {
-    let dim = pattern.row_count();
-    let too_large = |_| DirectError::OutOfMemory { dim };
-    let (mut forward, mut inverse) = (vec![0u32; dim], vec![0u32; dim]);
-    let mut scratch = Scratch::new(dim, amd::order_scratch::<u32>(dim, pattern.entry_count()))?;
-    let control = amd::Control::default();
-    amd::order(&mut forward, &mut inverse, faer_pattern(pattern), control, scratch.stack())
-        .map_err(too_large)?;
-    Ok(forward.into_iter().map(|row| row as usize).collect())
 }
 
 fn permutation(dim: usize, order: &[usize]) -> Result<(Vec<u32>, Vec<u32>), DirectError> {

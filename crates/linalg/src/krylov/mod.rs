@@ -3,11 +3,15 @@
 mod basis;
 mod cg;
 mod gcr;
+mod lanczos;
 
 pub use cg::{Cg, CgParams};
 pub use gcr::{Gcr, GcrParams};
+pub use lanczos::estimate_lambda_max;
 
-use crate::{LinOp, Scalar, vector};
+use crate::operator::LinOp;
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// The norm that the relative tolerance is relative to.
 #[derive(Clone, Copy, Debug, PartialEq)]

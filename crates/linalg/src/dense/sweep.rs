@@ -9,7 +9,7 @@
 
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-use crate::BlockError;
+use super::cholesky::BlockError;
 
 /// Rows are padded to a multiple of this, which is one of the numbers in a vector.
 const LANES: usize = 8;

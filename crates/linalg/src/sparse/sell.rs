@@ -4,7 +4,10 @@
 //! The rows of a slice lie side by side, filled up to the longest with zeros: their products do not wait for one another, as those
 //! of one short row do.
 
-use crate::{LinOp, Pattern, Scalar, SparseMatrix, parallel};
+use super::{Pattern, SparseMatrix};
+use crate::operator::LinOp;
+use crate::parallel;
+use crate::scalar::Scalar;
 
 /// Rows of a slice.
 const ROWS: usize = 16;

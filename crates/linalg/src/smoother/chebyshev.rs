@@ -5,7 +5,9 @@
 //! at least `1/T_k(theta/delta)`, and modes below `lower` never grow. Nothing but `A`, `M` and vector updates is
 //! needed, so the result does not depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
 
-use crate::{LinOp, Preconditioner, Scalar, parallel, vector};
+use crate::operator::{LinOp, Preconditioner};
+use crate::scalar::Scalar;
+use crate::{parallel, vector};
 
 /// Part of the spectrum of `M^-1 A` that is to be smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,5 @@
+//! Smoothers: what damps the part of an error that a coarser mesh does not see.
+
+mod chebyshev;
+
+pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
