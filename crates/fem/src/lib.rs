@@ -11,18 +11,17 @@
 //! assert_eq!((mesh.cell_count(), nodes.node_count()), (64, 17 * 17));
 //! ```
 //!
+//! The rooms, lowest first; a room knows only those before it: meshes, [`element`] on the unit cube, spaces of nodes,
+//! operators on [`cells`].
+//!
 //! Not for curved boundaries or unstructured meshes: the domain is a box, particles are immersed.
 
 pub mod cells;
-mod chunks;
 pub mod element;
-mod interpolation;
-mod nodes;
-mod reference;
-mod tree;
+mod mesh;
+mod space;
 
-pub use chunks::{CHUNK_CELLS, Chunks};
-pub use interpolation::Interpolation;
-pub use nodes::{Constraint, NodeMap};
-pub use reference::{Reference, add_viscous};
-pub use tree::{Cell, MeshError, TreeMesh};
+pub use cells::{CHUNK_CELLS, Chunks};
+pub use element::{Reference, add_viscous};
+pub use mesh::{Cell, MeshError, TreeMesh};
+pub use space::{Constraint, Interpolation, NodeMap};

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use gluey_linalg::Scalar;
 
-use super::lanes::Nodes;
+use super::simd::Nodes;
 
 /// The buffers of one thread.
 #[derive(Clone, Debug)]

@@ -2,8 +2,9 @@
 
 use gluey_linalg::Scalar;
 
-use super::lanes::{CellScalar, Lanes, Nodes};
 use super::legendre::{self, CORNERS, UNKNOWNS};
+use super::scalar::CellScalar;
+use super::simd::{Lanes, Nodes};
 use super::{CellOperator, GROUP};
 use crate::element::node_count;
 

@@ -13,7 +13,7 @@
 
 use gluey_linalg::Scalar;
 
-use super::lanes::Lanes;
+use super::simd::Lanes;
 use crate::element::{node_count, split};
 
 /// Most velocity unknowns of a cell: those in 3D.

@@ -1,8 +1,8 @@
 //! The Stokes operator on cubic cells, matrix-free, in the reduced unknowns of a mesh.
 //!
 //! A chunk of cells is worked off in a buffer that stays in the cache: its nodal velocities and pressures are read, rigid
-//! and hanging nodes set, cells taken as many at a time as a vector has lanes ([`lanes`]), their matrices applied in
-//! Legendre products ([`legendre`]), a viscosity that varies inside by quadrature ([`points`]), and the loads of hanging
+//! and hanging nodes set, cells taken as many at a time as a vector has lanes ([`simd`]), their matrices applied in
+//! Legendre products ([`legendre`]), a viscosity that varies inside by quadrature ([`varying`]), and the loads of hanging
 //! and rigid nodes moved to where they belong before the owned nodes are written. No vector is passed over twice.
 //!
 //! Kernels are compiled for AVX-512, AVX2 and portably, and chosen at run time. Chunks run in parallel on the current
@@ -10,26 +10,28 @@
 
 mod buffers;
 mod kernel;
-mod lanes;
 mod legendre;
-mod points;
-mod run;
+mod partition;
+mod rigid;
+mod scalar;
+mod simd;
+mod sweep;
 #[cfg(test)]
 mod tests;
-mod ties;
-#[cfg(target_arch = "x86_64")]
-mod x86;
+mod varying;
 
 use std::sync::Arc;
 
-use crate::chunks::{Chunks, Lists, Slots};
+pub use partition::{CHUNK_CELLS, Chunks};
+pub use rigid::Tie;
+pub use scalar::CellScalar;
+pub use sweep::Workspace;
+
 use crate::element::node_count;
-use crate::nodes::NodeMap;
-pub use lanes::CellScalar;
+use crate::space::NodeMap;
 use legendre::Coefficients;
-use points::PointRule;
-pub use run::Workspace;
-pub use ties::Tie;
+use partition::{Lists, Slots};
+use varying::PointRule;
 
 /// Cells are padded to multiples of this, the largest number of lanes.
 const GROUP: usize = 16;

@@ -1,7 +1,6 @@
 use super::*;
-use crate::element::gauss_cube;
-use crate::reference::{Reference, add_viscous};
-use crate::tree::TreeMesh;
+use crate::element::{Reference, add_viscous, gauss_cube};
+use crate::mesh::TreeMesh;
 use gluey_geom::{Aabb, Vector};
 
 /// Gauss points a direction where the viscosity varies; also an odd number.
@@ -192,20 +191,20 @@ fn kernels_agree<T: CellScalar, const D: usize>() {
     let case = Case::<D>::new(4);
     let operator = case.operator::<T>();
     let (x, p) = (cast(&wave(operator.velocity_dim(), 0.9)), cast(&wave(operator.pressure_dim(), 0.4)));
-    let portable = run::with(&operator, &x, &p, &|input, output, buffers| {
-        operator.run::<lanes::Portable<T>, true, true, T>(input, output, buffers);
+    let portable = sweep::with(&operator, &x, &p, &|input, output, buffers| {
+        operator.run::<simd::Portable<T>, true, true, T>(input, output, buffers);
     });
     let portable: Vec<f64> = portable.iter().map(|x| x.to_f64()).collect();
     let scale = portable.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     let check = |found: Vec<T>| assert!(distance(&found, &portable) < 50.0 * T::EPSILON * scale);
-    check(run::with(&operator, &x, &p, &|input, output, buffers| {
+    check(sweep::with(&operator, &x, &p, &|input, output, buffers| {
         operator.dispatch::<true, true, T>(input, output, buffers);
     }));
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        check(run::with(&operator, &x, &p, &|input, output, buffers| {
+        check(sweep::with(&operator, &x, &p, &|input, output, buffers| {
             // SAFETY: the instructions were detected.
-            unsafe { run::run_avx2::<T, D, true, true, T>(&operator, input, output, buffers) };
+            unsafe { sweep::run_avx2::<T, D, true, true, T>(&operator, input, output, buffers) };
         }));
     }
 }

@@ -6,9 +6,10 @@ use gluey_linalg::Scalar;
 
 use super::buffers::Buffers;
 use super::kernel::Registers;
-use super::lanes::{CellScalar, Lanes, Nodes, Portable};
+use super::partition::Shares;
+use super::scalar::CellScalar;
+use super::simd::{Lanes, Nodes, Portable};
 use super::{CellOperator, GROUP};
-use crate::chunks::Shares;
 
 /// What a [`CellOperator`] works in: buffers for every thread while it runs, in the precision `T` that is computed in, and
 /// contributions to nodes of other chunks, in that of the vectors.

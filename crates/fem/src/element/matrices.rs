@@ -5,7 +5,7 @@
 
 use std::sync::OnceLock;
 
-use crate::element::{gauss_cube, gradient, node_count, value};
+use super::{gauss_cube, gradient, node_count, value};
 
 /// Dense element matrices on the unit cube, row-major. They are integrated once and then shared.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::nodes::NodeMap;
+use crate::space::NodeMap;
 
 /// Cells of a chunk: their nodes stay in the cache next to a core.
 pub const CHUNK_CELLS: usize = 512;

@@ -1,12 +1,12 @@
 //! Lanes in the vector registers of x86-64.
 //!
-//! Values of these types are made only by kernels that `super::dispatch` has chosen after it found the instructions on
-//! the processor: what every `SAFETY` comment here refers to as *detected*. Their twin is [`super::lanes::Portable`];
+//! Values of these types are made only by kernels that `CellOperator::dispatch` has chosen after it found the instructions on
+//! the processor: what every `SAFETY` comment here refers to as *detected*. Their twin is [`super::Portable`];
 //! the test `vector_and_portable_kernels_agree` compares the kernels built on all three.
 
 use std::arch::x86_64::*;
 
-use super::lanes::{Lanes, Nodes};
+use super::{Lanes, Nodes};
 
 macro_rules! lanes {
     ($(#[$doc:meta])* $name:ident([$scalar:ty; $count:literal] in $register:ty):

@@ -6,8 +6,8 @@
 
 use gluey_linalg::Scalar;
 
-use super::lanes::Lanes;
 use super::legendre::{DERIVATIVE, UNKNOWNS, VELOCITY};
+use super::simd::Lanes;
 use crate::element::{gauss, gauss_cube, node_count, split};
 
 /// Points a direction for which there is a kernel of its own.

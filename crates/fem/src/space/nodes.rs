@@ -4,7 +4,7 @@ use gluey_geom::Vector;
 use rustc_hash::FxHashMap;
 
 use crate::element::{node_count, split, values_1d};
-use crate::tree::{COORD_BITS, Cell, TreeMesh, offsets};
+use crate::mesh::{COORD_BITS, Cell, TreeMesh, offsets};
 
 /// A hanging node: its value is the weighted sum of those of regular nodes, `u = sum_j w_j u_j`.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,9 +11,9 @@ use std::sync::Arc;
 use gluey_linalg::parallel;
 use rayon::prelude::*;
 
+use super::nodes::NodeMap;
 use crate::element::{split, values_1d};
-use crate::nodes::NodeMap;
-use crate::tree::{Cell, TreeMesh};
+use crate::mesh::{Cell, TreeMesh};
 
 /// Place of a hanging node: its value follows from its masters.
 const NOWHERE: u8 = u8::MAX;
