@@ -5,6 +5,7 @@ mod confined;
 mod law;
 mod modules;
 mod rooms;
+mod shape;
 mod sources;
 mod style;
 
@@ -45,6 +46,7 @@ pub fn offences(root: &Path) -> Result<Vec<String>, TidyError> {
     offences.extend(confined::offences(&law, &sources));
     offences.extend(rooms::offences(&law, &sources)?);
     offences.extend(style::offences(&sources));
+    offences.extend(shape::offences(&sources)?);
     Ok(offences)
 }
 
