@@ -18,26 +18,32 @@
 //! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order ([`parallel`]), so
 //! equal input gives equal bits for any number of threads.
 //!
-//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`], operators,
-//! small dense matrices, sparse matrices, direct solvers, Krylov methods, smoothers.
+//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`], jagged arrays,
+//! subsets, affine constraints, operators, small dense matrices, sparse matrices, direct solvers, Krylov methods, smoothers.
 
+mod affine;
 mod dense;
 mod direct;
+mod jagged;
 mod krylov;
 mod operator;
 pub mod parallel;
 mod scalar;
 mod smoother;
 mod sparse;
+mod subset;
 pub mod vector;
 
+pub use affine::AffineConstraints;
 pub use dense::{BlockError, BlockJacobi, BlockJacobiError, DenseSymmetric, invert_general, invert_spd};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
+pub use jagged::Jagged;
 pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
 pub use scalar::Scalar;
 pub use smoother::{Chebyshev, Guess, SpectralInterval};
 pub use sparse::{BlockGroups, BlockPattern, Pattern, SlicedMatrix, SparseError, SparseMatrix};
+pub use subset::Subset;
