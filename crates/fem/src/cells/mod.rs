@@ -27,10 +27,12 @@ pub use rigid::Tie;
 pub use scalar::CellScalar;
 pub use sweep::Workspace;
 
+use gluey_linalg::Jagged;
+
 use crate::element::node_count;
 use crate::space::NodeMap;
 use legendre::Coefficients;
-use partition::{Lists, Slots};
+use partition::Slots;
 use varying::PointRule;
 
 /// Cells are padded to multiples of this, the largest number of lanes.
@@ -73,8 +75,8 @@ pub struct CellOperator<T, const D: usize> {
     /// Viscosities at quadrature points, times weights: groups of cells, point by point.
     points: Vec<T>,
     /// Tied nodes of the cells of each chunk; `node` is a slot, `body` the place in the list of bodies of the chunk.
-    ties: Lists<Tie<T, D>>,
-    bodies: Lists<u32>,
+    ties: Jagged<Tie<T, D>>,
+    bodies: Jagged<u32>,
     body_count: usize,
 }
 
@@ -101,8 +103,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             viscous: Vec::new(),
             divergence: Vec::new(),
             points: Vec::new(),
-            ties: Lists::default(),
-            bodies: Lists::default(),
+            ties: Jagged::default(),
+            bodies: Jagged::default(),
             body_count,
         };
         let mut tie_of = vec![u32::MAX; nodes.node_count()];
@@ -157,7 +159,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     /// Ties of the nodes that a chunk owns or borrows.
     fn push_ties(&mut self, chunk: usize, ties: &[Tie<f64, D>], tie_of: &[u32]) {
         let shares = &self.chunks.velocity;
-        let nodes = shares.owned(chunk).chain(shares.borrowed.of(chunk).iter().map(|&n| n as usize));
+        let nodes = shares.owned(chunk).chain(shares.borrowed[chunk].iter().map(|&n| n as usize));
         let tied: Vec<(u16, Tie<f64, D>)> = nodes
             .enumerate()
             .filter_map(|(slot, node)| ties.get(tie_of[node] as usize).map(|&tie| (slot as u16, tie)))

@@ -8,46 +8,12 @@
 
 use std::ops::Range;
 
+use gluey_linalg::Jagged;
+
 use crate::space::NodeMap;
 
 /// Cells of a chunk: their nodes stay in the cache next to a core.
 pub const CHUNK_CELLS: usize = 512;
-
-/// Lists of one chunk after another.
-#[derive(Clone, Debug)]
-pub(crate) struct Lists<T> {
-    starts: Vec<u32>,
-    items: Vec<T>,
-}
-
-impl<T> Default for Lists<T> {
-    fn default() -> Self {
-        Self { starts: vec![0], items: Vec::new() }
-    }
-}
-
-impl<T> Lists<T> {
-    /// Appends the list of the next chunk.
-    pub(crate) fn push(&mut self, items: impl IntoIterator<Item = T>) {
-        self.items.extend(items);
-        self.starts.push(self.items.len() as u32);
-    }
-
-    /// Where the list of a chunk lies among all items.
-    pub(crate) fn range(&self, chunk: usize) -> Range<usize> {
-        self.starts[chunk] as usize..self.starts[chunk + 1] as usize
-    }
-
-    /// The list of a chunk.
-    pub(crate) fn of(&self, chunk: usize) -> &[T] {
-        &self.items[self.range(chunk)]
-    }
-
-    /// All lists.
-    pub(crate) fn items(&self) -> &[T] {
-        &self.items
-    }
-}
 
 /// Which chunk owns and which borrows the nodes of one space.
 #[derive(Clone, Debug, Default)]
@@ -55,9 +21,9 @@ pub(crate) struct Shares {
     /// First node of each chunk, and the number of nodes.
     first: Vec<u32>,
     /// Nodes of other chunks that a chunk touches, in ascending order.
-    pub(crate) borrowed: Lists<u32>,
+    pub(crate) borrowed: Jagged<u32>,
     /// Positions among all borrowed nodes of those that a chunk owns, in ascending order.
-    pub(crate) returned: Lists<u32>,
+    pub(crate) returned: Jagged<u32>,
 }
 
 impl Shares {
@@ -79,21 +45,8 @@ impl Shares {
 
     fn find_returned(&mut self) {
         let owner = |node: u32| self.first.partition_point(|&f| f <= node) - 1;
-        let mut counts = vec![0u32; self.first.len()];
-        for &node in self.borrowed.items() {
-            counts[owner(node) + 1] += 1;
-        }
-        for chunk in 1..counts.len() {
-            counts[chunk] += counts[chunk - 1];
-        }
-        let mut next = counts.clone();
-        let mut items = vec![0; self.borrowed.items().len()];
-        for (position, &node) in self.borrowed.items().iter().enumerate() {
-            let slot = &mut next[owner(node)];
-            items[*slot as usize] = position as u32;
-            *slot += 1;
-        }
-        self.returned = Lists { starts: counts, items };
+        let owned = self.borrowed.items().iter().zip(0u32..).map(|(&node, position)| (owner(node), position));
+        self.returned = Jagged::grouped(self.first.len() - 1, owned);
     }
 
     /// Nodes a chunk owns.
@@ -125,11 +78,11 @@ pub struct Chunks<const D: usize> {
     /// Slots of the borrowed pressure nodes.
     pub(crate) borrowed_pressure_slots: Vec<u16>,
     /// Hanging velocity nodes of the cells of a chunk.
-    pub(crate) hanging: Lists<Hanging>,
+    pub(crate) hanging: Jagged<Hanging>,
     pub(crate) masters: Vec<u16>,
     pub(crate) weights: Vec<f64>,
     /// Slots of the nodes on the boundary.
-    pub(crate) boundary: Lists<u16>,
+    pub(crate) boundary: Jagged<u16>,
 }
 
 impl<const D: usize> Chunks<D> {
@@ -164,7 +117,7 @@ impl<const D: usize> Chunks<D> {
                     .velocity
                     .owned(chunk)
                     .map(|n| n as u32)
-                    .chain(chunks.velocity.borrowed.of(chunk).iter().copied())
+                    .chain(chunks.velocity.borrowed[chunk].iter().copied())
             };
             let boundary: Vec<u16> =
                 local().filter(|&n| velocity.is_on_boundary(n as usize)).map(|n| slots.of(n)).collect();
@@ -194,7 +147,7 @@ impl<const D: usize> Chunks<D> {
 
     fn place_pressures(&mut self, velocity: &NodeMap<D>, pressure: &NodeMap<D>, chunk: usize, slots: &Slots) {
         let own = self.pressure.owned(chunk);
-        let borrowed = self.pressure.borrowed.of(chunk);
+        let borrowed = &self.pressure.borrowed[chunk];
         let mut borrowed_slots = vec![0; borrowed.len()];
         for cell in self.cells(chunk) {
             for (corner, &q) in pressure.cell(cell).iter().enumerate() {
@@ -228,7 +181,7 @@ impl<const D: usize> Chunks<D> {
             0 => 0,
             k => self.hanging.items()[k - 1].masters_end as usize,
         };
-        for hanging in self.hanging.of(chunk) {
+        for hanging in &self.hanging[chunk] {
             let end = hanging.masters_end as usize;
             visit(hanging.slot, &self.masters[start..end], &self.weights[start..end]);
             start = end;
@@ -279,9 +232,9 @@ impl Slots {
 
     pub(crate) fn set(&mut self, shares: &Shares, chunk: usize) {
         let own = shares.owned(chunk);
-        let count = own.len() + shares.borrowed.of(chunk).len();
+        let count = own.len() + shares.borrowed[chunk].len();
         assert!(count < usize::from(u16::MAX), "a chunk touches at most {CHUNK_CELLS} cells' nodes");
-        let nodes = own.chain(shares.borrowed.of(chunk).iter().map(|&n| n as usize));
+        let nodes = own.chain(shares.borrowed[chunk].iter().map(|&n| n as usize));
         for (slot, node) in nodes.enumerate() {
             self.of[node] = slot as u16;
         }

@@ -268,7 +268,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     ) {
         let chunks = &*self.chunks;
         if VISCOUS {
-            let (own, borrowed) = (chunks.velocity.owned(chunk), chunks.velocity.borrowed.of(chunk));
+            let (own, borrowed) = (chunks.velocity.owned(chunk), &chunks.velocity.borrowed[chunk]);
             let (x, _) = input.x[..chunks.velocity.node_count() * D].as_chunks::<D>();
             let (owned_buffer, rest) = buffer.split_at_mut(own.len());
             for (node, x) in owned_buffer.iter_mut().zip(&x[own]) {
@@ -288,7 +288,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             }
             let borrowed = chunks.pressure.borrowed.range(chunk);
             let slots = &chunks.borrowed_pressure_slots[borrowed];
-            for (&slot, &q) in slots.iter().zip(chunks.pressure.borrowed.of(chunk)) {
+            for (&slot, &q) in slots.iter().zip(&chunks.pressure.borrowed[chunk]) {
                 buffer[slot as usize][D] = T::from_f64(input.p[q as usize].to_f64());
             }
         }
@@ -298,8 +298,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     /// Sets rigid nodes, then hanging ones.
     #[inline(always)]
     fn expand<X: Scalar>(&self, chunk: usize, twists: &[X], buffer: &mut Nodes<T>) {
-        let bodies = self.bodies.of(chunk);
-        for tie in self.ties.of(chunk) {
+        let bodies = &self.bodies[chunk];
+        for tie in &self.ties[chunk] {
             let twist = &twists[bodies[tie.body as usize] as usize * Self::TWIST..][..Self::TWIST];
             tie.set_velocity(twist, &mut buffer[tie.node as u16 as usize]);
         }
@@ -325,11 +325,11 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             }
         });
         output.twists.fill(X::ZERO);
-        for tie in self.ties.of(chunk) {
+        for tie in &self.ties[chunk] {
             let force = take_velocity::<T, D>(&mut buffer[tie.node as u16 as usize]);
             tie.add_moment(&force, &mut output.twists[tie.body as usize * Self::TWIST..][..Self::TWIST]);
         }
-        for &slot in chunks.boundary.of(chunk) {
+        for &slot in &chunks.boundary[chunk] {
             take_velocity::<T, D>(&mut buffer[slot as usize]);
         }
         let (own, borrowed) = (output.y.as_chunks_mut::<D>().0, output.borrowed_y.as_chunks_mut::<D>().0);

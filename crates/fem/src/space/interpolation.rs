@@ -8,7 +8,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_linalg::parallel;
+use gluey_linalg::{Jagged, parallel};
 use rayon::prelude::*;
 
 use super::nodes::NodeMap;
@@ -32,7 +32,8 @@ pub struct Interpolation<const D: usize> {
     line: Line,
     /// Loads on the nodes of each coarse cell, while threads share the restriction.
     loads: Vec<f32>,
-    incidence: Incidence,
+    /// See [`incidence`].
+    incidence: Jagged<u32>,
 }
 
 impl<const D: usize> Interpolation<D> {
@@ -54,7 +55,7 @@ impl<const D: usize> Interpolation<D> {
             refined: Vec::with_capacity(cell_count),
             line: Line::new(fine_nodes.degree()),
             loads: Vec::new(),
-            incidence: Incidence::new(&coarse_nodes),
+            incidence: incidence(&coarse_nodes),
             coarse_nodes,
         };
         for (c, cell) in fine.cells().iter().enumerate() {
@@ -201,7 +202,7 @@ impl<const D: usize> Interpolation<D> {
         });
         coarse.par_chunks_exact_mut(C).enumerate().with_min_len(1024).for_each(|(node, sum)| {
             sum.fill(0.0);
-            for &k in self.incidence.of(node) {
+            for &k in &self.incidence[node] {
                 add(&loads[k as usize * C..][..C], sum);
             }
         });
@@ -334,32 +335,9 @@ fn combine<const DEGREE: usize>(weights: &[f32; 3], rows: &[f32], sum: &mut [f32
 }
 
 /// The places where each node occurs in the lists of the cells, ascending.
-#[derive(Clone, Debug)]
-struct Incidence {
-    first: Vec<u32>,
-    places: Vec<u32>,
-}
-
-impl Incidence {
-    fn new<const D: usize>(nodes: &NodeMap<D>) -> Self {
-        let listed = || (0..nodes.cell_count()).flat_map(|cell| nodes.cell(cell));
-        let mut first = vec![0u32; nodes.node_count() + 1];
-        listed().for_each(|&node| first[node as usize + 1] += 1);
-        for node in 0..nodes.node_count() {
-            first[node + 1] += first[node];
-        }
-        let mut next = first.clone();
-        let mut places = vec![0; nodes.cell_count() * nodes.nodes_per_cell()];
-        for (place, &node) in listed().enumerate() {
-            places[next[node as usize] as usize] = place as u32;
-            next[node as usize] += 1;
-        }
-        Self { first, places }
-    }
-
-    fn of(&self, node: usize) -> &[u32] {
-        &self.places[self.first[node] as usize..self.first[node + 1] as usize]
-    }
+fn incidence<const D: usize>(nodes: &NodeMap<D>) -> Jagged<u32> {
+    let listed = (0..nodes.cell_count()).flat_map(|cell| nodes.cell(cell));
+    Jagged::grouped(nodes.node_count(), listed.zip(0u32..).map(|(&node, place)| (node as usize, place)))
 }
 
 #[cfg(test)]

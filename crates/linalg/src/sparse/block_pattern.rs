@@ -6,31 +6,24 @@
 use std::sync::Arc;
 
 use super::{Pattern, SparseError, SparseMatrix};
+use crate::jagged::Jagged;
 use crate::scalar::Scalar;
 
 /// Groups of blocks that are coupled with each other; a group is typically the blocks of a cell.
 #[derive(Clone, Debug, Default)]
 pub struct BlockGroups {
-    ends: Vec<usize>,
-    members: Vec<usize>,
+    groups: Jagged<usize>,
 }
 
 impl BlockGroups {
     /// Adds a group with the given blocks in the order of their first appearance.
     pub fn push(&mut self, blocks: impl IntoIterator<Item = usize>) {
-        let begin = self.members.len();
-        for block in blocks {
-            if !self.members[begin..].contains(&block) {
-                self.members.push(block);
-            }
-        }
-        self.ends.push(self.members.len());
+        self.groups.push_distinct(blocks);
     }
 
     /// The groups, in the order they came.
     pub fn iter(&self) -> impl Iterator<Item = &[usize]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.members[start..end])
+        self.groups.iter()
     }
 }
 
@@ -53,7 +46,7 @@ impl BlockPattern {
     pub fn new(first: Vec<u32>, groups: BlockGroups) -> Result<Self, SparseError> {
         let slices: Vec<&[usize]> = groups.iter().collect();
         let blocks = Pattern::from_groups(first.len().saturating_sub(1), &slices)?;
-        let offsets = offsets(&blocks, &first, &slices);
+        let offsets = offsets(&blocks, &first, &groups);
         let pattern = Arc::new(blocks.expanded(&first)?);
         Ok(Self { blocks, first, groups, offsets, pattern })
     }
@@ -110,19 +103,18 @@ impl BlockPattern {
 }
 
 /// See [`BlockPattern`]. Goes row by row, where the place of each column can be looked up.
-fn offsets(blocks: &Pattern, first: &[u32], groups: &[&[usize]]) -> Vec<u32> {
+fn offsets(blocks: &Pattern, first: &[u32], groups: &BlockGroups) -> Vec<u32> {
     let (visits, count) = visits(blocks.row_count(), groups);
     let mut offsets = vec![0; count];
     let mut place = vec![0; blocks.row_count()];
-    let mut visits = visits.into_iter().peekable();
-    for row in 0..blocks.row_count() {
+    for (row, visits) in visits.iter().enumerate() {
         let mut next = 0;
         for &column in blocks.columns_of(row) {
             place[column as usize] = next;
             next += first[column as usize + 1] - first[column as usize];
         }
-        while let Some(visit) = visits.next_if(|visit| visit.row == row) {
-            let group = groups[visit.group];
+        for visit in visits {
+            let group = &groups.groups[visit.group as usize];
             let target = &mut offsets[visit.begin..][..group.len()];
             target.iter_mut().zip(group).for_each(|(offset, &column)| *offset = place[column]);
         }
@@ -131,30 +123,23 @@ fn offsets(blocks: &Pattern, first: &[u32], groups: &[&[usize]]) -> Vec<u32> {
 }
 
 /// A block of a group, with the begin of its offsets.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Visit {
-    row: usize,
-    group: usize,
+    group: u32,
     begin: usize,
 }
 
-/// All blocks of all groups, sorted by row, and the number of offsets.
-fn visits(row_count: usize, groups: &[&[usize]]) -> (Vec<Visit>, usize) {
-    let mut cursor = vec![0; row_count + 1];
-    groups.iter().copied().flatten().for_each(|&row| cursor[row + 1] += 1);
-    for row in 0..row_count {
-        cursor[row + 1] += cursor[row];
-    }
-    let mut visits = vec![Visit::default(); cursor[row_count]];
+/// The groups that each block is in, and the number of offsets.
+fn visits(row_count: usize, groups: &BlockGroups) -> (Jagged<Visit>, usize) {
+    let mut visits = Vec::with_capacity(groups.groups.items().len());
     let mut begin = 0;
-    for (index, group) in groups.iter().enumerate() {
-        for &row in *group {
-            visits[cursor[row]] = Visit { row, group: index, begin };
-            cursor[row] += 1;
-            begin += group.len();
+    for (blocks, group) in groups.iter().zip(0..) {
+        for &row in blocks {
+            visits.push((row, Visit { group, begin }));
+            begin += blocks.len();
         }
     }
-    (visits, begin)
+    (Jagged::grouped(row_count, visits.into_iter()), begin)
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! Where the entries of a sparse matrix in compressed rows lie.
 
+use crate::jagged::Jagged;
+
 /// Positions of the entries of a sparse matrix, row by row, columns ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     column_count: usize,
-    /// Row `i` holds entries `row_start[i] .. row_start[i + 1]`.
-    row_start: Vec<u32>,
-    columns: Vec<u32>,
+    /// Columns of each row.
+    rows: Jagged<u32>,
 }
 
 /// Why a pattern or a matrix was refused.
@@ -52,18 +53,18 @@ impl Pattern {
     /// Pattern of a square matrix of dimension `dim` that couples all unknowns of a group with each other; a group is
     /// typically the unknowns of a cell. The diagonal is always in it, and the pattern is symmetric.
     pub fn from_groups<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
-        let touching = Touching::new(dim, groups)?;
+        let touching = touching(dim, groups)?;
         let mut builder = RowBuilder::new(dim, dim);
         for row in 0..dim {
             builder.insert(row);
-            for &group in touching.groups_of(row) {
+            for &group in &touching[row] {
                 for &column in groups[group as usize].as_ref() {
                     builder.insert(column);
                 }
             }
             builder.end_row()?;
         }
-        Ok(builder.pattern.into_ascending())
+        Ok(builder.finish().into_ascending())
     }
 
     /// The pattern in which row and column `b` of this square one stand for `first[b] .. first[b + 1]`.
@@ -75,33 +76,22 @@ impl Pattern {
         if u32::try_from(entry_count).is_err() {
             return Err(SparseError::TooLarge { entry_count });
         }
-        let mut row_start = Vec::with_capacity(dim + 1);
-        let mut columns = Vec::with_capacity(entry_count);
-        row_start.push(0);
+        let mut rows = Jagged::with_capacity(dim, entry_count);
         for row in 0..self.row_count() {
             for _ in 0..size(row) {
                 let spans = self.columns_of(row).iter().map(|&c| first[c as usize]..first[c as usize + 1]);
-                columns.extend(spans.flatten());
-                row_start.push(columns.len() as u32);
+                rows.push(spans.flatten());
             }
         }
-        Ok(Self { column_count: dim, row_start, columns })
+        Ok(Self { column_count: dim, rows })
     }
 
     /// This symmetric pattern, whose rows are not sorted, with rows sorted. Row `i` is column `i`, so handing out rows
     /// in ascending order to their columns sorts them all, without a comparison.
-    fn into_ascending(mut self) -> Self {
-        let mut end = self.row_start.clone();
-        let mut columns = vec![0; self.columns.len()];
-        for row in 0..self.row_count() {
-            for &column in self.columns_of(row) {
-                let cursor = &mut end[column as usize];
-                columns[*cursor as usize] = row as u32;
-                *cursor += 1;
-            }
-        }
-        self.columns = columns;
-        self
+    fn into_ascending(self) -> Self {
+        let rows = self.rows.iter().zip(0u32..);
+        let transposed = rows.flat_map(|(columns, row)| columns.iter().map(move |&c| (c as usize, row)));
+        Self { rows: Jagged::grouped(self.rows.len(), transposed), ..self }
     }
 
     /// Pattern of the entries `(row, column)`, in any order, repetitions allowed.
@@ -125,13 +115,13 @@ impl Pattern {
         }
         match next.next() {
             Some(&(row, column)) => Err(SparseError::OutOfRange { row, column, row_count, column_count }),
-            None => Ok(builder.pattern),
+            None => Ok(builder.finish()),
         }
     }
 
     /// Number of rows.
     pub fn row_count(&self) -> usize {
-        self.row_start.len() - 1
+        self.rows.len()
     }
 
     /// Number of columns.
@@ -141,24 +131,23 @@ impl Pattern {
 
     /// Number of entries.
     pub fn entry_count(&self) -> usize {
-        self.columns.len()
+        self.rows.items().len()
     }
 
     /// Columns of a row, ascending.
     pub fn columns_of(&self, row: usize) -> &[u32] {
-        &self.columns[self.range(row)]
+        &self.rows[row]
     }
 
     /// Positions of the entries of a row in the array of values.
     pub fn range(&self, row: usize) -> std::ops::Range<usize> {
-        self.row_start[row] as usize..self.row_start[row + 1] as usize
+        self.rows.range(row)
     }
 
     /// Position of an entry in the array of values.
     pub fn position(&self, row: usize, column: usize) -> Option<usize> {
-        let range = self.range(row);
         let column = u32::try_from(column).ok()?;
-        self.columns[range.clone()].binary_search(&column).ok().map(|offset| range.start + offset)
+        self.rows[row].binary_search(&column).ok().map(|offset| self.range(row).start + offset)
     }
 
     /// Whether the matrix is square and has entry `(j, i)` wherever it has `(i, j)`.
@@ -167,12 +156,12 @@ impl Pattern {
             return false;
         }
         // Rows are visited in ascending order, so the next unseen entry of row j must be the row at hand.
-        let mut seen = self.row_start[..self.row_count()].to_vec();
+        let mut seen = self.row_start()[..self.row_count()].to_vec();
         for row in 0..self.row_count() {
             for &column in self.columns_of(row) {
                 let column = column as usize;
                 let cursor = seen[column];
-                if cursor == self.row_start[column + 1] || self.columns[cursor as usize] as usize != row {
+                if cursor == self.row_start()[column + 1] || self.columns()[cursor as usize] as usize != row {
                     return false;
                 }
                 seen[column] += 1;
@@ -182,56 +171,37 @@ impl Pattern {
     }
 
     pub(crate) fn row_start(&self) -> &[u32] {
-        &self.row_start
+        self.rows.starts()
     }
 
     pub(crate) fn columns(&self) -> &[u32] {
-        &self.columns
+        self.rows.items()
     }
 }
 
 /// The groups that touch each unknown.
-struct Touching {
-    start: Vec<u32>,
-    groups: Vec<u32>,
-}
-
-impl Touching {
-    fn new<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
-        let mut start = vec![0u32; dim + 1];
-        let total: usize = groups.iter().map(|group| group.as_ref().len()).sum();
-        if u32::try_from(total).is_err() {
-            return Err(SparseError::TooLarge { entry_count: total });
-        }
-        for &dof in groups.iter().flat_map(|group| group.as_ref()) {
-            if dof >= dim {
-                let (row, column) = (dof, dof);
-                return Err(SparseError::OutOfRange { row, column, row_count: dim, column_count: dim });
-            }
-            start[dof + 1] += 1;
-        }
-        for dof in 0..dim {
-            start[dof + 1] += start[dof];
-        }
-        let mut end = start.clone();
-        let mut touching = vec![0u32; total];
-        for (group, dofs) in groups.iter().enumerate() {
-            for &dof in dofs.as_ref() {
-                touching[end[dof] as usize] = group as u32;
-                end[dof] += 1;
-            }
-        }
-        Ok(Self { start, groups: touching })
+fn touching<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Jagged<u32>, SparseError> {
+    let pairs = groups
+        .iter()
+        .zip(0u32..)
+        .flat_map(|(dofs, group)| dofs.as_ref().iter().map(move |&dof| (dof, group)));
+    let entry_count = groups.iter().map(|group| group.as_ref().len()).sum();
+    if u32::try_from(entry_count).is_err() {
+        return Err(SparseError::TooLarge { entry_count });
     }
-
-    fn groups_of(&self, dof: usize) -> &[u32] {
-        &self.groups[self.start[dof] as usize..self.start[dof + 1] as usize]
+    match pairs.clone().find(|&(dof, _)| dof >= dim) {
+        Some((row, _)) => {
+            Err(SparseError::OutOfRange { row, column: row, row_count: dim, column_count: dim })
+        }
+        None => Ok(Jagged::grouped(dim, pairs)),
     }
 }
 
 /// Collects the columns of one row after the other.
 struct RowBuilder {
-    pattern: Pattern,
+    column_count: usize,
+    row_start: Vec<u32>,
+    columns: Vec<u32>,
     /// One more than the last row that has this column.
     mark: Vec<u32>,
 }
@@ -240,27 +210,27 @@ impl RowBuilder {
     fn new(row_count: usize, column_count: usize) -> Self {
         let mut row_start = Vec::with_capacity(row_count + 1);
         row_start.push(0);
-        Self {
-            pattern: Pattern { column_count, row_start, columns: Vec::new() },
-            mark: vec![0; column_count],
-        }
+        Self { column_count, row_start, columns: Vec::new(), mark: vec![0; column_count] }
     }
 
     fn insert(&mut self, column: usize) {
-        let stamp = self.pattern.row_start.len() as u32;
+        let stamp = self.row_start.len() as u32;
         if self.mark[column] != stamp {
             self.mark[column] = stamp;
-            self.pattern.columns.push(column as u32);
+            self.columns.push(column as u32);
         }
     }
 
     /// Ends a row and leaves its columns in the order they came.
     fn end_row(&mut self) -> Result<(), SparseError> {
-        let Pattern { row_start, columns, .. } = &mut self.pattern;
-        let end =
-            u32::try_from(columns.len()).map_err(|_| SparseError::TooLarge { entry_count: columns.len() })?;
-        row_start.push(end);
+        let entry_count = self.columns.len();
+        let end = u32::try_from(entry_count).map_err(|_| SparseError::TooLarge { entry_count })?;
+        self.row_start.push(end);
         Ok(())
+    }
+
+    fn finish(self) -> Pattern {
+        Pattern { column_count: self.column_count, rows: Jagged::from_starts(self.row_start, self.columns) }
     }
 }
 
