@@ -124,23 +124,23 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.r.resize(b.len(), S::ZERO);
         self.forget();
         let right_hand_side_norm = finite(vector::norm(b), 0)?;
-        let mut norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
+        let norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
         let GcrParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
         self.history.push(norm);
-        let (mut iterations, mut end) = (0, StageEnd::Regular);
-        while norm > target.norm {
-            if iterations == max_iterations {
-                return Err(target.not_converged(iterations, norm, &self.history));
+        let mut now = Progress { iterations: 0, norm, stage: StageEnd::Regular };
+        while now.norm > target.norm {
+            if now.iterations == max_iterations {
+                return Err(target.not_converged(now.iterations, now.norm, &self.history));
             }
-            end = self.stage(a, m, norm, &target, (&mut iterations, end))?;
-            let before = norm;
-            norm = self.update(a, b, x, norm, iterations)?;
-            if end == StageEnd::BrokeDown && norm > target.norm.max(0.5 * before) {
-                return Err(target.not_converged(iterations, norm, &self.history));
+            now.stage = self.stage(a, m, &target, &mut now)?;
+            let before = now.norm;
+            now.norm = self.update(a, b, x, &now)?;
+            if now.stage == StageEnd::BrokeDown && now.norm > target.norm.max(0.5 * before) {
+                return Err(target.not_converged(now.iterations, now.norm, &self.history));
             }
         }
-        Ok(target.report(iterations, norm))
+        Ok(target.report(now.iterations, now.norm))
     }
 
     /// Drops all directions.
@@ -150,16 +150,17 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.triangle.clear();
     }
 
-    /// Takes steps from the true residual, of this norm, until it is small, the precision of the steps is used up or they no
-    /// longer help: none if the images known already leave little of it, but at least one if there was none in the `last` stage.
+    /// Takes steps from the true residual until it is small, the precision of the steps is used up or they no longer
+    /// help: none if the images known already leave little of it, but at least one if there was none in the last stage.
     fn stage(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
         m: &mut (impl Preconditioner<S> + ?Sized),
-        norm: f64,
         target: &Target,
-        (iterations, last): (&mut usize, StageEnd),
+        progress: &mut Progress,
     ) -> Result<StageEnd, KrylovError> {
+        let Progress { iterations, norm, stage: last } = progress;
+        let norm = *norm;
         if self.images.len() >= self.params.restart {
             self.forget();
         }
@@ -167,7 +168,7 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.coefficients.clear();
         let mut now = self.images.take_out(&mut self.r, |c| self.coefficients.push(c));
         let enough = (target.norm / norm).max(S::EPSILON.powf(2.0 / 3.0));
-        if now <= enough && last != StageEnd::NoStep {
+        if now <= enough && *last != StageEnd::NoStep {
             return Ok(StageEnd::NoStep);
         }
         let (mut is_slow, mut is_first, mut slow_steps) = (false, true, 0);
@@ -223,8 +224,7 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         a: &mut (impl LinOp<T> + ?Sized),
         b: &[T],
         x: &mut [T],
-        norm: f64,
-        iterations: usize,
+        &Progress { iterations, norm, .. }: &Progress,
     ) -> Result<f64, KrylovError> {
         self.triangle.solve(&mut self.coefficients);
         self.coefficients.iter_mut().for_each(|c| *c *= norm);
@@ -236,6 +236,15 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         }
         Ok(norm)
     }
+}
+
+/// How far a solve has come.
+struct Progress {
+    iterations: usize,
+    /// Norm of the true residual.
+    norm: f64,
+    /// How the last stage ended.
+    stage: StageEnd,
 }
 
 /// How a stage ended.
