@@ -44,6 +44,6 @@ pub use jagged::Jagged;
 pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
 pub use scalar::Scalar;
-pub use smoother::{Chebyshev, Guess, SpectralInterval};
+pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
 pub use sparse::{BlockGroups, BlockPattern, Pattern, SlicedMatrix, SparseError, SparseMatrix};
 pub use subset::Subset;

@@ -5,6 +5,7 @@
 //! at least `1/T_k(theta/delta)`, and modes below `lower` never grow. Nothing but `A`, `M` and vector updates is
 //! needed, so the result does not depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
 
+use crate::krylov::{KrylovError, estimate_lambda_max};
 use crate::operator::{LinOp, Preconditioner};
 use crate::scalar::Scalar;
 use crate::{parallel, vector};
@@ -26,7 +27,26 @@ impl SpectralInterval {
     }
 }
 
-/// What a smoother finds in `x`.
+/// Tuning of a Chebyshev smoother that damps the upper part of the spectrum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChebyshevParams {
+    /// Applications of the preconditioner per sweep.
+    pub degree: usize,
+    /// Largest over smallest eigenvalue that a sweep damps.
+    pub ratio: f64,
+    /// Factor on the estimate of the largest eigenvalue, which comes from below.
+    pub safety: f64,
+    /// Lanczos steps of that estimate.
+    pub lanczos_steps: usize,
+}
+
+impl Default for ChebyshevParams {
+    fn default() -> Self {
+        Self { degree: 4, ratio: 5.0, safety: 1.1, lanczos_steps: 10 }
+    }
+}
+
+/// Content of `x` before a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guess {
     /// Nothing: `x` counts as zero, whatever is in it. Saves one application of the operator.
@@ -70,14 +90,25 @@ impl<T: Scalar> Chebyshev<T> {
         Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), apart: Apart::default() }
     }
 
+    /// A smoother for the upper part of the spectrum of `M^-1 A`, of which the largest eigenvalue is estimated.
+    pub fn for_operator(
+        a: &mut (impl LinOp<T> + ?Sized),
+        m: &mut (impl Preconditioner<T> + ?Sized),
+        params: &ChebyshevParams,
+    ) -> Result<Self, KrylovError> {
+        let lambda_max = estimate_lambda_max(a, m, params.lanczos_steps)?;
+        Ok(Self::below(lambda_max, a.dim(), params))
+    }
+
+    /// A smoother for the upper part of the spectrum below a known largest eigenvalue, for operators of dimension `dim`.
+    pub fn below(lambda_max: f64, dim: usize, params: &ChebyshevParams) -> Self {
+        let interval = SpectralInterval::upper_part(lambda_max, params.ratio, params.safety);
+        Self::new(dim, params.degree, interval)
+    }
+
     /// The interval in use.
     pub fn interval(&self) -> SpectralInterval {
         self.interval
-    }
-
-    /// Takes a new interval, after the operator has changed.
-    pub fn set_interval(&mut self, interval: SpectralInterval) {
-        self.interval = interval;
     }
 
     /// Bound `1/T_k(theta/delta)` of the factor by which error components in the interval are multiplied.
@@ -106,24 +137,30 @@ impl<T: Scalar> Chebyshev<T> {
             }
         }
         let Self { y, z, apart, .. } = self;
+        let mut system = System { b, z, apart };
         // So that the last iterate is in `x`.
         let (mut before, mut now) = if is_odd { (&mut y[..], x) } else { (x, &mut y[..]) };
-        let first = T::from_f64(1.0 / theta);
+        let weight = T::from_f64(1.0 / theta);
         match guess {
-            Guess::Zero => step(m, (b, z, apart), (before, now), |b, _| b, (first, |_, _| T::ZERO)),
-            Guess::Given => step(m, (b, z, apart), (before, now), |b, z| b - z, (first, |x, _| x)),
+            Guess::Zero => {
+                Step { weight, residual: |b, _| b, next: |_, _| T::ZERO }.take(m, &mut system, before, now);
+            }
+            Guess::Given => {
+                Step { weight, residual: |b, z| b - z, next: |x, _| x }.take(m, &mut system, before, now);
+            }
         }
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
         for k in 1..self.degree {
-            a.apply(now, z);
+            a.apply(now, system.z);
             let rho_next = 1.0 / (2.0 * sigma - rho);
-            let (new, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
+            let (weight, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
+            let residual = |b, z| b - z;
             if k == 1 && guess == Guess::Zero {
-                step(m, (b, z, apart), (now, before), |b, z| b - z, (new, |x, _| x + old * x));
+                Step { weight, residual, next: |x, _| x + old * x }.take(m, &mut system, now, before);
             } else {
                 let next = |x: T, before: T| x + old * (x - before);
-                step(m, (b, z, apart), (now, before), |b, z| b - z, (new, next));
+                Step { weight, residual, next }.take(m, &mut system, now, before);
             }
             std::mem::swap(&mut before, &mut now);
             rho = rho_next;
@@ -131,18 +168,50 @@ impl<T: Scalar> Chebyshev<T> {
     }
 }
 
-/// `to = next(from, to) + new M^-1 residual(b, z)`, in one pass where `M` is a diagonal.
-fn step<T: Scalar>(
-    m: &mut (impl Preconditioner<T> + ?Sized),
-    (b, z, apart): (&[T], &mut [T], &mut Apart<T>),
-    (from, to): (&[T], &mut [T]),
-    residual: impl Fn(T, T) -> T + Sync,
-    (new, next): (T, impl Fn(T, T) -> T + Sync),
-) {
-    let split = m.diagonal().len();
-    let (to, to_rest) = to.split_at_mut(split);
-    if !to_rest.is_empty() {
-        let (b, z, from) = (&b[split..], &mut z[split..], &from[split..]);
+/// The right-hand side, `A x` of the last iterate, and workspace.
+struct System<'a, T> {
+    b: &'a [T],
+    z: &'a mut [T],
+    apart: &'a mut Apart<T>,
+}
+
+/// `to = next(from, to) + weight M^-1 residual(b, z)`.
+struct Step<T, R, N> {
+    weight: T,
+    residual: R,
+    next: N,
+}
+
+impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Step<T, R, N> {
+    /// In one pass where `M` is a diagonal.
+    fn take(
+        &self,
+        m: &mut (impl Preconditioner<T> + ?Sized),
+        System { b, z, apart }: &mut System<'_, T>,
+        from: &[T],
+        to: &mut [T],
+    ) {
+        let split = m.diagonal().len();
+        let (to, to_rest) = to.split_at_mut(split);
+        if !to_rest.is_empty() {
+            let part = System { b: &b[split..], z: &mut z[split..], apart };
+            self.take_rest(m, part, &from[split..], to_rest);
+        }
+        self.take_diagonal(m.diagonal(), b, z, from, to);
+        if !m.scattered().is_empty() {
+            self.add_scattered(m, System { b, z, apart }, to);
+        }
+    }
+
+    /// On the unknowns after those of the diagonal.
+    fn take_rest(
+        &self,
+        m: &mut (impl Preconditioner<T> + ?Sized),
+        System { b, z, apart }: System<'_, T>,
+        from: &[T],
+        to: &mut [T],
+    ) {
+        let Self { weight, residual, next } = self;
         let rest = &mut apart.rest;
         rest.resize(b.len(), T::ZERO);
         parallel::for_each(rest, |first, r| {
@@ -151,27 +220,36 @@ fn step<T: Scalar>(
             }
         });
         m.apply_rest(rest, z);
-        parallel::for_each(to_rest, |first, to| {
+        parallel::for_each(to, |first, to| {
             for (to, (&z, &from)) in to.iter_mut().zip(z[first..].iter().zip(&from[first..])) {
-                *to = next(from, *to) + new * z;
+                *to = next(from, *to) + *weight * z;
             }
         });
     }
-    let diagonal = m.diagonal();
-    parallel::for_each(to, |first, to| {
-        let n = to.len();
-        let (diagonal, b) = (&diagonal[first..][..n], &b[first..][..n]);
-        let (z, from) = (&z[first..][..n], &from[first..][..n]);
-        for k in 0..n {
-            to[k] = next(from[k], to[k]) + new * (diagonal[k] * residual(b[k], z[k]));
-        }
-    });
-    if !m.scattered().is_empty() {
+
+    fn take_diagonal(&self, diagonal: &[T], b: &[T], z: &[T], from: &[T], to: &mut [T]) {
+        let Self { weight, residual, next } = self;
+        parallel::for_each(to, |first, to| {
+            let n = to.len();
+            let (diagonal, b) = (&diagonal[first..][..n], &b[first..][..n]);
+            let (z, from) = (&z[first..][..n], &from[first..][..n]);
+            for k in 0..n {
+                to[k] = next(from[k], to[k]) + *weight * (diagonal[k] * residual(b[k], z[k]));
+            }
+        });
+    }
+
+    fn add_scattered(
+        &self,
+        m: &mut (impl Preconditioner<T> + ?Sized),
+        System { b, z, apart }: System<'_, T>,
+        to: &mut [T],
+    ) {
         let [r, sum] = &mut apart.scattered;
         r.clear();
-        r.extend(m.scattered().iter().map(|&k| residual(b[k as usize], z[k as usize])));
+        r.extend(m.scattered().iter().map(|&k| (self.residual)(b[k as usize], z[k as usize])));
         sum.resize(r.len(), T::ZERO);
         m.apply_scattered(r, sum);
-        m.scattered().iter().zip(sum).for_each(|(&k, sum)| to[k as usize] += new * *sum);
+        m.scattered().iter().zip(sum).for_each(|(&k, sum)| to[k as usize] += self.weight * *sum);
     }
 }

@@ -2,4 +2,4 @@
 
 mod chebyshev;
 
-pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
+pub use chebyshev::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
