@@ -5,12 +5,12 @@
 //! and a solve that returns `Ok` has a small *true* residual.
 //!
 //! ```
-//! use gluey_linalg::{Cg, CgParams, Jacobi, Reference, SparseMatrix};
+//! use gluey_linalg::{Gcr, GcrParams, Jacobi, Reference, SparseMatrix};
 //!
 //! let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 3.0)])?;
 //! let mut jacobi = Jacobi::new(&a.diagonal())?;
 //! let mut x = [0.0_f64; 2];
-//! Cg::new(2, CgParams::default()).solve(&mut a, &mut jacobi, &[1.0, 2.0], &mut x, Reference::RightHandSide)?;
+//! Gcr::new(GcrParams::default()).solve(&mut a, &mut jacobi, &[1.0, 2.0], &mut x, Reference::RightHandSide)?;
 //! assert!((x[0] - 1.0 / 11.0).abs() < 1e-8 && (x[1] - 7.0 / 11.0).abs() < 1e-8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -35,14 +35,14 @@ mod subset;
 pub mod vector;
 
 pub use affine::AffineConstraints;
-pub use dense::{BlockError, BlockJacobi, BlockJacobiError, DenseSymmetric, invert_general, invert_spd};
+pub use dense::{BlockError, DenseSymmetric, invert_spd};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
 pub use jagged::Jagged;
-pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
-pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
+pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
+pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
 pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
 pub use sparse::{BlockGroups, BlockPattern, Pattern, SlicedMatrix, SparseError, SparseMatrix};

@@ -1,6 +1,5 @@
-//! Small dense matrices, stored row by row, and the block-Jacobi preconditioner made of their inverses.
+//! Inverses of small dense positive definite matrices, stored row by row, by their Cholesky factors.
 
-use crate::operator::Preconditioner;
 use crate::scalar::Scalar;
 
 /// Why a dense block has no inverse.
@@ -13,31 +12,6 @@ pub enum BlockError {
         pivot: usize,
         /// Its value.
         value: f64,
-    },
-    /// All candidates for a pivot are zero, or not numbers.
-    #[error("the block is singular: no pivot in column {pivot}")]
-    Singular {
-        /// Column in which no pivot was found.
-        pivot: usize,
-    },
-}
-
-/// Why a block-Jacobi preconditioner was refused.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum BlockJacobiError {
-    /// A block does not have the size of its list of unknowns, or names one outside the vector.
-    #[error("block {block} does not fit its unknowns")]
-    WrongShape {
-        /// Index of the block.
-        block: usize,
-    },
-    /// A block has no inverse.
-    #[error("block {block}: {source}")]
-    NoInverse {
-        /// Index of the block.
-        block: usize,
-        /// Why.
-        source: BlockError,
     },
 }
 
@@ -98,150 +72,6 @@ fn invert_lower<T: Scalar>(dim: usize, l: &mut [T]) {
     }
 }
 
-/// Replaces a matrix by its inverse (Gauss and Jordan, with column pivoting in `pivots`, a workspace of `dim` numbers).
-pub fn invert_general<T: Scalar>(dim: usize, a: &mut [T], pivots: &mut [usize]) -> Result<(), BlockError> {
-    for k in 0..dim {
-        let pivot_row = largest_in_column(dim, a, k).ok_or(BlockError::Singular { pivot: k })?;
-        pivots[k] = pivot_row;
-        swap_rows(dim, a, k, pivot_row);
-        eliminate(dim, a, k);
-    }
-    for k in (0..dim).rev() {
-        for i in 0..dim {
-            a.swap(i * dim + k, i * dim + pivots[k]);
-        }
-    }
-    Ok(())
-}
-
-fn largest_in_column<T: Scalar>(dim: usize, a: &[T], k: usize) -> Option<usize> {
-    let mut best = None;
-    let mut size = T::ZERO;
-    for i in k..dim {
-        let candidate = a[i * dim + k].abs();
-        if candidate > size && candidate.is_finite() {
-            (best, size) = (Some(i), candidate);
-        }
-    }
-    best
-}
-
-fn swap_rows<T: Scalar>(dim: usize, a: &mut [T], i: usize, j: usize) {
-    if i != j {
-        for k in 0..dim {
-            a.swap(i * dim + k, j * dim + k);
-        }
-    }
-}
-
-/// One step of Gauss and Jordan in place: exchanges unknown `k` with equation `k`.
-fn eliminate<T: Scalar>(dim: usize, a: &mut [T], k: usize) {
-    let inverse = T::ONE / a[k * dim + k];
-    a[k * dim + k] = T::ONE;
-    for j in 0..dim {
-        a[k * dim + j] *= inverse;
-    }
-    for i in (0..dim).filter(|&i| i != k) {
-        let factor = a[i * dim + k];
-        a[i * dim + k] = T::ZERO;
-        for j in 0..dim {
-            let change = factor * a[k * dim + j];
-            a[i * dim + j] -= change;
-        }
-    }
-}
-
-/// Block Jacobi: the inverse of a block-diagonal matrix with small blocks.
-///
-/// Unknowns in no block are passed through; where blocks overlap, their results are added (additive Schwarz).
-#[derive(Clone, Debug)]
-pub struct BlockJacobi<T> {
-    dim: usize,
-    block_start: Vec<usize>,
-    unknowns: Vec<usize>,
-    inverse_start: Vec<usize>,
-    inverses: Vec<T>,
-    /// Unknowns in no block.
-    free: Vec<usize>,
-}
-
-impl<T: Scalar> BlockJacobi<T> {
-    /// A preconditioner for vectors of length `dim` from symmetric positive definite blocks, given as pairs of unknowns
-    /// and matrix.
-    pub fn new_spd<'a>(
-        dim: usize,
-        blocks: impl IntoIterator<Item = (&'a [usize], &'a [T])>,
-    ) -> Result<Self, BlockJacobiError> {
-        Self::collect(dim, blocks, invert_spd)
-    }
-
-    /// The same for regular blocks of any kind.
-    pub fn new_general<'a>(
-        dim: usize,
-        blocks: impl IntoIterator<Item = (&'a [usize], &'a [T])>,
-    ) -> Result<Self, BlockJacobiError> {
-        let mut pivots = Vec::new();
-        Self::collect(dim, blocks, |size, a| {
-            pivots.resize(size, 0);
-            invert_general(size, a, &mut pivots)
-        })
-    }
-
-    fn collect<'a>(
-        dim: usize,
-        blocks: impl IntoIterator<Item = (&'a [usize], &'a [T])>,
-        mut invert: impl FnMut(usize, &mut [T]) -> Result<(), BlockError>,
-    ) -> Result<Self, BlockJacobiError> {
-        let mut jacobi = Self {
-            dim,
-            block_start: vec![0],
-            unknowns: Vec::new(),
-            inverse_start: vec![0],
-            inverses: Vec::new(),
-            free: Vec::new(),
-        };
-        let mut covered = vec![false; dim];
-        for (block, (unknowns, matrix)) in blocks.into_iter().enumerate() {
-            let size = unknowns.len();
-            if matrix.len() != size * size || unknowns.iter().any(|&unknown| unknown >= dim) {
-                return Err(BlockJacobiError::WrongShape { block });
-            }
-            unknowns.iter().for_each(|&unknown| covered[unknown] = true);
-            let begin = jacobi.inverses.len();
-            jacobi.inverses.extend_from_slice(matrix);
-            invert(size, &mut jacobi.inverses[begin..])
-                .map_err(|source| BlockJacobiError::NoInverse { block, source })?;
-            jacobi.unknowns.extend_from_slice(unknowns);
-            jacobi.block_start.push(jacobi.unknowns.len());
-            jacobi.inverse_start.push(jacobi.inverses.len());
-        }
-        jacobi.free = (0..dim).filter(|&unknown| !covered[unknown]).collect();
-        Ok(jacobi)
-    }
-
-    /// Length of the vectors.
-    pub fn dim(&self) -> usize {
-        self.dim
-    }
-}
-
-impl<T: Scalar> Preconditioner<T> for BlockJacobi<T> {
-    fn apply(&mut self, r: &[T], z: &mut [T]) {
-        z.fill(T::ZERO);
-        for &unknown in &self.free {
-            z[unknown] = r[unknown];
-        }
-        for (block, bounds) in self.block_start.windows(2).enumerate() {
-            let unknowns = &self.unknowns[bounds[0]..bounds[1]];
-            let inverse = &self.inverses[self.inverse_start[block]..self.inverse_start[block + 1]];
-            for (&row, entries) in unknowns.iter().zip(inverse.chunks_exact(unknowns.len())) {
-                let product = unknowns.iter().zip(entries).fold(T::ZERO, |sum, (&c, &v)| sum + v * r[c]);
-                z[row] += product;
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -272,47 +102,13 @@ mod tests {
             let mut inverse = a.clone();
             invert_spd(dim, &mut inverse).expect("positive definite");
             assert!(distance_from_identity(dim, &a, &inverse) < 1e-11, "dim {dim}");
-            let mut general = vec![0.0; dim * dim];
-            vector::fill_pseudo_random(7 + dim as u64, &mut general);
-            let mut inverse = general.clone();
-            invert_general(dim, &mut inverse, &mut vec![0; dim]).expect("regular");
-            assert!(distance_from_identity(dim, &general, &inverse) < 1e-11, "dim {dim}");
         }
     }
 
     #[test]
-    fn pivoting_handles_a_zero_in_front() {
-        let mut a = [0.0, 2.0, 4.0, 0.0];
-        invert_general(2, &mut a, &mut [0; 2]).expect("regular");
-        assert_eq!(a, [0.0, 0.25, 0.5, 0.0]);
-    }
-
-    #[test]
     fn bad_blocks_are_refused() {
-        let singular = BlockError::Singular { pivot: 1 };
-        assert_eq!(invert_general(2, &mut [1.0, 2.0, 2.0, 4.0], &mut [0; 2]), Err(singular));
-        assert!(invert_general(1, &mut [f64::NAN], &mut [0]).is_err());
         let indefinite = BlockError::NotPositiveDefinite { pivot: 1, value: -3.0 };
         assert_eq!(invert_spd(2, &mut [1.0, 2.0, 2.0, 1.0]), Err(indefinite));
         assert!(invert_spd(1, &mut [f64::NAN]).is_err());
-        let blocks = [(&[0usize, 1][..], &[1.0][..])];
-        assert_eq!(
-            BlockJacobi::new_spd(2, blocks).expect_err("shape"),
-            BlockJacobiError::WrongShape { block: 0 }
-        );
-        let blocks = [(&[0usize][..], &[1.0][..]), (&[1usize][..], &[0.0][..])];
-        assert!(matches!(
-            BlockJacobi::new_general(2, blocks),
-            Err(BlockJacobiError::NoInverse { block: 1, .. })
-        ));
-    }
-
-    #[test]
-    fn block_jacobi_inverts_its_blocks_and_passes_the_rest() {
-        let blocks = [(&[3usize, 0][..], &[4.0, 0.0, 0.0, 16.0][..])];
-        let mut m = BlockJacobi::new_spd(4, blocks).expect("valid");
-        let mut z = [9.0; 4];
-        m.apply(&[64.0, 1.0, 2.0, 8.0], &mut z);
-        assert_eq!(z, [4.0, 1.0, 2.0, 2.0]);
     }
 }

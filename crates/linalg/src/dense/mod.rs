@@ -3,5 +3,5 @@
 mod cholesky;
 mod sweep;
 
-pub use cholesky::{BlockError, BlockJacobi, BlockJacobiError, invert_general, invert_spd};
+pub use cholesky::{BlockError, invert_spd};
 pub use sweep::DenseSymmetric;

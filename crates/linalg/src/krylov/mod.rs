@@ -1,11 +1,9 @@
 //! What the Krylov methods share: reference norms, reports and errors.
 
 mod basis;
-mod cg;
 mod gcr;
 mod lanczos;
 
-pub use cg::{Cg, CgParams};
 pub use gcr::{Gcr, GcrParams};
 pub use lanczos::estimate_lambda_max;
 
@@ -58,7 +56,7 @@ pub enum KrylovError {
         /// Iteration in which it was seen; 0 is the initial residual.
         iteration: usize,
     },
-    /// Conjugate gradients met a direction of curvature that is not positive.
+    /// A method for positive definite operators met a direction of curvature that is not positive.
     #[error("{what} is not positive definite: form {form:e} in iteration {iteration}")]
     NotPositiveDefinite {
         /// "operator" or "preconditioner".

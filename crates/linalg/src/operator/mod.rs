@@ -157,90 +157,6 @@ impl<T: Scalar> Preconditioner<T> for Jacobi<T> {
     fn apply_rest(&mut self, _: &[T], _: &mut [T]) {}
 }
 
-/// A single-precision preconditioner seen from double precision.
-///
-/// The residual is scaled to norm one before it is rounded, so that neither small nor large residuals leave the
-/// range of `f32`. The result is not a linear function of `r` to more than seven digits: use it inside a *flexible*
-/// Krylov method ([`crate::Gcr`]), never inside a fixed one.
-#[derive(Clone, Debug)]
-pub struct SinglePrecision<M> {
-    inner: M,
-    r: Vec<f32>,
-    z: Vec<f32>,
-}
-
-impl<M: Preconditioner<f32>> SinglePrecision<M> {
-    /// Wraps `inner` for vectors of length `dim`.
-    pub fn new(dim: usize, inner: M) -> Self {
-        Self { inner, r: vec![0.0; dim], z: vec![0.0; dim] }
-    }
-
-    /// The wrapped preconditioner.
-    pub fn inner_mut(&mut self) -> &mut M {
-        &mut self.inner
-    }
-}
-
-impl<M: Preconditioner<f32>> Preconditioner<f64> for SinglePrecision<M> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let norm = vector::norm(r);
-        if norm == 0.0 {
-            z.fill(0.0);
-            return;
-        }
-        vector::convert(1.0 / norm, r, &mut self.r);
-        self.inner.apply(&self.r, &mut self.z);
-        vector::convert(norm, &self.z, z);
-    }
-}
-
-/// An operator or a preconditioner in double precision, between vectors in single precision.
-#[derive(Clone, Debug)]
-pub struct Rounded<A> {
-    inner: A,
-    input: Vec<f64>,
-    output: Vec<f64>,
-}
-
-impl<A> Rounded<A> {
-    /// Wraps `inner` for vectors of length `dim`.
-    pub fn new(dim: usize, inner: A) -> Self {
-        Self { inner, input: vec![0.0; dim], output: vec![0.0; dim] }
-    }
-
-    fn between(&mut self, x: &[f32], y: &mut [f32], action: impl FnOnce(&mut A, &[f64], &mut [f64])) {
-        vector::convert(1.0, x, &mut self.input);
-        action(&mut self.inner, &self.input, &mut self.output);
-        vector::convert(1.0, &self.output, y);
-    }
-}
-
-impl<A: LinOp<f64>> LinOp<f64> for Rounded<A> {
-    fn dim(&self) -> usize {
-        self.inner.dim()
-    }
-
-    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.inner.apply(x, y);
-    }
-}
-
-impl<A: LinOp<f64>> LinOp<f32> for Rounded<A> {
-    fn dim(&self) -> usize {
-        self.inner.dim()
-    }
-
-    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
-        self.between(x, y, |inner, x, y| inner.apply(x, y));
-    }
-}
-
-impl<M: Preconditioner<f64>> Preconditioner<f32> for Rounded<M> {
-    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
-        self.between(r, z, |inner, r, z| inner.apply(r, z));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,26 +170,5 @@ mod tests {
         assert_eq!(Jacobi::new(&[1.0, 0.0]).expect_err("zero"), BadDiagonal { row: 1, value: 0.0 });
         assert!(Jacobi::new(&[f64::NAN]).is_err());
         assert!(Jacobi::new(&[f64::INFINITY]).is_err());
-    }
-
-    #[test]
-    fn rounding_happens_once_on_the_way_out() {
-        let r = [3.0, -4.0 / 3.0];
-        let mut z = [0f32; 2];
-        Preconditioner::apply(&mut Rounded::new(2, Identity), &r, &mut z);
-        assert_eq!(z, r);
-        let thirds = FnOp::new(2, |x: &[f64], y: &mut [f64]| vector::scaled_copy(1.0 / 3.0, x, y));
-        LinOp::<f32>::apply(&mut Rounded::new(2, thirds), &r, &mut z);
-        assert_eq!(z, r.map(|r| (f64::from(r) / 3.0) as f32));
-    }
-
-    #[test]
-    fn single_precision_keeps_the_scale() {
-        let mut m = SinglePrecision::new(2, Identity);
-        let mut z = [0.0; 2];
-        m.apply(&[3e-120, -4e-120], &mut z);
-        assert!((z[0] / 3e-120 - 1.0).abs() < 1e-6 && (z[1] / -4e-120 - 1.0).abs() < 1e-6);
-        m.apply(&[0.0, 0.0], &mut z);
-        assert_eq!(z, [0.0, 0.0]);
     }
 }

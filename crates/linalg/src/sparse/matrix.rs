@@ -122,17 +122,6 @@ impl<T: Scalar> SparseMatrix<T> {
         });
     }
 
-    /// `y += a A^T x`.
-    pub fn transpose_multiply_add(&self, a: f64, x: &[T], y: &mut [T]) {
-        let a = T::from_f64(a);
-        for (row, &x) in x.iter().enumerate() {
-            let range = self.pattern.range(row);
-            for (&column, &value) in self.pattern.columns()[range.clone()].iter().zip(&self.values[range]) {
-                y[column as usize] += a * x * value;
-            }
-        }
-    }
-
     /// In partial sums, so that one product need not wait for the one before.
     fn row_product(&self, row: usize, x: &[T]) -> T {
         const SUMS: usize = 4;
@@ -172,9 +161,6 @@ mod tests {
         let mut y = [0.0; 2];
         a.multiply(&[1.0, 10.0, 100.0], &mut y);
         assert_eq!(y, [1.0, 302.0]);
-        let mut x = [1.0; 3];
-        a.transpose_multiply_add(2.0, &[1.0, 1.0], &mut x);
-        assert_eq!(x, [7.0, 1.0, 7.0]);
         a.multiply_add(-1.0, &[1.0, 10.0, 100.0], &mut y);
         assert_eq!(y, [0.0, 0.0]);
         assert!(!a.pattern().is_symmetric());
