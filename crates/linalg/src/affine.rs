@@ -1,8 +1,9 @@
 //! Values that are short linear forms in the unknowns of a problem, plus known numbers: `u = T x + g`.
 //!
-//! A hanging node is a weighted sum of its masters, a node of a rigid body of the entries of the body's twist, a node with a
-//! boundary value is that value, and a free node is an unknown itself. The equations of a problem `A u = f` in the values are
-//! then `T^T A T x = T^T (f - A g)` in the unknowns. (deal.II: `AffineConstraints`, distribute and condense.)
+//! A hanging node is a weighted sum of its masters, a node of a rigid body of the entries of the body's
+//! twist, a node with a boundary value is that value, and a free node is an unknown itself. The equations of
+//! a problem `A u = f` in the values are then `T^T A T x = T^T (f - A g)` in the unknowns. (deal.II:
+//! `AffineConstraints`, distribute and condense.)
 
 use crate::scalar::Scalar;
 use crate::subset::Subset;
@@ -140,7 +141,8 @@ impl AffineConstraints {
         new
     }
 
-    /// The same forms in the numbers of `kept`, in which unknown `k` has the position `first + k`; the others count as zero.
+    /// The same forms in the numbers of `kept`, in which unknown `k` has the position `first + k`; the others
+    /// count as zero.
     pub fn restricted_to(&self, kept: &Subset, first: usize) -> Self {
         let mut new = Self::zeros(self.row_count(), kept.len());
         for row in 0..self.row_count() {

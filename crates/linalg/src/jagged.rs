@@ -12,7 +12,8 @@ use std::ops::{Index, Range};
 /// assert_eq!(nodes_of_cells[1], [1, 2]);
 ///
 /// // The cells of each of the five nodes.
-/// let pairs = nodes_of_cells.iter().zip(0u32..).flat_map(|(nodes, cell)| nodes.iter().map(move |&n| (n as usize, cell)));
+/// let cells = nodes_of_cells.iter().zip(0u32..);
+/// let pairs = cells.flat_map(|(nodes, cell)| nodes.iter().map(move |&node| (node as usize, cell)));
 /// let cells_of_nodes = Jagged::grouped(5, pairs);
 /// assert_eq!(cells_of_nodes[1], [0, 1]);
 /// assert!(cells_of_nodes[3].is_empty());

@@ -1,8 +1,8 @@
 //! Krylov methods, Chebyshev smoothing and checked sparse direct solvers.
 //!
-//! An operator is anything that can be applied ([`LinOp`]), a preconditioner likewise ([`Preconditioner`]). Methods own
-//! their workspace: after the first solve nothing is allocated. Each method has `Params`, a report and a typed error,
-//! and a solve that returns `Ok` has a small *true* residual.
+//! An operator is anything that can be applied ([`LinOp`]), a preconditioner likewise ([`Preconditioner`]).
+//! Methods own their workspace: after the first solve nothing is allocated. Each method has `Params`, a
+//! report and a typed error, and a solve that returns `Ok` has a small *true* residual.
 //!
 //! ```
 //! use gluey_linalg::{Gcr, GcrParams, Jacobi, Reference, SparseMatrix};
@@ -15,11 +15,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order ([`parallel`]), so
-//! equal input gives equal bits for any number of threads.
+//! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order
+//! ([`parallel`]), so equal input gives equal bits for any number of threads.
 //!
-//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`], jagged arrays,
-//! subsets, affine constraints, operators, small dense matrices, sparse matrices, direct solvers, Krylov methods, smoothers.
+//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`],
+//! jagged arrays, subsets, affine constraints, operators, small dense matrices, sparse matrices, direct
+//! solvers, Krylov methods, smoothers.
 
 mod affine;
 mod dense;
@@ -45,5 +46,5 @@ pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
 pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
-pub use sparse::{BlockGroups, BlockPattern, Pattern, SlicedMatrix, SparseError, SparseMatrix};
+pub use sparse::{BlockGroups, BlockPattern, Pattern, SellMatrix, SparseError, SparseMatrix};
 pub use subset::Subset;

@@ -1,7 +1,7 @@
 //! Threads for vectors, with the same bits for any number of them.
 //!
-//! A vector is cut into pieces whose length depends on its own alone; sums over pieces are added from first to last.
-//! Short vectors, and all vectors in a pool of one thread, are handled by the calling thread.
+//! A vector is cut into pieces whose length depends on its own alone; sums over pieces are added from first
+//! to last. Short vectors, and all vectors in a pool of one thread, are handled by the calling thread.
 
 use std::ops::Range;
 

@@ -1,12 +1,12 @@
 //! Some of the unknowns, with numbers of their own.
 
-/// What stands for the number of an unknown that is left out.
+/// Stands for the number of an unknown that is left out.
 const NONE: u32 = u32::MAX;
 
 /// Some of the positions in a vector, numbered in ascending order.
 ///
-/// With `E` the matrix of zeros and ones that places the entries of a short vector in a long one, [`Subset::scatter`] is `E`,
-/// [`Subset::gather`] is `E^T`.
+/// With `E` the matrix of zeros and ones that places the entries of a short vector in a long one,
+/// [`Subset::scatter`] is `E`, [`Subset::gather`] is `E^T`.
 ///
 /// ```
 /// use gluey_linalg::Subset;

@@ -1,7 +1,9 @@
-//! Vector kernels with a fixed order of summation, shared by threads where that pays (see [`crate::parallel`]).
+//! Vector kernels with a fixed order of summation, shared by threads where that pays (see
+//! [`crate::parallel`]).
 //!
-//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in vector registers; the
-//! sums of the blocks are added in `f64` in an order that depends on the length alone: equal inputs give equal bits.
+//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in vector
+//! registers; the sums of the blocks are added in `f64` in an order that depends on the length alone: equal
+//! inputs give equal bits.
 
 use crate::parallel;
 use crate::scalar::Scalar;

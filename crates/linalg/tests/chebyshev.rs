@@ -10,7 +10,8 @@ use gluey_linalg::{
 };
 use support::{laplacian_2d, pseudo_random};
 
-/// Eigenvector of the five-point Laplacian with the wave numbers `k`, `l`, and its eigenvalue over the diagonal.
+/// Eigenvector of the five-point Laplacian with the wave numbers `k`, `l`, and its eigenvalue over the
+/// diagonal.
 fn eigenpair(n: usize, k: usize, l: usize) -> (Vec<f64>, f64) {
     let wave = |k: usize, i: usize| (PI * k as f64 * (i + 1) as f64 / (n + 1) as f64).sin();
     let vector = (0..n * n).map(|row| wave(k, row % n) * wave(l, row / n)).collect();

@@ -200,7 +200,8 @@ fn a_tolerance_beyond_rounding_ends_without_looping() {
     }
 }
 
-/// One in double precision and 1/1.6 in single: a correction by what the steps know leaves -0.6 of the residual.
+/// One in double precision and 1/1.6 in single: a correction by what the steps know leaves -0.6 of the
+/// residual.
 struct Inexact;
 
 impl LinOp<f64> for Inexact {
@@ -258,7 +259,8 @@ fn wrong_lengths_are_refused() {
     assert_eq!(error, Err(KrylovError::DimensionMismatch { expected: 9, found: 10 }));
 }
 
-/// A nonsymmetric operator with diagonal from 1 to `contrast`, and the preconditioner that takes out most of it.
+/// A nonsymmetric operator with diagonal from 1 to `contrast`, and the preconditioner that takes out most of
+/// it.
 fn ill_conditioned(n: usize, contrast: f64) -> (impl LinOp<f64>, impl Preconditioner<f64>) {
     let diagonal: Vec<f64> = (0..n).map(|i| contrast.powf(i as f64 / n as f64)).collect();
     let inverse: Vec<f64> = (0..n).map(|i| 1.0 / (diagonal[i] * (1.0 + 0.4 * (i as f64).sin()))).collect();

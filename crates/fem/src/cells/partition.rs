@@ -1,10 +1,11 @@
 //! Contiguous runs of cells that own contiguous runs of nodes.
 //!
-//! Cells in Morton order are cut into chunks of [`CHUNK_CELLS`]. Nodes are numbered as the cells touch them first, so a
-//! chunk owns a range of nodes; those of other chunks that its cells also touch it *borrows*. A chunk works in a buffer
-//! of its own, first the nodes it owns, then those it borrows, and its contributions to the latter are added by their
-//! owners, in the order of the chunks. So the cutting, and with it every bit of a sum, depends on the mesh alone and not
-//! on the number of threads.
+//! Cells in Morton order are cut into chunks of [`CHUNK_CELLS`]. Nodes are numbered as the cells touch them
+//! first, so a chunk *owns* a range of nodes; those of other chunks that its cells also touch are its
+//! *ghosts*. A chunk works in a buffer of its own, first the owned nodes, then the ghosts: the position of a
+//! node there is its *local index*. Contributions to ghosts are added by the owners, in the order of the
+//! chunks. So the partition, and with it every bit of a sum, depends on the mesh alone and not on the number
+//! of threads.
 
 use std::ops::Range;
 
@@ -15,43 +16,53 @@ use crate::space::NodeMap;
 /// Cells of a chunk: their nodes stay in the cache next to a core.
 pub const CHUNK_CELLS: usize = 512;
 
-/// Which chunk owns and which borrows the nodes of one space.
+/// The nodes of one space: those that each chunk owns, and its ghosts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Shares {
+pub(crate) struct NodePartition {
     /// First node of each chunk, and the number of nodes.
     first: Vec<u32>,
     /// Nodes of other chunks that a chunk touches, in ascending order.
-    pub(crate) borrowed: Jagged<u32>,
-    /// Positions among all borrowed nodes of those that a chunk owns, in ascending order.
-    pub(crate) returned: Jagged<u32>,
+    pub(crate) ghosts: Jagged<u32>,
+    /// Positions in the list of all ghosts of those that a chunk owns, in ascending order.
+    pub(crate) owned_ghosts: Jagged<u32>,
 }
 
-impl Shares {
-    /// `touched(chunk, nodes)` appends the nodes a chunk touches.
+impl NodePartition {
+    /// `touched(chunk, nodes)` appends the nodes that a chunk touches.
     fn new(first: Vec<u32>, touched: impl Fn(usize, &mut Vec<u32>)) -> Self {
-        let mut shares = Self { first, ..Self::default() };
+        let mut partition = Self { first, ..Self::default() };
         let mut nodes = Vec::new();
-        for chunk in 0..shares.first.len() - 1 {
+        for chunk in 0..partition.first.len() - 1 {
             touched(chunk, &mut nodes);
-            let own = shares.owned(chunk);
+            let own = partition.owned(chunk);
             nodes.retain(|&n| !own.contains(&(n as usize)));
             nodes.sort_unstable();
             nodes.dedup();
-            shares.borrowed.push(nodes.drain(..));
+            partition.ghosts.push(nodes.drain(..));
         }
-        shares.find_returned();
-        shares
+        partition.find_owned_ghosts();
+        partition
     }
 
-    fn find_returned(&mut self) {
+    fn find_owned_ghosts(&mut self) {
         let owner = |node: u32| self.first.partition_point(|&f| f <= node) - 1;
-        let owned = self.borrowed.items().iter().zip(0u32..).map(|(&node, position)| (owner(node), position));
-        self.returned = Jagged::grouped(self.first.len() - 1, owned);
+        let owned = self.ghosts.items().iter().zip(0u32..).map(|(&node, position)| (owner(node), position));
+        self.owned_ghosts = Jagged::grouped(self.first.len() - 1, owned);
     }
 
-    /// Nodes a chunk owns.
+    /// Nodes that a chunk owns.
     pub(crate) fn owned(&self, chunk: usize) -> Range<usize> {
         self.first[chunk] as usize..self.first[chunk + 1] as usize
+    }
+
+    /// First node that a chunk owns; for the number of chunks, the number of nodes.
+    pub(crate) fn first_of(&self, chunk: usize) -> usize {
+        self.first[chunk] as usize
+    }
+
+    /// All nodes of a chunk in the order of their local indices.
+    pub(crate) fn local_nodes(&self, chunk: usize) -> impl Iterator<Item = u32> {
+        self.owned(chunk).map(|node| node as u32).chain(self.ghosts[chunk].iter().copied())
     }
 
     /// Nodes of the space.
@@ -63,25 +74,26 @@ impl Shares {
 /// A hanging node in the buffer of a chunk, and where its masters end in the list of all masters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hanging {
-    pub(crate) slot: u16,
+    pub(crate) local: u16,
     pub(crate) masters_end: u32,
 }
 
-/// The chunks of a mesh with the nodes of the Q2-Q1 pair. Positions in the buffer of a chunk are called slots.
+/// The chunks of a mesh with the nodes of the Q2-Q1 pair.
 #[derive(Clone, Debug, Default)]
 pub struct Chunks<const D: usize> {
     cell_count: usize,
-    pub(crate) velocity: Shares,
-    pub(crate) pressure: Shares,
-    /// Slot of each pressure node in the chunk that owns it: that of the velocity node at the same place.
-    pub(crate) pressure_slots: Vec<u16>,
-    /// Slots of the borrowed pressure nodes.
-    pub(crate) borrowed_pressure_slots: Vec<u16>,
+    pub(crate) velocity: NodePartition,
+    pub(crate) pressure: NodePartition,
+    /// Local index of each pressure node in the chunk that owns it: that of the velocity node at the same
+    /// place.
+    pub(crate) pressure_locals: Vec<u16>,
+    /// Local indices of the pressure ghosts.
+    pub(crate) ghost_pressure_locals: Vec<u16>,
     /// Hanging velocity nodes of the cells of a chunk.
     pub(crate) hanging: Jagged<Hanging>,
     pub(crate) masters: Vec<u16>,
     pub(crate) weights: Vec<f64>,
-    /// Slots of the nodes on the boundary.
+    /// Local indices of the nodes on the boundary.
     pub(crate) boundary: Jagged<u16>,
 }
 
@@ -96,41 +108,28 @@ impl<const D: usize> Chunks<D> {
         let constraint = |node: u32| velocity.constraints().get(constraint_of[node as usize] as usize);
         let mut chunks = Self {
             cell_count,
-            velocity: Shares::new(first_nodes(velocity), |chunk, touched| {
+            velocity: NodePartition::new(first_nodes(velocity), |chunk, touched| {
                 for &node in velocity.cells(cells_of(chunk, cell_count)) {
                     touched.push(node);
                     touched.extend(constraint(node).iter().flat_map(|c| c.masters.iter().map(|m| m.0)));
                 }
             }),
-            pressure: Shares::new(first_nodes(pressure), |chunk, touched| {
+            pressure: NodePartition::new(first_nodes(pressure), |chunk, touched| {
                 touched.extend_from_slice(pressure.cells(cells_of(chunk, cell_count)));
             }),
-            pressure_slots: vec![0; pressure.node_count()],
+            pressure_locals: vec![0; pressure.node_count()],
             ..Self::default()
         };
-        let mut slots = Slots::new(velocity.node_count());
+        let mut locals = LocalIndices::new(velocity.node_count());
         for chunk in 0..chunks.count() {
-            slots.set(&chunks.velocity, chunk);
-            chunks.place_pressures(velocity, pressure, chunk, &slots);
-            let local = || {
-                chunks
-                    .velocity
-                    .owned(chunk)
-                    .map(|n| n as u32)
-                    .chain(chunks.velocity.borrowed[chunk].iter().copied())
-            };
-            let boundary: Vec<u16> =
-                local().filter(|&n| velocity.is_on_boundary(n as usize)).map(|n| slots.of(n)).collect();
-            let mut hanging: Vec<u32> = velocity
-                .cells(cells_of(chunk, cell_count))
-                .iter()
-                .map(|&n| constraint_of[n as usize])
-                .filter(|&k| k != u32::MAX)
-                .collect();
-            hanging.sort_unstable();
-            hanging.dedup();
-            chunks.boundary.push(boundary);
-            chunks.place_hanging(velocity, &hanging, &slots);
+            locals.set(&chunks.velocity, chunk);
+            chunks.place_pressures(velocity, pressure, chunk, &locals);
+            let nodes = chunks.velocity.local_nodes(chunk);
+            let boundary = nodes.filter(|&n| velocity.is_on_boundary(n as usize)).map(|n| locals.of(n));
+            chunks.boundary.push(boundary.collect::<Vec<u16>>());
+            let nodes = velocity.cells(cells_of(chunk, cell_count)).iter();
+            let hanging = nodes.map(|&n| constraint_of[n as usize]).filter(|&k| k != u32::MAX);
+            chunks.place_hanging(velocity, hanging.collect(), &locals);
         }
         chunks
     }
@@ -145,35 +144,45 @@ impl<const D: usize> Chunks<D> {
         cells_of(chunk, self.cell_count)
     }
 
-    fn place_pressures(&mut self, velocity: &NodeMap<D>, pressure: &NodeMap<D>, chunk: usize, slots: &Slots) {
+    fn place_pressures(
+        &mut self,
+        velocity: &NodeMap<D>,
+        pressure: &NodeMap<D>,
+        chunk: usize,
+        locals: &LocalIndices,
+    ) {
         let own = self.pressure.owned(chunk);
-        let borrowed = &self.pressure.borrowed[chunk];
-        let mut borrowed_slots = vec![0; borrowed.len()];
+        let ghosts = &self.pressure.ghosts[chunk];
+        let mut ghost_locals = vec![0; ghosts.len()];
         for cell in self.cells(chunk) {
             for (corner, &q) in pressure.cell(cell).iter().enumerate() {
-                let slot = slots.of(velocity.cell(cell)[corner_node::<D>(corner)]);
+                let local = locals.of(velocity.cell(cell)[corner_node::<D>(corner)]);
                 if own.contains(&(q as usize)) {
-                    self.pressure_slots[q as usize] = slot;
-                } else if let Ok(k) = borrowed.binary_search(&q) {
-                    borrowed_slots[k] = slot;
+                    self.pressure_locals[q as usize] = local;
+                } else if let Ok(k) = ghosts.binary_search(&q) {
+                    ghost_locals[k] = local;
                 }
             }
         }
-        self.borrowed_pressure_slots.extend(borrowed_slots);
+        self.ghost_pressure_locals.extend(ghost_locals);
     }
 
-    fn place_hanging(&mut self, velocity: &NodeMap<D>, constraints: &[u32], slots: &Slots) {
+    /// Places hanging nodes, given by the numbers of their constraints.
+    fn place_hanging(&mut self, velocity: &NodeMap<D>, mut constraints: Vec<u32>, locals: &LocalIndices) {
+        constraints.sort_unstable();
+        constraints.dedup();
         let mut hanging = Vec::with_capacity(constraints.len());
-        for &k in constraints {
+        for k in constraints {
             let constraint = &velocity.constraints()[k as usize];
-            self.masters.extend(constraint.masters.iter().map(|m| slots.of(m.0)));
+            self.masters.extend(constraint.masters.iter().map(|m| locals.of(m.0)));
             self.weights.extend(constraint.masters.iter().map(|m| m.1));
-            hanging.push(Hanging { slot: slots.of(constraint.node), masters_end: self.masters.len() as u32 });
+            hanging
+                .push(Hanging { local: locals.of(constraint.node), masters_end: self.masters.len() as u32 });
         }
         self.hanging.push(hanging);
     }
 
-    /// Calls `visit(slot, masters, weights)` for the hanging nodes of a chunk.
+    /// Calls `visit(local, masters, weights)` for the hanging nodes of a chunk.
     #[inline(always)]
     pub(crate) fn for_each_hanging(&self, chunk: usize, mut visit: impl FnMut(u16, &[u16], &[f64])) {
         let range = self.hanging.range(chunk);
@@ -183,14 +192,14 @@ impl<const D: usize> Chunks<D> {
         };
         for hanging in &self.hanging[chunk] {
             let end = hanging.masters_end as usize;
-            visit(hanging.slot, &self.masters[start..end], &self.weights[start..end]);
+            visit(hanging.local, &self.masters[start..end], &self.weights[start..end]);
             start = end;
         }
     }
 
-    /// Slots in the buffer of a chunk.
-    pub(crate) fn slot_count(&self, chunk: usize) -> usize {
-        self.velocity.owned(chunk).len() + self.velocity.borrowed.range(chunk).len()
+    /// Nodes in the buffer of a chunk.
+    pub(crate) fn local_count(&self, chunk: usize) -> usize {
+        self.velocity.owned(chunk).len() + self.velocity.ghosts.range(chunk).len()
     }
 }
 
@@ -220,23 +229,21 @@ fn first_nodes<const D: usize>(nodes: &NodeMap<D>) -> Vec<u32> {
     first
 }
 
-/// Slots of the nodes in the buffer of one chunk at a time.
-pub(crate) struct Slots {
+/// Local indices of the nodes of one chunk at a time.
+pub(crate) struct LocalIndices {
     of: Vec<u16>,
 }
 
-impl Slots {
+impl LocalIndices {
     pub(crate) fn new(node_count: usize) -> Self {
         Self { of: vec![0; node_count] }
     }
 
-    pub(crate) fn set(&mut self, shares: &Shares, chunk: usize) {
-        let own = shares.owned(chunk);
-        let count = own.len() + shares.borrowed[chunk].len();
+    pub(crate) fn set(&mut self, partition: &NodePartition, chunk: usize) {
+        let count = partition.owned(chunk).len() + partition.ghosts[chunk].len();
         assert!(count < usize::from(u16::MAX), "a chunk touches at most {CHUNK_CELLS} cells' nodes");
-        let nodes = own.chain(shares.borrowed[chunk].iter().map(|&n| n as usize));
-        for (slot, node) in nodes.enumerate() {
-            self.of[node] = slot as u16;
+        for (local, node) in partition.local_nodes(chunk).enumerate() {
+            self.of[node as usize] = local as u16;
         }
     }
 

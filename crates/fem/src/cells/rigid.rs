@@ -4,7 +4,7 @@ use gluey_linalg::Scalar;
 
 /// A node that moves with a body: `u = U + w x arm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tie<T, const D: usize> {
+pub struct RigidNode<T, const D: usize> {
     /// The node.
     pub node: u32,
     /// The body.
@@ -13,7 +13,7 @@ pub struct Tie<T, const D: usize> {
     pub arm: [T; D],
 }
 
-impl<T: Scalar, const D: usize> Tie<T, D> {
+impl<T: Scalar, const D: usize> RigidNode<T, D> {
     /// `u = U + w x arm`.
     #[inline(always)]
     pub(super) fn set_velocity<X: Scalar>(&self, twist: &[X], u: &mut [T; 4]) {

@@ -1,18 +1,16 @@
-//! How a [`CellOperator`] runs over its chunks.
-
-use std::ops::Range;
+//! The sweep of a [`CellOperator`] over its chunks.
 
 use gluey_linalg::Scalar;
 
 use super::buffers::Buffers;
-use super::kernel::Registers;
-use super::partition::Shares;
+use super::kernel::{Fields, Registers};
+use super::output::{Input, Output, add_ghost_contributions};
 use super::scalar::CellScalar;
 use super::simd::{Lanes, Nodes, Portable};
-use super::{CellOperator, GROUP};
+use super::{CellOperator, GROUP, Span};
 
-/// What a [`CellOperator`] works in: buffers for every thread while it runs, in the precision `T` that is computed in, and
-/// contributions to nodes of other chunks, in that of the vectors.
+/// Workspace of a [`CellOperator`]: buffers for every thread while it runs, in the precision `T` that is
+/// computed in, and contributions to ghosts, in that of the vectors.
 #[derive(Clone, Debug)]
 pub struct Workspace<T, X = T> {
     buffers: Vec<Buffers<T>>,
@@ -27,27 +25,6 @@ impl<T, X> Default for Workspace<T, X> {
     }
 }
 
-/// What is applied to which fields.
-#[derive(Clone, Copy)]
-pub(super) struct Input<'a, X> {
-    /// Velocities and twists; empty for none.
-    x: &'a [X],
-    /// Nodal pressures; empty for none.
-    p: &'a [X],
-    /// Whether rigid and hanging nodes are to be set first.
-    expand: bool,
-}
-
-/// Results of some chunks: of the nodes they own, of those they borrow, and of the bodies they touch.
-pub(super) struct Output<'a, T> {
-    chunks: Range<usize>,
-    y: &'a mut [T],
-    q: &'a mut [T],
-    borrowed_y: &'a mut [T],
-    borrowed_q: &'a mut [T],
-    twists: &'a mut [T],
-}
-
 impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     /// `y = A x`.
     pub fn viscous(&self, x: &[T], y: &mut [T], work: &mut Workspace<T>) {
@@ -59,8 +36,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         self.apply::<true, false, _>(Input { x: u, p: &[], expand: false }, y, &mut [], work);
     }
 
-    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal. Vectors may have another precision than the one
-    /// that is computed in.
+    /// `(y, q) = (A x - B^T p, -B x)`. The pressures and their loads are nodal. Vectors may have another
+    /// precision than the one that is computed in.
     pub fn stokes<X: Scalar>(&self, x: &[X], p: &[X], y: &mut [X], q: &mut [X], work: &mut Workspace<T, X>) {
         self.apply::<true, true, _>(Input { x, p, expand: true }, y, q, work);
     }
@@ -97,22 +74,22 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         work: &mut Workspace<T, X>,
         kernel: &(impl Fn(Output<'_, X>, &mut Buffers<T>) + Sync),
     ) {
-        let shares = &self.chunks.velocity;
-        let (y, twists) = y.split_at_mut(shares.node_count() * D);
+        let partition = &self.chunks.velocity;
+        let (y, twists) = y.split_at_mut(partition.node_count() * D);
         let Workspace { buffers, velocity, pressure, twists: of_chunks } = work;
         let count = self.chunks.count();
         let output = Output {
             chunks: 0..count,
             y: &mut *y,
             q: &mut *q,
-            borrowed_y: velocity,
-            borrowed_q: pressure,
+            ghost_y: velocity,
+            ghost_q: pressure,
             twists: of_chunks,
         };
         self.in_parallel(output, buffers, kernel);
-        add_returned::<X, D>(shares, 0..count, y, velocity, buffers.len());
+        add_ghost_contributions::<X, D>(partition, 0..count, y, velocity, buffers.len());
         if !q.is_empty() {
-            add_returned::<X, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
+            add_ghost_contributions::<X, 1>(&self.chunks.pressure, 0..count, q, pressure, buffers.len());
         }
         T::pool().take_back(buffers);
         twists.fill(X::ZERO);
@@ -134,33 +111,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         }
         let (first, second) = buffers.split_at_mut(buffers.len() / 2);
         let middle = output.chunks.start + output.chunks.len() * first.len() / (first.len() + second.len());
-        let (left, right) = self.split(output, middle);
+        let (left, right) = output.split_at(self, middle);
         rayon::join(|| self.in_parallel(left, first, run), || self.in_parallel(right, second, run));
-    }
-
-    fn split<'a, X>(&self, output: Output<'a, X>, chunk: usize) -> (Output<'a, X>, Output<'a, X>) {
-        let start = output.chunks.start;
-        let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
-        let nodes = |shares: &Shares| shares.owned(chunk).start - shares.owned(start).start;
-        let borrowed =
-            |shares: &Shares| shares.borrowed.range(chunk).start - shares.borrowed.range(start).start;
-        let bodies = self.bodies.range(chunk).start - self.bodies.range(start).start;
-        let (y, y2) = output.y.split_at_mut(nodes(velocity) * D);
-        let (q, q2) = output.q.split_at_mut(nodes(pressure).min(output.q.len()));
-        let (borrowed_y, borrowed_y2) = output.borrowed_y.split_at_mut(borrowed(velocity) * D);
-        let (borrowed_q, borrowed_q2) =
-            output.borrowed_q.split_at_mut(borrowed(pressure).min(output.borrowed_q.len()));
-        let (twists, twists2) = output.twists.split_at_mut(bodies * Self::TWIST);
-        let left = Output { chunks: start..chunk, y, q, borrowed_y, borrowed_q, twists };
-        let right = Output {
-            chunks: chunk..output.chunks.end,
-            y: y2,
-            q: q2,
-            borrowed_y: borrowed_y2,
-            borrowed_q: borrowed_q2,
-            twists: twists2,
-        };
-        (left, right)
     }
 
     /// Runs the kernel compiled for the widest vectors this processor has.
@@ -173,8 +125,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         #[cfg(target_arch = "x86_64")]
         {
             if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-                // SAFETY: the instructions the function is compiled for were detected just above; its code is the safe
-                // generic `run`. The test `vector_and_portable_kernels_agree` compares all three.
+                // SAFETY: the instructions the function is compiled for were detected just above; its code is
+                // the safe generic `run`. The test `vector_and_portable_kernels_agree` compares all three.
                 return unsafe { run_avx512::<T, D, VISCOUS, PRESSURE, X>(self, input, output, buffers) };
             }
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
@@ -193,61 +145,54 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         output: Output<'_, X>,
         buffers: &mut Buffers<T>,
     ) {
-        let Output { chunks, mut y, mut q, mut borrowed_y, mut borrowed_q, mut twists } = output;
+        let mut output = output;
         let registers = &mut Registers::new();
         let (x_buffer, y_buffer, points) = buffers.split();
-        for chunk in chunks {
+        for chunk in output.chunks.clone() {
+            let output = output.take_first(self);
             let span = &self.spans[chunk];
-            let (velocity, pressure) = (&self.chunks.velocity, &self.chunks.pressure);
-            let output = Output {
-                chunks: chunk..chunk + 1,
-                y: first_part(&mut y, velocity.owned(chunk).len() * D),
-                q: first_part(&mut q, pressure.owned(chunk).len()),
-                borrowed_y: first_part(&mut borrowed_y, velocity.borrowed.range(chunk).len() * D),
-                borrowed_q: first_part(&mut borrowed_q, pressure.borrowed.range(chunk).len()),
-                twists: first_part(&mut twists, self.bodies.range(chunk).len() * Self::TWIST),
-            };
-            if span.uniform.0 == span.uniform.1 && span.varying.0 == span.varying.1 {
+            if span.is_empty() {
                 output.clear();
                 continue;
             }
             self.read::<VISCOUS, PRESSURE, X>(chunk, input, x_buffer);
-            y_buffer[..=self.chunks.slot_count(chunk)].fill([T::ZERO; 4]);
-            for first in (span.uniform.0..span.uniform.1).step_by(V::COUNT) {
-                self.cells::<V, VISCOUS, PRESSURE, false>(
-                    first as usize,
-                    &[],
-                    x_buffer,
-                    y_buffer,
-                    registers,
-                    &mut [],
-                );
-            }
+            y_buffer[..=self.chunks.local_count(chunk)].fill([T::ZERO; 4]);
+            let fields = &mut Fields { x: x_buffer, y: y_buffer, points };
+            self.uniform_cells::<V, VISCOUS, PRESSURE>(span.uniform, fields, registers);
             if VISCOUS {
-                for first in (span.varying.0..span.varying.1).step_by(V::COUNT) {
-                    let eta = self.points_of(span.first_points, (first - span.varying.0) as usize);
-                    self.cells::<V, VISCOUS, PRESSURE, true>(
-                        first as usize,
-                        eta,
-                        x_buffer,
-                        y_buffer,
-                        registers,
-                        points,
-                    );
-                }
+                self.varying_cells::<V, PRESSURE>(span, fields, registers);
             } else {
-                for first in (span.varying.0..span.varying.1).step_by(V::COUNT) {
-                    self.cells::<V, VISCOUS, PRESSURE, false>(
-                        first as usize,
-                        &[],
-                        x_buffer,
-                        y_buffer,
-                        registers,
-                        &mut [],
-                    );
-                }
+                self.uniform_cells::<V, VISCOUS, PRESSURE>(span.varying, fields, registers);
             }
             self.write(chunk, y_buffer, output);
+        }
+    }
+
+    /// Cells whose viscosity is one number, or does not matter.
+    #[inline(always)]
+    fn uniform_cells<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool>(
+        &self,
+        (start, end): (u32, u32),
+        fields: &mut Fields<'_, T>,
+        registers: &mut Registers<V>,
+    ) {
+        for first in (start..end).step_by(V::COUNT) {
+            self.cells::<V, VISCOUS, PRESSURE, false>(first as usize, &[], fields, registers);
+        }
+    }
+
+    /// Cells whose viscosity varies.
+    #[inline(always)]
+    fn varying_cells<V: Lanes<Scalar = T>, const PRESSURE: bool>(
+        &self,
+        span: &Span,
+        fields: &mut Fields<'_, T>,
+        registers: &mut Registers<V>,
+    ) {
+        let (start, end) = span.varying;
+        for first in (start..end).step_by(V::COUNT) {
+            let eta = self.points_of(span.first_points, (first - start) as usize);
+            self.cells::<V, true, PRESSURE, true>(first as usize, eta, fields, registers);
         }
     }
 
@@ -268,13 +213,13 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     ) {
         let chunks = &*self.chunks;
         if VISCOUS {
-            let (own, borrowed) = (chunks.velocity.owned(chunk), &chunks.velocity.borrowed[chunk]);
+            let (own, ghosts) = (chunks.velocity.owned(chunk), &chunks.velocity.ghosts[chunk]);
             let (x, _) = input.x[..chunks.velocity.node_count() * D].as_chunks::<D>();
             let (owned_buffer, rest) = buffer.split_at_mut(own.len());
             for (node, x) in owned_buffer.iter_mut().zip(&x[own]) {
                 set_velocity(node, x);
             }
-            for (node, &from) in rest.iter_mut().zip(borrowed) {
+            for (node, &from) in rest.iter_mut().zip(ghosts) {
                 set_velocity(node, &x[from as usize]);
             }
             if input.expand {
@@ -283,33 +228,33 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         }
         if PRESSURE {
             let own = chunks.pressure.owned(chunk);
-            for (&slot, &p) in chunks.pressure_slots[own.clone()].iter().zip(&input.p[own]) {
-                buffer[slot as usize][D] = T::from_f64(p.to_f64());
+            for (&local, &p) in chunks.pressure_locals[own.clone()].iter().zip(&input.p[own]) {
+                buffer[local as usize][D] = T::from_f64(p.to_f64());
             }
-            let borrowed = chunks.pressure.borrowed.range(chunk);
-            let slots = &chunks.borrowed_pressure_slots[borrowed];
-            for (&slot, &q) in slots.iter().zip(&chunks.pressure.borrowed[chunk]) {
-                buffer[slot as usize][D] = T::from_f64(input.p[q as usize].to_f64());
+            let ghosts = chunks.pressure.ghosts.range(chunk);
+            let locals = &chunks.ghost_pressure_locals[ghosts];
+            for (&local, &q) in locals.iter().zip(&chunks.pressure.ghosts[chunk]) {
+                buffer[local as usize][D] = T::from_f64(input.p[q as usize].to_f64());
             }
         }
-        buffer[chunks.slot_count(chunk)] = [T::ZERO; 4];
+        buffer[chunks.local_count(chunk)] = [T::ZERO; 4];
     }
 
     /// Sets rigid nodes, then hanging ones.
     #[inline(always)]
     fn expand<X: Scalar>(&self, chunk: usize, twists: &[X], buffer: &mut Nodes<T>) {
         let bodies = &self.bodies[chunk];
-        for tie in &self.ties[chunk] {
-            let twist = &twists[bodies[tie.body as usize] as usize * Self::TWIST..][..Self::TWIST];
-            tie.set_velocity(twist, &mut buffer[tie.node as u16 as usize]);
+        for rigid in &self.rigid_nodes[chunk] {
+            let twist = &twists[bodies[rigid.body as usize] as usize * Self::TWIST..][..Self::TWIST];
+            rigid.set_velocity(twist, &mut buffer[rigid.node as u16 as usize]);
         }
-        self.chunks.for_each_hanging(chunk, |slot, masters, weights| {
+        self.chunks.for_each_hanging(chunk, |local, masters, weights| {
             let mut sum = [T::ZERO; D];
             for (&master, &weight) in masters.iter().zip(weights) {
                 let (weight, master) = (T::from_f64(weight), &buffer[master as usize]);
                 (0..D).for_each(|c| sum[c] += weight * master[c]);
             }
-            buffer[slot as usize][..D].copy_from_slice(&sum);
+            buffer[local as usize][..D].copy_from_slice(&sum);
         });
     }
 
@@ -317,32 +262,33 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     #[inline(always)]
     fn write<X: Scalar>(&self, chunk: usize, buffer: &mut Nodes<T>, output: Output<'_, X>) {
         let chunks = &*self.chunks;
-        self.chunks.for_each_hanging(chunk, |slot, masters, weights| {
-            let load = take_velocity::<T, D>(&mut buffer[slot as usize]);
+        self.chunks.for_each_hanging(chunk, |local, masters, weights| {
+            let load = take_velocity::<T, D>(&mut buffer[local as usize]);
             for (&master, &weight) in masters.iter().zip(weights) {
                 let (weight, master) = (T::from_f64(weight), &mut buffer[master as usize]);
                 (0..D).for_each(|c| master[c] += weight * load[c]);
             }
         });
         output.twists.fill(X::ZERO);
-        for tie in &self.ties[chunk] {
-            let force = take_velocity::<T, D>(&mut buffer[tie.node as u16 as usize]);
-            tie.add_moment(&force, &mut output.twists[tie.body as usize * Self::TWIST..][..Self::TWIST]);
+        for rigid in &self.rigid_nodes[chunk] {
+            let force = take_velocity::<T, D>(&mut buffer[rigid.node as u16 as usize]);
+            rigid.add_moment(&force, &mut output.twists[rigid.body as usize * Self::TWIST..][..Self::TWIST]);
         }
-        for &slot in &chunks.boundary[chunk] {
-            take_velocity::<T, D>(&mut buffer[slot as usize]);
+        for &local in &chunks.boundary[chunk] {
+            take_velocity::<T, D>(&mut buffer[local as usize]);
         }
-        let (own, borrowed) = (output.y.as_chunks_mut::<D>().0, output.borrowed_y.as_chunks_mut::<D>().0);
+        let (own, ghosts) = (output.y.as_chunks_mut::<D>().0, output.ghost_y.as_chunks_mut::<D>().0);
         let (owned_buffer, rest) = buffer.split_at(own.len());
         own.iter_mut().zip(owned_buffer).for_each(|(y, node)| *y = velocity_of(node));
-        borrowed.iter_mut().zip(rest).for_each(|(y, node)| *y = velocity_of(node));
-        if !output.q.is_empty() || !output.borrowed_q.is_empty() {
-            for (q, &slot) in output.q.iter_mut().zip(&chunks.pressure_slots[chunks.pressure.owned(chunk)]) {
-                *q = X::from_f64(buffer[slot as usize][D].to_f64());
+        ghosts.iter_mut().zip(rest).for_each(|(y, node)| *y = velocity_of(node));
+        if !output.q.is_empty() || !output.ghost_q.is_empty() {
+            for (q, &local) in output.q.iter_mut().zip(&chunks.pressure_locals[chunks.pressure.owned(chunk)])
+            {
+                *q = X::from_f64(buffer[local as usize][D].to_f64());
             }
-            let slots = &chunks.borrowed_pressure_slots[chunks.pressure.borrowed.range(chunk)];
-            for (q, &slot) in output.borrowed_q.iter_mut().zip(slots) {
-                *q = X::from_f64(buffer[slot as usize][D].to_f64());
+            let locals = &chunks.ghost_pressure_locals[chunks.pressure.ghosts.range(chunk)];
+            for (q, &local) in output.ghost_q.iter_mut().zip(locals) {
+                *q = X::from_f64(buffer[local as usize][D].to_f64());
             }
         }
     }
@@ -363,57 +309,16 @@ fn set_velocity<T: Scalar, X: Scalar, const D: usize>(node: &mut [T; 4], u: &[X;
     *node = std::array::from_fn(|c| if c < D { T::from_f64(u[c].to_f64()) } else { T::ZERO });
 }
 
-/// Cuts off the first `count` entries, or what there is.
-fn first_part<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let count = count.min(rest.len());
-    let (first, second) = std::mem::take(rest).split_at_mut(count);
-    *rest = second;
-    first
-}
-
-/// Adds to the nodes of each chunk what the chunks that borrow them have left, in their order.
-fn add_returned<T: Scalar, const C: usize>(
-    shares: &Shares,
-    chunks: Range<usize>,
-    y: &mut [T],
-    borrowed: &[T],
-    part_count: usize,
-) {
-    let first = shares.owned(chunks.start).start;
-    if part_count > 1 && chunks.len() > 1 {
-        let middle = chunks.start + chunks.len() / 2;
-        let (left, right) = y.split_at_mut((shares.owned(middle).start - first) * C);
-        rayon::join(
-            || add_returned::<T, C>(shares, chunks.start..middle, left, borrowed, part_count / 2),
-            || add_returned::<T, C>(shares, middle..chunks.end, right, borrowed, part_count.div_ceil(2)),
-        );
-        return;
-    }
-    let all = shares.returned.range(chunks.start).start..shares.returned.range(chunks.end - 1).end;
-    for &position in &shares.returned.items()[all] {
-        let node = shares.borrowed.items()[position as usize] as usize - first;
-        let (sum, add) = (&mut y[node * C..][..C], &borrowed[position as usize * C..][..C]);
-        (0..C).for_each(|c| sum[c] += add[c]);
-    }
-}
-
-impl<T: Scalar> Output<'_, T> {
-    fn clear(self) {
-        for part in [self.y, self.q, self.borrowed_y, self.borrowed_q, self.twists] {
-            part.fill(T::ZERO);
-        }
-    }
-}
-
 impl<T: CellScalar, X: Scalar> Workspace<T, X> {
-    /// Makes room for an operator on the current pool of threads and borrows buffers; a second time nothing is allocated.
+    /// Makes room for an operator on the current pool of threads and borrows buffers; a second time nothing
+    /// is allocated.
     fn fit<const D: usize>(&mut self, operator: &CellOperator<T, D>, divergence: bool) {
         let chunks = &operator.chunks;
         let threads = rayon::current_num_threads().clamp(1, chunks.count());
         T::pool().lend(threads, operator.rule.workspace_len(GROUP), &mut self.buffers);
-        self.velocity.resize(chunks.velocity.borrowed.items().len() * D, X::ZERO);
+        self.velocity.resize(chunks.velocity.ghosts.items().len() * D, X::ZERO);
         if divergence {
-            self.pressure.resize(chunks.pressure.borrowed.items().len(), X::ZERO);
+            self.pressure.resize(chunks.pressure.ghosts.items().len(), X::ZERO);
         }
         self.twists.resize(operator.bodies.items().len() * CellOperator::<T, D>::TWIST, X::ZERO);
     }

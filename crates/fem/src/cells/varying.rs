@@ -1,16 +1,16 @@
 //! Viscosity that varies inside a cell, by quadrature.
 //!
-//! `int 2 eta eps(v) : eps(u)` is the sum over the points of a tensor-product rule of `2 eta_q eps(v)_q : eps(u)_q`. Each
-//! of the strains is a triquadratic in Legendre products; its values at the points come one direction after another,
-//! with points that mirror each other in pairs.
+//! `int 2 eta eps(v) : eps(u)` is the sum over the points of a tensor-product rule of
+//! `2 eta_q eps(v)_q : eps(u)_q`. Each of the strains is a triquadratic in Legendre products; its values at
+//! the points come one direction after another, with points that mirror each other in pairs.
 
 use gluey_linalg::Scalar;
 
-use super::legendre::{DERIVATIVE, UNKNOWNS, VELOCITY};
+use super::legendre::{DERIVATIVE, UNKNOWNS, VELOCITY, stride};
 use super::simd::Lanes;
-use crate::element::{gauss, gauss_cube, node_count, split};
+use crate::element::{gauss, gauss_cube, multi_index, node_count};
 
-/// Points a direction for which there is a kernel of its own.
+/// Points per direction for which there is a kernel of its own.
 const USUAL: usize = 4;
 /// Stands for any other number of points.
 const ANY: usize = 0;
@@ -18,11 +18,11 @@ const ANY: usize = 0;
 /// Gauss points with the values of the Legendre polynomials.
 #[derive(Clone, Debug)]
 pub(super) struct PointRule<T> {
-    /// Points a direction.
+    /// Points per direction.
     count: usize,
     /// `c_1 P_1 / c_0` and `c_2 P_2 / c_0` at the points of the lower half.
     lower: Vec<[T; 2]>,
-    /// Weights of all points, `c_0^2` a direction included.
+    /// Weights of all points, `c_0^2` per direction included.
     pub(super) weights: Vec<f64>,
     /// Derivatives: `c_{l+1} P_{l+1}' = slope[l] c_l P_l`.
     slope: [T; 2],
@@ -49,7 +49,8 @@ impl<T: Scalar> PointRule<T> {
         2 * buffer_len(self.count) * lanes
     }
 
-    /// `r += K(eta) u`; `eta` holds viscosities times weights, one group of lanes after another `step` numbers apart.
+    /// `r += K(eta) u`; `eta` holds viscosities times weights, one group of lanes after another `step`
+    /// numbers apart.
     #[inline(always)]
     pub(super) fn add_viscous<V: Lanes<Scalar = T>, const D: usize>(
         &self,
@@ -65,7 +66,7 @@ impl<T: Scalar> PointRule<T> {
         }
     }
 
-    /// `add_viscous` for `N` points a direction.
+    /// `add_viscous` for `N` points per direction.
     #[inline(always)]
     fn add_strains<V: Lanes<Scalar = T>, const D: usize, const N: usize>(
         &self,
@@ -80,7 +81,7 @@ impl<T: Scalar> PointRule<T> {
             for a in 0..=b {
                 let mut strain = [V::splat(T::ZERO); 27];
                 for k in 0..n {
-                    let l = split::<D>(k, 3);
+                    let l = multi_index::<D>(k, 3);
                     if l[b] < 2 {
                         strain[k] = u[a * n + k + stride(b)].mul(V::splat(self.slope[l[b]]));
                     }
@@ -91,7 +92,7 @@ impl<T: Scalar> PointRule<T> {
                 let factor = V::splat(if a == b { T::ONE + T::ONE } else { T::ONE });
                 self.weigh::<V, D, N>(&mut strain, factor, eta, step, work);
                 for k in 0..n {
-                    let l = split::<D>(k, 3);
+                    let l = multi_index::<D>(k, 3);
                     if l[b] < 2 {
                         let r = &mut r[a * n + k + stride(b)];
                         *r = strain[k].mul_add(V::splat(self.slope[l[b]]), *r);
@@ -127,7 +128,7 @@ impl<T: Scalar> PointRule<T> {
         }
         self.weigh_lines::<V, N>(from, count.pow(D as u32 - 1), eta, step);
         for d in (0..D - 1).rev() {
-            self.collect::<V, N>(from, to, stride(D - 1 - d), count.pow(d as u32));
+            self.evaluate_transpose::<V, N>(from, to, stride(D - 1 - d), count.pow(d as u32));
             (from, to) = (to, from);
         }
         for (k, value) in field[..node_count::<D>(2)].iter_mut().enumerate() {
@@ -145,7 +146,8 @@ impl<T: Scalar> PointRule<T> {
         &self.lower[..self.count::<N>().div_ceil(2)]
     }
 
-    /// From coefficients to values at the points of one direction: `outer x 3 x inner` to `outer x count x inner`.
+    /// From coefficients to values at the points of one direction: `outer x 3 x inner` to
+    /// `outer x count x inner`.
     #[inline(always)]
     fn evaluate<V: Lanes<Scalar = T>, const N: usize>(
         &self,
@@ -194,7 +196,7 @@ impl<T: Scalar> PointRule<T> {
 
     /// The transpose of `evaluate`.
     #[inline(always)]
-    fn collect<V: Lanes<Scalar = T>, const N: usize>(
+    fn evaluate_transpose<V: Lanes<Scalar = T>, const N: usize>(
         &self,
         from: &[T],
         to: &mut [T],
@@ -250,11 +252,6 @@ fn put_line<V: Lanes>(to: &mut [V::Scalar], start: usize, stride: usize, a: [V; 
     for (l, a) in a.into_iter().enumerate() {
         put(to, start + l * stride, a);
     }
-}
-
-#[inline(always)]
-const fn stride(direction: usize) -> usize {
-    [1, 3, 9, 27][direction]
 }
 
 #[inline(always)]

@@ -8,13 +8,14 @@ pub const fn node_count<const D: usize>(degree: usize) -> usize {
     (degree + 1).pow(D as u32)
 }
 
-/// The 1D indices of point `i` in a grid with `n` points a direction.
-pub fn split<const D: usize>(i: usize, n: usize) -> [usize; D] {
+/// The 1D indices of point `i` in a grid with `n` points per direction.
+pub fn multi_index<const D: usize>(i: usize, n: usize) -> [usize; D] {
     std::array::from_fn(|d| i / n.pow(d as u32) % n)
 }
 
 /// Values of the 1D Lagrange functions of `degree` 1 or 2 at `x` in `[0, 1]`; unused entries are zero.
 pub fn values_1d(degree: usize, x: f64) -> [f64; 3] {
+    debug_assert!(degree == 1 || degree == 2, "degree {degree}");
     match degree {
         1 => [1.0 - x, x, 0.0],
         _ => [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)],
@@ -23,6 +24,7 @@ pub fn values_1d(degree: usize, x: f64) -> [f64; 3] {
 
 /// Derivatives of the 1D Lagrange functions of `degree` 1 or 2 at `x`.
 pub fn derivatives_1d(degree: usize, x: f64) -> [f64; 3] {
+    debug_assert!(degree == 1 || degree == 2, "degree {degree}");
     match degree {
         1 => [-1.0, 1.0, 0.0],
         _ => [4.0 * x - 3.0, 4.0 - 8.0 * x, 4.0 * x - 1.0],
@@ -31,13 +33,13 @@ pub fn derivatives_1d(degree: usize, x: f64) -> [f64; 3] {
 
 /// Value of shape function `i` of `degree` at the point `x` of the unit cube.
 pub fn value<const D: usize>(degree: usize, i: usize, x: &[f64; D]) -> f64 {
-    let index = split::<D>(i, degree + 1);
+    let index = multi_index::<D>(i, degree + 1);
     (0..D).map(|d| values_1d(degree, x[d])[index[d]]).product()
 }
 
 /// Gradient of shape function `i` of `degree` at `x`, with respect to the unit-cube coordinates.
 pub fn gradient<const D: usize>(degree: usize, i: usize, x: &[f64; D]) -> [f64; D] {
-    let index = split::<D>(i, degree + 1);
+    let index = multi_index::<D>(i, degree + 1);
     std::array::from_fn(|g| {
         let factor = |d: usize| match d == g {
             true => derivatives_1d(degree, x[d])[index[d]],

@@ -1,7 +1,7 @@
 //! Element matrices of the Q2-Q1 pair on the unit cube.
 //!
-//! On a cell of size `h` the viscous matrix scales with `h^(D-2)`, the divergence with `h^(D-1)` and the pressure
-//! mass with `h^D`. Velocity degrees of freedom are numbered `node * D + component`.
+//! On a cell of size `h` the viscous matrix scales with `h^(D-2)`, the divergence with `h^(D-1)` and the
+//! pressure mass with `h^D`. Velocity degrees of freedom are numbered `node * D + component`.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use super::{gauss_cube, gradient, node_count, value};
 
 /// Dense element matrices on the unit cube, row-major. They are integrated once and then shared.
 #[derive(Clone, Copy, Debug)]
-pub struct Reference<const D: usize> {
+pub struct ReferenceMatrices<const D: usize> {
     /// `K[(i,a),(j,b)] = int 2 eps(phi_j e_b) : eps(phi_i e_a)`, square of size `D 3^D`.
     pub viscous: &'static [f64],
     /// `B[q,(j,b)] = int psi_q d_b phi_j`, `2^D` rows of `D 3^D`.
@@ -18,19 +18,19 @@ pub struct Reference<const D: usize> {
     pub pressure_mass: &'static [f64],
 }
 
-impl<const D: usize> Default for Reference<D> {
+impl<const D: usize> Default for ReferenceMatrices<D> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const D: usize> Reference<D> {
+impl<const D: usize> ReferenceMatrices<D> {
     /// Velocity degrees of freedom of a cell, `D 3^D`.
     pub const VELOCITY: usize = D * node_count::<D>(2);
     /// Pressure degrees of freedom of a cell, `2^D`.
     pub const PRESSURE: usize = node_count::<D>(1);
 
-    /// The matrices, integrated exactly (three Gauss points a direction).
+    /// The matrices, integrated exactly (three Gauss points per direction).
     pub fn new() -> Self {
         static OF_DIMENSION: [OnceLock<Matrices>; 4] = [const { OnceLock::new() }; 4];
         let Matrices { viscous, divergence, pressure_mass } = OF_DIMENSION[D].get_or_init(Matrices::new::<D>);
@@ -48,7 +48,7 @@ struct Matrices {
 
 impl Matrices {
     fn new<const D: usize>() -> Self {
-        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         let mut new =
             Self { viscous: vec![0.0; n * n], divergence: vec![0.0; m * n], pressure_mass: vec![0.0; m * m] };
         for (x, weight) in gauss_cube::<D>(3) {
@@ -59,7 +59,7 @@ impl Matrices {
     }
 
     fn add_pressure_terms<const D: usize>(&mut self, x: &[f64; D], weight: f64) {
-        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         let psi: Vec<f64> = (0..m).map(|q| value::<D>(1, q, x)).collect();
         let slopes: Vec<[f64; D]> = (0..n / D).map(|j| gradient::<D>(2, j, x)).collect();
         for q in 0..m {
@@ -73,7 +73,8 @@ impl Matrices {
     }
 }
 
-/// Adds `weight * 2 eps(phi_j e_b) : eps(phi_i e_a)` at the point `x` of the unit cube to a `(D 3^D)^2` matrix.
+/// Adds `weight * 2 eps(phi_j e_b) : eps(phi_i e_a)` at the point `x` of the unit cube to a `(D 3^D)^2`
+/// matrix.
 pub fn add_viscous<const D: usize>(x: &[f64; D], weight: f64, matrix: &mut [f64]) {
     let nodes = node_count::<D>(2);
     let slopes: Vec<[f64; D]> = (0..nodes).map(|i| gradient::<D>(2, i, x)).collect();
@@ -94,12 +95,13 @@ pub fn add_viscous<const D: usize>(x: &[f64; D], weight: f64, matrix: &mut [f64]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::split;
+    use crate::element::multi_index;
 
     fn rigid_motions_cost_nothing<const D: usize>() {
-        let reference = Reference::<D>::new();
-        let n = Reference::<D>::VELOCITY;
-        let points: Vec<[f64; D]> = (0..n / D).map(|i| split::<D>(i, 3).map(|k| 0.5 * k as f64)).collect();
+        let reference = ReferenceMatrices::<D>::new();
+        let n = ReferenceMatrices::<D>::VELOCITY;
+        let points: Vec<[f64; D]> =
+            (0..n / D).map(|i| multi_index::<D>(i, 3).map(|k| 0.5 * k as f64)).collect();
         let rotation: Vec<f64> =
             points.iter().flat_map(|x| (0..D).map(|c| [-x[1], x[0], 0.0][c]).collect::<Vec<_>>()).collect();
         let shear: Vec<f64> =
@@ -110,7 +112,7 @@ mod tests {
         assert!(energy(&rotation).abs() < 1e-12);
         // 2 eps:eps of u = (y, 0) is 2 (1/4 + 1/4) = 1.
         assert!((energy(&shear) - 1.0).abs() < 1e-12);
-        for q in 0..Reference::<D>::PRESSURE {
+        for q in 0..ReferenceMatrices::<D>::PRESSURE {
             let divergence: f64 = (0..n).map(|j| reference.divergence[q * n + j] * shear[j]).sum();
             assert!(divergence.abs() < 1e-13);
         }

@@ -4,6 +4,6 @@ mod lagrange;
 mod matrices;
 mod quadrature;
 
-pub use lagrange::{derivatives_1d, gradient, node_count, split, value, values_1d};
-pub use matrices::{Reference, add_viscous};
+pub use lagrange::{derivatives_1d, gradient, multi_index, node_count, value, values_1d};
+pub use matrices::{ReferenceMatrices, add_viscous};
 pub use quadrature::{gauss, gauss_cube};

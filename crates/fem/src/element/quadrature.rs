@@ -1,6 +1,6 @@
 //! Gauss quadrature on the unit cube. Points are numbered with x fastest.
 
-use super::lagrange::split;
+use super::lagrange::multi_index;
 
 /// Gauss-Legendre points and weights on `[0, 1]` with `n` points (exact to degree `2n-1`).
 pub fn gauss(n: usize) -> Vec<(f64, f64)> {
@@ -32,12 +32,12 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
     (p1, n as f64 * (x * p1 - p0) / (x * x - 1.0))
 }
 
-/// Points and weights of the tensor-product Gauss rule with `n` points a direction on the unit cube.
+/// Points and weights of the tensor-product Gauss rule with `n` points per direction on the unit cube.
 pub fn gauss_cube<const D: usize>(n: usize) -> Vec<([f64; D], f64)> {
     let line = gauss(n);
     (0..n.pow(D as u32))
         .map(|q| {
-            let index = split::<D>(q, n);
+            let index = multi_index::<D>(q, n);
             let weight = (0..D).map(|d| line[index[d]].1).product();
             (std::array::from_fn(|d| line[index[d]].0), weight)
         })

@@ -87,8 +87,8 @@ impl<const D: usize> TreeMesh<D> {
         Self::refine(domain, roots, periodic, level, |_, _, _| true)
     }
 
-    /// Refines every cell of a level below `max_level` for which `wants(lower corner, size, level)` holds, then
-    /// balances 2:1.
+    /// Refines every cell of a level below `max_level` for which `wants(lower corner, size, level)` holds,
+    /// then balances 2:1.
     ///
     /// # Errors
     /// [`MeshError`] if the roots are not cubes or `max_level` is beyond the resolution of the keys.
@@ -202,7 +202,8 @@ impl<const D: usize> TreeMesh<D> {
         }
     }
 
-    /// The cell of the same level displaced by `offset` cells, wrapped in periodic directions; `None` outside.
+    /// The cell of the same level displaced by `offset` cells, wrapped in periodic directions; `None`
+    /// outside.
     pub fn neighbour(&self, cell: &Cell<D>, offset: &[i32; D]) -> Option<Cell<D>> {
         let mut coords = cell.coords;
         for d in 0..D {

@@ -1,9 +1,9 @@
 //! Interpolation from the space of a coarse mesh to that of a finer one whose cells refine it.
 //!
-//! On a refined coarse cell the fine nodes form a grid of `2 degree + 1` points a direction, and interpolation is the
-//! tensor product of one matrix of `2 degree + 1` rows. A fine node belongs to the coarse cell that touches it first.
-//! Nodes are numbered in that order, so the nodes of a coarse cell are a range, and all that is stored of a fine node is
-//! its place in the grid.
+//! On a refined coarse cell the fine nodes form a grid of `2 degree + 1` points per direction, and
+//! interpolation is the tensor product of one matrix of `2 degree + 1` rows. A fine node belongs to the
+//! coarse cell that touches it first. Nodes are numbered in that order, so the nodes of a coarse cell are a
+//! range, and all that is stored of a fine node is its place in the grid.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use gluey_linalg::{Jagged, parallel};
 use rayon::prelude::*;
 
 use super::nodes::NodeMap;
-use crate::element::{split, values_1d};
+use crate::element::{multi_index, values_1d};
 use crate::mesh::{Cell, TreeMesh};
 
 /// Place of a hanging node: its value follows from its masters.
@@ -87,7 +87,7 @@ impl<const D: usize> Interpolation<D> {
                 continue;
             }
             debug_assert_eq!(node as usize, self.place.len(), "nodes are numbered as cells touch them");
-            let index = split::<D>(i, degree + 1);
+            let index = multi_index::<D>(i, degree + 1);
             let along = |d: usize| index[d] + (cell.coords[d] & 1) as usize * degree;
             let in_grid = || (0..D).rev().fold(0, |place, d| place * points + along(d));
             let place = if refined { in_grid() } else { i };
@@ -254,7 +254,8 @@ fn add(load: &[f32], sum: &mut [f32]) {
     sum.iter_mut().zip(load).for_each(|(sum, load)| *sum += load);
 }
 
-/// Interpolation on a line: points `0, 2, ..` of the fine grid are coarse nodes, the others are weighted sums of them.
+/// Interpolation on a line: points `0, 2, ..` of the fine grid are coarse nodes, the others are weighted sums
+/// of them.
 #[derive(Clone, Debug)]
 struct Line {
     degree: usize,

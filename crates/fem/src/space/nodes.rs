@@ -3,7 +3,7 @@
 use gluey_geom::Vector;
 use rustc_hash::FxHashMap;
 
-use crate::element::{node_count, split, values_1d};
+use crate::element::{multi_index, node_count, values_1d};
 use crate::mesh::{COORD_BITS, Cell, TreeMesh, offsets};
 
 /// A hanging node: its value is the weighted sum of those of regular nodes, `u = sum_j w_j u_j`.
@@ -129,7 +129,7 @@ impl<const D: usize> NodeMap<D> {
     }
 
     /// The transpose of [`NodeMap::distribute`]: moves the load on hanging nodes to their masters.
-    pub fn collect<T: Copy + std::ops::AddAssign + std::ops::Mul<Output = T>>(
+    pub fn condense<T: Copy + std::ops::AddAssign + std::ops::Mul<Output = T>>(
         &self,
         components: usize,
         weight: impl Fn(f64) -> T,
@@ -147,7 +147,8 @@ impl<const D: usize> NodeMap<D> {
         }
     }
 
-    /// Appends the nodes of a cell; `index` finds those that other cells have touched before by their lattice points.
+    /// Appends the nodes of a cell; `index` finds those that other cells have touched before by their lattice
+    /// points.
     fn touch(&mut self, cell: &Cell<D>, finest: u8, index: &mut FxHashMap<u64, u32>) {
         for i in 0..self.nodes_per_cell {
             let point = self.wrap(lattice_point(cell, self.degree, i, finest));
@@ -201,7 +202,7 @@ impl<const D: usize> NodeMap<D> {
     /// Local nodes of a cell that lie on the face, edge or corner in the direction `offset`.
     fn nodes_facing(&self, offset: &[i32; D]) -> Vec<usize> {
         let faces = |i: &usize| {
-            let index = split::<D>(*i, self.degree + 1);
+            let index = multi_index::<D>(*i, self.degree + 1);
             (0..D).all(|d| match offset[d] {
                 -1 => index[d] == 0,
                 1 => index[d] == self.degree,
@@ -226,7 +227,7 @@ impl<const D: usize> NodeMap<D> {
         let values: [[f64; 3]; D] = std::array::from_fn(|d| values_1d(self.degree, local[d]));
         let mut masters: Vec<(u32, f64)> = Vec::new();
         for (i, &master) in self.cell(coarse).iter().enumerate() {
-            let index = split::<D>(i, self.degree + 1);
+            let index = multi_index::<D>(i, self.degree + 1);
             let weight: f64 = (0..D).map(|d| values[d][index[d]]).product();
             if weight == 0.0 {
                 continue;
@@ -259,7 +260,7 @@ impl<const D: usize> NodeMap<D> {
 
 /// Lattice point of local node `i` of a cell.
 fn lattice_point<const D: usize>(cell: &Cell<D>, degree: usize, i: usize, finest: u8) -> [u32; D] {
-    let index = split::<D>(i, degree + 1);
+    let index = multi_index::<D>(i, degree + 1);
     std::array::from_fn(|d| (cell.coords[d] * degree as u32 + index[d] as u32) << (finest - cell.level))
 }
 
@@ -333,7 +334,7 @@ mod tests {
         constraints_reproduce_polynomials::<3>();
     }
 
-    fn collect_is_the_transpose<const D: usize>() {
+    fn condense_is_the_transpose<const D: usize>() {
         let nodes = NodeMap::new(&graded::<D>(true), 2);
         let n = nodes.node_count();
         let wave = |k: f64| (0..n).map(|i| (k * i as f64).sin()).collect::<Vec<f64>>();
@@ -344,15 +345,15 @@ mod tests {
         }
         let (before_u, before_f) = (u.clone(), f.clone());
         nodes.distribute(1, |w| w, &mut u);
-        nodes.collect(1, |w| w, &mut f);
+        nodes.condense(1, |w| w, &mut f);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         assert!((dot(&u, &before_f) - dot(&before_u, &f)).abs() < 1e-10);
     }
 
     #[test]
-    fn collecting_loads_is_the_transpose_of_distributing() {
-        collect_is_the_transpose::<2>();
-        collect_is_the_transpose::<3>();
+    fn condensing_loads_is_the_transpose_of_distributing() {
+        condense_is_the_transpose::<2>();
+        condense_is_the_transpose::<3>();
     }
 
     #[test]

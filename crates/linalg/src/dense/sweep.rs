@@ -1,11 +1,12 @@
 //! Inverses and Schur complements of dense symmetric matrices of some tens of rows.
 //!
-//! A group of unknowns `K` changes places with its equations: with `P = A_KK` the matrix becomes `-P^-1` there,
-//! `A_iK P^-1` beside it and `A_ij - A_iK P^-1 A_Kj` elsewhere, and stays symmetric (Goodnight 1979,
-//! 10.2307/2683825). After all unknowns have gone it is `-A^-1`. If only the first ones go, what is left of the others is
-//! their Schur complement.
+//! The sweep operator: a group of unknowns `K` changes places with its equations: with `P = A_KK` the matrix
+//! becomes `-P^-1` there, `A_iK P^-1` beside it and `A_ij - A_iK P^-1 A_Kj` elsewhere, and stays symmetric
+//! (Goodnight 1979, 10.2307/2683825). After all unknowns have gone it is `-A^-1`. If only the first ones go,
+//! what is left of the others is their Schur complement.
 //!
-//! The loops are compiled for the vectors the processor has; where it fuses products and sums, they are fused.
+//! The loops are compiled for the vectors the processor has; where it fuses products and sums, they are
+//! fused.
 
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
@@ -13,7 +14,7 @@ use super::cholesky::BlockError;
 
 /// Rows are padded to a multiple of this, which is one of the numbers in a vector.
 const LANES: usize = 8;
-/// Unknowns that are exchanged at once.
+/// Unknowns that are swept at once.
 const GROUP: usize = 4;
 
 /// A dense symmetric matrix, of which the lower triangle counts.
@@ -24,7 +25,7 @@ pub struct DenseSymmetric {
     stride: usize,
     /// Row by row.
     values: Vec<f64>,
-    /// The rows `A_K` of the group that is exchanged, one after the other.
+    /// The rows `A_K` of the group that is swept, one after the other.
     group: Vec<f64>,
 }
 
@@ -59,16 +60,16 @@ impl DenseSymmetric {
         &mut self.values[row * self.stride..][..self.dim]
     }
 
-    /// Replaces a positive definite matrix by the negative of its inverse.
-    pub fn invert_to_negative(&mut self) -> Result<(), BlockError> {
+    /// Sweeps all unknowns: replaces a positive definite matrix by the negative of its inverse.
+    pub fn sweep(&mut self) -> Result<(), BlockError> {
         let count = self.dim;
-        Arch::new().dispatch(Exchange::<true> { matrix: self, count })
+        Arch::new().dispatch(Sweep::<true> { matrix: self, count })
     }
 
-    /// Replaces the part of the matrix beyond the first `count` unknowns, on which it is positive definite, by the Schur
-    /// complement; the rest is lost.
+    /// Sweeps the first unknowns only: replaces the part of the matrix beyond the first `count` unknowns, on
+    /// which it is positive definite, by the Schur complement; the rest is lost.
     pub fn eliminate(&mut self, count: usize) -> Result<(), BlockError> {
-        Arch::new().dispatch(Exchange::<false> { matrix: self, count })
+        Arch::new().dispatch(Sweep::<false> { matrix: self, count })
     }
 
     /// `P^-1` for the group of `size` unknowns from `first` on, with zeros around it.
@@ -116,8 +117,8 @@ impl DenseSymmetric {
         })
     }
 
-    /// Subtracts the multiples `factors` of the rows of the group, in the columns from `start` on, which is a multiple of
-    /// [`LANES`].
+    /// Subtracts the multiples `factors` of the rows of the group, in the columns from `start` on, which is a
+    /// multiple of [`LANES`].
     #[inline(always)]
     fn subtract<S: Simd>(&mut self, simd: S, row: usize, start: usize, factors: &[f64; GROUP]) {
         let columns = start..(row + 1).next_multiple_of(LANES);
@@ -140,13 +141,14 @@ impl DenseSymmetric {
     }
 }
 
-/// Exchanges the first `count` unknowns. Unless `BACKWARD`, what becomes of those that have gone is not computed.
-struct Exchange<'a, const BACKWARD: bool> {
+/// Sweeps the first `count` unknowns. Unless `BACKWARD`, what becomes of those that have gone is not
+/// computed.
+struct Sweep<'a, const BACKWARD: bool> {
     matrix: &'a mut DenseSymmetric,
     count: usize,
 }
 
-impl<const BACKWARD: bool> WithSimd for Exchange<'_, BACKWARD> {
+impl<const BACKWARD: bool> WithSimd for Sweep<'_, BACKWARD> {
     type Output = Result<(), BlockError>;
 
     #[inline(always)]
@@ -203,7 +205,7 @@ mod tests {
     fn the_inverse_times_the_matrix_is_one() {
         for dim in 1..40 {
             let (mut inverse, a) = random(dim);
-            inverse.invert_to_negative().expect("positive definite");
+            inverse.sweep().expect("positive definite");
             for i in 0..dim {
                 for j in 0..dim {
                     let product: f64 = (0..dim).map(|k| -at(&inverse, i, k) * a[k * dim + j]).sum();
@@ -221,7 +223,7 @@ mod tests {
             let (mut schur, _) = random(dim);
             let mut inverse = schur.clone();
             schur.eliminate(count).expect("positive definite");
-            inverse.invert_to_negative().expect("positive definite");
+            inverse.sweep().expect("positive definite");
             for i in count..dim {
                 for j in count..dim {
                     let product: f64 = (count..dim).map(|k| -at(&schur, i, k) * at(&inverse, k, j)).sum();
@@ -237,7 +239,7 @@ mod tests {
         let (mut wide, _) = random(81);
         let mut plain = wide.clone();
         wide.eliminate(70).expect("positive definite");
-        Exchange::<false> { matrix: &mut plain, count: 70 }.with_simd(Scalar).expect("positive definite");
+        Sweep::<false> { matrix: &mut plain, count: 70 }.with_simd(Scalar).expect("positive definite");
         for (a, b) in (70..81).flat_map(|row| wide.row(row)[70..].iter().zip(&plain.row(row)[70..])) {
             assert!((a - b).abs() < 1e-12 * plain.row(70)[70], "{a} {b}");
         }
@@ -249,6 +251,6 @@ mod tests {
         matrix.row_mut(0)[0] = 1.0;
         matrix.row_mut(1).copy_from_slice(&[2.0, 1.0]);
         let refused = BlockError::NotPositiveDefinite { pivot: 1, value: -3.0 };
-        assert_eq!(matrix.invert_to_negative(), Err(refused));
+        assert_eq!(matrix.sweep(), Err(refused));
     }
 }

@@ -1,8 +1,8 @@
 //! Sparse direct solvers with checked results, on the supernodal factorisations of faer. Always one thread.
 //!
-//! The symbolic part ([`Symbolic`]) depends on the pattern alone and is shared as long as that stands. Every solve
-//! computes its true residual `b - A x`, refines, and either meets its tolerance or returns an error: a factorisation
-//! that broke down can never pass for a solution.
+//! The symbolic part ([`Symbolic`]) depends on the pattern alone and is shared as long as that stands. Every
+//! solve computes its true residual `b - A x`, refines, and either meets its tolerance or returns an error: a
+//! factorisation that broke down can never pass for a solution.
 
 mod indefinite;
 mod ordering;
@@ -36,7 +36,8 @@ const SIDE: Side = Side::Lower;
 /// Order in which the unknowns are eliminated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ordering<'a> {
-    /// Approximate minimum degree (Amestoy, Davis and Duff 1996). Good in 2D; in 3D nested dissection fills less.
+    /// Approximate minimum degree (Amestoy, Davis and Duff 1996). Good in 2D; in 3D nested dissection fills
+    /// less.
     Amd,
     /// Order of the rows.
     Natural,

@@ -6,8 +6,8 @@ use super::{DirectError, Scratch, faer_pattern};
 use crate::sparse::{BlockPattern, Pattern};
 
 impl BlockPattern {
-    /// An order of elimination of the unknowns by approximate minimum degree (Amestoy, Davis and Duff 1996) of whole
-    /// blocks, for [`crate::Ordering::Custom`].
+    /// An order of elimination of the unknowns by approximate minimum degree (Amestoy, Davis and Duff 1996)
+    /// of whole blocks, for [`crate::Ordering::Custom`].
     pub fn minimum_degree(&self) -> Result<Vec<usize>, DirectError> {
         let order = minimum_degree(self.blocks())?;
         Ok(order.into_iter().flat_map(|block| self.range(block)).collect())

@@ -1,16 +1,19 @@
 //! Generalised conjugate residuals with a preconditioner that may change, in two precisions.
 //!
-//! Step `k` takes a direction `z = M_k^-1 r`, makes `c = A z` orthogonal to those before it and takes `c` out of the residual `r`:
-//! with `A Z = C R` for the stored directions, orthogonal `C` and upper triangular `R`, the residual `r - C C^T r` is the smallest
-//! that any combination of the directions leaves, and belongs to `x + Z R^-1 C^T r` (Eisenstat, Elman and Schultz 1983,
-//! 10.1137/0720023; with inner iterations van der Vorst and Vuik 1994, 10.1002/nla.1680010404). Flexible GMRES finds the same
-//! residuals; here they are at hand in every step. Where a step hardly makes the residual smaller, the next direction starts
-//! from `c` in place of `r`, which would give the last direction again (Jiranek and Rozloznik 2010, 10.1007/s11075-009-9311-6).
+//! Step `k` takes a direction `z = M_k^-1 r`, makes `c = A z` orthogonal to those before it and takes `c` out
+//! of the residual `r`: with `A Z = C R` for the stored directions, orthogonal `C` and upper triangular `R`,
+//! the residual `r - C C^T r` is the smallest that any combination of the directions leaves, and belongs to
+//! `x + Z R^-1 C^T r` (Eisenstat, Elman and Schultz 1983, 10.1137/0720023; with inner iterations van der
+//! Vorst and Vuik 1994, 10.1002/nla.1680010404). Flexible GMRES finds the same residuals; here they are at
+//! hand in every step. Where a step hardly makes the residual smaller, the next direction starts from `c` in
+//! place of `r`, which would give the last direction again (Jiranek and Rozloznik 2010,
+//! 10.1007/s11075-009-9311-6).
 //!
-//! `Gcr<f64, f32>` takes its steps in single precision: preconditioner, operator and all vectors that are kept. They work in
-//! stages: when the residual has become smaller by `epsilon^(2/3)`, or no longer becomes smaller, `x` is updated and the residual
-//! computed anew, both in double precision. `Z`, `C` and `R` stay, so a new stage loses nothing. The true residual decides when
-//! to stop, and reaches what double precision allows.
+//! `Gcr<f64, f32>` takes its steps in single precision: preconditioner, operator and all vectors that are
+//! kept. They work in stages: when the residual has become smaller by `epsilon^(2/3)`, or no longer becomes
+//! smaller, `x` is updated and the residual computed anew, both in double precision. `Z`, `C` and `R` stay,
+//! so a new stage loses nothing. The true residual decides when to stop, and reaches what double precision
+//! allows.
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
@@ -42,16 +45,17 @@ impl Default for GcrParams {
     }
 }
 
-/// Flexible generalised conjugate residuals. Owns its workspace, which grows to what the longest solve needed and is then
-/// reused.
+/// Flexible generalised conjugate residuals. Owns its workspace, which grows to what the longest solve needed
+/// and is then reused.
 ///
-/// `Gcr<f64, f32>` takes its steps in single precision, see [`Gcr::with_steps`]. It reaches the same true residual.
+/// `Gcr<f64, f32>` takes its steps in single precision, see [`Gcr::with_steps`]. It reaches the same true
+/// residual.
 #[derive(Clone, Debug)]
 pub struct Gcr<T, S = T> {
     params: GcrParams,
     /// `b - A x`.
     residual: Vec<T>,
-    /// What the steps of a stage have left of it, over its norm at their start.
+    /// The part of it that the steps of a stage have left, over its norm at their start.
     r: Vec<S>,
     /// `Z`.
     directions: Directions<S>,
@@ -72,11 +76,11 @@ impl<T: Scalar> Gcr<T> {
 }
 
 impl<T: Scalar, S: Scalar> Gcr<T, S> {
-    /// A solver with an empty workspace that takes its steps in `S`: half the memory and half the traffic where that is
-    /// narrower than `T`.
+    /// A solver with an empty workspace that takes its steps in `S`: half the memory and half the traffic
+    /// where that is narrower than `T`.
     ///
-    /// For a good preconditioner, with convergence in a few dozen iterations: rounded vectors no longer span a Krylov space,
-    /// which delays convergence through hundreds of iterations.
+    /// For a good preconditioner, with convergence in a few dozen iterations: rounded vectors no longer span
+    /// a Krylov space, which delays convergence through hundreds of iterations.
     pub fn with_steps(params: GcrParams) -> Self {
         let restart = params.restart.max(1);
         Self {
@@ -101,15 +105,16 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.params.relative_tolerance = tolerance;
     }
 
-    /// Residual norms of the last solve: the initial one, then one for each iteration. The last is the true one.
+    /// Residual norms of the last solve: the initial one, then one for each iteration. The last is the true
+    /// one.
     pub fn residual_history(&self) -> &[f64] {
         &self.history
     }
 
     /// Solves `A x = b` from the guess in `x`.
     ///
-    /// Converged means that the residual recomputed from `x` is small, not the one of the recurrence. On an error `x`
-    /// holds the last finite iterate.
+    /// Converged means that the residual recomputed from `x` is small, not the one of the recurrence. On an
+    /// error `x` holds the last finite iterate.
     pub fn solve(
         &mut self,
         a: &mut (impl LinOp<T> + LinOp<S> + ?Sized),
@@ -150,8 +155,9 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.triangle.clear();
     }
 
-    /// Takes steps from the true residual until it is small, the precision of the steps is used up or they no longer
-    /// help: none if the images known already leave little of it, but at least one if there was none in the last stage.
+    /// Takes steps from the true residual until it is small, the precision of the steps is used up or they no
+    /// longer help: none if the images known already leave little of it, but at least one if there was none
+    /// in the last stage.
     fn stage(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
@@ -193,8 +199,8 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         Ok(StageEnd::Regular)
     }
 
-    /// One more direction, from the last image or from the residual; returns the norm of what it leaves of the residual, or
-    /// nothing where its image is a combination of those before.
+    /// One more direction, from the last image or from the residual; returns the norm of what it leaves of
+    /// the residual, or nothing where its image is a combination of those before.
     fn step(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
@@ -218,7 +224,8 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         Some(images.take_out_last(left.product, r))
     }
 
-    /// `x += norm Z R^-1 C^T r`, unless that is not finite, and the true residual for the next stage; returns its norm.
+    /// `x += norm Z R^-1 C^T r`, unless that is not finite, and the true residual for the next stage; returns
+    /// its norm.
     fn update(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),

@@ -1,5 +1,5 @@
-//! The largest eigenvalue of a preconditioned operator, from the Lanczos matrix that conjugate gradients builds
-//! (Golub and Van Loan 2013, section 11.3).
+//! The largest eigenvalue of a preconditioned operator, from the Lanczos matrix that conjugate gradients
+//! builds (Golub and Van Loan 2013, section 11.3).
 
 use super::KrylovError;
 use crate::operator::{LinOp, Preconditioner};
@@ -8,8 +8,9 @@ use crate::vector;
 
 /// Estimate of the largest eigenvalue of `M^-1 A`, both symmetric positive definite, from `iterations` steps.
 ///
-/// The estimate is a Ritz value, a bound from below; ten steps come within a few per cent, so multiply it by 1.1 to 1.2
-/// where a bound from above is needed. The start vector is fixed, so the result repeats bit for bit.
+/// The estimate is a Ritz value, a bound from below; ten steps come within a few per cent, so multiply it by
+/// 1.1 to 1.2 where a bound from above is needed. The start vector is fixed, so the result repeats bit for
+/// bit.
 pub fn estimate_lambda_max<T: Scalar>(
     a: &mut (impl LinOp<T> + ?Sized),
     m: &mut (impl Preconditioner<T> + ?Sized),

@@ -1,4 +1,5 @@
-//! What the Krylov methods share: reference norms, reports and errors.
+//! Krylov methods: solvers, an estimate of the largest eigenvalue, and the norms, reports and errors they
+//! share.
 
 mod basis;
 mod gcr;

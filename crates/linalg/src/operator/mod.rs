@@ -1,4 +1,4 @@
-//! What iterative methods ask of a matrix and of its approximate inverse, and the simplest of these.
+//! Operators and preconditioners: all that iterative methods ask of a matrix and of its approximate inverse.
 
 use crate::scalar::Scalar;
 use crate::vector;
@@ -27,12 +27,13 @@ pub trait Preconditioner<T> {
         &[]
     }
 
-    /// What is to be added there: `z = P r` for vectors on the scattered unknowns alone.
+    /// The addition there: `z = P r` for vectors on the scattered unknowns alone.
     fn apply_scattered(&mut self, _r: &[T], z: &mut [T]) {
         debug_assert!(z.is_empty(), "scattered unknowns without a matrix");
     }
 
-    /// `z = M^-1 r` on the unknowns after those of [`Preconditioner::diagonal`], which they must not depend on.
+    /// `z = M^-1 r` on the unknowns after those of [`Preconditioner::diagonal`], which they must not depend
+    /// on.
     fn apply_rest(&mut self, r: &[T], z: &mut [T]) {
         self.apply(r, z);
     }

@@ -1,9 +1,10 @@
 //! Chebyshev smoothing (Adams, Brezina, Hu and Tuminaro 2003, 10.1016/S0021-9991(03)00194-3).
 //!
-//! With the spectrum of `M^-1 A` in `[lower, upper]` the error is multiplied by `T_k((theta - M^-1 A)/delta) /
-//! T_k(theta/delta)`, `theta = (upper + lower)/2`, `delta = (upper - lower)/2`: on that interval the error contracts by
-//! at least `1/T_k(theta/delta)`, and modes below `lower` never grow. Nothing but `A`, `M` and vector updates is
-//! needed, so the result does not depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
+//! With the spectrum of `M^-1 A` in `[lower, upper]` the error is multiplied by
+//! `T_k((theta - M^-1 A)/delta) / T_k(theta/delta)`, `theta = (upper + lower)/2`,
+//! `delta = (upper - lower)/2`: on that interval the error contracts by at least `1/T_k(theta/delta)`, and
+//! modes below `lower` never grow. Nothing but `A`, `M` and vector updates is needed, so the result does not
+//! depend on the number of threads, and the smoother is symmetric where `A` and `M` are.
 
 use crate::krylov::{KrylovError, estimate_lambda_max};
 use crate::operator::{LinOp, Preconditioner};
@@ -20,8 +21,9 @@ pub struct SpectralInterval {
 }
 
 impl SpectralInterval {
-    /// `[safety * lambda_max / ratio, safety * lambda_max]`: the upper part that a coarse grid does not see. `safety`
-    /// (1.1 is usual) covers an estimate of the largest eigenvalue from below; see [`crate::estimate_lambda_max`].
+    /// `[safety * lambda_max / ratio, safety * lambda_max]`: the upper part that a coarse grid does not see.
+    /// `safety` (1.1 is usual) covers an estimate of the largest eigenvalue from below; see
+    /// [`crate::estimate_lambda_max`].
     pub fn upper_part(lambda_max: f64, ratio: f64, safety: f64) -> Self {
         Self { lower: safety * lambda_max / ratio, upper: safety * lambda_max }
     }
@@ -57,8 +59,9 @@ pub enum Guess {
 
 /// Chebyshev smoother of fixed degree. Owns its workspace of two vectors.
 ///
-/// The last two iterates take the place of residual and step: `x_{k+1} = x_k + old (x_k - x_{k-1}) + new M^-1 (b - A x_k)`
-/// overwrites `x_{k-1}`, so a step reads five vectors and writes one.
+/// The last two iterates take the place of residual and step:
+/// `x_{k+1} = x_k + old (x_k - x_{k-1}) + new M^-1 (b - A x_k)` overwrites `x_{k-1}`, so a step reads five
+/// vectors and writes one.
 #[derive(Clone, Debug)]
 pub struct Chebyshev<T> {
     degree: usize,
@@ -67,17 +70,17 @@ pub struct Chebyshev<T> {
     y: Vec<T>,
     /// `A x_k`.
     z: Vec<T>,
-    apart: Apart<T>,
+    work: SplitWorkspace<T>,
 }
 
-/// Residuals, and what becomes of them, where `M` is not a diagonal.
+/// Residuals, and `M^-1` of them, where `M` is not a diagonal.
 #[derive(Clone, Debug)]
-struct Apart<T> {
+struct SplitWorkspace<T> {
     rest: Vec<T>,
     scattered: [Vec<T>; 2],
 }
 
-impl<T> Default for Apart<T> {
+impl<T> Default for SplitWorkspace<T> {
     fn default() -> Self {
         Self { rest: Vec::new(), scattered: Default::default() }
     }
@@ -87,10 +90,11 @@ impl<T: Scalar> Chebyshev<T> {
     /// A smoother with `degree` >= 1 applications of the preconditioner, for operators of dimension `dim`.
     pub fn new(dim: usize, degree: usize, interval: SpectralInterval) -> Self {
         let zeros = || vec![T::ZERO; dim];
-        Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), apart: Apart::default() }
+        Self { degree: degree.max(1), interval, y: zeros(), z: zeros(), work: SplitWorkspace::default() }
     }
 
-    /// A smoother for the upper part of the spectrum of `M^-1 A`, of which the largest eigenvalue is estimated.
+    /// A smoother for the upper part of the spectrum of `M^-1 A`, of which the largest eigenvalue is
+    /// estimated.
     pub fn for_operator(
         a: &mut (impl LinOp<T> + ?Sized),
         m: &mut (impl Preconditioner<T> + ?Sized),
@@ -100,7 +104,8 @@ impl<T: Scalar> Chebyshev<T> {
         Ok(Self::below(lambda_max, a.dim(), params))
     }
 
-    /// A smoother for the upper part of the spectrum below a known largest eigenvalue, for operators of dimension `dim`.
+    /// A smoother for the upper part of the spectrum below a known largest eigenvalue, for operators of
+    /// dimension `dim`.
     pub fn below(lambda_max: f64, dim: usize, params: &ChebyshevParams) -> Self {
         let interval = SpectralInterval::upper_part(lambda_max, params.ratio, params.safety);
         Self::new(dim, params.degree, interval)
@@ -118,7 +123,8 @@ impl<T: Scalar> Chebyshev<T> {
         1.0 / (self.degree as f64 * sigma.acosh()).cosh()
     }
 
-    /// One smoothing sweep for `A x = b`: `degree` applications of `m`, and as many of `a`, less one from a zero guess.
+    /// One smoothing sweep for `A x = b`: `degree` applications of `m`, and as many of `a`, less one from a
+    /// zero guess.
     pub fn smooth(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
@@ -136,8 +142,8 @@ impl<T: Scalar> Chebyshev<T> {
                 vector::copy(x, &mut self.y);
             }
         }
-        let Self { y, z, apart, .. } = self;
-        let mut system = System { b, z, apart };
+        let Self { y, z, work, .. } = self;
+        let mut system = System { b, z, work };
         // So that the last iterate is in `x`.
         let (mut before, mut now) = if is_odd { (&mut y[..], x) } else { (x, &mut y[..]) };
         let weight = T::from_f64(1.0 / theta);
@@ -172,7 +178,7 @@ impl<T: Scalar> Chebyshev<T> {
 struct System<'a, T> {
     b: &'a [T],
     z: &'a mut [T],
-    apart: &'a mut Apart<T>,
+    work: &'a mut SplitWorkspace<T>,
 }
 
 /// `to = next(from, to) + weight M^-1 residual(b, z)`.
@@ -187,19 +193,19 @@ impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Step<T, R, N> 
     fn take(
         &self,
         m: &mut (impl Preconditioner<T> + ?Sized),
-        System { b, z, apart }: &mut System<'_, T>,
+        System { b, z, work }: &mut System<'_, T>,
         from: &[T],
         to: &mut [T],
     ) {
         let split = m.diagonal().len();
         let (to, to_rest) = to.split_at_mut(split);
         if !to_rest.is_empty() {
-            let part = System { b: &b[split..], z: &mut z[split..], apart };
+            let part = System { b: &b[split..], z: &mut z[split..], work };
             self.take_rest(m, part, &from[split..], to_rest);
         }
         self.take_diagonal(m.diagonal(), b, z, from, to);
         if !m.scattered().is_empty() {
-            self.add_scattered(m, System { b, z, apart }, to);
+            self.add_scattered(m, System { b, z, work }, to);
         }
     }
 
@@ -207,12 +213,12 @@ impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Step<T, R, N> 
     fn take_rest(
         &self,
         m: &mut (impl Preconditioner<T> + ?Sized),
-        System { b, z, apart }: System<'_, T>,
+        System { b, z, work }: System<'_, T>,
         from: &[T],
         to: &mut [T],
     ) {
         let Self { weight, residual, next } = self;
-        let rest = &mut apart.rest;
+        let rest = &mut work.rest;
         rest.resize(b.len(), T::ZERO);
         parallel::for_each(rest, |first, r| {
             for (r, (&b, &z)) in r.iter_mut().zip(b[first..].iter().zip(&z[first..])) {
@@ -242,10 +248,10 @@ impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Step<T, R, N> 
     fn add_scattered(
         &self,
         m: &mut (impl Preconditioner<T> + ?Sized),
-        System { b, z, apart }: System<'_, T>,
+        System { b, z, work }: System<'_, T>,
         to: &mut [T],
     ) {
-        let [r, sum] = &mut apart.scattered;
+        let [r, sum] = &mut work.scattered;
         r.clear();
         r.extend(m.scattered().iter().map(|&k| (self.residual)(b[k as usize], z[k as usize])));
         sum.resize(r.len(), T::ZERO);

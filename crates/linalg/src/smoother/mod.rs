@@ -1,4 +1,4 @@
-//! Smoothers: what damps the part of an error that a coarser mesh does not see.
+//! Smoothers: they damp the part of an error that a coarser mesh does not see.
 
 mod chebyshev;
 

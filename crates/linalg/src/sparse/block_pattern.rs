@@ -1,7 +1,9 @@
-//! Patterns of matrices whose unknowns come in blocks of consecutive numbers, such as the velocity components of a node.
+//! Patterns of matrices whose unknowns come in blocks of consecutive numbers, such as the velocity components
+//! of a node.
 //!
-//! The unknowns of a block share their couplings. What depends on couplings alone (the pattern, the places where a
-//! cell's matrix goes, the elimination order) is found for blocks and expanded to unknowns, at a fraction of the cost.
+//! The unknowns of a block share their couplings. What depends on couplings alone (the pattern, the places
+//! where a cell's matrix goes, the elimination order) is found for blocks and expanded to unknowns, at a
+//! fraction of the cost.
 
 use std::sync::Arc;
 
@@ -41,8 +43,9 @@ pub struct BlockPattern {
 }
 
 impl BlockPattern {
-    /// Pattern that couples all unknowns of all blocks of a group with each other. Block `b` holds the unknowns
-    /// `first[b] .. first[b + 1]`, so `first` ascends from zero and has one entry more than there are blocks.
+    /// Pattern that couples all unknowns of all blocks of a group with each other. Block `b` holds the
+    /// unknowns `first[b] .. first[b + 1]`, so `first` ascends from zero and has one entry more than there
+    /// are blocks.
     pub fn new(first: Vec<u32>, groups: BlockGroups) -> Result<Self, SparseError> {
         let slices: Vec<&[usize]> = groups.iter().collect();
         let blocks = Pattern::from_groups(first.len().saturating_sub(1), &slices)?;
@@ -71,8 +74,8 @@ impl BlockPattern {
         self.first[block] as usize..self.first[block + 1] as usize
     }
 
-    /// The sum of dense matrices, one a group. `fill` is called for group after group with its blocks and a zero matrix
-    /// to write to, row by row in the order of [`BlockPattern::unknowns_of`].
+    /// The sum of dense matrices, one per group. `fill` is called for group after group with its blocks and a
+    /// zero matrix to write to, row by row in the order of [`BlockPattern::unknowns_of`].
     pub fn sum<T: Scalar>(&self, mut fill: impl FnMut(&[usize], &mut [T])) -> SparseMatrix<T> {
         let mut matrix = SparseMatrix::zeros(self.pattern.clone());
         let (mut dense, mut offsets) = (Vec::new(), self.offsets.as_slice());

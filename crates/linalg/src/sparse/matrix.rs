@@ -1,4 +1,5 @@
-//! Sparse matrices in compressed rows: the pattern apart from the values, so that a steady mesh refills only values.
+//! Sparse matrices in compressed rows: the pattern apart from the values, so that a steady mesh refills only
+//! values.
 
 use std::sync::Arc;
 

@@ -8,4 +8,4 @@ mod sell;
 pub use block_pattern::{BlockGroups, BlockPattern};
 pub use matrix::SparseMatrix;
 pub use pattern::{Pattern, SparseError};
-pub use sell::SlicedMatrix;
+pub use sell::SellMatrix;

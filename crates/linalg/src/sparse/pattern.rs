@@ -50,8 +50,8 @@ pub enum SparseError {
 }
 
 impl Pattern {
-    /// Pattern of a square matrix of dimension `dim` that couples all unknowns of a group with each other; a group is
-    /// typically the unknowns of a cell. The diagonal is always in it, and the pattern is symmetric.
+    /// Pattern of a square matrix of dimension `dim` that couples all unknowns of a group with each other; a
+    /// group is typically the unknowns of a cell. The diagonal is always in it, and the pattern is symmetric.
     pub fn from_groups<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
         let touching = touching(dim, groups)?;
         let mut builder = RowBuilder::new(dim, dim);
@@ -86,8 +86,8 @@ impl Pattern {
         Ok(Self { column_count: dim, rows })
     }
 
-    /// This symmetric pattern, whose rows are not sorted, with rows sorted. Row `i` is column `i`, so handing out rows
-    /// in ascending order to their columns sorts them all, without a comparison.
+    /// This symmetric pattern, whose rows are not sorted, with rows sorted. Row `i` is column `i`, so handing
+    /// out rows in ascending order to their columns sorts them all, without a comparison.
     fn into_ascending(self) -> Self {
         let rows = self.rows.iter().zip(0u32..);
         let transposed = rows.flat_map(|(columns, row)| columns.iter().map(move |&c| (c as usize, row)));

@@ -1,8 +1,8 @@
-//! Sparse matrices for products only, in slices of rows (SELL: Kreutzer, Hager, Wellein, Fehske and Bishop 2014,
-//! 10.1137/130930352).
+//! Sparse matrices for products only, in slices of rows (SELL: Kreutzer, Hager, Wellein, Fehske and Bishop
+//! 2014, 10.1137/130930352).
 //!
-//! The rows of a slice lie side by side, filled up to the longest with zeros: their products do not wait for one another, as those
-//! of one short row do.
+//! The rows of a slice lie side by side, filled up to the longest with zeros: their products do not wait for
+//! one another, as those of one short row do.
 
 use super::{Pattern, SparseMatrix};
 use crate::operator::LinOp;
@@ -14,7 +14,7 @@ const ROWS: usize = 16;
 
 /// A square sparse matrix in slices of rows.
 #[derive(Clone, Debug)]
-pub struct SlicedMatrix<T> {
+pub struct SellMatrix<T> {
     dim: usize,
     /// First entries of each slice, in units of [`ROWS`] entries; one more for the end.
     first: Vec<u32>,
@@ -22,7 +22,7 @@ pub struct SlicedMatrix<T> {
     values: Vec<[T; ROWS]>,
 }
 
-impl<T: Scalar> SlicedMatrix<T> {
+impl<T: Scalar> SellMatrix<T> {
     /// The entries of a square `matrix`, rounded to the precision of this one.
     pub fn new<S: Scalar>(matrix: &SparseMatrix<S>) -> Self {
         let pattern = matrix.pattern();
@@ -70,7 +70,7 @@ impl<T: Scalar> SlicedMatrix<T> {
     }
 }
 
-impl<T: Scalar> LinOp<T> for SlicedMatrix<T> {
+impl<T: Scalar> LinOp<T> for SellMatrix<T> {
     fn dim(&self) -> usize {
         self.dim
     }
@@ -99,7 +99,7 @@ mod tests {
             let x: Vec<f64> = (0..dim).map(|i| (0.3 * i as f64).cos()).collect();
             let (mut want, mut got) = (vec![0.0; dim], vec![f64::NAN; dim]);
             matrix.multiply(&x, &mut want);
-            let mut sliced = SlicedMatrix::<f64>::new(&matrix);
+            let mut sliced = SellMatrix::<f64>::new(&matrix);
             for threads in [1, 2] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
                 pool.install(|| sliced.apply(&x, &mut got));

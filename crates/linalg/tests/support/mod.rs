@@ -1,4 +1,5 @@
-//! Matrices for the tests: Q2-Q1 Stokes on a uniform grid and the five-point Laplacian; operators between precisions.
+//! Matrices for the tests: Q2-Q1 Stokes on a uniform grid and the five-point Laplacian; operators between
+//! precisions.
 
 #![allow(dead_code)]
 
@@ -12,8 +13,8 @@ pub struct Saddle {
     pub is_pressure: Vec<bool>,
 }
 
-/// Q2-Q1 elements on `n x n` cells of the unit square, velocity zero on the boundary, one pressure pinned, and
-/// viscosity `viscosity(x, y)` at the quadrature points.
+/// Q2-Q1 elements on `n x n` cells of the unit square, velocity zero on the boundary, one pressure pinned,
+/// and viscosity `viscosity(x, y)` at the quadrature points.
 pub fn stokes_2d(n: usize, viscosity: impl Fn(f64, f64) -> f64) -> Saddle {
     stokes_2d_around(n, viscosity, |_, _| false)
 }
@@ -71,7 +72,8 @@ impl Grid {
             .map(|(x, y)| number(inner(x) && inner(y) && !solid(place(x), place(y)), 2))
             .collect();
         let velocity_count = velocity.iter().flatten().count() * 2;
-        // The coupling to the far corners of the cells is zero: the integral of (1-t) t (2t-1) over [0, 1] vanishes.
+        // The coupling to the far corners of the cells is zero: the integral of (1-t) t (2t-1) over [0, 1]
+        // vanishes.
         let sees_velocity = |px: usize, py: usize| {
             let near = |k: usize| k.saturating_sub(2)..=(k + 2).min(2 * n);
             let couples = |x: usize, y: usize| px.abs_diff(x) < 2 || py.abs_diff(y) < 2;

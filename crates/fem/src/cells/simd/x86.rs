@@ -1,8 +1,8 @@
 //! Lanes in the vector registers of x86-64.
 //!
-//! Values of these types are made only by kernels that `CellOperator::dispatch` has chosen after it found the instructions on
-//! the processor: what every `SAFETY` comment here refers to as *detected*. Their twin is [`super::Portable`];
-//! the test `vector_and_portable_kernels_agree` compares the kernels built on all three.
+//! Values of these types are made only by kernels that `CellOperator::dispatch` has chosen after it found the
+//! instructions on the processor: what every `SAFETY` comment here refers to as *detected*. Their twin is
+//! [`super::Portable`]; the test `vector_and_portable_kernels_agree` compares the kernels built on all three.
 
 use std::arch::x86_64::*;
 
