@@ -38,8 +38,8 @@ fn meshes<const D: usize>(criterion: &mut Criterion, finest: u8) {
     group.finish();
 }
 
-/// The viscous and the Stokes operator on all cells of a uniform mesh, every `varying`-th with a viscosity given at `4^D`
-/// points; throughput in unknowns.
+/// The viscous and the Stokes operator on all cells of a uniform mesh, every `varying`-th with a viscosity
+/// given at `4^D` points; throughput in unknowns.
 fn operator<T: CellScalar, const D: usize>(criterion: &mut Criterion, level: u8, varying: usize) {
     const QUADRATURE: usize = 4;
     let mesh = uniform::<D>(level);

@@ -26,3 +26,7 @@ pub use cells::{CHUNK_CELLS, Chunks};
 pub use element::{ReferenceMatrices, add_viscous};
 pub use mesh::{Cell, MeshError, TreeMesh};
 pub use space::{Constraint, Interpolation, NodeMap};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

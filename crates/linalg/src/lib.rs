@@ -48,3 +48,7 @@ pub use scalar::Scalar;
 pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
 pub use sparse::{BlockGroups, BlockPattern, Pattern, SellMatrix, SparseError, SparseMatrix};
 pub use subset::Subset;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
