@@ -1,11 +1,11 @@
 //! Poisson's equation `-laplace u = f` with biquadratic elements on an adaptive tree:
 //! `cargo run --release -p gluey-fem --example poisson`.
 //!
-//! The solution is a peak `u = exp(-a |x - c|^2)` with its values on the boundary of the unit square; cells near the
-//! peak are one level finer, so there are hanging nodes. These and the boundary values are affine constraints `u = T x + g`
-//! in the free nodes, and the equations of these are `T^T K T x = T^T (f - K g)`. The error in the mean square falls with
-//! the third power of the cell size, as for any smooth function and elements of degree 2: a wrong constraint, a wrong
-//! weight or a wrong sign would show as a lower order.
+//! The solution is a peak `u = exp(-a |x - c|^2)` with its values on the boundary of the unit square; cells
+//! near the peak are one level finer, so there are hanging nodes. These and the boundary values are affine
+//! constraints `u = T x + g` in the free nodes, and the equations of these are `T^T K T x = T^T (f - K g)`.
+//! The error in the mean square falls with the third power of the cell size, as for any smooth function and
+//! elements of degree 2: a wrong constraint, a wrong weight or a wrong sign would show as a lower order.
 
 use std::error::Error;
 use std::sync::Arc;

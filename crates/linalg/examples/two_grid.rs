@@ -1,8 +1,8 @@
 //! Poisson's equation by GCR with a two-grid cycle: `cargo run --release -p gluey-linalg --example two_grid`.
 //!
-//! The cycle smooths with Chebyshev polynomials, restricts the residual to a grid of half as many points per direction,
-//! solves there directly, interpolates the correction and smooths again. The number of iterations does not grow with
-//! the grid: that is the point of a multigrid method.
+//! The cycle smooths with Chebyshev polynomials, restricts the residual to a grid of half as many points per
+//! direction, solves there directly, interpolates the correction and smooths again. The number of iterations
+//! does not grow with the grid: that is the point of a multigrid method.
 
 use std::error::Error;
 use std::sync::Arc;
