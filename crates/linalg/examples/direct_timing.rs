@@ -1,5 +1,5 @@
-//! Seconds of one thread for the direct solution of 2D Stokes, Q2-Q1, with two discs of another viscosity (`inf`: rigid):
-//! `cargo run --release -p gluey-linalg --example direct_timing [cells per side] [contrast]`.
+//! Seconds of one thread for the direct solution of 2D Stokes, Q2-Q1, with two discs of another viscosity
+//! (`inf`: rigid): `cargo run --release -p gluey-linalg --example direct_timing [cells per side] [contrast]`.
 
 #[path = "../tests/support/mod.rs"]
 mod support;

@@ -1,48 +1,54 @@
 //! Krylov methods, Chebyshev smoothing and checked sparse direct solvers.
 //!
-//! An operator is anything that can be applied ([`LinOp`]), a preconditioner likewise ([`Preconditioner`]). Methods own
-//! their workspace: after the first solve nothing is allocated. Each method has `Params`, a report and a typed error,
-//! and a solve that returns `Ok` has a small *true* residual.
+//! An operator is anything that can be applied ([`LinOp`]), a preconditioner likewise ([`Preconditioner`]).
+//! Methods own their workspace: after the first solve nothing is allocated. Each method has `Params`, a
+//! report and a typed error, and a solve that returns `Ok` has a small *true* residual.
 //!
 //! ```
-//! use gluey_linalg::{Cg, CgParams, Jacobi, Reference, SparseMatrix};
+//! use gluey_linalg::{Gcr, GcrParams, Jacobi, Reference, SparseMatrix};
 //!
 //! let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 4.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 3.0)])?;
 //! let mut jacobi = Jacobi::new(&a.diagonal())?;
 //! let mut x = [0.0_f64; 2];
-//! Cg::new(2, CgParams::default()).solve(&mut a, &mut jacobi, &[1.0, 2.0], &mut x, Reference::RightHandSide)?;
+//! Gcr::new(GcrParams::default()).solve(&mut a, &mut jacobi, &[1.0, 2.0], &mut x, Reference::RightHandSide)?;
 //! assert!((x[0] - 1.0 / 11.0).abs() < 1e-8 && (x[1] - 7.0 / 11.0).abs() < 1e-8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order ([`parallel`]), so
-//! equal input gives equal bits for any number of threads.
+//! Long vectors are shared by the threads of the present rayon pool; sums are taken in a fixed order
+//! ([`parallel`]), so equal input gives equal bits for any number of threads.
+//!
+//! The rooms, lowest first; a room knows only those before it: [`mod@parallel`], scalars, [`mod@vector`],
+//! jagged arrays, subsets, affine constraints, operators, small dense matrices, sparse matrices, direct
+//! solvers, Krylov methods, smoothers.
 
-mod block;
-mod blocked;
-mod chebyshev;
+mod affine;
+mod dense;
 mod direct;
-mod exchange;
+mod jagged;
 mod krylov;
 mod operator;
 pub mod parallel;
 mod scalar;
-mod sliced;
+mod smoother;
 mod sparse;
-mod spectrum;
+mod subset;
 pub mod vector;
 
-pub use block::{BlockError, BlockJacobi, BlockJacobiError, invert_general, invert_spd};
-pub use blocked::{BlockGroups, BlockPattern};
-pub use chebyshev::{Chebyshev, Guess, SpectralInterval};
+pub use affine::AffineConstraints;
+pub use dense::{BlockError, DenseSymmetric, invert_spd};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
-pub use exchange::DenseSymmetric;
-pub use krylov::{Cg, CgParams, Gcr, GcrParams, KrylovError, KrylovReport, Reference};
-pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner, Rounded, SinglePrecision};
+pub use jagged::Jagged;
+pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
+pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
-pub use sliced::SlicedMatrix;
-pub use sparse::{Pattern, SparseError, SparseMatrix};
-pub use spectrum::estimate_lambda_max;
+pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
+pub use sparse::{BlockGroups, BlockPattern, Pattern, SellMatrix, SparseError, SparseMatrix};
+pub use subset::Subset;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

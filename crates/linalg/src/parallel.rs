@@ -1,7 +1,7 @@
 //! Threads for vectors, with the same bits for any number of them.
 //!
-//! A vector is cut into pieces whose length depends on its own alone; sums over pieces are added from first to last.
-//! Short vectors, and all vectors in a pool of one thread, are handled by the calling thread.
+//! A vector is cut into pieces whose length depends on its own alone; sums over pieces are added from first
+//! to last. Short vectors, and all vectors in a pool of one thread, are handled by the calling thread.
 
 use std::ops::Range;
 
@@ -67,21 +67,6 @@ pub fn for_each<T: Send>(x: &mut [T], work: impl Fn(usize, &mut [T]) + Sync) {
     x.par_chunks_mut(piece).enumerate().for_each(|(k, x)| work(k * piece, x));
 }
 
-/// `work(first index, piece of x, piece of y)` on all pieces of two vectors of one length.
-pub fn for_each_2<T: Send, S: Send>(
-    x: &mut [T],
-    y: &mut [S],
-    work: impl Fn(usize, &mut [T], &mut [S]) + Sync,
-) {
-    debug_assert_eq!(x.len(), y.len());
-    if !is_shared(x.len()) {
-        return work(0, x, y);
-    }
-    let piece = piece_len(x.len());
-    let pieces = x.par_chunks_mut(piece).zip(y.par_chunks_mut(piece)).enumerate();
-    pieces.for_each(|(k, (x, y))| work(k * piece, x, y));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,13 +100,12 @@ mod tests {
     #[test]
     fn every_entry_is_visited_once() {
         for (len, threads) in [(10, 1), (100_003, 1), (100_003, 3)] {
-            let (x, y) = with_threads(threads, || {
-                let (mut x, mut y) = (vec![0; len], vec![0; len]);
+            let x = with_threads(threads, || {
+                let mut x = vec![0; len];
                 for_each(&mut x, |first, x| x.iter_mut().enumerate().for_each(|(i, x)| *x += first + i));
-                for_each_2(&mut x, &mut y, |_, x, y| y.iter_mut().zip(x).for_each(|(y, x)| *y += *x));
-                (x, y)
+                x
             });
-            assert!((0..len).all(|i| x[i] == i && y[i] == i));
+            assert!((0..len).all(|i| x[i] == i));
         }
     }
 }

@@ -1,9 +1,12 @@
-//! Vector kernels with a fixed order of summation, shared by threads where that pays (see [`crate::parallel`]).
+//! Vector kernels with a fixed order of summation, shared by threads where that pays (see
+//! [`crate::parallel`]).
 //!
-//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in vector registers; the
-//! sums of the blocks are added in `f64` in an order that depends on the length alone: equal inputs give equal bits.
+//! A sum is taken in blocks of 1024 entries, each with 16 partial sums that the compiler keeps in vector
+//! registers; the sums of the blocks are added in `f64` in an order that depends on the length alone: equal
+//! inputs give equal bits.
 
-use crate::{Scalar, parallel};
+use crate::parallel;
+use crate::scalar::Scalar;
 
 /// Entries summed in the precision of the scalar before the sum goes over to `f64`.
 pub(crate) const BLOCK: usize = 1024;

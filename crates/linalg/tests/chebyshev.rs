@@ -5,12 +5,13 @@ mod support;
 use std::f64::consts::PI;
 
 use gluey_linalg::{
-    Chebyshev, FnOp, Guess, Identity, Jacobi, KrylovError, LinOp, Preconditioner, Scalar, SparseMatrix,
-    SpectralInterval, estimate_lambda_max, vector,
+    Chebyshev, ChebyshevParams, FnOp, Guess, Identity, Jacobi, KrylovError, LinOp, Preconditioner, Scalar,
+    SparseMatrix, SpectralInterval, estimate_lambda_max, vector,
 };
 use support::{laplacian_2d, pseudo_random};
 
-/// Eigenvector of the five-point Laplacian with the wave numbers `k`, `l`, and its eigenvalue over the diagonal.
+/// Eigenvector of the five-point Laplacian with the wave numbers `k`, `l`, and its eigenvalue over the
+/// diagonal.
 fn eigenpair(n: usize, k: usize, l: usize) -> (Vec<f64>, f64) {
     let wave = |k: usize, i: usize| (PI * k as f64 * (i + 1) as f64 / (n + 1) as f64).sin();
     let vector = (0..n * n).map(|row| wave(k, row % n) * wave(l, row / n)).collect();
@@ -41,6 +42,20 @@ fn error_in_the_interval_contracts_by_the_bound_and_none_grows() {
         }
         assert!(worst > 0.5 * bound, "the bound is sharp: {worst} against {bound}");
     }
+}
+
+#[test]
+fn a_smoother_for_an_operator_damps_the_upper_part_of_its_spectrum() {
+    let mut a = laplacian_2d(20);
+    let mut jacobi = Jacobi::new(&a.diagonal()).expect("positive");
+    let params = ChebyshevParams { degree: 3, ratio: 8.0, safety: 1.1, lanczos_steps: 10 };
+    let chebyshev = Chebyshev::for_operator(&mut a, &mut jacobi, &params).expect("positive definite");
+    let lambda_max = estimate_lambda_max(&mut a, &mut jacobi, 10).expect("positive definite");
+    assert_eq!(chebyshev.interval(), SpectralInterval::upper_part(lambda_max, 8.0, 1.1));
+    assert_eq!(chebyshev.interval(), Chebyshev::<f64>::below(lambda_max, 400, &params).interval());
+    assert!(chebyshev.interval().upper >= eigenpair(20, 20, 20).1);
+    let defaults = Chebyshev::for_operator(&mut a, &mut jacobi, &ChebyshevParams::default());
+    assert!(defaults.expect("positive definite").contraction_bound() < 0.1);
 }
 
 #[test]

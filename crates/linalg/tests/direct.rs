@@ -84,7 +84,8 @@ fn one_symbolic_part_serves_many_matrices() {
     }
 }
 
-/// Every pressure before every velocity: each first pivot is zero, on which the plain factorisation returns NaN.
+/// Every pressure before every velocity: each first pivot is zero, on which the plain factorisation returns
+/// NaN.
 fn pressures_first(is_pressure: &[bool]) -> Vec<usize> {
     let (mut order, velocities): (Vec<usize>, Vec<usize>) =
         (0..is_pressure.len()).partition(|&unknown| is_pressure[unknown]);
@@ -114,7 +115,8 @@ fn zero_pivots_are_found_and_cured_by_regularisation() {
 
 #[test]
 fn weak_pressures_beside_solids_are_solved() {
-    // Discs anywhere on the grid leave pressures that see a handful of velocities, which AMD eliminates first.
+    // Discs anywhere on the grid leave pressures that see a handful of velocities, which AMD eliminates
+    // first.
     let mut unique_count = 0;
     for k in 0..20 {
         let (x0, y0) = (0.3 + 0.011 * k as f64, 0.4 + 0.007 * k as f64);
@@ -141,7 +143,8 @@ fn weak_pressures_beside_solids_are_solved() {
         unique_count += usize::from((0..b.len()).all(close));
         assert!(solutions[0].iter().all(|x| x.abs() < 10.0), "no noise in the null space, position {k}");
     }
-    // In some positions a few pressures see fewer velocities than they are: these are not unique, velocities are.
+    // In some positions a few pressures see fewer velocities than they are: these are not unique, velocities
+    // are.
     assert_eq!(unique_count, 14);
 }
 

@@ -5,11 +5,10 @@ mod support;
 use std::sync::Arc;
 
 use gluey_linalg::{
-    Cg, CgParams, DirectSpd, FnOp, Gcr, GcrParams, Identity, Jacobi, KrylovError, KrylovReport, LinOp,
-    Ordering, Preconditioner, Reference, RefinementParams, Rounded, SinglePrecision, SparseMatrix, Symbolic,
-    vector,
+    DirectSpd, FnOp, Gcr, GcrParams, Identity, Jacobi, KrylovError, KrylovReport, LinOp, Ordering,
+    Preconditioner, Reference, RefinementParams, SparseMatrix, Symbolic, vector,
 };
-use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d};
+use support::{Rounded, laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 
 fn gcr(
     params: GcrParams,
@@ -40,20 +39,19 @@ fn upwind(n: usize) -> SparseMatrix {
 }
 
 #[test]
-fn both_methods_agree_with_the_direct_solver() {
+fn gcr_agrees_with_the_direct_solver() {
     let mut a = laplacian_2d(25);
     let b = pseudo_random(1, 625);
     let mut expected = vec![0.0; 625];
     direct(&a).solve(&b, &mut expected).expect("solvable");
     let mut jacobi = Jacobi::new(&a.diagonal()).expect("positive");
-    let mut x = vec![0.0; 625];
-    let params = CgParams { relative_tolerance: 1e-12, ..Default::default() };
-    Cg::new(625, params).solve(&mut a, &mut jacobi, &b, &mut x, Reference::RightHandSide).expect("converges");
-    assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
-    x.fill(0.0);
     let params =
         GcrParams { relative_tolerance: 1e-12, restart: 30, max_iterations: 2000, ..Default::default() };
+    let mut x = vec![0.0; 625];
     gcr(params, &mut a, &b, &mut x).expect("converges");
+    assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
+    x.fill(0.0);
+    Gcr::new(params).solve(&mut a, &mut jacobi, &b, &mut x, Reference::RightHandSide).expect("converges");
     assert!(x.iter().zip(&expected).all(|(x, e)| (x - e).abs() < 1e-9));
 }
 
@@ -66,10 +64,6 @@ fn small_systems_end_in_as_many_steps_as_unknowns() {
     let report = gcr(params, &mut a, &b, &mut x).expect("converges");
     assert!(report.iterations <= 6);
     assert!(relative_residual(&a, &b, &x) < 1e-13);
-    let report = Cg::new(4, CgParams::default())
-        .solve(&mut laplacian_2d(2), &mut Identity, &b[..4], &mut x[..4], Reference::RightHandSide)
-        .expect("converges");
-    assert!(report.iterations <= 4);
 }
 
 #[test]
@@ -79,11 +73,6 @@ fn an_exact_preconditioner_needs_one_step() {
     let mut x = vec![0.0; 225];
     let mut exact = direct(&a);
     let report = Gcr::new(GcrParams::default())
-        .solve(&mut a, &mut exact, &b, &mut x, Reference::RightHandSide)
-        .expect("converges");
-    assert_eq!(report.iterations, 1);
-    x.fill(0.0);
-    let report = Cg::new(225, CgParams::default())
         .solve(&mut a, &mut exact, &b, &mut x, Reference::RightHandSide)
         .expect("converges");
     assert_eq!(report.iterations, 1);
@@ -123,8 +112,8 @@ fn references_and_guesses_decide_when_to_stop() {
         .into_iter()
         .map(|reference| {
             let mut x = near.clone();
-            let mut cg = Cg::new(100, CgParams::default());
-            cg.solve(&mut a, &mut Identity, &b, &mut x, reference).expect("converges").iterations
+            let mut gcr = Gcr::new(GcrParams::default());
+            gcr.solve(&mut a, &mut Identity, &b, &mut x, reference).expect("converges").iterations
         })
         .collect();
     assert!(counts[2] < counts[0] && counts[0] < counts[1], "{counts:?}");
@@ -136,27 +125,20 @@ fn references_and_guesses_decide_when_to_stop() {
 }
 
 #[test]
-fn a_single_precision_preconditioner_reaches_double_precision() {
-    let saddle = laplacian_2d(40);
-    let n = 1600;
-    let double = saddle.values();
-    let single: Vec<f32> = double.iter().map(|&v| v as f32).collect();
-    let mut a32 = SparseMatrix::new(saddle.pattern().clone(), single).expect("same pattern");
-    // The inner iteration stops early and in single precision: a different operator in every step.
-    let params = CgParams { relative_tolerance: 1e-2, ..Default::default() };
-    let mut inner = Cg::<f32>::new(n, params);
-    let inner = FnOp::new(n, move |r: &[f32], z: &mut [f32]| {
+fn a_preconditioner_may_change_in_every_step() {
+    let mut a = laplacian_2d(40);
+    let (n, mut inner_a) = (1600, a.clone());
+    // The inner iteration stops early: a different operator in every step.
+    let mut inner = Gcr::new(GcrParams { relative_tolerance: 1e-2, ..Default::default() });
+    let mut inner = FnOp::new(n, move |r: &[f64], z: &mut [f64]| {
         z.fill(0.0);
-        inner.solve(&mut a32, &mut Identity, r, z, Reference::RightHandSide).expect("converges");
+        inner.solve(&mut inner_a, &mut Identity, r, z, Reference::RightHandSide).expect("converges");
     });
-    let mut a = saddle.clone();
     let b = pseudo_random(1, n);
     let mut x = vec![0.0; n];
-    let params = GcrParams { relative_tolerance: 1e-10, ..Default::default() };
-    let report = Gcr::new(params)
-        .solve(&mut a, &mut SinglePrecision::new(n, inner), &b, &mut x, Reference::RightHandSide)
-        .expect("converges");
-    assert!(relative_residual(&saddle, &b, &x) <= 1e-10);
+    let mut outer = Gcr::new(GcrParams { relative_tolerance: 1e-10, ..Default::default() });
+    let report = outer.solve(&mut a, &mut inner, &b, &mut x, Reference::RightHandSide).expect("converges");
+    assert!(relative_residual(&a, &b, &x) <= 1e-10);
     assert!(report.iterations <= 10, "{report:?}");
 }
 
@@ -188,12 +170,6 @@ fn giving_up_returns_the_history_and_the_best_iterate() {
     assert_eq!(history.len(), 6);
     assert!(residual_norm < history[0]);
     assert!((relative_residual(&a, &b, &x) * vector::norm(&b) / residual_norm - 1.0).abs() < 1e-9);
-    x.fill(0.0);
-    let params = CgParams { max_iterations: 5, ..Default::default() };
-    let error = Cg::new(900, params).solve(&mut a, &mut Identity, &b, &mut x, Reference::RightHandSide);
-    assert!(
-        matches!(error, Err(KrylovError::NotConverged { iterations: 5, ref history, .. }) if history.len() == 6)
-    );
 }
 
 #[test]
@@ -224,7 +200,8 @@ fn a_tolerance_beyond_rounding_ends_without_looping() {
     }
 }
 
-/// One in double precision and 1/1.6 in single: a correction by what the steps know leaves -0.6 of the residual.
+/// One in double precision and 1/1.6 in single: a correction by what the steps know leaves -0.6 of the
+/// residual.
 struct Inexact;
 
 impl LinOp<f64> for Inexact {
@@ -271,22 +248,6 @@ fn numbers_that_are_not_finite_are_reported_and_kept_out_of_x() {
     assert_eq!(bad_a, Err(KrylovError::NotFinite { iteration: 0 }));
     let bad_b = gcr(GcrParams::default(), &mut a, &[f64::INFINITY; 9], &mut x);
     assert_eq!(bad_b, Err(KrylovError::NotFinite { iteration: 0 }));
-    let mut cg = Cg::new(9, CgParams::default());
-    let bad_m = cg.solve(&mut a, &mut FnOp::new(9, nan), &[1.0; 9], &mut x, Reference::RightHandSide);
-    assert_eq!(bad_m, Err(KrylovError::NotFinite { iteration: 1 }));
-}
-
-#[test]
-fn conjugate_gradients_refuse_what_is_not_positive_definite() {
-    let mut a = SparseMatrix::from_triplets(2, 2, &[(0, 0, 1.0), (1, 1, -1.0)]).expect("in range");
-    let mut cg = Cg::new(2, CgParams::default());
-    let error = cg.solve(&mut a, &mut Identity, &[0.0, 1.0], &mut [0.0; 2], Reference::RightHandSide);
-    let expected = KrylovError::NotPositiveDefinite { what: "operator", iteration: 1, form: -1.0 };
-    assert_eq!(error, Err(expected));
-    let mut positive = FnOp::new(2, |x: &[f64], y: &mut [f64]| y.copy_from_slice(x));
-    let mut minus = FnOp::new(2, |r: &[f64], z: &mut [f64]| vector::scaled_copy(-1.0, r, z));
-    let error = cg.solve(&mut positive, &mut minus, &[0.0, 1.0], &mut [0.0; 2], Reference::RightHandSide);
-    assert!(matches!(error, Err(KrylovError::NotPositiveDefinite { what: "preconditioner", .. })));
 }
 
 #[test]
@@ -294,12 +255,12 @@ fn wrong_lengths_are_refused() {
     let mut a = laplacian_2d(3);
     let error = gcr(GcrParams::default(), &mut a, &[1.0; 8], &mut [0.0; 9]);
     assert_eq!(error, Err(KrylovError::DimensionMismatch { expected: 9, found: 8 }));
-    let mut cg = Cg::new(8, CgParams::default());
-    let error = cg.solve(&mut a, &mut Identity, &[1.0; 9], &mut [0.0; 9], Reference::RightHandSide);
-    assert!(matches!(error, Err(KrylovError::DimensionMismatch { .. })));
+    let error = gcr(GcrParams::default(), &mut a, &[1.0; 9], &mut [0.0; 10]);
+    assert_eq!(error, Err(KrylovError::DimensionMismatch { expected: 9, found: 10 }));
 }
 
-/// A nonsymmetric operator with diagonal from 1 to `contrast`, and the preconditioner that takes out most of it.
+/// A nonsymmetric operator with diagonal from 1 to `contrast`, and the preconditioner that takes out most of
+/// it.
 fn ill_conditioned(n: usize, contrast: f64) -> (impl LinOp<f64>, impl Preconditioner<f64>) {
     let diagonal: Vec<f64> = (0..n).map(|i| contrast.powf(i as f64 / n as f64)).collect();
     let inverse: Vec<f64> = (0..n).map(|i| 1.0 / (diagonal[i] * (1.0 + 0.4 * (i as f64).sin()))).collect();

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::Reference;
+use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     BlockGroups, BlockPattern, DirectSpd, Ordering, RefinementParams, SparseError, SparseMatrix, Symbolic,
@@ -188,7 +188,7 @@ where
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
         discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.of(q as usize)));
     };
-    let size = Reference::<D>::VELOCITY + Reference::<D>::PRESSURE;
+    let size = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
     assemble(system, unknowns, forms, &Elements::new(discretisation, system, size))
 }
 
@@ -200,7 +200,7 @@ pub fn assemble_viscous<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let elements = Elements::new(discretisation, system, Reference::<D>::VELOCITY);
+    let elements = Elements::new(discretisation, system, ReferenceMatrices::<D>::VELOCITY);
     assemble_viscous_on(discretisation, system, &elements, |_| true)
 }
 

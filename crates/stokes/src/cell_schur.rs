@@ -8,8 +8,8 @@
 //! free to expand, and for constant pressures the bound is `D` times too high. So that cut cells fit to those around them, theirs is
 //! `T S_c T` with the symmetric `T` that turns the Schur complement of a plain cell into its mass matrix.
 
-use gluey_fem::Reference;
-use gluey_fem::element::split;
+use gluey_fem::ReferenceMatrices;
+use gluey_fem::element::multi_index;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockError, DenseSymmetric};
 use nalgebra::DMatrix;
@@ -45,7 +45,7 @@ impl PressureMatrices {
             cell.volume * cell.viscous / (viscosity * elements.viscous(index).0)
         };
         let mut new = Self {
-            unit: Reference::<D>::new().pressure_mass.to_vec(),
+            unit: ReferenceMatrices::<D>::new().pressure_mass.to_vec(),
             scales: cells.clone().map(scale).collect(),
             own: vec![None; elements.cells().len()],
         };
@@ -54,7 +54,7 @@ impl PressureMatrices {
         }
         let mut schur = CellSchur::<D>::new()?;
         let factor = mass_factor(&schur.unit, &new.unit);
-        let m = Reference::<D>::PRESSURE;
+        let m = ReferenceMatrices::<D>::PRESSURE;
         for (index, cell) in cells {
             if let (viscous, Some(own)) = elements.viscous(index) {
                 let matrix = DMatrix::from_vec(m, m, schur.of(viscous, cell.divergence, own)?);
@@ -89,7 +89,7 @@ fn mass_factor(schur: &[f64], mass: &[f64]) -> DMatrix<f64> {
 
 /// Computes the Schur complements of cells.
 struct CellSchur<const D: usize> {
-    reference: Reference<D>,
+    reference: ReferenceMatrices<D>,
     /// `sum r r^T` over rigid motions `r`, which make up the kernel of every `A_c`.
     rigid: Vec<f64>,
     /// The Schur complement of the unit cube at viscosity one.
@@ -103,7 +103,7 @@ where
     Dim<D>: Space<D>,
 {
     fn new() -> Result<Self, BlockError> {
-        let (reference, rigid) = (Reference::<D>::new(), rigid_projector::<D>());
+        let (reference, rigid) = (ReferenceMatrices::<D>::new(), rigid_projector::<D>());
         let mut new = Self { unit: Vec::new(), saddle: DenseSymmetric::default(), reference, rigid };
         new.unit = new.of(1.0, 1.0, &[])?;
         Ok(new)
@@ -111,7 +111,7 @@ where
 
     /// That of a cell with the matrices `A_c = viscous K + own` and `B_c = divergence B`, row by row.
     fn of(&mut self, viscous: f64, divergence: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
-        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.
         let matrix = &mut self.saddle;
         matrix.reset(n + m);
@@ -135,8 +135,8 @@ where
 
 /// `sum r r^T` over translations and rotations of the unit cube about its centre.
 fn rigid_projector<const D: usize>() -> Vec<f64> {
-    let n = Reference::<D>::VELOCITY;
-    let x = |k: usize, d: usize| 0.5 * split::<D>(k / D, 3)[d] as f64 - 0.5;
+    let n = ReferenceMatrices::<D>::VELOCITY;
+    let x = |k: usize, d: usize| 0.5 * multi_index::<D>(k / D, 3)[d] as f64 - 0.5;
     let along = |c: usize, d: usize| if c == d { 1.0 } else { 0.0 };
     let mut sum = vec![0.0; n * n];
     let mut add = |motion: &dyn Fn(usize) -> f64| {
@@ -183,7 +183,7 @@ mod tests {
         let mut schur = CellSchur::<D>::new().unwrap();
         let (eta, h) = (40.0, 0.25f64);
         let stiffness = h.powi(D as i32 - 2);
-        let solid = Reference::<D>::new().viscous.iter().map(|k| (eta - 1.0) * stiffness * k);
+        let solid = ReferenceMatrices::<D>::new().viscous.iter().map(|k| (eta - 1.0) * stiffness * k);
         let own: Vec<f64> = solid.collect();
         let found = schur.of(stiffness, h.powi(D as i32 - 1), &own).unwrap();
         for (a, b) in found.iter().zip(&schur.unit) {
@@ -197,8 +197,8 @@ mod tests {
         Dim<D>: Space<D>,
     {
         let schur = CellSchur::<D>::new().unwrap().unit;
-        let mass = Reference::<D>::new().pressure_mass;
-        let m = Reference::<D>::PRESSURE;
+        let mass = ReferenceMatrices::<D>::new().pressure_mass;
+        let m = ReferenceMatrices::<D>::PRESSURE;
         let factor = mass_factor(&schur, mass);
         assert!((&factor - factor.transpose()).amax() < 1e-12);
         let difference =

@@ -84,7 +84,7 @@ where
         pressures[top].copy_from_slice(r);
         for level in (0..top).rev() {
             let (below, above) = pressures.split_at_mut(level + 1);
-            meshes[level + 1].pressure.collect(1, |w| w as f32, &mut above[0]);
+            meshes[level + 1].pressure.condense(1, |w| w as f32, &mut above[0]);
             transfers[level].restrict::<1>(&above[0], &mut below[level]);
         }
         system.pressure.reduce(&mut pressures[0]);
@@ -135,7 +135,7 @@ where
         pressures: unknowns.len(),
         cells: discretisation.mesh.cell_count(),
     };
-    let elements = Elements::new(discretisation, system, gluey_fem::Reference::<D>::VELOCITY);
+    let elements = Elements::new(discretisation, system, gluey_fem::ReferenceMatrices::<D>::VELOCITY);
     let mass = pressure_matrix(discretisation, system, &elements, viscosity)?;
     let count = unknowns.len();
     let mass = DMatrix::from_fn(count, count, |i, j| mass.get(unknowns[i] as usize, unknowns[j] as usize));

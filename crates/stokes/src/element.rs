@@ -1,6 +1,6 @@
 //! Element matrices of the Stokes system: the viscous one, or the whole saddle.
 
-use gluey_fem::Reference;
+use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 
 use crate::discretisation::Discretisation;
@@ -16,7 +16,7 @@ where
     Dim<D>: Space<D>,
 {
     system: &'a StokesSystem<D>,
-    reference: Reference<D>,
+    reference: ReferenceMatrices<D>,
     size: usize,
     /// Scale of the viscous reference matrix in each cell.
     viscous: Vec<f64>,
@@ -33,7 +33,7 @@ where
     pub fn new(discretisation: &Discretisation<D>, system: &'a StokesSystem<D>, size: usize) -> Self {
         let mut new = Self {
             system,
-            reference: Reference::new(),
+            reference: ReferenceMatrices::new(),
             size,
             viscous: system.cells.iter().map(|cell| cell.viscous).collect(),
             additional: vec![None; system.cells.len()],
@@ -55,7 +55,7 @@ where
 
     /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a surface cuts it.
     pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
-        let size = Reference::<D>::VELOCITY.pow(2);
+        let size = ReferenceMatrices::<D>::VELOCITY.pow(2);
         let own = self.additional[index].map(|own| &self.own[own as usize * size..][..size]);
         (self.viscous[index], own)
     }
@@ -67,7 +67,7 @@ where
             slot[cell.cell as usize] = k;
         }
         let mut own_count = 0;
-        self.own.reserve_exact(penalty.stress.cut_cell_count() * Reference::<D>::VELOCITY.pow(2));
+        self.own.reserve_exact(penalty.stress.cut_cell_count() * ReferenceMatrices::<D>::VELOCITY.pow(2));
         penalty.stress.for_each_cell(|cell, scale, own| {
             let slot = slot[cell as usize];
             let scale = penalty.factor * scale;
@@ -84,7 +84,7 @@ where
 
     /// Writes the matrix of an active cell, row by row.
     pub fn fill(&self, index: usize, matrix: &mut [f64]) {
-        let (n, size) = (Reference::<D>::VELOCITY, self.size);
+        let (n, size) = (ReferenceMatrices::<D>::VELOCITY, self.size);
         let (viscous, own) = self.viscous(index);
         for (row, from) in matrix.chunks_exact_mut(size).zip(self.reference.viscous.chunks_exact(n)) {
             row.iter_mut().zip(from).for_each(|(value, k)| *value = viscous * k);
@@ -100,7 +100,7 @@ where
     }
 
     fn fill_pressure(&self, index: usize, matrix: &mut [f64]) {
-        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         let (reference, cell) = (&self.reference, &self.system.cells[index]);
         let viscosity = cell.viscous * (cell.volume / cell.divergence).powi(2) / cell.volume;
         let compressibility = COMPRESSIBILITY * cell.volume / viscosity;

@@ -7,7 +7,7 @@
 //! and dense, and a good estimate since the flow in a gap is local. The bodies' twists belong to `V`: a gap that could not
 //! open would hide the lubrication pressure.
 
-use gluey_fem::Reference;
+use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::SparseMatrix;
 use nalgebra::DMatrix;
@@ -143,7 +143,7 @@ where
         let Gap { pressures, velocities } = gap;
         let (n, m) = (velocities.len(), pressures.len());
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, m));
-        let reference = Reference::<D>::new();
+        let reference = ReferenceMatrices::<D>::new();
         for cell in cells_of(cells, &velocities) {
             let cell = &self.system.cells[cell as usize];
             self.add_cell(cell, &reference, (&velocities, &pressures), (&mut a, &mut b));
@@ -165,11 +165,11 @@ where
     fn add_cell(
         &self,
         cell: &ActiveCell,
-        reference: &Reference<D>,
+        reference: &ReferenceMatrices<D>,
         (velocities, pressures): (&[u32], &[u32]),
         (a, b): (&mut DMatrix<f64>, &mut DMatrix<f64>),
     ) {
-        let n = Reference::<D>::VELOCITY;
+        let n = ReferenceMatrices::<D>::VELOCITY;
         let forms: Vec<_> = self.nodal(cell).map(|k| placed(self.velocity.of(k), velocities)).collect();
         for (i, row) in forms.iter().enumerate().filter(|form| !form.1.is_empty()) {
             for (j, column) in forms.iter().enumerate() {

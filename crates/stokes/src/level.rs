@@ -1,6 +1,6 @@
 //! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
 
-use gluey_fem::{Interpolation, NodeMap, Reference};
+use gluey_fem::{Interpolation, NodeMap, ReferenceMatrices};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, invert_spd, vector};
 
@@ -257,8 +257,8 @@ where
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds that of sums over
 /// cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 % (3D) too large.
 fn cell_lambda_max<const D: usize>() -> f64 {
-    let n = Reference::<D>::VELOCITY;
-    let viscous = Reference::<D>::new().viscous;
+    let n = ReferenceMatrices::<D>::VELOCITY;
+    let viscous = ReferenceMatrices::<D>::new().viscous;
     let scale = |i: usize| viscous[i * (n + 1)].sqrt();
     let scaled = nalgebra::DMatrix::from_fn(n, n, |i, j| viscous[i * n + j] / (scale(i) * scale(j)));
     scaled.symmetric_eigenvalues().max()
@@ -296,7 +296,7 @@ where
 {
     let mut nodal = viscous_diagonal(discretisation, cells.iter().map(|c| (c, c.viscous, None)));
     // The squares keep the sum positive: weights of hanging nodes may be negative.
-    space.nodes().collect(D, |w| w * w, &mut nodal);
+    space.nodes().condense(D, |w| w * w, &mut nodal);
     let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
@@ -305,7 +305,7 @@ where
             false => 0.0,
         };
     }
-    let twists = twist_blocks(discretisation, space, cells, &Reference::new())?;
+    let twists = twist_blocks(discretisation, space, cells, &ReferenceMatrices::new())?;
     Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
 }
 
@@ -314,12 +314,12 @@ fn twist_blocks<const D: usize>(
     discretisation: &Discretisation<D>,
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
-    reference: &Reference<D>,
+    reference: &ReferenceMatrices<D>,
 ) -> Result<Vec<f32>, DiagonalError>
 where
     Dim<D>: Space<D>,
 {
-    let (n, rigid) = (Reference::<D>::VELOCITY, Dim::<D>::RIGID);
+    let (n, rigid) = (ReferenceMatrices::<D>::VELOCITY, Dim::<D>::RIGID);
     let mut rows = vec![None; space.nodes().node_count()];
     for (node, body, matrix) in space.rigid_rows() {
         rows[node as usize] = Some((body as usize, matrix));

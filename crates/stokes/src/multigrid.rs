@@ -11,7 +11,7 @@
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_fem::{Interpolation, Reference as Matrices};
+use gluey_fem::{Interpolation, ReferenceMatrices};
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Body;
 use gluey_linalg::{DirectSpd, Gcr, GcrParams, LinOp, Ordering, Preconditioner, Reference, Scalar, vector};
@@ -92,7 +92,7 @@ where
         system: &StokesSystem<D>,
         preparation: &Preparation<'_, D>,
     ) -> Result<(), StokesError> {
-        let elements = Elements::new(discretisation, system, Matrices::<D>::VELOCITY);
+        let elements = Elements::new(discretisation, system, ReferenceMatrices::<D>::VELOCITY);
         let before = self.cycle.take().map(|cycle| cycle.hierarchy).unwrap_or_default();
         let hierarchy = Hierarchy::new(discretisation, before);
         let before = self.schur.take();

@@ -54,7 +54,7 @@ impl<T: Scalar, const D: usize> Patches<T, D> {
         for &end in &new.ends {
             let nodes = &new.nodes[start as usize..end as usize];
             block_on(matrix, nodes, &mut place, &mut dense);
-            dense.invert_to_negative()?;
+            dense.sweep()?;
             weights.clear();
             let weight = |node: &u32| 1.0 / f64::from(count[*node as usize]).sqrt();
             weights.extend(nodes.iter().map(weight).flat_map(|weight| [weight; D]));

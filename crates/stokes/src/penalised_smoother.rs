@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use gluey_fem::{Reference, TreeMesh};
+    use gluey_fem::{ReferenceMatrices, TreeMesh};
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
     use gluey_linalg::LinOp;
@@ -297,7 +297,7 @@ mod tests {
             let balls = [Ball::new(Vector::<3>::repeat(0.47), 0.3)];
             let (problem, touched) = problem(3, viscosity_ratio, &balls);
             let Problem { discretisation, system, .. } = &problem;
-            let elements = Elements::new(discretisation, system, Reference::<3>::VELOCITY);
+            let elements = Elements::new(discretisation, system, ReferenceMatrices::<3>::VELOCITY);
             let solid = Numbered::new(discretisation, |n| touched[n].is_some() && system.space.is_free(n));
             let matrix = NodeMatrix::assembled(&solid, &elements).unwrap();
             let all = vec![true; touched.len()];
@@ -338,7 +338,7 @@ mod tests {
     fn a_sweep_around_a_film_damps_rough_errors_there_and_changes_nothing_else() {
         let (problem, touched) = problem(4, 1e3, &two_balls(0.025));
         let Problem { discretisation, system, .. } = &problem;
-        let elements = Elements::new(discretisation, system, Reference::<3>::VELOCITY);
+        let elements = Elements::new(discretisation, system, ReferenceMatrices::<3>::VELOCITY);
         let film = around_films(discretisation, &touched).unwrap();
         let touched: Vec<bool> = touched.iter().map(Option::is_some).collect();
         let mut smoother = FilmSmoother::new(discretisation, system, &elements, (&film, &touched)).unwrap();

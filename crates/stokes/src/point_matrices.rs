@@ -4,8 +4,8 @@
 //! `K[(i,a),(j,b)] = S[(i,b),(j,a)] + [a = b] sum_d S[(i,d),(j,d)]`. Points and shape functions are products of those on a
 //! line, so the sum over points is taken one direction after the other (Orszag 1980, 10.1016/0021-9991(80)90005-4).
 
-use gluey_fem::Reference;
-use gluey_fem::element::{derivatives_1d, gauss, gauss_cube, split, value, values_1d};
+use gluey_fem::ReferenceMatrices;
+use gluey_fem::element::{derivatives_1d, gauss, gauss_cube, multi_index, value, values_1d};
 
 /// Shape functions on a line.
 const LINE: usize = 3;
@@ -34,7 +34,7 @@ impl<const D: usize> PointMatrices<D> {
     /// Prepares the tensor-product Gauss rule with `points` points a direction.
     pub fn new(line: usize) -> Self {
         let points = gauss_cube::<D>(line);
-        let nodes = Reference::<D>::VELOCITY / D;
+        let nodes = ReferenceMatrices::<D>::VELOCITY / D;
         let shape = |(x, _): &([f64; D], f64)| (0..nodes).map(|i| value::<D>(2, i, x)).collect();
         let factor = |is_slope: bool, x: f64| if is_slope { derivatives_1d(2, x) } else { values_1d(2, x) };
         let products = |(f, g): Slopes| {
@@ -65,7 +65,7 @@ impl<const D: usize> PointMatrices<D> {
 
     /// The matrix `K` for the viscosities `scale * fraction[q]` at the points.
     pub fn matrix(&self, scale: f64, fraction: &[f64]) -> Vec<f64> {
-        let n = Reference::<D>::VELOCITY;
+        let n = ReferenceMatrices::<D>::VELOCITY;
         let weighted = self.points.iter().zip(fraction).map(|(point, fraction)| scale * point.1 * fraction);
         let weights: Vec<f64> = weighted.collect();
         let mut matrix = vec![0.0; n * n];
@@ -118,7 +118,7 @@ fn pairs<const D: usize>() -> Vec<(usize, usize)> {
         (0..D).rev().fold(0, |node, d| node * LINE + along(pairs[d]))
     };
     let place = |k: usize| {
-        let pairs = split::<D>(k, PAIRS);
+        let pairs = multi_index::<D>(k, PAIRS);
         (node(&pairs, |pair| pair / LINE), node(&pairs, |pair| pair % LINE))
     };
     (0..PAIRS.pow(D as u32)).map(place).collect()
@@ -131,7 +131,7 @@ fn add_strain_product<const D: usize>(
     sum: f64,
     matrix: &mut [f64],
 ) {
-    let n = Reference::<D>::VELOCITY;
+    let n = ReferenceMatrices::<D>::VELOCITY;
     matrix[(i + b) * n + j + a] += sum;
     if a != b {
         matrix[(j + a) * n + i + b] += sum;
@@ -149,7 +149,7 @@ mod tests {
     fn is_the_sum_over_points<const D: usize>(line: usize) {
         let matrices = PointMatrices::<D>::new(line);
         let fraction: Vec<f64> = (0..line.pow(D as u32)).map(|q| (q as f64).sin().max(0.0)).collect();
-        let mut expected = vec![0.0; Reference::<D>::VELOCITY.pow(2)];
+        let mut expected = vec![0.0; ReferenceMatrices::<D>::VELOCITY.pow(2)];
         for ((x, weight), fraction) in gauss_cube::<D>(line).iter().zip(&fraction) {
             gluey_fem::add_viscous(x, 7.0 * weight * fraction, &mut expected);
         }

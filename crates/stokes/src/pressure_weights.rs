@@ -15,7 +15,7 @@
 //! out that the solid in one cell holds the nodes of the next and are too large; the diagonal takes a node as held once any cell
 //! around it is stiff and is too small. There the weight is the geometric mean of the two, the root of the ratio.
 
-use gluey_fem::{Reference, TreeMesh};
+use gluey_fem::{ReferenceMatrices, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::SparseMatrix;
@@ -88,7 +88,7 @@ where
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 2).expect("four cells a side");
     let discretisation = Discretisation::new(mesh);
     let system = without_bodies(&discretisation, 1.0);
-    let elements = Elements::new(&discretisation, &system, Reference::<D>::VELOCITY);
+    let elements = Elements::new(&discretisation, &system, ReferenceMatrices::<D>::VELOCITY);
     let matrices = PressureMatrices::new(&system, &elements, 1.0).expect("no cell is cut");
     let centre = Vector::<D>::repeat(0.5);
     let is_centre = |q: usize| discretisation.pressure.point(q) == centre;
@@ -147,9 +147,9 @@ fn ratios<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let n = Reference::<D>::VELOCITY;
-    let m = Reference::<D>::PRESSURE;
-    let reference = Reference::<D>::new();
+    let n = ReferenceMatrices::<D>::VELOCITY;
+    let m = ReferenceMatrices::<D>::PRESSURE;
+    let reference = ReferenceMatrices::<D>::new();
     let cells = elements.cells().iter().enumerate().map(|(index, cell)| {
         let (scale, own) = elements.viscous(index);
         (cell, scale, own)
@@ -241,7 +241,7 @@ mod tests {
     where
         Dim<D>: Space<D>,
     {
-        let elements = Elements::new(discretisation, system, Reference::<D>::VELOCITY);
+        let elements = Elements::new(discretisation, system, ReferenceMatrices::<D>::VELOCITY);
         let matrices = PressureMatrices::new(system, &elements, viscosity).unwrap();
         weights(discretisation, (system, &elements, &matrices))
     }

@@ -10,7 +10,7 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, Guess, Jacobi, LinOp, SlicedMatrix, SparseMatrix, SpectralInterval, estimate_lambda_max,
+    Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SparseMatrix, SpectralInterval, estimate_lambda_max,
 };
 
 use crate::cell_schur::PressureMatrices;
@@ -39,7 +39,7 @@ where
     Dim<D>: Space<D>,
 {
     /// `T`.
-    mass: SlicedMatrix<f32>,
+    mass: SellMatrix<f32>,
     jacobi: Jacobi<f32>,
     chebyshev: Chebyshev<f32>,
     gaps: GapInverse,
@@ -63,7 +63,7 @@ where
         let gaps = GapInverse::new(discretisation, system, &mass)?;
         let coarse = CoarseSchur::new(meshes, viscosity, before.and_then(|before| before.coarse))?;
         let diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
-        let mut mass = SlicedMatrix::new(&mass);
+        let mut mass = SellMatrix::new(&mass);
         let mut jacobi = Jacobi::new(&diagonal).map_err(StokesError::PressureMass)?;
         let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
@@ -154,7 +154,7 @@ mod tests {
         direct.solve(&system, &b, &mut x, 1e-10).unwrap();
         let exact = &x[system.velocity_dim()..];
 
-        let elements = Elements::new(fine, &system, gluey_fem::Reference::<D>::VELOCITY);
+        let elements = Elements::new(fine, &system, gluey_fem::ReferenceMatrices::<D>::VELOCITY);
         let mut inverse = SchurInverse::new(&meshes, &system, &elements, 1.5, None).unwrap();
         inverse.chebyshev = Chebyshev::new(r.len(), 30, inverse.chebyshev.interval());
         let r: Vec<f32> = r.iter().map(|&r| r as f32).collect();

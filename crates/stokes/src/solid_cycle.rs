@@ -5,7 +5,7 @@
 //! products `P^T A P` on those of their nodes that lie among the solid's, so a cell that is cut stays cut as it is. [`Patches`]
 //! smooth on all but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
 
-use gluey_fem::element::{split, values_1d};
+use gluey_fem::element::{multi_index, values_1d};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, DirectSpd, Guess, LinOp, Ordering, Preconditioner, SparseMatrix, SpectralInterval,
@@ -86,7 +86,7 @@ impl<'a, const D: usize> Numbered<'a, D> {
         }
         let coarse = Numbered::new(mesh, |node| is_in[node]);
         let terms = |(cell, line): &(usize, [[f64; 3]; D])| {
-            let weight = |i: usize| (0..D).map(|d| line[d][split::<D>(i, 3)[d]]).product::<f64>();
+            let weight = |i: usize| (0..D).map(|d| line[d][multi_index::<D>(i, 3)[d]]).product::<f64>();
             let nodes = mesh.velocity.cell(*cell).iter().map(|&n| coarse.number[n as usize]).enumerate();
             let terms = nodes.filter(|term| term.1 != NONE).map(|(i, node)| (node, weight(i)));
             terms.filter(|term| term.1 != 0.0).collect::<Vec<_>>()

@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use gluey_fem::NodeMap;
-use gluey_fem::cells::Tie;
+use gluey_fem::cells;
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
@@ -134,7 +134,7 @@ where
     pub fn reduce<T: Scalar>(&self, f: &mut [T]) {
         let (nodal, loads) = f.split_at_mut(self.full_dim());
         loads.fill(T::ZERO);
-        self.nodes.collect(D, T::from_f64, nodal);
+        self.nodes.condense(D, T::from_f64, nodal);
         for r in &self.rigid {
             let load = &mut loads[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
             let source = &mut nodal[r.node as usize * D..][..D];
@@ -200,9 +200,12 @@ where
     }
 
     /// The rigid nodes, for the operators.
-    pub fn ties(&self) -> Vec<Tie<f64, D>> {
-        let tie =
-            |r: &RigidNode<D>| Tie { node: r.node, body: r.body, arm: std::array::from_fn(|d| r.arm[d]) };
+    pub fn ties(&self) -> Vec<cells::RigidNode<f64, D>> {
+        let tie = |r: &RigidNode<D>| cells::RigidNode {
+            node: r.node,
+            body: r.body,
+            arm: std::array::from_fn(|d| r.arm[d]),
+        };
         self.rigid.iter().map(tie).collect()
     }
 

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::Reference;
+use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::{CellData, CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Pattern, Scalar, SparseMatrix, vector};
@@ -95,8 +95,8 @@ where
     Dim<D>: Space<D>,
 {
     let nodes = &discretisation.velocity;
-    let viscous = Reference::<D>::new().viscous;
-    let n = Reference::<D>::VELOCITY;
+    let viscous = ReferenceMatrices::<D>::new().viscous;
+    let n = ReferenceMatrices::<D>::VELOCITY;
     let mut nodal = vec![0.0; nodes.node_count() * D];
     for (cell, scale, own) in cells {
         for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
@@ -287,7 +287,7 @@ pub fn pressure_mass<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let m = Reference::<D>::PRESSURE;
+    let m = ReferenceMatrices::<D>::PRESSURE;
     let expansion = crate::assembly::pressure_expansion(system);
     let unknowns = |c: &ActiveCell| {
         let nodes = discretisation.pressure.cell(c.cell as usize).iter();

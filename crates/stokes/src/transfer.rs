@@ -1,6 +1,6 @@
 //! Evaluation of a field of one mesh at the nodes of another over the same box, and of a velocity at a point.
 
-use gluey_fem::element::{gradient, split, value, values_1d};
+use gluey_fem::element::{gradient, multi_index, value, values_1d};
 use gluey_fem::{Cell, NodeMap, TreeMesh};
 use gluey_geom::{Dim, Space, Twist, Vector};
 
@@ -34,7 +34,7 @@ impl<'a, const D: usize> Evaluator<'a, D> {
             let Some((cell, x)) = self.locate(to_nodes, node) else { continue };
             let line: [[f64; 3]; D] = std::array::from_fn(|d| values_1d(degree, x[d]));
             for (i, &source) in from_nodes.cell(cell).iter().enumerate() {
-                let index = split::<D>(i, degree + 1);
+                let index = multi_index::<D>(i, degree + 1);
                 let weight: f64 = (0..D).map(|d| line[d][index[d]]).product();
                 if weight != 0.0 {
                     let source = source as usize * components;

@@ -8,7 +8,7 @@ pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
     let mut offences = Vec::new();
     for source in sources {
         for (name, places) in &law.confined {
-            if places.iter().any(|place| lies_in(&source.path, place)) {
+            if places.iter().any(|place| source.lies_in(place)) {
                 continue;
             }
             let uses = source.all_code().filter(|(_, line)| uses(line, name));
@@ -19,11 +19,6 @@ pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
         }
     }
     offences
-}
-
-/// Whether `path` is `place` or lies under it.
-fn lies_in(path: &str, place: &str) -> bool {
-    path.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 /// Whether a line of code names the library in a path: `name::...` or `use name`.

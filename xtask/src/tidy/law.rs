@@ -14,6 +14,8 @@ pub struct Law {
     pub test_arrows: BTreeMap<String, BTreeSet<String>>,
     /// For each confined library, the paths under which its name may be used.
     pub confined: BTreeMap<String, Vec<String>>,
+    /// For each folder of a crate that has them, its rooms, lowest first.
+    pub rooms: BTreeMap<String, Vec<String>>,
 }
 
 impl Law {
@@ -35,6 +37,10 @@ impl Law {
         for line in block(text, "confined")? {
             let (name, paths) = split(line, " in ")?;
             law.confined.insert(name, paths);
+        }
+        for line in block(text, "rooms")? {
+            let (name, rooms) = split(line, ":")?;
+            law.rooms.insert(name, rooms.into_iter().filter(|word| word != "<").collect());
         }
         Ok(law)
     }
@@ -60,13 +66,16 @@ mod tests {
 
     #[test]
     fn blocks_are_read_and_their_absence_is_an_error() {
-        let law =
-            Law::parse("```arrows\na -> b c\nb ->\na ~> d\n```\n```confined\nx in p/q r\n```\n").unwrap();
+        let law = Law::parse(
+            "```arrows\na -> b c\nb ->\na ~> d\n```\n```confined\nx in p/q r\n```\n```rooms\na: s < t\n```\n",
+        )
+        .unwrap();
         assert_eq!(law.arrows["a"], BTreeSet::from(["b".to_owned(), "c".to_owned()]));
         assert!(law.arrows["b"].is_empty());
         assert_eq!(law.test_arrows["a"], BTreeSet::from(["d".to_owned()]));
         assert_eq!(law.confined["x"], ["p/q", "r"]);
+        assert_eq!(law.rooms["a"], ["s", "t"]);
         assert!(Law::parse("no blocks").is_err());
-        assert!(Law::parse("```arrows\na to b\n```\n```confined\n```\n").is_err());
+        assert!(Law::parse("```arrows\na to b\n```\n```confined\n```\n```rooms\n```\n").is_err());
     }
 }

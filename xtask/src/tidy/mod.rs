@@ -3,6 +3,9 @@
 mod arrows;
 mod confined;
 mod law;
+mod modules;
+mod rooms;
+mod shape;
 mod sources;
 mod style;
 
@@ -22,6 +25,14 @@ pub enum TidyError {
     /// A block of the law is missing or a line of it makes no sense.
     #[error("ARCHITECTURE.md: {0}")]
     Law(String),
+    /// A file is not Rust.
+    #[error("{path}: {error}")]
+    Syntax {
+        /// The file or the folder it lies in.
+        path: String,
+        /// What the parser said.
+        error: syn::Error,
+    },
     /// `cargo metadata` did not answer.
     #[error("cargo metadata: {0}")]
     Metadata(String),
@@ -33,7 +44,9 @@ pub fn offences(root: &Path) -> Result<Vec<String>, TidyError> {
     let sources = sources::all(root)?;
     let mut offences = arrows::offences(&law, &arrows::metadata(root)?);
     offences.extend(confined::offences(&law, &sources));
+    offences.extend(rooms::offences(&law, &sources)?);
     offences.extend(style::offences(&sources));
+    offences.extend(shape::offences(&sources)?);
     Ok(offences)
 }
 

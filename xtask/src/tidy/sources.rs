@@ -36,6 +36,21 @@ impl Source {
         Self { path, lines, tests_from }
     }
 
+    /// Whether it holds nothing but tests, examples or timings.
+    pub fn is_test(&self) -> bool {
+        self.tests_from == 0 && !self.lines.is_empty()
+    }
+
+    /// Whether it is `place` or lies under it.
+    pub fn lies_in(&self, place: &str) -> bool {
+        self.path.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> String {
+        self.lines.join("\n")
+    }
+
     /// Line numbers (from 1) and code outside tests and comments.
     pub fn code(&self) -> impl Iterator<Item = (usize, &str)> {
         self.all_code().take_while(|(number, _)| *number <= self.tests_from)

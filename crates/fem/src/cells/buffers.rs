@@ -1,13 +1,13 @@
 //! Where a thread works off chunks.
 //!
-//! Buffers belong to nobody: an operator takes as many as it has threads for the time it is applied. They are made once for all
-//! operators of a program, and what one has brought into the cache serves the next.
+//! Buffers belong to nobody: an operator takes as many as it has threads for the time it is applied. They are
+//! made once for all operators of a program, and what one has brought into the cache serves the next.
 
 use std::sync::{Mutex, PoisonError};
 
 use gluey_linalg::Scalar;
 
-use super::lanes::Nodes;
+use super::simd::Nodes;
 
 /// The buffers of one thread.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ impl<T: Scalar> Buffers<T> {
 fn nodes_in<T>(buffer: &mut [T]) -> &mut Nodes<T> {
     let offset = buffer.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT / 4);
     let (nodes, _) = buffer[offset..].as_chunks_mut::<4>();
-    (&mut nodes[..1 << 16]).try_into().expect("the buffer is longer than all slots")
+    (&mut nodes[..1 << 16]).try_into().expect("the buffer is longer than all locals")
 }
 
 /// The buffers that are not in use.

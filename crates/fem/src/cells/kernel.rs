@@ -1,14 +1,22 @@
-//! What a vector of cells contributes: from nodes to lanes, the matrices in Legendre products, and back.
+//! The contribution of a vector of cells: from nodes to lanes, the matrices in Legendre products, and back.
 
 use gluey_linalg::Scalar;
 
-use super::lanes::{CellScalar, Lanes, Nodes};
 use super::legendre::{self, CORNERS, UNKNOWNS};
+use super::scalar::CellScalar;
+use super::simd::{Lanes, Nodes};
 use super::{CellOperator, GROUP};
 use crate::element::node_count;
 
 /// Nodes at the corners of a plane of nine.
 const CORNERS_OF_PLANE: [usize; 4] = [0, 2, 6, 8];
+
+/// The buffers of a chunk: nodes that are read, nodes that are written, room for fields at quadrature points.
+pub(super) struct Fields<'a, T> {
+    pub(super) x: &'a Nodes<T>,
+    pub(super) y: &'a mut Nodes<T>,
+    pub(super) points: &'a mut [T],
+}
 
 /// Fields of as many cells as a vector has lanes.
 pub(super) struct Registers<V> {
@@ -22,7 +30,7 @@ pub(super) struct Registers<V> {
 #[inline(always)]
 fn gather<V: Lanes, const D: usize, const VISCOUS: bool>(
     x: &Nodes<V::Scalar>,
-    slots: &[u16],
+    locals: &[u16],
     u: &mut [V; UNKNOWNS],
     p: &mut [V; CORNERS],
 ) {
@@ -30,7 +38,7 @@ fn gather<V: Lanes, const D: usize, const VISCOUS: bool>(
     for plane in 0..n / 9 {
         let mut of_plane = [[V::splat(V::Scalar::ZERO); 9]; 4];
         for k in 0..9 {
-            let node = V::gather(x, &slots[9 * plane + k..], n);
+            let node = V::gather(x, &locals[9 * plane + k..], n);
             for c in 0..4 {
                 of_plane[c][k] = node[c];
             }
@@ -53,7 +61,7 @@ fn gather<V: Lanes, const D: usize, const VISCOUS: bool>(
 #[inline(always)]
 fn scatter<V: Lanes, const D: usize, const DIVERGENCE: bool>(
     y: &mut Nodes<V::Scalar>,
-    slots: &[u16],
+    locals: &[u16],
     r: &[V; UNKNOWNS],
     q: &[V; CORNERS],
 ) {
@@ -71,7 +79,7 @@ fn scatter<V: Lanes, const D: usize, const DIVERGENCE: bool>(
         }
         for k in 0..9 {
             let node = [of_plane[0][k], of_plane[1][k], of_plane[2][k], of_plane[3][k]];
-            V::scatter(node, y, &slots[9 * plane + k..], n);
+            V::scatter(node, y, &locals[9 * plane + k..], n);
         }
     }
 }
@@ -85,7 +93,7 @@ impl<V: Lanes> Registers<V> {
 }
 
 impl<T: CellScalar, const D: usize> CellOperator<T, D> {
-    /// Adds what [`Lanes::COUNT`] cells contribute.
+    /// Adds the contributions of [`Lanes::COUNT`] cells.
     #[inline(always)]
     pub(super) fn cells<
         V: Lanes<Scalar = T>,
@@ -96,15 +104,13 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         &self,
         first: usize,
         eta: &[T],
-        x: &Nodes<T>,
-        y: &mut Nodes<T>,
+        Fields { x, y, points }: &mut Fields<'_, T>,
         registers: &mut Registers<V>,
-        work: &mut [T],
     ) {
         let n = node_count::<D>(2);
-        let slots = &self.slots[first * n..][..V::COUNT * n];
+        let locals = &self.locals[first * n..][..V::COUNT * n];
         let Registers { u, r, p, q } = registers;
-        gather::<V, D, VISCOUS>(x, slots, u, p);
+        gather::<V, D, VISCOUS>(x, locals, u, p);
         if VISCOUS {
             legendre::third::<V, D, true>(u);
             if PRESSURE {
@@ -112,7 +118,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             }
             if VARYING {
                 let mut by_points = [V::splat(T::ZERO); UNKNOWNS];
-                self.rule.add_viscous::<V, D>(eta, GROUP, u, &mut by_points, work);
+                self.rule.add_viscous::<V, D>(eta, GROUP, u, &mut by_points, points);
                 self.viscous_lanes::<V>(first, u, r);
                 for (r, add) in r[..D * n].iter_mut().zip(&by_points) {
                     *r = r.add(*add);
@@ -139,9 +145,9 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         }
         legendre::third::<V, D, false>(r);
         if VISCOUS && PRESSURE {
-            scatter::<V, D, true>(y, slots, r, q);
+            scatter::<V, D, true>(y, locals, r, q);
         } else {
-            scatter::<V, D, false>(y, slots, r, q);
+            scatter::<V, D, false>(y, locals, r, q);
         }
     }
 

@@ -1,20 +1,20 @@
 //! The element matrices in products of Legendre polynomials.
 //!
-//! On the line from -1 to 1 let a quadratic be `a_0 P_0 + a_1 P_1 + a_2 P_2`. The `P_l` are orthogonal, and so are their
-//! derivatives `P_1' = P_0`, `P_2' = 3 P_1`. In the products of these polynomials
+//! On the line from -1 to 1 let a quadratic be `a_0 P_0 + a_1 P_1 + a_2 P_2`. The `P_l` are orthogonal, and
+//! so are their derivatives `P_1' = P_0`, `P_2' = 3 P_1`. In the products of these polynomials
 //!
 //! - mass and Laplacian of a cube are diagonal,
 //! - `int d_b v_a d_a u_b` joins each function to at most one other, since `P_l'` is a multiple of `P_{l-1}`,
 //! - a trilinear pressure sees one function of each component,
 //!
-//! so 153 multiplications apply the viscous matrix of a 3D cell, in place of 6561 for its entries, and a change of basis
-//! costs four operations a line of three nodes:
-//! `A_0 = u_0 + 4 u_1 + u_2`, `A_1 = u_0 - u_2`, `A_2 = u_1 - A_0 / 6` are `a_l / c_l`.
+//! so 153 multiplications apply the viscous matrix of a 3D cell, in place of 6561 for its entries, and a
+//! change of basis costs four operations per line of three nodes: `A_0 = u_0 + 4 u_1 + u_2`,
+//! `A_1 = u_0 - u_2`, `A_2 = u_1 - A_0 / 6` are `a_l / c_l`.
 
 use gluey_linalg::Scalar;
 
-use super::lanes::Lanes;
-use crate::element::{node_count, split};
+use super::simd::Lanes;
+use crate::element::{multi_index, node_count};
 
 /// Most velocity unknowns of a cell: those in 3D.
 pub(super) const UNKNOWNS: usize = 81;
@@ -48,8 +48,9 @@ const fn nodes<const D: usize>() -> usize {
     node_count::<D>(2)
 }
 
+/// Distance of neighbours in a direction, in a grid of three nodes per direction.
 #[inline(always)]
-const fn stride(direction: usize) -> usize {
+pub(super) const fn stride(direction: usize) -> usize {
     [1, 3, 9, 27][direction]
 }
 
@@ -58,7 +59,7 @@ impl<T: Scalar> Coefficients<T> {
         let mass = |l: usize| MASS[l] * VELOCITY[l].powi(2);
         let stiffness = |l: usize| STIFFNESS[l] * VELOCITY[l].powi(2);
         let diagonal = |a: usize, node: usize| {
-            let l = split::<D>(node, 3);
+            let l = multi_index::<D>(node, 3);
             let along = |d: usize| -> f64 {
                 (0..D).map(|e| if e == d { stiffness(l[e]) } else { mass(l[e]) }).product()
             };
@@ -144,8 +145,8 @@ impl<T: Scalar> Coefficients<T> {
         });
     }
 
-    /// Visits the entries of `B`: the function of component `b` whose derivative in direction `b` has the degrees of the
-    /// pressure.
+    /// Visits the entries of `B`: the function of component `b` whose derivative in direction `b` has the
+    /// degrees of the pressure.
     #[inline(always)]
     fn for_each_pressure<V: Lanes<Scalar = T>, const D: usize>(
         &self,

@@ -1,21 +1,20 @@
 use super::*;
-use crate::element::gauss_cube;
-use crate::reference::{Reference, add_viscous};
-use crate::tree::TreeMesh;
+use crate::element::{ReferenceMatrices, add_viscous, gauss_cube};
+use crate::mesh::TreeMesh;
 use gluey_geom::{Aabb, Vector};
 
-/// Gauss points a direction where the viscosity varies; also an odd number.
+/// Gauss points per direction where the viscosity varies; also an odd number.
 const QUADRATURE: [usize; 3] = [3, 4, 5];
 
-/// A mesh of several chunks with hanging nodes, some cells left out, some scaled, some with a viscosity that varies, and
-/// some nodes tied to two bodies.
+/// A mesh of several chunks with hanging nodes, some cells left out, some scaled, some with a viscosity that
+/// varies, and some nodes that move with two bodies.
 struct Case<const D: usize> {
     velocity: NodeMap<D>,
     pressure: NodeMap<D>,
     chunks: Arc<Chunks<D>>,
     scales: Vec<(usize, f64, f64)>,
     eta: Vec<Vec<f64>>,
-    ties: Vec<Tie<f64, D>>,
+    rigid_nodes: Vec<RigidNode<f64, D>>,
     quadrature: usize,
 }
 
@@ -35,8 +34,8 @@ impl<const D: usize> Case<D> {
         let varying = |c: usize| if c % 11 == 1 { points } else { 0 };
         let eta =
             scales.iter().map(|s| (0..varying(s.0)).map(|q| (1.0 + (s.0 + q) as f64).sin() + 2.0).collect());
-        let tied = |n: &usize| n % 13 == 5 && !velocity.is_hanging(*n) && !velocity.is_on_boundary(*n);
-        let ties = (0..velocity.node_count()).filter(tied).map(|n| Tie {
+        let rigid = |n: &usize| n % 13 == 5 && !velocity.is_hanging(*n) && !velocity.is_on_boundary(*n);
+        let rigid_nodes = (0..velocity.node_count()).filter(rigid).map(|n| RigidNode {
             node: n as u32,
             body: 2 * (n % 2) as u32,
             arm: std::array::from_fn(|d| velocity.point(n)[d] - 0.5),
@@ -44,7 +43,7 @@ impl<const D: usize> Case<D> {
         Self {
             chunks: Arc::new(Chunks::new(&velocity, &pressure)),
             eta: eta.collect(),
-            ties: ties.collect(),
+            rigid_nodes: rigid_nodes.collect(),
             scales,
             velocity,
             pressure,
@@ -58,20 +57,20 @@ impl<const D: usize> Case<D> {
             .iter()
             .zip(&self.eta)
             .map(|(&(cell, viscous, divergence), points)| CellData { cell, viscous, divergence, points });
-        CellOperator::new(&self.chunks, &self.velocity, cells, self.quadrature, &self.ties, 3)
+        CellOperator::new(&self.chunks, &self.velocity, cells, self.quadrature, &self.rigid_nodes, 3)
     }
 
     /// `(y, q)` by dense element matrices, with all maps written out.
     fn dense(&self, x: &[f64], p: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let reference = Reference::<D>::new();
-        let (n, m) = (Reference::<D>::VELOCITY, Reference::<D>::PRESSURE);
+        let reference = ReferenceMatrices::<D>::new();
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         let nodal = self.velocity.node_count() * D;
         let twist = CellOperator::<f64, D>::TWIST;
         let mut u = x[..nodal].to_vec();
-        for tie in &self.ties {
-            let from = &x[nodal + tie.body as usize * twist..];
+        for rigid in &self.rigid_nodes {
+            let from = &x[nodal + rigid.body as usize * twist..];
             (0..D).for_each(|c| {
-                u[tie.node as usize * D + c] = row(tie, c).iter().zip(from).map(|(a, b)| a * b).sum()
+                u[rigid.node as usize * D + c] = row(rigid, c).iter().zip(from).map(|(a, b)| a * b).sum()
             });
         }
         self.velocity.distribute(D, |w| w, &mut u);
@@ -93,12 +92,12 @@ impl<const D: usize> Case<D> {
             }
         }
         let (nodes, loads) = y.split_at_mut(nodal);
-        self.velocity.collect(D, |w| w, nodes);
-        for tie in &self.ties {
+        self.velocity.condense(D, |w| w, nodes);
+        for rigid in &self.rigid_nodes {
             for c in 0..D {
-                let force = std::mem::take(&mut nodes[tie.node as usize * D + c]);
-                let load = &mut loads[tie.body as usize * twist..];
-                row(tie, c).iter().zip(load).for_each(|(a, l)| *l += a * force);
+                let force = std::mem::take(&mut nodes[rigid.node as usize * D + c]);
+                let load = &mut loads[rigid.body as usize * twist..];
+                row(rigid, c).iter().zip(load).for_each(|(a, l)| *l += a * force);
             }
         }
         for node in (0..self.velocity.node_count()).filter(|&n| self.velocity.is_on_boundary(n)) {
@@ -109,14 +108,14 @@ impl<const D: usize> Case<D> {
 }
 
 /// Component `c` of `U + w x arm` as a form in the entries of the twist.
-fn row<const D: usize>(tie: &Tie<f64, D>, c: usize) -> Vec<f64> {
+fn row<const D: usize>(rigid: &RigidNode<f64, D>, c: usize) -> Vec<f64> {
     let mut row = vec![0.0; CellOperator::<f64, D>::TWIST];
     row[c] = 1.0;
     if D == 2 {
-        row[2] = [-tie.arm[1], tie.arm[0]][c];
+        row[2] = [-rigid.arm[1], rigid.arm[0]][c];
     } else {
-        row[D + (c + 1) % D] = tie.arm[(c + 2) % D];
-        row[D + (c + 2) % D] = -tie.arm[(c + 1) % D];
+        row[D + (c + 1) % D] = rigid.arm[(c + 2) % D];
+        row[D + (c + 2) % D] = -rigid.arm[(c + 1) % D];
     }
     row
 }
@@ -137,7 +136,9 @@ fn equals_the_dense_matrices<T: CellScalar, const D: usize>() {
     for quadrature in QUADRATURE {
         let case = Case::<D>::new(quadrature);
         let operator = case.operator::<T>();
-        assert!(case.chunks.count() > 1 && !case.velocity.constraints().is_empty() && case.ties.len() > 10);
+        assert!(
+            case.chunks.count() > 1 && !case.velocity.constraints().is_empty() && case.rigid_nodes.len() > 10
+        );
         let (x, p) = (wave(operator.velocity_dim(), 0.9), wave(operator.pressure_dim(), 0.4));
         let (want_y, want_q) = case.dense(&x, &p);
         let (x, p) = (cast::<T>(&x), cast::<T>(&p));
@@ -192,20 +193,20 @@ fn kernels_agree<T: CellScalar, const D: usize>() {
     let case = Case::<D>::new(4);
     let operator = case.operator::<T>();
     let (x, p) = (cast(&wave(operator.velocity_dim(), 0.9)), cast(&wave(operator.pressure_dim(), 0.4)));
-    let portable = run::with(&operator, &x, &p, &|input, output, buffers| {
-        operator.run::<lanes::Portable<T>, true, true, T>(input, output, buffers);
+    let portable = sweep::with(&operator, &x, &p, &|input, output, buffers| {
+        operator.run::<simd::Portable<T>, true, true, T>(input, output, buffers);
     });
     let portable: Vec<f64> = portable.iter().map(|x| x.to_f64()).collect();
     let scale = portable.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     let check = |found: Vec<T>| assert!(distance(&found, &portable) < 50.0 * T::EPSILON * scale);
-    check(run::with(&operator, &x, &p, &|input, output, buffers| {
+    check(sweep::with(&operator, &x, &p, &|input, output, buffers| {
         operator.dispatch::<true, true, T>(input, output, buffers);
     }));
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        check(run::with(&operator, &x, &p, &|input, output, buffers| {
+        check(sweep::with(&operator, &x, &p, &|input, output, buffers| {
             // SAFETY: the instructions were detected.
-            unsafe { run::run_avx2::<T, D, true, true, T>(&operator, input, output, buffers) };
+            unsafe { sweep::run_avx2::<T, D, true, true, T>(&operator, input, output, buffers) };
         }));
     }
 }

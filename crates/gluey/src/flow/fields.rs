@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gluey_fem::element::{split, value};
+use gluey_fem::element::{multi_index, value};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::{Ball, BallTree, Ramp, ViscosityLaw};
 use gluey_motion::Fields;
@@ -22,7 +22,7 @@ where
     for (index, cell) in mesh.cells().iter().enumerate() {
         let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
         for (i, &node) in nodes.cell(index).iter().enumerate() {
-            let local = split::<D>(i, 3).map(|k| 0.5 * k as f64);
+            let local = multi_index::<D>(i, 3).map(|k| 0.5 * k as f64);
             let x = lower + Vector::from_fn(|d, _| h * local[d]);
             let wrapped = std::array::from_fn(|d| (x[d] - nodes.point(node as usize)[d]).abs() > 0.25 * h);
             let next = fields.points.len() as u32;

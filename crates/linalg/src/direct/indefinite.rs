@@ -1,13 +1,15 @@
-//! Factorisation `L B L^T` of symmetric indefinite matrices, such as the saddle points of the Stokes equations.
+//! Factorisation `L B L^T` of symmetric indefinite matrices, such as the saddle points of the Stokes
+//! equations.
 //!
-//! faer pivots (Bunch and Kaufman 1977, 10.1090/S0025-5718-1977-0428694-0) inside a supernode only. A pressure whose
-//! diagonal is zero and which the ordering eliminates before any of its velocities is a pivot of exactly zero, and the
-//! factor fills with NaN in silence. That is the rule, not the exception, beside rigid bodies, where pressures see few
-//! free velocities. Therefore each factor is tested by a solve with a known answer. If the test fails
-//! the zero diagonal entries are replaced by `-s d_i`, where `d_i = sum_j a_ij^2 / |a_jj|` is the diagonal of the Schur
-//! complement with the other unknowns lumped: for Stokes a slight compressibility. The matrix is then quasi-definite and
-//! has a factor for *every* ordering (Vanderbei 1995, 10.1137/0805005); refinement with the true matrix removes the
-//! error of order `s` within two or three steps.
+//! faer pivots (Bunch and Kaufman 1977, 10.1090/S0025-5718-1977-0428694-0) inside a supernode only. A
+//! pressure whose diagonal is zero and which the ordering eliminates before any of its velocities is a pivot
+//! of exactly zero, and the factor fills with NaN in silence. That is the rule, not the exception, beside
+//! rigid bodies, where pressures see few free velocities. Therefore each factor is tested by a solve with a
+//! known answer. If the test fails the zero diagonal entries are replaced by `-s d_i`, where
+//! `d_i = sum_j a_ij^2 / |a_jj|` is the diagonal of the Schur complement with the other unknowns lumped: for
+//! Stokes a slight compressibility. The matrix is then quasi-definite and has a factor for *every* ordering
+//! (Vanderbei 1995, 10.1137/0805005); refinement with the true matrix removes the error of order `s` within
+//! two or three steps.
 
 use std::sync::Arc;
 
@@ -17,7 +19,9 @@ use faer::sparse::linalg::cholesky::IntranodeLbltRef;
 
 use super::refinement::{Refinement, rounding_norm};
 use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
-use crate::{Preconditioner, SparseMatrix, vector};
+use crate::operator::Preconditioner;
+use crate::sparse::SparseMatrix;
+use crate::vector;
 
 /// When [`DirectIndefinite`] regularises zero diagonal entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +30,8 @@ pub enum Regularise {
     Never,
     /// If the plain factor fails its test, which then has cost a factorisation.
     WhenNeeded,
-    /// Always. Best where the plain factor is known to fail, as it is with pressures that see few free velocities:
-    /// approximate minimum degree eliminates these first. Costs one refinement in each solve.
+    /// Always. Best where the plain factor is known to fail, as it is with pressures that see few free
+    /// velocities: approximate minimum degree eliminates these first. Costs one refinement in each solve.
     Always,
 }
 
@@ -108,7 +112,8 @@ impl DirectIndefinite {
         &self.symbolic
     }
 
-    /// Factorises the matrix with the given values, in the order of the pattern, and tests the factor by a solve.
+    /// Factorises the matrix with the given values, in the order of the pattern, and tests the factor by a
+    /// solve.
     pub fn factorise(&mut self, values: &[f64]) -> Result<FactorReport, DirectError> {
         self.factorised = false;
         self.matrix.copy_values(values)?;
@@ -133,7 +138,8 @@ impl DirectIndefinite {
         self.probe()
     }
 
-    /// The same with zero diagonal entries regularised in the factor, not in the matrix that residuals are taken of.
+    /// The same with zero diagonal entries regularised in the factor, not in the matrix that residuals are
+    /// taken of.
     fn factorise_regularised(&mut self, values: &[f64]) -> Result<f64, DirectError> {
         self.regularise();
         self.factor.compute(&self.symbolic, self.matrix.values());
@@ -196,8 +202,9 @@ impl DirectIndefinite {
     }
 }
 
-/// `d_i` counts for at least this fraction of the largest. A pressure whose couplings are rounding errors would else
-/// keep a pivot that is one; and where the system is truly singular, the null vector would be filled with noise.
+/// `d_i` counts for at least this fraction of the largest. A pressure whose couplings are rounding errors
+/// would else keep a pivot that is one; and where the system is truly singular, the null vector would be
+/// filled with noise.
 const LUMPED_FLOOR: f64 = 1e-2;
 
 /// `d_i = sum_j a_ij^2 / |a_jj|` over the `j` with a diagonal.

@@ -1,7 +1,8 @@
 //! Iterative refinement with a true residual (Wilkinson 1963; Skeel 1980, 10.1090/S0025-5718-1980-0572859-4).
 
 use super::DirectError;
-use crate::{SparseMatrix, vector};
+use crate::sparse::SparseMatrix;
+use crate::vector;
 
 /// Tuning of the refinement after a direct solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,13 +28,13 @@ pub struct SolveReport {
     pub residual_norm: f64,
     /// Norm of the right-hand side.
     pub right_hand_side_norm: f64,
-    /// The tolerance was not met, but the residual is rounding error: it is below `ROUNDING_UNITS` units of roundoff of
-    /// the terms it is the sum of, and no solver in this precision does better.
+    /// The tolerance was not met, but the residual is rounding error: it is below `ROUNDING_UNITS` units of
+    /// roundoff of the terms it is the sum of, and no solver in this precision does better.
     pub limited_by_rounding: bool,
 }
 
-/// A residual of so many units of roundoff of `|A| |x| + |b|` is rounding error: a row of n terms accumulates at most n
-/// of them and about sqrt(n) in practice.
+/// A residual of so many units of roundoff of `|A| |x| + |b|` is rounding error: a row of n terms accumulates
+/// at most n of them and about sqrt(n) in practice.
 const ROUNDING_UNITS: f64 = 16.0;
 
 /// Workspace of the refinement.
@@ -58,8 +59,8 @@ impl Refinement {
         self.params.relative_tolerance = tolerance;
     }
 
-    /// Solves `A x = b`, where `approximate` overwrites its argument with the approximate solution for it. Stops when a
-    /// step no longer halves the residual.
+    /// Solves `A x = b`, where `approximate` overwrites its argument with the approximate solution for it.
+    /// Stops when a step no longer halves the residual.
     pub fn solve(
         &mut self,
         a: &SparseMatrix,

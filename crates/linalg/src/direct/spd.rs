@@ -8,7 +8,8 @@ use faer::sparse::linalg::cholesky::LltRef;
 
 use super::refinement::Refinement;
 use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
-use crate::{Preconditioner, SparseMatrix};
+use crate::operator::Preconditioner;
+use crate::sparse::SparseMatrix;
 
 /// Direct solver for symmetric positive definite matrices with one pattern.
 #[derive(Debug)]

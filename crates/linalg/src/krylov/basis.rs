@@ -1,18 +1,21 @@
-//! The vectors that a Krylov method keeps: an orthogonal basis, and the directions whose images span the same space.
+//! The vectors that a Krylov method keeps: an orthogonal basis, and the directions whose images span the same
+//! space.
 //!
-//! Both are written where they stay: directions by the preconditioner, basis vectors by the operator. Basis vectors are not
-//! scaled to norm one; their norms go into the coefficients.
+//! Both are written where they stay: directions by the preconditioner, basis vectors by the operator. Basis
+//! vectors are not scaled to norm one; their norms go into the coefficients.
 //!
-//! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified between
-//! groups; the pass over `w` that subtracts one group takes the scalar products with the next.
+//! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified
+//! between groups; the pass over `w` that subtracts one group takes the scalar products with the next.
 
+use crate::scalar::Scalar;
 use crate::vector::{BLOCK, axpy_block, dot_block};
-use crate::{Scalar, parallel, vector};
+use crate::{parallel, vector};
 
 /// Vectors that one pass over `w` is orthogonalised against.
 const GROUP: usize = 8;
 
-/// Largest norm of a basis vector, and its inverse the smallest: products of entries stay in the range of `f32`.
+/// Largest norm of a basis vector, and its inverse the smallest: products of entries stay in the range of
+/// `f32`.
 const LARGEST_NORM: f64 = 1e8;
 
 /// Vectors of one length, of which the first are in use. Memory is kept for later use.
@@ -46,12 +49,12 @@ impl<T: Scalar> Stack<T> {
     }
 }
 
-/// What a basis leaves of a vector.
+/// The part of a vector that is orthogonal to a basis.
 #[derive(Clone, Copy, Debug)]
-pub struct Left {
+pub struct Remainder {
     /// Its norm.
     pub norm: f64,
-    /// The product of what is left, over its norm, with another vector.
+    /// Its product, over its norm, with another vector.
     pub product: f64,
 }
 
@@ -74,8 +77,8 @@ impl<T: Scalar> Basis<T> {
         self.vectors.used_and_next().1
     }
 
-    /// Takes what was written to [`Basis::next`] into the basis: a vector of this norm, orthogonal to the others. It is scaled
-    /// if products with such vectors might leave the range of the scalar.
+    /// Takes what was written to [`Basis::next`] into the basis: a vector of this norm, orthogonal to the
+    /// others. It is scaled if products with such vectors might leave the range of the scalar.
     pub fn push(&mut self, norm: f64) {
         let is_safe = (1.0 / LARGEST_NORM..=LARGEST_NORM).contains(&norm);
         if !is_safe {
@@ -95,20 +98,20 @@ impl<T: Scalar> Basis<T> {
         self.vectors.used().last().map_or(&[], Vec::as_slice)
     }
 
-    /// Makes [`Basis::next`] orthogonal to the basis, passes its products with the normalised vectors to `coefficient` and
-    /// returns the norm of what is left and its product with `r`.
-    pub fn orthogonalise(&mut self, r: &[T], coefficient: impl FnMut(f64)) -> Left {
+    /// Makes [`Basis::next`] orthogonal to the basis, passes its products with the normalised vectors to
+    /// `coefficient` and returns the norm of what is left and its product with `r`.
+    pub fn orthogonalise(&mut self, r: &[T], coefficient: impl FnMut(f64)) -> Remainder {
         let (used, w) = self.vectors.used_and_next();
         let last = take_out_all(used, &self.norms, w, coefficient);
         let terms =
             |at: usize, block: &[T]| [dot_block(block, block), dot_block(&r[at..][..block.len()], block)];
         let [square, product] = pass(w, last, terms);
         let norm = square.sqrt();
-        Left { norm, product: product / norm }
+        Remainder { norm, product: product / norm }
     }
 
-    /// Makes `r` orthogonal to the basis, passes its products with the normalised vectors to `coefficient` and returns the
-    /// norm of what is left.
+    /// Makes `r` orthogonal to the basis, passes its products with the normalised vectors to `coefficient`
+    /// and returns the norm of what is left.
     pub fn take_out(&self, r: &mut [T], coefficient: impl FnMut(f64)) -> f64 {
         let last = take_out_all(self.vectors.used(), &self.norms, r, coefficient);
         norm_after(r, last)
@@ -152,7 +155,8 @@ fn norm_after<T: Scalar>(w: &mut [T], pending: Pending<'_, T>) -> f64 {
     square.sqrt()
 }
 
-/// Subtracts the multiples `h` of `group` from `w` and sums `terms(first index, block)` over the blocks of the result.
+/// Subtracts the multiples `h` of `group` from `w` and sums `terms(first index, block)` over the blocks of
+/// the result.
 fn pass<T: Scalar, const N: usize>(
     w: &mut [T],
     (group, h): Pending<'_, T>,
@@ -185,7 +189,7 @@ fn subtract<T: Scalar>(vectors: &[Vec<T>], h: &[f64; GROUP], at: usize, block: &
     }
 }
 
-/// What a preconditioner has returned.
+/// The directions that a preconditioner has returned.
 #[derive(Clone, Debug, Default)]
 pub struct Directions<S> {
     vectors: Stack<S>,
@@ -231,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_orthogonal_to_the_basis() {
+    fn remainders_are_orthogonal_to_the_basis() {
         let n = 3 * BLOCK + 5;
         let mut basis = Basis::<f64>::default();
         basis.reset(n);
@@ -241,7 +245,7 @@ mod tests {
             basis.next().copy_from_slice(&w);
             let mut h = Vec::new();
             let r = wave(n, 0.2);
-            let Left { norm, product } = basis.orthogonalise(&r, |c| h.push(c));
+            let Remainder { norm, product } = basis.orthogonalise(&r, |c| h.push(c));
             assert_eq!(h.len(), j);
             assert!((product * norm - vector::dot(&r, basis.next())).abs() < 1e-12 * vector::norm(&r) * norm);
             assert!((norm - vector::norm(basis.next())).abs() < 1e-12 * norm);

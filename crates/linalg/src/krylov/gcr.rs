@@ -1,20 +1,25 @@
 //! Generalised conjugate residuals with a preconditioner that may change, in two precisions.
 //!
-//! Step `k` takes a direction `z = M_k^-1 r`, makes `c = A z` orthogonal to those before it and takes `c` out of the residual `r`:
-//! with `A Z = C R` for the stored directions, orthogonal `C` and upper triangular `R`, the residual `r - C C^T r` is the smallest
-//! that any combination of the directions leaves, and belongs to `x + Z R^-1 C^T r` (Eisenstat, Elman and Schultz 1983,
-//! 10.1137/0720023; with inner iterations van der Vorst and Vuik 1994, 10.1002/nla.1680010404). Flexible GMRES finds the same
-//! residuals; here they are at hand in every step. Where a step hardly makes the residual smaller, the next direction starts
-//! from `c` in place of `r`, which would give the last direction again (Jiranek and Rozloznik 2010, 10.1007/s11075-009-9311-6).
+//! Step `k` takes a direction `z = M_k^-1 r`, makes `c = A z` orthogonal to those before it and takes `c` out
+//! of the residual `r`: with `A Z = C R` for the stored directions, orthogonal `C` and upper triangular `R`,
+//! the residual `r - C C^T r` is the smallest that any combination of the directions leaves, and belongs to
+//! `x + Z R^-1 C^T r` (Eisenstat, Elman and Schultz 1983, 10.1137/0720023; with inner iterations van der
+//! Vorst and Vuik 1994, 10.1002/nla.1680010404). Flexible GMRES finds the same residuals; here they are at
+//! hand in every step. Where a step hardly makes the residual smaller, the next direction starts from `c` in
+//! place of `r`, which would give the last direction again (Jiranek and Rozloznik 2010,
+//! 10.1007/s11075-009-9311-6).
 //!
-//! `Gcr<f64, f32>` takes its steps in single precision: preconditioner, operator and all vectors that are kept. They work in
-//! stages: when the residual has become smaller by `epsilon^(2/3)`, or no longer becomes smaller, `x` is updated and the residual
-//! computed anew, both in double precision. `Z`, `C` and `R` stay, so a new stage loses nothing. The true residual decides when
-//! to stop, and reaches what double precision allows.
+//! `Gcr<f64, f32>` takes its steps in single precision: preconditioner, operator and all vectors that are
+//! kept. They work in stages: when the residual has become smaller by `epsilon^(2/3)`, or no longer becomes
+//! smaller, `x` is updated and the residual computed anew, both in double precision. `Z`, `C` and `R` stay,
+//! so a new stage loses nothing. The true residual decides when to stop, and reaches what double precision
+//! allows.
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
-use crate::{LinOp, Preconditioner, Scalar, vector};
+use crate::operator::{LinOp, Preconditioner};
+use crate::scalar::Scalar;
+use crate::vector;
 
 /// A step from the residual that leaves more than this of it is followed by one that starts from `c`.
 const SLOW: f64 = 0.9;
@@ -40,16 +45,17 @@ impl Default for GcrParams {
     }
 }
 
-/// Flexible generalised conjugate residuals. Owns its workspace, which grows to what the longest solve needed and is then
-/// reused.
+/// Flexible generalised conjugate residuals. Owns its workspace, which grows to what the longest solve needed
+/// and is then reused.
 ///
-/// `Gcr<f64, f32>` takes its steps in single precision, see [`Gcr::with_steps`]. It reaches the same true residual.
+/// `Gcr<f64, f32>` takes its steps in single precision, see [`Gcr::with_steps`]. It reaches the same true
+/// residual.
 #[derive(Clone, Debug)]
 pub struct Gcr<T, S = T> {
     params: GcrParams,
     /// `b - A x`.
     residual: Vec<T>,
-    /// What the steps of a stage have left of it, over its norm at their start.
+    /// The part of it that the steps of a stage have left, over its norm at their start.
     r: Vec<S>,
     /// `Z`.
     directions: Directions<S>,
@@ -70,11 +76,11 @@ impl<T: Scalar> Gcr<T> {
 }
 
 impl<T: Scalar, S: Scalar> Gcr<T, S> {
-    /// A solver with an empty workspace that takes its steps in `S`: half the memory and half the traffic where that is
-    /// narrower than `T`.
+    /// A solver with an empty workspace that takes its steps in `S`: half the memory and half the traffic
+    /// where that is narrower than `T`.
     ///
-    /// For a good preconditioner, with convergence in a few dozen iterations: rounded vectors no longer span a Krylov space,
-    /// which delays convergence through hundreds of iterations.
+    /// For a good preconditioner, with convergence in a few dozen iterations: rounded vectors no longer span
+    /// a Krylov space, which delays convergence through hundreds of iterations.
     pub fn with_steps(params: GcrParams) -> Self {
         let restart = params.restart.max(1);
         Self {
@@ -99,15 +105,16 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.params.relative_tolerance = tolerance;
     }
 
-    /// Residual norms of the last solve: the initial one, then one for each iteration. The last is the true one.
+    /// Residual norms of the last solve: the initial one, then one for each iteration. The last is the true
+    /// one.
     pub fn residual_history(&self) -> &[f64] {
         &self.history
     }
 
     /// Solves `A x = b` from the guess in `x`.
     ///
-    /// Converged means that the residual recomputed from `x` is small, not the one of the recurrence. On an error `x`
-    /// holds the last finite iterate.
+    /// Converged means that the residual recomputed from `x` is small, not the one of the recurrence. On an
+    /// error `x` holds the last finite iterate.
     pub fn solve(
         &mut self,
         a: &mut (impl LinOp<T> + LinOp<S> + ?Sized),
@@ -122,23 +129,23 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.r.resize(b.len(), S::ZERO);
         self.forget();
         let right_hand_side_norm = finite(vector::norm(b), 0)?;
-        let mut norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
+        let norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
         let GcrParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
         self.history.push(norm);
-        let (mut iterations, mut end) = (0, StageEnd::Regular);
-        while norm > target.norm {
-            if iterations == max_iterations {
-                return Err(target.not_converged(iterations, norm, &self.history));
+        let mut now = Progress { iterations: 0, norm, stage: StageEnd::Regular };
+        while now.norm > target.norm {
+            if now.iterations == max_iterations {
+                return Err(target.not_converged(now.iterations, now.norm, &self.history));
             }
-            end = self.stage(a, m, norm, &target, (&mut iterations, end))?;
-            let before = norm;
-            norm = self.update(a, b, x, norm, iterations)?;
-            if end == StageEnd::BrokeDown && norm > target.norm.max(0.5 * before) {
-                return Err(target.not_converged(iterations, norm, &self.history));
+            now.stage = self.stage(a, m, &target, &mut now)?;
+            let before = now.norm;
+            now.norm = self.update(a, b, x, &now)?;
+            if now.stage == StageEnd::BrokeDown && now.norm > target.norm.max(0.5 * before) {
+                return Err(target.not_converged(now.iterations, now.norm, &self.history));
             }
         }
-        Ok(target.report(iterations, norm))
+        Ok(target.report(now.iterations, now.norm))
     }
 
     /// Drops all directions.
@@ -148,16 +155,18 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.triangle.clear();
     }
 
-    /// Takes steps from the true residual, of this norm, until it is small, the precision of the steps is used up or they no
-    /// longer help: none if the images known already leave little of it, but at least one if there was none in the `last` stage.
+    /// Takes steps from the true residual until it is small, the precision of the steps is used up or they no
+    /// longer help: none if the images known already leave little of it, but at least one if there was none
+    /// in the last stage.
     fn stage(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
         m: &mut (impl Preconditioner<S> + ?Sized),
-        norm: f64,
         target: &Target,
-        (iterations, last): (&mut usize, StageEnd),
+        progress: &mut Progress,
     ) -> Result<StageEnd, KrylovError> {
+        let Progress { iterations, norm, stage: last } = progress;
+        let norm = *norm;
         if self.images.len() >= self.params.restart {
             self.forget();
         }
@@ -165,7 +174,7 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.coefficients.clear();
         let mut now = self.images.take_out(&mut self.r, |c| self.coefficients.push(c));
         let enough = (target.norm / norm).max(S::EPSILON.powf(2.0 / 3.0));
-        if now <= enough && last != StageEnd::NoStep {
+        if now <= enough && *last != StageEnd::NoStep {
             return Ok(StageEnd::NoStep);
         }
         let (mut is_slow, mut is_first, mut slow_steps) = (false, true, 0);
@@ -190,8 +199,8 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         Ok(StageEnd::Regular)
     }
 
-    /// One more direction, from the last image or from the residual; returns the norm of what it leaves of the residual, or
-    /// nothing where its image is a combination of those before.
+    /// One more direction, from the last image or from the residual; returns the norm of what it leaves of
+    /// the residual, or nothing where its image is a combination of those before.
     fn step(
         &mut self,
         a: &mut (impl LinOp<S> + ?Sized),
@@ -215,14 +224,14 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         Some(images.take_out_last(left.product, r))
     }
 
-    /// `x += norm Z R^-1 C^T r`, unless that is not finite, and the true residual for the next stage; returns its norm.
+    /// `x += norm Z R^-1 C^T r`, unless that is not finite, and the true residual for the next stage; returns
+    /// its norm.
     fn update(
         &mut self,
         a: &mut (impl LinOp<T> + ?Sized),
         b: &[T],
         x: &mut [T],
-        norm: f64,
-        iterations: usize,
+        &Progress { iterations, norm, .. }: &Progress,
     ) -> Result<f64, KrylovError> {
         self.triangle.solve(&mut self.coefficients);
         self.coefficients.iter_mut().for_each(|c| *c *= norm);
@@ -234,6 +243,15 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         }
         Ok(norm)
     }
+}
+
+/// How far a solve has come.
+struct Progress {
+    iterations: usize,
+    /// Norm of the true residual.
+    norm: f64,
+    /// How the last stage ended.
+    stage: StageEnd,
 }
 
 /// How a stage ended.

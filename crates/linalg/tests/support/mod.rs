@@ -1,10 +1,11 @@
-//! Matrices for the tests: Q2-Q1 Stokes on a uniform grid and the five-point Laplacian.
+//! Matrices for the tests: Q2-Q1 Stokes on a uniform grid and the five-point Laplacian; operators between
+//! precisions.
 
 #![allow(dead_code)]
 
 use std::sync::Arc;
 
-use gluey_linalg::{Pattern, SparseMatrix};
+use gluey_linalg::{LinOp, Pattern, Preconditioner, SparseMatrix, vector};
 
 /// A saddle-point matrix and which of its unknowns are pressures.
 pub struct Saddle {
@@ -12,8 +13,8 @@ pub struct Saddle {
     pub is_pressure: Vec<bool>,
 }
 
-/// Q2-Q1 elements on `n x n` cells of the unit square, velocity zero on the boundary, one pressure pinned, and
-/// viscosity `viscosity(x, y)` at the quadrature points.
+/// Q2-Q1 elements on `n x n` cells of the unit square, velocity zero on the boundary, one pressure pinned,
+/// and viscosity `viscosity(x, y)` at the quadrature points.
 pub fn stokes_2d(n: usize, viscosity: impl Fn(f64, f64) -> f64) -> Saddle {
     stokes_2d_around(n, viscosity, |_, _| false)
 }
@@ -71,7 +72,8 @@ impl Grid {
             .map(|(x, y)| number(inner(x) && inner(y) && !solid(place(x), place(y)), 2))
             .collect();
         let velocity_count = velocity.iter().flatten().count() * 2;
-        // The coupling to the far corners of the cells is zero: the integral of (1-t) t (2t-1) over [0, 1] vanishes.
+        // The coupling to the far corners of the cells is zero: the integral of (1-t) t (2t-1) over [0, 1]
+        // vanishes.
         let sees_velocity = |px: usize, py: usize| {
             let near = |k: usize| k.saturating_sub(2)..=(k + 2).min(2 * n);
             let couples = |x: usize, y: usize| px.abs_diff(x) < 2 || py.abs_diff(y) < 2;
@@ -171,4 +173,51 @@ pub fn relative_residual(a: &SparseMatrix, b: &[f64], x: &[f64]) -> f64 {
     let mut r = b.to_vec();
     a.multiply_add(-1.0, x, &mut r);
     gluey_linalg::vector::norm(&r) / gluey_linalg::vector::norm(b)
+}
+
+/// An operator or a preconditioner in double precision, between vectors in single precision.
+#[derive(Clone, Debug)]
+pub struct Rounded<A> {
+    inner: A,
+    input: Vec<f64>,
+    output: Vec<f64>,
+}
+
+impl<A> Rounded<A> {
+    /// Wraps `inner` for vectors of length `dim`.
+    pub fn new(dim: usize, inner: A) -> Self {
+        Self { inner, input: vec![0.0; dim], output: vec![0.0; dim] }
+    }
+
+    fn between(&mut self, x: &[f32], y: &mut [f32], action: impl FnOnce(&mut A, &[f64], &mut [f64])) {
+        vector::convert(1.0, x, &mut self.input);
+        action(&mut self.inner, &self.input, &mut self.output);
+        vector::convert(1.0, &self.output, y);
+    }
+}
+
+impl<A: LinOp<f64>> LinOp<f64> for Rounded<A> {
+    fn dim(&self) -> usize {
+        self.inner.dim()
+    }
+
+    fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.inner.apply(x, y);
+    }
+}
+
+impl<A: LinOp<f64>> LinOp<f32> for Rounded<A> {
+    fn dim(&self) -> usize {
+        self.inner.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.between(x, y, |inner, x, y| inner.apply(x, y));
+    }
+}
+
+impl<M: Preconditioner<f64>> Preconditioner<f32> for Rounded<M> {
+    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+        self.between(r, z, |inner, r, z| inner.apply(r, z));
+    }
 }

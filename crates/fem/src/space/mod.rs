@@ -1,0 +1,7 @@
+//! Continuous Lagrange spaces on a mesh, and interpolation between those of two meshes.
+
+mod interpolation;
+mod nodes;
+
+pub use interpolation::Interpolation;
+pub use nodes::{Constraint, NodeMap};
