@@ -7,7 +7,7 @@ use gluey_geom::Vector;
 
 use crate::islands::{Island, Islands, Slot};
 use crate::rows::{GROUND, Row};
-use crate::solver::{Factor, GapOperator, Projection, ProjectionSolver, SolveFailure, SolveReport};
+use crate::solver::{DelassusOperator, Factor, Projection, ProjectionSolver, SolveFailure, SolveReport};
 use crate::{ContactParams, Mobility, StepGeometry};
 
 /// What all islands of a step share.
@@ -392,7 +392,7 @@ impl<const D: usize, M: Mobility<D>> Operator<'_, D, M> {
     }
 }
 
-impl<const D: usize, M: Mobility<D>> GapOperator for Operator<'_, D, M> {
+impl<const D: usize, M: Mobility<D>> DelassusOperator for Operator<'_, D, M> {
     fn apply(&mut self, forces: &[f64], gaps: &mut [f64]) {
         self.spread(forces);
         for (gap, arrow) in gaps.iter_mut().zip(self.arrows) {

@@ -7,7 +7,7 @@ use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 
 use super::closest::{closest, frame};
 use super::{Shape, ShapeStep, displaced};
-use crate::solver::{GapOperator, Projection};
+use crate::solver::{DelassusOperator, Projection};
 use crate::{
     Contact, ContactError, ContactParams, ContactReport, ContactState, Mobility, PairKey, StepGeometry,
     WorstPair,
@@ -454,7 +454,7 @@ where
     }
 }
 
-impl<const D: usize> GapOperator for Operator<'_, D>
+impl<const D: usize> DelassusOperator for Operator<'_, D>
 where
     Dim<D>: Space<D>,
 {

@@ -34,12 +34,12 @@ pub use uzawa::Uzawa;
 
 use contradiction::Watch;
 
-/// The symmetric positive semidefinite operator `A`.
-pub trait GapOperator {
+/// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open the gaps.
+pub trait DelassusOperator {
     /// Writes into `gaps` how far `forces` open each gap.
     fn apply(&mut self, forces: &[f64], gaps: &mut [f64]);
 
-    /// `R` with `A = R R^T`, if it is known and sparse: one row a contact, one column a degree of freedom.
+    /// `R` with `A = R R^T`, if it is known and sparse: one row per contact, one column per degree of freedom.
     fn factor(&self) -> Option<Factor> {
         None
     }
@@ -48,7 +48,7 @@ pub trait GapOperator {
 /// One projection problem.
 pub struct Projection<'a> {
     /// `A`.
-    pub operator: &'a mut dyn GapOperator,
+    pub operator: &'a mut dyn DelassusOperator,
     /// `q`: gaps at the end of the step without contact forces.
     pub free_gaps: &'a [f64],
     /// Smallest force of each contact: 0 where it can only push, `-inf` where it must stay closed.

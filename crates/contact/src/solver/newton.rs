@@ -14,7 +14,7 @@
 //! forces (a jammed cluster), some ten or a hundred of these do.
 
 use super::envelope::Envelope;
-use super::{Factor, GapOperator, Projection, SolveReport, gaps_under, residual};
+use super::{DelassusOperator, Factor, Projection, SolveReport, gaps_under, residual};
 
 /// Smallest and largest `sigma ||A||`.
 const SIGMAS: (f64, f64) = (1e3, 1e14);
@@ -182,6 +182,6 @@ pub(super) fn improve(
     norm: f64,
     step_limit: usize,
 ) -> Option<SolveReport> {
-    let factor = GapOperator::factor(problem.operator)?;
+    let factor = DelassusOperator::factor(problem.operator)?;
     Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
 }
