@@ -143,7 +143,7 @@ pub enum ContactError {
     },
     /// Contacts that no velocities can satisfy, such as a particle between walls that are too near.
     #[error("no velocities keep these contacts from overlapping: {}", Names(pairs))]
-    Contradictory {
+    Infeasible {
         /// The contacts, sorted.
         pairs: Vec<PairKey>,
     },
@@ -179,12 +179,12 @@ pub enum ContactError {
 impl ContactError {
     /// What the failure of a solver means; `key` names its rows.
     pub(crate) fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
-        match &failure.contradiction {
+        match &failure.infeasible {
             Some(rows) => {
                 let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();
                 pairs.sort_unstable();
                 pairs.dedup();
-                Self::Contradictory { pairs }
+                Self::Infeasible { pairs }
             }
             None => Self::NotConverged {
                 residual: failure.report.residual,

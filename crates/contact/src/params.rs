@@ -63,12 +63,12 @@ impl FromStr for Strategy {
 pub enum Memory {
     /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays closed
     /// for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with as many contacts as
-    /// degrees of freedom, the closed pairs may contradict each other; that ends with an error.
+    /// degrees of freedom, the closed pairs may be infeasible; that ends with an error.
     #[default]
     Paper,
     /// By the scheme that moves the particles, `gamma <- gamma - c lambda^n - (dt - c) lambda^{n-1}`, with
     /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step. Second order
-    /// for Adams-Bashforth 2, and never contradictory: the pull of a contact is bounded by its memory.
+    /// for Adams-Bashforth 2, and never infeasible: the pull of a contact is bounded by its memory.
     Consistent,
 }
 

@@ -134,7 +134,7 @@ fn too_few_iterations_are_told_with_the_way_there() {
 }
 
 #[test]
-fn contradictory_contacts_end_with_an_error() {
+fn infeasible_contacts_end_with_an_error() {
     // The outer discs cannot be 2 away from the middle one and 2 from each other, all on a line.
     let pairs = [(0, 1), (1, 2), (0, 2)].map(|(i, j)| PairKey::new(i, j));
     for exact_gap in [false, true] {
@@ -146,7 +146,7 @@ fn contradictory_contacts_end_with_an_error() {
         });
         assert_eq!(
             error,
-            ContactError::Contradictory {
+            ContactError::Infeasible {
                 pairs: vec![PairKey::new(0, 1), PairKey::new(0, 2), PairKey::new(1, 2)]
             }
         );

@@ -49,7 +49,7 @@ where
         let predicted =
             positions.iter().map(|x| spread(&mut random, 0.6) - (x - site(count - 1) * 0.5) * 0.5).collect();
         let drift = (0..count).map(|_| spread(&mut random, 0.02)).collect();
-        // Disjoint pairs, so that gluing them cannot be contradictory.
+        // Disjoint pairs, so that gluing them cannot be infeasible.
         let glued = (0..count).filter(|i| (i % side).is_multiple_of(2) && i % side + 1 < side && i % 3 == 0);
         let glued = glued.map(|i| PairKey::new(i, i + 1)).collect();
         Self { positions, radii, drift, predicted, glued }

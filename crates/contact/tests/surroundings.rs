@@ -123,7 +123,7 @@ fn a_disc_between_walls_that_close_is_named() {
         let positions = [at(0.5, 9.0), at(1.05, 0.0)];
         let error = correct(&mut contact, &positions, &[0.1, 1.0], &[at(0.0, 0.0); 2]).expect_err("squeezed");
         let pairs = vec![PairKey::wall(1, 0), PairKey::wall(1, 1)];
-        assert_eq!(error, ContactError::Contradictory { pairs }, "{solver:?}");
+        assert_eq!(error, ContactError::Infeasible { pairs }, "{solver:?}");
         let text = "no velocities keep these contacts from overlapping: particle 2 and wall 1; particle 2 and wall 2";
         assert_eq!(error.to_string(), text);
     }

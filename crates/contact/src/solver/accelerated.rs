@@ -5,10 +5,10 @@
 //! the extrapolation starts anew when it has gone uphill. The number of iterations goes like the square root of that of
 //! Uzawa's algorithm.
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, gaps_under, largest_eigenvalue,
-    residual, split,
+    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under,
+    largest_eigenvalue, residual, split,
 };
 
 /// Safety of the estimated norm, a lower bound.
@@ -20,7 +20,7 @@ pub struct Accelerated;
 
 impl ProjectionSolver for Accelerated {
     fn scratch_count(&self) -> usize {
-        3 + WATCH_VECTOR_COUNT
+        3 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -31,7 +31,7 @@ impl ProjectionSolver for Accelerated {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, ahead, before, mark, ray, image] = split(scratch, forces.len());
         let mut norm = NORM_SAFETY * largest_eigenvalue(problem.operator, ray, image);
-        let mut watch = Watch::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
         let mut course = Course::new();
         let (mut least, mut momentum) = (f64::INFINITY, 1.0);
         ahead.copy_from_slice(forces);
@@ -43,7 +43,7 @@ impl ProjectionSolver for Accelerated {
                 forces.copy_from_slice(ahead);
                 return Ok(course.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
+            course.check(&mut monitor, problem, forces, norm)?;
             least = least.min(course.residual);
             if course.residual > 100.0 * least {
                 (norm, least, momentum) = (2.0 * norm, course.residual, 1.0);

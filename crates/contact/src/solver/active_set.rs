@@ -5,9 +5,9 @@
 //! gradient step changes the active set; when the forces at the floor are worse than the others, a step frees them.
 //! The rate of convergence depends on the spectrum of `A` only, and the operator may be singular.
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, dot, gaps_under,
+    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, dot, gaps_under,
     largest_eigenvalue, residual, split,
 };
 
@@ -36,7 +36,7 @@ struct State<'a> {
 
 impl ProjectionSolver for ActiveSet {
     fn scratch_count(&self) -> usize {
-        5 + WATCH_VECTOR_COUNT
+        5 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -47,7 +47,7 @@ impl ProjectionSolver for ActiveSet {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
-        let mut watch = Watch::new([mark, ray, mapped], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], forces);
         let mut state = State { gaps, free, chopped, direction, image };
         let mut course = Course::new();
         state.begin(problem, forces);
@@ -57,7 +57,7 @@ impl ProjectionSolver for ActiveSet {
             if course.has_arrived(problem) && fresh {
                 return Ok(course.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
+            course.check(&mut monitor, problem, forces, norm)?;
             fresh =
                 course.has_arrived(problem) || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
             if fresh {

@@ -95,7 +95,7 @@ impl Budget {
     fn is_over(&self, outcome: &Result<SolveReport, SolveFailure>) -> bool {
         match outcome {
             Ok(_) => true,
-            Err(failure) => failure.contradiction.is_some() || self.spent >= self.limit,
+            Err(failure) => failure.infeasible.is_some() || self.spent >= self.limit,
         }
     }
 }

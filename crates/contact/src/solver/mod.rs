@@ -18,9 +18,9 @@
 mod accelerated;
 mod active_set;
 mod auto;
-mod contradiction;
 mod envelope;
 mod factor;
+mod infeasibility;
 mod newton;
 mod spectrum;
 mod uzawa;
@@ -32,7 +32,7 @@ pub use factor::Factor;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 
-use contradiction::Watch;
+use infeasibility::InfeasibilityMonitor;
 
 /// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open the gaps.
 pub trait DelassusOperator {
@@ -92,8 +92,8 @@ pub struct SolveFailure {
     pub history: ResidualHistory,
     /// Contact with the largest residual.
     pub worst: usize,
-    /// Contacts that contradict each other, if that is why.
-    pub contradiction: Option<Vec<usize>>,
+    /// Contacts that no forces can satisfy together, if that is why the solve failed.
+    pub infeasible: Option<Vec<usize>>,
 }
 
 /// Residuals at iterations 1, 2, 4, 8, ... and at the last one.
@@ -136,21 +136,21 @@ impl Course {
     /// The failure to report if there is no sense in going on.
     fn check(
         &self,
-        watch: &mut Watch<'_>,
+        monitor: &mut InfeasibilityMonitor<'_>,
         problem: &mut Projection<'_>,
         forces: &[f64],
         norm: f64,
     ) -> Result<(), SolveFailure> {
-        let contradiction = watch.look(self.iteration, problem, forces, norm);
+        let infeasible = monitor.certificate(self.iteration, problem, forces, norm);
         let is_lost = self.iteration >= problem.iteration_limit || !self.residual.is_finite();
-        if contradiction.is_some() || is_lost { Err(self.failure(contradiction)) } else { Ok(()) }
+        if infeasible.is_some() || is_lost { Err(self.failure(infeasible)) } else { Ok(()) }
     }
 
     fn report(&self) -> SolveReport {
         SolveReport { iterations: self.iteration, residual: self.residual }
     }
 
-    fn failure(&self, contradiction: Option<Vec<usize>>) -> SolveFailure {
+    fn failure(&self, infeasible: Option<Vec<usize>>) -> SolveFailure {
         let powers = 0..=self.iteration.max(1).ilog2() as usize;
         let mut entries: Vec<(usize, f64)> =
             powers.map(|power| (1 << power, self.history[power.min(HISTORY_LENGTH - 1)])).collect();
@@ -158,7 +158,7 @@ impl Course {
             entries.push((self.iteration, self.residual));
         }
         let history = ResidualHistory { entries };
-        SolveFailure { report: self.report(), history, worst: self.worst, contradiction }
+        SolveFailure { report: self.report(), history, worst: self.worst, infeasible }
     }
 }
 

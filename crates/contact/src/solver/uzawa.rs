@@ -1,9 +1,9 @@
 //! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI 10.3166/REMN.16.365-383).
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, gaps_under, largest_eigenvalue,
-    residual, split,
+    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under,
+    largest_eigenvalue, residual, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
@@ -16,7 +16,7 @@ pub struct Uzawa;
 
 impl ProjectionSolver for Uzawa {
     fn scratch_count(&self) -> usize {
-        1 + WATCH_VECTOR_COUNT
+        1 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -27,7 +27,7 @@ impl ProjectionSolver for Uzawa {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, mark, ray, image] = split(scratch, forces.len());
         let mut norm = largest_eigenvalue(problem.operator, ray, image);
-        let mut watch = Watch::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
         let mut course = Course::new();
         let mut least = f64::INFINITY;
         loop {
@@ -36,7 +36,7 @@ impl ProjectionSolver for Uzawa {
             if course.has_arrived(problem) {
                 return Ok(course.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
+            course.check(&mut monitor, problem, forces, norm)?;
             least = least.min(course.residual);
             if course.residual > 100.0 * least {
                 (norm, least) = (2.0 * norm, course.residual);
