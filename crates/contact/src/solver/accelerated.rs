@@ -7,8 +7,8 @@
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under,
-    largest_eigenvalue, residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// Safety of the estimated norm, a lower bound.
@@ -32,21 +32,21 @@ impl ProjectionSolver for Accelerated {
         let [gaps, ahead, before, mark, ray, image] = split(scratch, forces.len());
         let mut norm = NORM_SAFETY * largest_eigenvalue(problem.operator, ray, image);
         let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
-        let mut course = Course::new();
+        let mut log = ConvergenceLog::new();
         let (mut least, mut momentum) = (f64::INFINITY, 1.0);
         ahead.copy_from_slice(forces);
         loop {
             gaps_under(problem, ahead, gaps);
             // At the extrapolated forces, which in the end are the forces.
-            course.note(residual(gaps, ahead, problem.floors, norm));
-            if course.has_arrived(problem) {
+            log.record(residual(gaps, ahead, problem.floors, norm));
+            if log.has_converged(problem) {
                 forces.copy_from_slice(ahead);
-                return Ok(course.report());
+                return Ok(log.report());
             }
-            course.check(&mut monitor, problem, forces, norm)?;
-            least = least.min(course.residual);
-            if course.residual > 100.0 * least {
-                (norm, least, momentum) = (2.0 * norm, course.residual, 1.0);
+            log.check(&mut monitor, problem, forces, norm)?;
+            least = least.min(log.residual);
+            if log.residual > 100.0 * least {
+                (norm, least, momentum) = (2.0 * norm, log.residual, 1.0);
             }
             before.copy_from_slice(forces);
             let uphill = descend(forces, ahead, gaps, before, problem.floors, 1.0 / norm);

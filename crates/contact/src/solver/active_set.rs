@@ -7,8 +7,8 @@
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, dot, gaps_under,
-    largest_eigenvalue, residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, dot,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they bound the
@@ -49,17 +49,16 @@ impl ProjectionSolver for ActiveSet {
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
         let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], forces);
         let mut state = State { gaps, free, chopped, direction, image };
-        let mut course = Course::new();
+        let mut log = ConvergenceLog::new();
         state.begin(problem, forces);
         let mut fresh = true;
         loop {
-            course.note(residual(state.gaps, forces, problem.floors, norm));
-            if course.has_arrived(problem) && fresh {
-                return Ok(course.report());
+            log.record(residual(state.gaps, forces, problem.floors, norm));
+            if log.has_converged(problem) && fresh {
+                return Ok(log.report());
             }
-            course.check(&mut monitor, problem, forces, norm)?;
-            fresh =
-                course.has_arrived(problem) || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
+            log.check(&mut monitor, problem, forces, norm)?;
+            fresh = log.has_converged(problem) || log.iteration.is_multiple_of(REFRESH + 2 * forces.len());
             if fresh {
                 state.begin(problem, forces);
             } else {

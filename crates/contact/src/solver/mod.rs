@@ -86,7 +86,7 @@ pub struct SolveReport {
 /// A solve that ended above its tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveFailure {
-    /// What was reached.
+    /// Iterations made and residual reached.
     pub report: SolveReport,
     /// Residuals on the way.
     pub history: ResidualHistory,
@@ -106,21 +106,21 @@ pub struct ResidualHistory {
 /// Most iterations a history can tell are `2^40`.
 const HISTORY_LENGTH: usize = 40;
 
-/// Follows a solve: when to stop, and what to tell if that is too early.
-struct Course {
+/// Residuals of a solve: decides when to stop, and explains a failure.
+struct ConvergenceLog {
     history: [f64; HISTORY_LENGTH],
     iteration: usize,
     residual: f64,
     worst: usize,
 }
 
-impl Course {
+impl ConvergenceLog {
     fn new() -> Self {
         Self { history: [0.0; HISTORY_LENGTH], iteration: 0, residual: f64::INFINITY, worst: 0 }
     }
 
-    /// Notes the residual of the next iteration.
-    fn note(&mut self, (worst, residual): (usize, f64)) {
+    /// Records the residual of the next iteration.
+    fn record(&mut self, (worst, residual): (usize, f64)) {
         self.iteration += 1;
         (self.worst, self.residual) = (worst, residual);
         if self.iteration.is_power_of_two() {
@@ -129,7 +129,7 @@ impl Course {
     }
 
     /// Whether the last residual is small enough.
-    fn has_arrived(&self, problem: &Projection<'_>) -> bool {
+    fn has_converged(&self, problem: &Projection<'_>) -> bool {
         self.residual <= problem.tolerance
     }
 

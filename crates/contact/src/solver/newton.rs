@@ -175,7 +175,7 @@ fn root(function: impl Fn(f64) -> f64, small: f64) -> f64 {
     low
 }
 
-/// What Newton steps make of a problem whose factor is known and small enough.
+/// Improves `forces` by Newton steps, if the factor of the operator is known and small enough.
 pub(super) fn improve(
     problem: &mut Projection<'_>,
     forces: &mut [f64],

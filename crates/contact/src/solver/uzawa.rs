@@ -2,8 +2,8 @@
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under,
-    largest_eigenvalue, residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
@@ -28,18 +28,18 @@ impl ProjectionSolver for Uzawa {
         let [gaps, mark, ray, image] = split(scratch, forces.len());
         let mut norm = largest_eigenvalue(problem.operator, ray, image);
         let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
-        let mut course = Course::new();
+        let mut log = ConvergenceLog::new();
         let mut least = f64::INFINITY;
         loop {
             gaps_under(problem, forces, gaps);
-            course.note(residual(gaps, forces, problem.floors, norm));
-            if course.has_arrived(problem) {
-                return Ok(course.report());
+            log.record(residual(gaps, forces, problem.floors, norm));
+            if log.has_converged(problem) {
+                return Ok(log.report());
             }
-            course.check(&mut monitor, problem, forces, norm)?;
-            least = least.min(course.residual);
-            if course.residual > 100.0 * least {
-                (norm, least) = (2.0 * norm, course.residual);
+            log.check(&mut monitor, problem, forces, norm)?;
+            least = least.min(log.residual);
+            if log.residual > 100.0 * least {
+                (norm, least) = (2.0 * norm, log.residual);
             }
             step(forces, gaps, problem.floors, 1.0 / norm);
         }
