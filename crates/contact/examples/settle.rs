@@ -8,7 +8,7 @@ mod picture;
 use std::error::Error;
 
 use gluey_contact::{
-    ContactModel, ContactNetwork, ContactParams, Domain, PairContact, SolverKind, StepGeometry, Strategy,
+    ContactLaw, ContactModel, ContactNetwork, ContactParams, Domain, PairContact, SolverKind, StepGeometry,
     Wall,
 };
 use gluey_geom::{Twist, Vector};
@@ -33,7 +33,7 @@ pub fn settle(count: usize, time: f64) -> Result<String, Box<dyn Error>> {
 
     // Without pulls the gap may stay linear in the step: discs are then a little farther apart, never nearer.
     let params = ContactParams {
-        strategy: Strategy::Inelastic,
+        law: ContactLaw::Inelastic,
         solver: SolverKind::ActiveSet,
         tolerance: 1e-5,
         ..ContactParams::default()

@@ -8,7 +8,8 @@ mod picture;
 use std::error::Error;
 
 use gluey_contact::{
-    ContactModel, ContactNetwork, ContactParams, Domain, Memory, PairContact, SolverKind, StepGeometry, Wall,
+    ContactModel, ContactNetwork, ContactParams, Domain, GammaUpdate, PairContact, SolverKind, StepGeometry,
+    Wall,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -32,7 +33,7 @@ pub fn shear(columns: usize, rows: usize, strain: f64) -> Result<String, Box<dyn
 
     let params = ContactParams {
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         solver: SolverKind::ActiveSet,
         tolerance: 1e-8,
         ..ContactParams::default()

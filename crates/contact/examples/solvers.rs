@@ -6,7 +6,8 @@
 use std::time::Instant;
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, ContactReport, Memory, PairContact, SolverKind, StepGeometry,
+    ContactError, ContactModel, ContactParams, ContactReport, GammaUpdate, PairContact, SolverKind,
+    StepGeometry,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::{RngExt, SeedableRng};
@@ -76,7 +77,7 @@ where
         solver,
         iteration_limit,
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         ..ContactParams::default()
     };
     let (radii, drift) = (vec![0.5; positions.len()], vec![Vector::zeros(); positions.len()]);

@@ -1,7 +1,7 @@
 //! What can go wrong in a contact step.
 
 use crate::solver::{ResidualHistory, SolveFailure};
-use crate::{PairKey, Strategy};
+use crate::{ContactLaw, PairKey};
 
 /// Why velocities could not be corrected. They are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -62,11 +62,11 @@ pub enum ContactError {
         /// The shapes.
         pair: PairKey,
     },
-    /// A strategy that round particles know only.
-    #[error("the strategy `{strategy}` does not know other shapes than discs and spheres")]
+    /// A contact law that is defined for round particles only.
+    #[error("the contact law `{law}` is defined for discs and spheres only")]
     NotForShapes {
-        /// The strategy.
-        strategy: Strategy,
+        /// The contact law.
+        law: ContactLaw,
     },
     /// A remembered contact of a particle that is not there.
     #[error("a remembered contact joins {pair}, but there are only {count} particles")]

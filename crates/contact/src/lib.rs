@@ -64,4 +64,4 @@ pub use mobility::{Mobility, StokesDrag, WithFixed};
 pub use model::{Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
-pub use params::{ContactParams, Memory, SolverKind, Strategy, UnknownSolver, UnknownStrategy};
+pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownLaw, UnknownSolver};

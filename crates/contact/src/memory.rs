@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactParams, Memory, PairKey, StepGeometry, Strategy};
+use crate::{ContactLaw, ContactParams, GammaUpdate, PairKey, StepGeometry};
 
 /// One pair's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,17 +62,17 @@ impl ContactState {
 impl ContactParams {
     /// Weights of this step's and the last step's force in the impulse of a step.
     fn weights<const D: usize>(&self, step: &StepGeometry<'_, D>) -> (f64, f64) {
-        match self.memory {
-            Memory::Paper => (step.dt, 0.0),
-            Memory::Consistent => (step.rate, step.dt - step.rate),
+        match self.gamma_update {
+            GammaUpdate::Paper => (step.dt, 0.0),
+            GammaUpdate::Consistent => (step.rate, step.dt - step.rate),
         }
     }
 
     /// Smallest force a contact with the memory `gamma`, `last` admits: `-inf` keeps it closed.
     pub(crate) fn floor<const D: usize>(&self, gamma: f64, last: f64, step: &StepGeometry<'_, D>) -> f64 {
-        match (self.strategy, self.memory) {
-            (Strategy::Gluey, Memory::Paper) if gamma < 0.0 => f64::NEG_INFINITY,
-            (Strategy::Gluey, Memory::Consistent) => {
+        match (self.law, self.gamma_update) {
+            (ContactLaw::Gluey, GammaUpdate::Paper) if gamma < 0.0 => f64::NEG_INFINITY,
+            (ContactLaw::Gluey, GammaUpdate::Consistent) => {
                 let (now, before) = self.weights(step);
                 (gamma - before * last) / now
             }
@@ -88,7 +88,7 @@ impl ContactParams {
         lambda: f64,
         step: &StepGeometry<'_, D>,
     ) -> f64 {
-        if self.strategy != Strategy::Gluey {
+        if self.law != ContactLaw::Gluey {
             return 0.0;
         }
         let (now, before) = self.weights(step);

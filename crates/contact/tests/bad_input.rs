@@ -1,8 +1,8 @@
 //! What a contact step refuses, and that it says which particles it means.
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState, Quantity,
-    SolverKind, StepGeometry, Strategy,
+    ContactError, ContactLaw, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState,
+    Quantity, SolverKind, StepGeometry,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -54,10 +54,10 @@ fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
 #[test]
 fn particles_are_named() {
     let nan = Vector::<2>::new(0.0, f64::NAN);
-    for strategy in Strategy::ALL {
+    for law in ContactLaw::ALL {
         let refuse = |change: fn(&mut Input)| {
             refuse(|input| {
-                input.params.strategy = strategy;
+                input.params.law = law;
                 change(input);
             })
         };
@@ -103,13 +103,13 @@ fn messages_count_from_one() {
 
 #[test]
 fn coincident_centres_are_named() {
-    for strategy in [Strategy::VelocityCorrection, Strategy::Inelastic, Strategy::Gluey] {
+    for law in [ContactLaw::VelocityCorrection, ContactLaw::Inelastic, ContactLaw::Gluey] {
         let error = refuse(|input| {
-            input.params.strategy = strategy;
+            input.params.law = law;
             input.positions[2] = input.positions[0];
             input.twists[2] = input.twists[0];
         });
-        assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{strategy}");
+        assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{law}");
         assert_eq!(error.to_string(), "the centres of particles 1 and 3 coincide");
     }
 }
@@ -191,11 +191,11 @@ fn nothing_is_no_error() {
 }
 
 #[test]
-fn strategies_and_solvers_have_names() {
-    for strategy in Strategy::ALL {
-        assert_eq!(strategy.to_string().parse(), Ok(strategy));
+fn contact_laws_and_solvers_have_names() {
+    for law in ContactLaw::ALL {
+        assert_eq!(law.to_string().parse(), Ok(law));
     }
-    assert!("sticky".parse::<Strategy>().is_err());
+    assert!("sticky".parse::<ContactLaw>().is_err());
     for (solver, name) in SolverKind::ALL.into_iter().zip(SolverKind::NAMES) {
         assert_eq!((solver.to_string().as_str(), name.parse()), (name, Ok(solver)));
     }

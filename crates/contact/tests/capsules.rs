@@ -4,18 +4,18 @@ use std::f64::consts::PI;
 
 use gluey_contact::shape::{Capsule, Shape, ShapeContact, ShapeStep, displaced, gap};
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, Memory, PairContact, PairKey, SolverKind, StepGeometry,
-    Strategy, WithFixed,
+    ContactError, ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, PairKey, SolverKind,
+    StepGeometry, WithFixed,
 };
 use gluey_geom::{Dim, Pose, Space, Spin, Twist, Vector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn exact(strategy: Strategy) -> ContactParams {
+fn exact(law: ContactLaw) -> ContactParams {
     ContactParams {
-        strategy,
+        law,
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         solver: SolverKind::ActiveSet,
         ..Default::default()
     }
@@ -112,10 +112,10 @@ where
 
 #[test]
 fn capsules_of_no_length_are_round() {
-    for strategy in [Strategy::Inelastic, Strategy::Gluey] {
+    for law in [ContactLaw::Inelastic, ContactLaw::Gluey] {
         for exact_gap in [false, true] {
-            check_round::<2>(ContactParams { exact_gap, ..exact(strategy) });
-            check_round::<3>(ContactParams { exact_gap, ..exact(strategy) });
+            check_round::<2>(ContactParams { exact_gap, ..exact(law) });
+            check_round::<3>(ContactParams { exact_gap, ..exact(law) });
         }
     }
 }
@@ -135,7 +135,7 @@ where
     let poses = [Pose::at(at(lowest + start)), Pose::at(Vector::zeros())];
     let mut twists = [Twist { velocity: at(-1.0), ..Twist::default() }, Twist::default()];
     let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], rate: dt, dt };
-    let params = ContactParams { exact_gap: false, ..exact(Strategy::Gluey) };
+    let params = ContactParams { exact_gap: false, ..exact(ContactLaw::Gluey) };
     let mut contact = ShapeContact::with_mobility(params, WithFixed::new([1]));
     contact.correct(&step, &mut twists).expect("a good step");
 
@@ -166,7 +166,7 @@ fn a_landing_capsule_comes_to_lie_flat() {
         Capsule::new(Vector::<2>::new(20.0, 0.0), 0.5),
     ];
     let poses = vec![Pose::at(Vector::<2>::new(0.3, 1.7)), Pose::at(Vector::zeros())];
-    let contact = ShapeContact::with_mobility(exact(Strategy::Inelastic), WithFixed::new([1]));
+    let contact = ShapeContact::with_mobility(exact(ContactLaw::Inelastic), WithFixed::new([1]));
     let mut world = World { shapes, poses, contact, dt: 0.02 };
     for n in 0..300 {
         world.step(|pose| match pose.position.y > 0.5 {
@@ -215,18 +215,18 @@ fn params_inelastic(contact: &ShapeContact<3>) -> bool {
 
 #[test]
 fn gluey_capsules_come_apart_as_they_came_together() {
-    let errors = [50, 100, 200, 400].map(|count| push_and_pull(exact(Strategy::Gluey), count));
+    let errors = [50, 100, 200, 400].map(|count| push_and_pull(exact(ContactLaw::Gluey), count));
     println!("{errors:?}");
     for pair in errors.windows(2) {
         assert!(pair[1] < 0.6 * pair[0], "first order in dt: {errors:?}");
     }
     assert!(errors[3] < 5e-3, "{errors:?}");
-    let inelastic = push_and_pull(exact(Strategy::Inelastic), 200);
+    let inelastic = push_and_pull(exact(ContactLaw::Inelastic), 200);
     assert!(inelastic > 0.1, "{inelastic}");
 }
 
 /// A heap of capsules in all directions squeezed together by `u = -x` never overlaps.
-fn check_heap<const D: usize>(side: usize, strategy: Strategy)
+fn check_heap<const D: usize>(side: usize, law: ContactLaw)
 where
     Dim<D>: Space<D>,
 {
@@ -242,7 +242,7 @@ where
     let centre = Vector::<D>::repeat(0.5 * (side - 1) as f64);
     let shapes: Vec<_> = (0..count).map(|_| Capsule::new(direction(), 0.5)).collect();
     let poses = (0..count).map(|i| Pose::at((site(i) - centre) * 3.2 + direction() * 0.05)).collect();
-    let params = ContactParams { tolerance: 1e-11, ..exact(strategy) };
+    let params = ContactParams { tolerance: 1e-11, ..exact(law) };
     let mut world = World { shapes, poses, contact: ShapeContact::new(params), dt: 0.02 };
     let (mut smallest, mut most) = (f64::INFINITY, 0);
     for _ in 0..60 {
@@ -250,16 +250,16 @@ where
         smallest = smallest.min(world.smallest_gap());
         most = most.max(world.contact.contacts().len());
     }
-    println!("{D}D {strategy}: gap {smallest:e}, {most} contacts of {count} capsules");
+    println!("{D}D {law}: gap {smallest:e}, {most} contacts of {count} capsules");
     assert!(smallest > -2e-11, "{smallest:e}");
     assert!(most > count, "{most} contacts");
 }
 
 #[test]
 fn squeezed_capsules_do_not_overlap() {
-    for strategy in [Strategy::Inelastic, Strategy::Gluey] {
-        check_heap::<2>(6, strategy);
-        check_heap::<3>(3, strategy);
+    for law in [ContactLaw::Inelastic, ContactLaw::Gluey] {
+        check_heap::<2>(6, law);
+        check_heap::<3>(3, law);
     }
 }
 
@@ -299,7 +299,7 @@ fn boxes_keep_their_distance() {
     let mut twists = [1.0, -1.0].map(|v| Twist { velocity: Vector::<3>::z() * v, ..Twist::default() });
     let drift = [Twist::default(); 2];
     let step = ShapeStep { shapes: &boxes, poses: &poses, drift: &drift, rate: 0.1, dt: 0.1 };
-    let params = ContactParams { tolerance: 1e-6, ..exact(Strategy::Inelastic) };
+    let params = ContactParams { tolerance: 1e-6, ..exact(ContactLaw::Inelastic) };
     ShapeContact::new(params).correct(&step, &mut twists).expect("a good step");
     assert!((twists[0].velocity.z - 0.5 * found / 0.1).abs() < 1e-6, "{twists:?}");
 }
@@ -344,25 +344,25 @@ fn bad_shapes_are_named() {
         let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &drift, rate: 0.1, dt: 0.1 };
         ShapeContact::new(params).correct(&step, &mut [Twist::default(), twist]).expect_err("bad")
     };
-    let law = || exact(Strategy::Gluey);
+    let tuning = || exact(ContactLaw::Gluey);
     let still = Twist::default();
     let flat = Capsule::new(Vector::<2>::x(), -0.5);
     assert_eq!(
-        correct([good, flat], 2.0, law(), still),
+        correct([good, flat], 2.0, tuning(), still),
         ContactError::BadRadius { particle: 1, radius: -0.5 }
     );
     let endless = Capsule::new(Vector::<2>::repeat(f64::INFINITY), 0.5);
     assert!(matches!(
-        correct([endless, good], 2.0, law(), still),
+        correct([endless, good], 2.0, tuning(), still),
         ContactError::BadRadius { particle: 0, .. }
     ));
     let pair = PairKey::new(0, 1);
-    assert_eq!(correct([good, good], 0.0, law(), still), ContactError::Entangled { pair });
+    assert_eq!(correct([good, good], 0.0, tuning(), still), ContactError::Entangled { pair });
     let spinning = Twist { spin: Spin::<2>::new(f64::NAN), ..still };
     assert!(matches!(
-        correct([good, good], 2.0, law(), spinning),
+        correct([good, good], 2.0, tuning(), spinning),
         ContactError::NotFinite { particle: 1, .. }
     ));
-    let error = correct([good, good], 2.0, exact(Strategy::VelocityCorrection), still);
-    assert_eq!(error, ContactError::NotForShapes { strategy: Strategy::VelocityCorrection });
+    let error = correct([good, good], 2.0, exact(ContactLaw::VelocityCorrection), still);
+    assert_eq!(error, ContactError::NotForShapes { law: ContactLaw::VelocityCorrection });
 }

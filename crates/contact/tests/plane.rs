@@ -7,7 +7,7 @@
 //! gap is `1 - m - sin t`.
 
 use gluey_contact::{
-    ContactModel, ContactParams, Domain, Memory, PairContact, PairKey, StepGeometry, Strategy, Wall,
+    ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, PairContact, PairKey, StepGeometry, Wall,
 };
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::{Integrator, Scheme};
@@ -80,7 +80,7 @@ where
         .collect();
     let steps: Vec<f64> = STEP_COUNTS.iter().map(|count| END / *count as f64).collect();
     let order = convergence_order(&steps, &table.iter().map(|row| row[2]).collect::<Vec<_>>());
-    println!("{:?} {scheme:?}, order of the last gap {order:.2}", params.memory);
+    println!("{:?} {scheme:?}, order of the last gap {order:.2}", params.gamma_update);
     for (dt, row) in steps.iter().zip(&table) {
         println!("  dt {dt:.4}: begins off by {:.1e}, ends {:.1e}, last gap {:.1e}", row[0], row[1], row[2]);
         assert!(row[0] <= 1.01 * dt, "begins {} steps off", row[0] / dt);
@@ -102,13 +102,13 @@ where
     let release = std::f64::consts::PI - (1.0 - floor).asin();
     let rough = Fall { begin, end: release, last_gap: 1.0 - floor - END.sin() };
     for (gamma_min, exact) in [(None, smooth), (Some(-RADIUS * floor), rough)] {
-        let law = |memory| ContactParams { memory, gamma_min, ..Default::default() };
-        let (_, order) = errors::<D>(&law(Memory::Paper), Scheme::Euler, &exact);
+        let tuning = |gamma_update| ContactParams { gamma_update, gamma_min, ..Default::default() };
+        let (_, order) = errors::<D>(&tuning(GammaUpdate::Paper), Scheme::Euler, &exact);
         assert!(order > 0.8, "first order, not {order}");
-        let (table, order) = errors::<D>(&law(Memory::Consistent), Scheme::AdamsBashforth2, &exact);
+        let (table, order) = errors::<D>(&tuning(GammaUpdate::Consistent), Scheme::AdamsBashforth2, &exact);
         assert!(order > 1.5 || table[3][2] < 1e-5, "second order, not {order}");
     }
-    let inelastic = ContactParams { strategy: Strategy::Inelastic, ..Default::default() };
+    let inelastic = ContactParams { law: ContactLaw::Inelastic, ..Default::default() };
     let exact = Fall { begin, end: std::f64::consts::FRAC_PI_2, last_gap: 1.0 - END.sin() };
     let (_, order) = errors::<D>(&inelastic, Scheme::Euler, &exact);
     assert!(order > 0.8, "first order, not {order}");

@@ -5,8 +5,8 @@ use clarabel::solver::{
     DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT,
 };
 use gluey_contact::{
-    ContactModel, ContactParams, ContactState, Mobility, PairContact, PairKey, PairState, SolverKind,
-    StepGeometry, StokesDrag, Strategy,
+    ContactLaw, ContactModel, ContactParams, ContactState, Mobility, PairContact, PairKey, PairState,
+    SolverKind, StepGeometry, StokesDrag,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
@@ -350,7 +350,7 @@ fn one_pair_has_a_closed_form() {
     check_closed_form::<3>();
 }
 
-fn check_numbering<const D: usize>(side: usize, strategy: Strategy)
+fn check_numbering<const D: usize>(side: usize, law: ContactLaw)
 where
     Dim<D>: Space<D>,
 {
@@ -359,20 +359,20 @@ where
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(3));
     let shuffled = packing.shuffled(&order);
     for solver in SOLVERS {
-        let law = ContactParams { strategy, exact_gap: true, ..params(solver) };
-        let (straight, _) = packing.solve(law.clone());
-        let (other, _) = shuffled.solve(law);
+        let tuning = ContactParams { law, exact_gap: true, ..params(solver) };
+        let (straight, _) = packing.solve(tuning.clone());
+        let (other, _) = shuffled.solve(tuning);
         let back: Vec<_> = order.iter().map(|&i| straight[i]).collect();
         assert_ne!(straight, packing.predicted);
-        assert_eq!(back, other, "{strategy} {solver:?}");
+        assert_eq!(back, other, "{law} {solver:?}");
     }
 }
 
 #[test]
 fn numbering_changes_no_bit() {
-    for strategy in [Strategy::Gluey, Strategy::Inelastic, Strategy::VelocityCorrection] {
-        check_numbering::<2>(5, strategy);
-        check_numbering::<3>(3, strategy);
+    for law in [ContactLaw::Gluey, ContactLaw::Inelastic, ContactLaw::VelocityCorrection] {
+        check_numbering::<2>(5, law);
+        check_numbering::<3>(3, law);
     }
 }
 
@@ -380,17 +380,17 @@ fn check_exact_gaps<const D: usize>(side: usize)
 where
     Dim<D>: Space<D>,
 {
-    for strategy in [Strategy::Gluey, Strategy::Inelastic, Strategy::VelocityCorrection] {
+    for law in [ContactLaw::Gluey, ContactLaw::Inelastic, ContactLaw::VelocityCorrection] {
         for solver in SOLVERS {
             let packing = Packing::<D>::new(side, 0.01, 11);
-            let law = ContactParams { strategy, exact_gap: true, ..params(solver) };
-            let (velocities, _) = packing.solve(law);
+            let tuning = ContactParams { law, exact_gap: true, ..params(solver) };
+            let (velocities, _) = packing.solve(tuning);
             let end = |i: usize| packing.positions[i] + (velocities[i] * RATE + packing.drift[i]);
             for (pair, _, _, glued) in packing.rows() {
                 let (i, j) = ends(pair);
                 let gap = (end(j) - end(i)).norm() - packing.radii[i] - packing.radii[j];
-                assert!(gap > -1e-12, "{strategy} {pair:?}: {gap:e}");
-                assert!(!(glued && strategy == Strategy::Gluey) || gap < 1e-12, "{pair:?}: {gap:e}");
+                assert!(gap > -1e-12, "{law} {pair:?}: {gap:e}");
+                assert!(!(glued && law == ContactLaw::Gluey) || gap < 1e-12, "{pair:?}: {gap:e}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Walls, fixed bodies and periodic borders.
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, Domain, PairContact, PairKey, StepGeometry, Strategy, Wall,
+    ContactError, ContactLaw, ContactModel, ContactParams, Domain, PairContact, PairKey, StepGeometry, Wall,
     WithFixed,
 };
 use gluey_geom::{Aabb, Twist, Vector};
@@ -9,7 +9,7 @@ use gluey_geom::{Aabb, Twist, Vector};
 const RATE: f64 = 0.1;
 
 fn inelastic() -> ContactParams {
-    ContactParams { strategy: Strategy::Inelastic, ..Default::default() }
+    ContactParams { law: ContactLaw::Inelastic, ..Default::default() }
 }
 
 fn correct<M: gluey_contact::Mobility<2>>(

@@ -11,11 +11,11 @@ use crate::model::validate;
 use crate::project::{Failure, Setting, Work};
 use crate::rows::Row;
 use crate::{
-    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, MemoryError,
-    Mobility, PairState, StepGeometry, StokesDrag, Strategy, WorstPair,
+    Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState, Domain,
+    MemoryError, Mobility, PairState, StepGeometry, StokesDrag, WorstPair,
 };
 
-/// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
+/// Contacts between discs or spheres, and with walls, by one of the [`ContactLaw`]s.
 ///
 /// Results do not depend on the numbering of the particles nor on the number of threads, bit for bit.
 #[derive(Debug)]
@@ -137,7 +137,7 @@ where
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError> {
         validate(step, twists, &self.domain)?;
-        if self.params.strategy == Strategy::None {
+        if self.params.law == ContactLaw::None {
             return Ok(ContactReport::default());
         }
         let mut buffers = std::mem::take(&mut self.buffers);
@@ -191,8 +191,8 @@ where
         self.graph.begin(step, &self.domain, &buffers.free)?;
         let report = loop {
             self.begin(step, buffers)?;
-            let (reach, report) = match self.params.strategy {
-                Strategy::VelocityCorrection => self.push(step, tolerance, buffers)?,
+            let (reach, report) = match self.params.law {
+                ContactLaw::VelocityCorrection => self.push(step, tolerance, buffers)?,
                 _ => self.project(step, tolerance, buffers)?,
             };
             if let Reach::Enough = reach {
@@ -222,11 +222,7 @@ where
 
     /// Gap below which pairs are pushed apart, relative to the mean radius.
     fn margin(&self) -> f64 {
-        if self.params.strategy == Strategy::VelocityCorrection {
-            self.params.threshold.max(0.0)
-        } else {
-            0.0
-        }
+        if self.params.law == ContactLaw::VelocityCorrection { self.params.threshold.max(0.0) } else { 0.0 }
     }
 
     /// The projection on the pairs that are admitted, until no other closes.

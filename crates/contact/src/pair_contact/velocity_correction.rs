@@ -1,4 +1,4 @@
-//! The strategy that projects nothing: pairs are pushed apart one after the other.
+//! The contact law without a projection: pairs are pushed apart one after the other.
 
 use gluey_geom::{Dim, Space};
 

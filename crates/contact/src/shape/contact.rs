@@ -7,11 +7,11 @@ use super::{Shape, ShapeStep};
 use crate::broadphase::{BestOf, Broadphase};
 use crate::model::{is_positive, validate_sizes};
 use crate::{
-    Contact, ContactError, ContactParams, ContactReport, ContactState, MemoryError, Mobility, PairKey,
-    PairState, Partner, Quantity, StokesDrag, Strategy,
+    Contact, ContactError, ContactLaw, ContactParams, ContactReport, ContactState, MemoryError, Mobility,
+    PairKey, PairState, Partner, Quantity, StokesDrag,
 };
 
-/// Contacts between shapes by one of the strategies `none`, `inelastic` and `gluey`.
+/// Contacts between shapes by one of the contact laws `none`, `inelastic` and `gluey`.
 ///
 /// The memory is the pair's: where shapes touch at several points, their forces add up to the `lambda` that gamma integrates, and
 /// only the point where they are closest can pull. The mobility is that of spheres of [`Shape::drag_radius`], with
@@ -79,10 +79,10 @@ impl<const D: usize, M: Mobility<D>> ShapeContact<D, M> {
         Dim<D>: Space<D>,
     {
         validate(step, twists, &self.state)?;
-        match self.params.strategy {
-            Strategy::None => return Ok(ContactReport::default()),
-            strategy @ Strategy::VelocityCorrection => return Err(ContactError::NotForShapes { strategy }),
-            Strategy::Inelastic | Strategy::Gluey => {}
+        match self.params.law {
+            ContactLaw::None => return Ok(ContactReport::default()),
+            law @ ContactLaw::VelocityCorrection => return Err(ContactError::NotForShapes { law }),
+            ContactLaw::Inelastic | ContactLaw::Gluey => {}
         }
         let moves = twists.iter().zip(step.drift);
         let free: Vec<Twist<D>> = moves.map(|(twist, drift)| twist.combine(step.rate, drift, 1.0)).collect();
