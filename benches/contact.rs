@@ -58,7 +58,7 @@ impl Shear {
     /// Corrects velocities; the time that takes.
     fn correct(&mut self, twists: &mut [Twist<3>]) -> Duration {
         let (positions, radii, drift) = (&self.positions, &self.radii, &self.drift);
-        let step = StepGeometry { positions, radii, drift, rate: DT, dt: DT };
+        let step = StepGeometry { positions, radii, drift, velocity_weight: DT, dt: DT };
         let start = Instant::now();
         black_box(self.contact.correct(&step, twists).expect("feasible"));
         start.elapsed()

@@ -43,7 +43,8 @@ pub fn settle(count: usize, time: f64) -> Result<String, Box<dyn Error>> {
     let falling = Twist { velocity: -Vector::<2>::y(), ..Twist::default() };
     for _ in 0..(time / dt) as usize {
         let mut twists = vec![falling; count];
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: dt, dt };
         contact.correct(&step, &mut twists)?;
         positions.iter_mut().zip(&twists).for_each(|(x, twist)| *x += twist.velocity * dt);
     }

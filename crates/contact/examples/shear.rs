@@ -43,7 +43,8 @@ pub fn shear(columns: usize, rows: usize, strain: f64) -> Result<String, Box<dyn
     for _ in 0..(strain / dt).round() as usize {
         let flow = |x: &Vector<2>| Twist { velocity: Vector::<2>::new(x.y, 0.0), ..Twist::default() };
         let mut twists: Vec<_> = positions.iter().map(flow).collect();
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: dt, dt };
         contact.correct(&step, &mut twists)?;
         positions.iter_mut().zip(&twists).for_each(|(x, twist)| *x += twist.velocity * dt);
     }

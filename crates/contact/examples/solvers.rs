@@ -81,7 +81,7 @@ where
         ..ContactParams::default()
     };
     let (radii, drift) = (vec![0.5; positions.len()], vec![Vector::zeros(); positions.len()]);
-    let step = StepGeometry { positions, radii: &radii, drift: &drift, rate: 0.05, dt: 0.05 };
+    let step = StepGeometry { positions, radii: &radii, drift: &drift, velocity_weight: 0.05, dt: 0.05 };
     let mut contact = PairContact::<D>::new(params);
     let start = Instant::now();
     let outcome = contact.correct(&step, &mut twists);

@@ -27,10 +27,10 @@ pub enum ContactError {
         count: usize,
     },
     /// The step is not a step.
-    #[error("rate {rate} and dt {dt} must be positive and finite")]
+    #[error("velocity weight {velocity_weight} and dt {dt} must be positive and finite")]
     BadStep {
         /// Factor of the velocity in the displacement.
-        rate: f64,
+        velocity_weight: f64,
         /// Length of the step.
         dt: f64,
     },

@@ -18,7 +18,7 @@
 //! use gluey_geom::{Spin, Twist, Vector};
 //!
 //! let (positions, radii) = ([Vector::<2>::new(0.0, 0.0), Vector::<2>::new(2.1, 0.0)], [1.0, 1.0]);
-//! let step = StepGeometry { positions: &positions, radii: &radii, drift: &[Vector::zeros(); 2], rate: 0.1, dt: 0.1 };
+//! let step = StepGeometry { positions: &positions, radii: &radii, drift: &[Vector::zeros(); 2], velocity_weight: 0.1, dt: 0.1 };
 //! let run = |x| Twist { velocity: Vector::<2>::new(x, 0.0), spin: Spin::<2>::new(0.0) };
 //! let mut twists = [run(1.0), run(-1.0)];
 //!

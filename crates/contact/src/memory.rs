@@ -64,7 +64,7 @@ impl ContactParams {
     fn weights<const D: usize>(&self, step: &StepGeometry<'_, D>) -> (f64, f64) {
         match self.gamma_update {
             GammaUpdate::Paper => (step.dt, 0.0),
-            GammaUpdate::Consistent => (step.rate, step.dt - step.rate),
+            GammaUpdate::Consistent => (step.velocity_weight, step.dt - step.velocity_weight),
         }
     }
 

@@ -15,7 +15,7 @@ pub struct StepGeometry<'a, const D: usize> {
     /// Displacement known before the velocity (the history of a multi-step scheme).
     pub drift: &'a [Vector<D>],
     /// `c`: the displacement a unit velocity makes.
-    pub rate: f64,
+    pub velocity_weight: f64,
     /// Length of the step. `dt - c` is the weight of the last step's velocities in the drift.
     pub dt: f64,
 }
@@ -95,7 +95,7 @@ where
     Dim<D>: Space<D>,
 {
     let count = step.positions.len();
-    validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.rate, step.dt)?;
+    validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.velocity_weight, step.dt)?;
     for particle in 0..count {
         let radius = step.radii[particle];
         if !is_positive(radius) {
@@ -115,7 +115,7 @@ where
 }
 
 /// Checks how many positions, radii (or shapes), drifts and velocities there are, and the step in time.
-pub(crate) fn validate_sizes(lengths: [usize; 4], rate: f64, dt: f64) -> Result<(), ContactError> {
+pub(crate) fn validate_sizes(lengths: [usize; 4], velocity_weight: f64, dt: f64) -> Result<(), ContactError> {
     let [positions, radii, drifts, twists] = lengths;
     if lengths != [positions; 4] {
         return Err(ContactError::LengthMismatch { positions, radii, drifts, twists });
@@ -123,8 +123,8 @@ pub(crate) fn validate_sizes(lengths: [usize; 4], rate: f64, dt: f64) -> Result<
     if positions >= u32::MAX as usize {
         return Err(ContactError::TooManyParticles { count: positions });
     }
-    if !(is_positive(rate) && is_positive(dt)) {
-        return Err(ContactError::BadStep { rate, dt });
+    if !(is_positive(velocity_weight) && is_positive(dt)) {
+        return Err(ContactError::BadStep { velocity_weight, dt });
     }
     Ok(())
 }

@@ -235,7 +235,7 @@ impl<'a, const D: usize> Part<'a, D> {
             self.linearise();
             self.project(setting, &mut effort)?;
             for (moved, (slot, change)) in self.moved.iter_mut().zip(self.slots.iter().zip(&*self.changes)) {
-                *moved = slot.free + change * setting.step.rate;
+                *moved = slot.free + change * setting.step.velocity_weight;
             }
             let off = if setting.params.exact_gap { self.farthest_off(setting) } else { None };
             let Some((row, gap)) = off else { break };
@@ -327,7 +327,7 @@ impl<'a, const D: usize> Part<'a, D> {
         effort.iterations += report.iterations;
         effort.residual = report.residual;
         operator.spread(self.forces);
-        let rate = setting.step.rate;
+        let rate = setting.step.velocity_weight;
         self.changes.iter_mut().for_each(|change| *change /= rate);
         Ok(())
     }
@@ -386,7 +386,7 @@ impl<const D: usize, M: Mobility<D>> Operator<'_, D, M> {
         }
         mobility.apply(step.radii, &forces, &mut velocities);
         for (slot, velocity) in self.slots.iter().zip(&mut *self.velocities).skip(1) {
-            *velocity = velocities[particle(slot)] * step.rate;
+            *velocity = velocities[particle(slot)] * step.velocity_weight;
         }
         self.velocities[0] = Vector::zeros();
     }

@@ -42,7 +42,7 @@ fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
         positions: &input.positions,
         radii: &input.radii,
         drift: &input.drift,
-        rate: input.rate,
+        velocity_weight: input.rate,
         dt: 0.1,
     };
     let error = contact.correct(&step, &mut twists).expect_err("must be refused");
@@ -184,7 +184,7 @@ fn memories_that_no_step_leaves_are_refused() {
 #[test]
 fn nothing_is_no_error() {
     let mut contact = PairContact::<3>::new(ContactParams::default());
-    let step = StepGeometry { positions: &[], radii: &[], drift: &[], rate: 0.1, dt: 0.1 };
+    let step = StepGeometry { positions: &[], radii: &[], drift: &[], velocity_weight: 0.1, dt: 0.1 };
     let report = contact.correct(&step, &mut []).expect("no particles, no contacts");
     assert_eq!(report.pair_count, 0);
     assert!(contact.contacts().is_empty());

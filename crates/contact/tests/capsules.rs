@@ -40,7 +40,7 @@ where
         let mut twists: Vec<Twist<D>> = self.poses.iter().map(predict).collect();
         let drift = vec![Twist::default(); twists.len()];
         let (shapes, poses, dt) = (&self.shapes, &self.poses, self.dt);
-        let step = ShapeStep { shapes, poses, drift: &drift, rate: dt, dt };
+        let step = ShapeStep { shapes, poses, drift: &drift, velocity_weight: dt, dt };
         self.contact.correct(&step, &mut twists).unwrap_or_else(|error| panic!("{error}"));
         for (pose, twist) in self.poses.iter_mut().zip(&twists) {
             *pose = displaced(pose, &twist.combine(dt, &Twist::default(), 0.0));
@@ -91,7 +91,8 @@ where
         let sign = if n < 10 { -1.0 } else { 1.0 };
         let flow = |x: &Vector<D>| Twist { velocity: (x - centre) * sign, ..Twist::default() };
         let mut twists: Vec<Twist<D>> = positions.iter().map(flow).collect();
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: dt, dt };
         round.correct(&step, &mut twists).expect("a good step");
         positions.iter_mut().zip(&twists).for_each(|(x, twist)| *x += twist.velocity * dt);
 
@@ -134,7 +135,8 @@ where
     let at = |height: f64| Vector::<D>::from_fn(|d, _| if d == 1 { height } else { 0.0 });
     let poses = [Pose::at(at(lowest + start)), Pose::at(Vector::zeros())];
     let mut twists = [Twist { velocity: at(-1.0), ..Twist::default() }, Twist::default()];
-    let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], rate: dt, dt };
+    let step =
+        ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], velocity_weight: dt, dt };
     let params = ContactParams { exact_gap: false, ..exact(ContactLaw::Gluey) };
     let mut contact = ShapeContact::with_mobility(params, WithFixed::new([1]));
     contact.correct(&step, &mut twists).expect("a good step");
@@ -298,7 +300,7 @@ fn boxes_keep_their_distance() {
 
     let mut twists = [1.0, -1.0].map(|v| Twist { velocity: Vector::<3>::z() * v, ..Twist::default() });
     let drift = [Twist::default(); 2];
-    let step = ShapeStep { shapes: &boxes, poses: &poses, drift: &drift, rate: 0.1, dt: 0.1 };
+    let step = ShapeStep { shapes: &boxes, poses: &poses, drift: &drift, velocity_weight: 0.1, dt: 0.1 };
     let params = ContactParams { tolerance: 1e-6, ..exact(ContactLaw::Inelastic) };
     ShapeContact::new(params).correct(&step, &mut twists).expect("a good step");
     assert!((twists[0].velocity.z - 0.5 * found / 0.1).abs() < 1e-6, "{twists:?}");
@@ -341,7 +343,7 @@ fn bad_shapes_are_named() {
     let correct = |shapes: [Capsule<2>; 2], at: f64, params: ContactParams, twist: Twist<2>| {
         let poses = [Pose::at(Vector::<2>::zeros()), Pose::at(Vector::<2>::new(0.0, at))];
         let drift = [Twist::default(); 2];
-        let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &drift, rate: 0.1, dt: 0.1 };
+        let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &drift, velocity_weight: 0.1, dt: 0.1 };
         ShapeContact::new(params).correct(&step, &mut [Twist::default(), twist]).expect_err("bad")
     };
     let tuning = || exact(ContactLaw::Gluey);

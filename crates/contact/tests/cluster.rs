@@ -49,8 +49,9 @@ where
             flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
             integrator.drift(dt, &mut drift);
             let positions: Vec<_> = particles.iter().map(|particle| particle.pose.position).collect();
-            let rate = integrator.rate(dt);
-            let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate, dt };
+            let velocity_weight = integrator.velocity_weight(dt);
+            let step =
+                StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight, dt };
             contact.correct(&step, &mut twists).expect("feasible");
             integrator.advance(dt, &mut particles, &twists);
             outcome.contact_count = outcome.contact_count.max(contact.contacts().len());

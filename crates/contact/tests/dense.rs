@@ -36,8 +36,13 @@ impl Suspension {
         let mut twists: Vec<Twist<3>> =
             self.positions.iter().map(|x| Twist { velocity: flow(x), ..Twist::default() }).collect();
         let drift = vec![Vector::zeros(); twists.len()];
-        let step =
-            StepGeometry { positions: &self.positions, radii: &self.radii, drift: &drift, rate: dt, dt };
+        let step = StepGeometry {
+            positions: &self.positions,
+            radii: &self.radii,
+            drift: &drift,
+            velocity_weight: dt,
+            dt,
+        };
         self.contact.correct(&step, &mut twists).expect("feasible");
         for (x, twist) in self.positions.iter_mut().zip(&twists) {
             *x += twist.velocity * dt;

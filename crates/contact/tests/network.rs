@@ -127,7 +127,8 @@ fn two_discs_and_walls() {
     let mut twists = [Twist::<2>::default(); 3];
     twists[..2].iter_mut().for_each(|twist| twist.velocity.y = -1.0);
     let drift = [Vector::zeros(); 3];
-    let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.1, dt: 0.1 };
+    let step =
+        StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: 0.1, dt: 0.1 };
     model.correct(&step, &mut twists).expect("a good step");
     let mut contacts = model.contacts().to_vec();
     contacts.push(contact(PairKey::wall(1, 1), 0.0));
@@ -207,7 +208,13 @@ fn contacts_name_the_image_of_particles_that_have_left_the_period() {
             velocity: Vector::<2>::new(sign * towards.signum(), 0.0),
             ..Twist::default()
         });
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.1, dt: 0.1 };
+        let step = StepGeometry {
+            positions: &positions,
+            radii: &radii,
+            drift: &drift,
+            velocity_weight: 0.1,
+            dt: 0.1,
+        };
         let mut model = PairContact::new(ContactParams::default()).within(domain.clone());
         model.correct(&step, &mut twists).expect("a good step");
         let found = model.contacts().first().unwrap_or_else(|| panic!("no contact of {first} and {second}"));

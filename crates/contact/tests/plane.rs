@@ -49,7 +49,7 @@ where
             positions: &positions,
             radii: &[RADIUS],
             drift: &drift,
-            rate: integrator.rate(dt),
+            velocity_weight: integrator.velocity_weight(dt),
             dt,
         };
         contact.correct(&step, &mut twists).expect("a good step");

@@ -68,7 +68,7 @@ where
             positions: &self.positions,
             radii: &self.radii,
             drift: &self.drift,
-            rate: RATE,
+            velocity_weight: RATE,
             dt: 0.1,
         }
     }

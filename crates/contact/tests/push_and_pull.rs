@@ -34,7 +34,7 @@ where
             positions: &positions,
             radii: &[RADIUS; 2],
             drift: &[Vector::zeros(); 2],
-            rate: dt,
+            velocity_weight: dt,
             dt,
         };
         contact.correct(&step, &mut twists).expect("a good step");

@@ -41,7 +41,13 @@ fn check(packing: &Packing<3>, law: ContactLaw, solver: SolverKind) {
     // The same step again and again: sizes do not change any more.
     for repetition in 0..4 {
         twists.copy_from_slice(&predicted);
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.05, dt: 0.05 };
+        let step = StepGeometry {
+            positions: &positions,
+            radii: &radii,
+            drift: &drift,
+            velocity_weight: 0.05,
+            dt: 0.05,
+        };
         let (report, allocations) = count_in_thread(|| contact.correct(&step, &mut twists));
         assert!(report.expect("feasible").active_count > 30);
         assert!(repetition < 2 || allocations == 0, "{law} {solver:?}: {allocations} allocations");

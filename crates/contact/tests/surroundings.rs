@@ -21,7 +21,7 @@ fn correct<M: gluey_contact::Mobility<2>>(
     let mut twists: Vec<Twist<2>> =
         velocities.iter().map(|&velocity| Twist { velocity, ..Twist::default() }).collect();
     let drift = vec![Vector::zeros(); radii.len()];
-    let step = StepGeometry { positions, radii, drift: &drift, rate: RATE, dt: RATE };
+    let step = StepGeometry { positions, radii, drift: &drift, velocity_weight: RATE, dt: RATE };
     contact.correct(&step, &mut twists)?;
     Ok(twists.iter().map(|twist| twist.velocity).collect())
 }

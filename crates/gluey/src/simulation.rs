@@ -201,7 +201,7 @@ where
             positions: &self.positions,
             radii: &self.radii,
             drift: &self.drift,
-            rate: self.integrator.rate(self.dt),
+            velocity_weight: self.integrator.velocity_weight(self.dt),
             dt: self.dt,
         };
         let (contact, twists) = (&mut self.contact, &mut self.twists);

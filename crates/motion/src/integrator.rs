@@ -50,7 +50,7 @@ impl FromStr for Scheme {
 
 /// Moves particles with their velocities; owns the velocity history, which serialises for checkpoints.
 ///
-/// One step of a simulation: predict `u*`, ask for [`Integrator::rate`] and [`Integrator::drift`], correct the
+/// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`], correct the
 /// velocities for contact, [`Integrator::advance`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
@@ -80,7 +80,7 @@ where
     }
 
     /// The factor `c` of `u^n` in the displacement of a step of length `dt`.
-    pub fn rate(&self, dt: f64) -> f64 {
+    pub fn velocity_weight(&self, dt: f64) -> f64 {
         dt - self.history_weight(dt)
     }
 
@@ -97,12 +97,12 @@ where
     ///
     /// Orientations turn at the constant spin `(c w^n + drift)/dt`, so the scheme is the same for both.
     pub fn advance(&mut self, dt: f64, particles: &mut [Particle<D>], twists: &[Twist<D>]) {
-        let (rate, weight) = (self.rate(dt), self.history_weight(dt));
+        let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
         for (index, (particle, twist)) in particles.iter_mut().zip(twists).enumerate() {
             let old = self.history.get(index).copied().unwrap_or_default();
             // The same expression as in the contact constraint, so that gaps closed there stay closed to round-off.
-            particle.pose.position += twist.velocity * rate + old.velocity * weight;
-            let spin = twist.combine(rate / dt, &old, weight / dt).spin;
+            particle.pose.position += twist.velocity * weight + old.velocity * history_weight;
+            let spin = twist.combine(weight / dt, &old, history_weight / dt).spin;
             particle.pose.orientation = Dim::<D>::advance(&particle.pose.orientation, &spin, dt);
         }
         self.remember(dt, twists);

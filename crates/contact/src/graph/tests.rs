@@ -25,7 +25,7 @@ impl<const D: usize> Cloud<D> {
     }
 
     fn step<'a>(&'a self, drift: &'a [Vector<D>]) -> StepGeometry<'a, D> {
-        StepGeometry { positions: &self.positions, radii: &self.radii, drift, rate: 1.0, dt: 1.0 }
+        StepGeometry { positions: &self.positions, radii: &self.radii, drift, velocity_weight: 1.0, dt: 1.0 }
     }
 
     /// All pairs of particles and images nearer than `reach_i + reach_j`, but for a particle's own images.

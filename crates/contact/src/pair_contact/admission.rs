@@ -20,7 +20,8 @@ where
     ) -> Result<(), ContactError> {
         let graph = &mut self.graph;
         buffers.weights.clear();
-        let mobility = |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.rate;
+        let mobility =
+            |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.velocity_weight;
         buffers.weights.extend(graph.order.iter().map(mobility));
         buffers.changes.clear();
         buffers.changes.resize(graph.count(), Vector::zeros());

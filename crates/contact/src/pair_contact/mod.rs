@@ -183,7 +183,8 @@ where
         twists: &mut [Twist<D>],
         buffers: &mut Buffers<D>,
     ) -> Result<ContactReport, ContactError> {
-        let moves = twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.rate + drift);
+        let moves =
+            twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift);
         buffers.free.clear();
         buffers.free.extend(moves);
         let tolerance = self.tolerance(step, &buffers.free);
@@ -290,7 +291,7 @@ where
             for k in island.slots.clone().skip(1) {
                 let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
                 changes[place] = self.work.changes[k];
-                displacements[place] = slot.free + changes[place] * step.rate;
+                displacements[place] = slot.free + changes[place] * step.velocity_weight;
             }
         }
         Ok(())

@@ -55,7 +55,7 @@ where
         }
         let moves = buffers.displacements.iter().zip(&self.graph.free);
         for (change, (end, free)) in buffers.changes.iter_mut().zip(moves) {
-            *change = (end - free) / step.rate;
+            *change = (end - free) / step.velocity_weight;
         }
         Ok((Reach::Enough, report))
     }

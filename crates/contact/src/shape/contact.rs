@@ -85,7 +85,8 @@ impl<const D: usize, M: Mobility<D>> ShapeContact<D, M> {
             ContactLaw::Inelastic | ContactLaw::Gluey => {}
         }
         let moves = twists.iter().zip(step.drift);
-        let free: Vec<Twist<D>> = moves.map(|(twist, drift)| twist.combine(step.rate, drift, 1.0)).collect();
+        let free: Vec<Twist<D>> =
+            moves.map(|(twist, drift)| twist.combine(step.velocity_weight, drift, 1.0)).collect();
         let slack =
             |(move_, shape): (&Twist<D>, &S)| (SLACK.0 * move_.velocity.norm()).max(SLACK.1 * shape.reach());
         let mut slacks: Vec<f64> = free.iter().zip(step.shapes).map(slack).collect();
@@ -148,7 +149,11 @@ where
     Dim<D>: Space<D>,
 {
     let count = step.poses.len();
-    validate_sizes([count, step.shapes.len(), step.drift.len(), twists.len()], step.rate, step.dt)?;
+    validate_sizes(
+        [count, step.shapes.len(), step.drift.len(), twists.len()],
+        step.velocity_weight,
+        step.dt,
+    )?;
     for particle in 0..count {
         let shape = &step.shapes[particle];
         for radius in [shape.rounding(), shape.reach(), shape.drag_radius()] {

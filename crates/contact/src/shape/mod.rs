@@ -20,7 +20,7 @@
 //! // Two bars, one across the end of the other.
 //! let shapes = [Capsule::new(Vector::<2>::new(2.0, 0.0), 0.5), Capsule::new(Vector::<2>::new(0.0, 2.0), 0.5)];
 //! let poses = [Pose::at(Vector::<2>::zeros()), Pose::at(Vector::<2>::new(2.0, 3.05))];
-//! let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], rate: 0.1, dt: 0.1 };
+//! let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], velocity_weight: 0.1, dt: 0.1 };
 //! let mut twists = [Twist::default(), Twist { velocity: Vector::<2>::new(0.0, -1.0), ..Twist::default() }];
 //! ShapeContact::new(ContactParams::default()).correct(&step, &mut twists)?;
 //! // The lower bar gives way and turns clockwise.
@@ -73,7 +73,7 @@ where
     /// Displacement and rotation known before the velocity.
     pub drift: &'a [Twist<D>],
     /// `c`: the displacement a unit velocity makes.
-    pub rate: f64,
+    pub velocity_weight: f64,
     /// Length of the step.
     pub dt: f64,
 }

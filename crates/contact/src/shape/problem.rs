@@ -89,11 +89,17 @@ where
     ) -> Result<Self, ContactError> {
         let weight = |(body, shape): (usize, &S)| {
             let a = shape.drag_radius();
-            let translation = step.rate * mobility.own(body, a);
+            let translation = step.velocity_weight * mobility.own(body, a);
             // 8 pi eta a^3 beside 6 pi eta a.
             [translation, translation * 3.0 / (4.0 * a * a)]
         };
-        let law = StepGeometry { positions: &[], radii: &[], drift: &[], rate: step.rate, dt: step.dt };
+        let law = StepGeometry {
+            positions: &[],
+            radii: &[],
+            drift: &[],
+            velocity_weight: step.velocity_weight,
+            dt: step.dt,
+        };
         let mut problem = Self {
             law,
             params,
@@ -187,7 +193,7 @@ where
 
     fn move_to_end(&mut self) {
         for (moved, (free, change)) in self.moved.iter_mut().zip(self.free.iter().zip(&self.changes)) {
-            *moved = free.combine(1.0, change, self.step.rate);
+            *moved = free.combine(1.0, change, self.step.velocity_weight);
         }
         self.turn_frames();
     }
@@ -329,7 +335,7 @@ where
         report.iterations += solved.iterations;
         report.residual = solved.residual;
         for change in &mut self.changes {
-            *change = change.combine(1.0 / self.step.rate, &Twist::default(), 0.0);
+            *change = change.combine(1.0 / self.step.velocity_weight, &Twist::default(), 0.0);
         }
         for ((row, force), scale) in self.rows.iter_mut().zip(forces).zip(scales) {
             row.force = force * scale;

@@ -45,7 +45,7 @@ impl Encounter {
             positions: &positions,
             radii: &[RADIUS; 2],
             drift: &drift,
-            rate: self.integrator.rate(self.dt),
+            velocity_weight: self.integrator.velocity_weight(self.dt),
             dt: self.dt,
         };
         let report = self.contact.correct(&step, &mut twists).expect("a good step");
