@@ -43,7 +43,7 @@ where
         let step = ShapeStep { shapes, poses, drift: &drift, velocity_weight: dt, dt };
         self.contact.correct(&step, &mut twists).unwrap_or_else(|error| panic!("{error}"));
         for (pose, twist) in self.poses.iter_mut().zip(&twists) {
-            *pose = displaced(pose, &twist.combine(dt, &Twist::default(), 0.0));
+            *pose = displaced(pose, &(*twist * dt));
         }
         twists
     }

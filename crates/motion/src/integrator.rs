@@ -102,7 +102,7 @@ where
             let old = self.history.get(index).copied().unwrap_or_default();
             // The same expression as in the contact constraint, so that gaps closed there stay closed to round-off.
             particle.pose.position += twist.velocity * weight + old.velocity * history_weight;
-            let spin = twist.combine(weight / dt, &old, history_weight / dt).spin;
+            let spin = twist.spin * (weight / dt) + old.spin * (history_weight / dt);
             particle.pose.orientation = Dim::<D>::advance(&particle.pose.orientation, &spin, dt);
         }
         self.remember(dt, twists);
@@ -123,7 +123,7 @@ where
     pub fn reverse(&mut self) {
         self.history_age = -self.history_age;
         for twist in &mut self.history {
-            *twist = Twist::default().combine(0.0, twist, -1.0);
+            *twist = -*twist;
         }
     }
 

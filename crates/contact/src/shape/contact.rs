@@ -86,7 +86,7 @@ impl<const D: usize, M: Mobility<D>> ShapeContact<D, M> {
         }
         let moves = twists.iter().zip(step.drift);
         let free: Vec<Twist<D>> =
-            moves.map(|(twist, drift)| twist.combine(step.velocity_weight, drift, 1.0)).collect();
+            moves.map(|(twist, drift)| *twist * step.velocity_weight + *drift).collect();
         let slack =
             |(move_, shape): (&Twist<D>, &S)| (SLACK.0 * move_.velocity.norm()).max(SLACK.1 * shape.reach());
         let mut slacks: Vec<f64> = free.iter().zip(step.shapes).map(slack).collect();
@@ -114,7 +114,7 @@ impl<const D: usize, M: Mobility<D>> ShapeContact<D, M> {
             lambda,
         }));
         for (twist, change) in twists.iter_mut().zip(&problem.changes) {
-            *twist = twist.combine(1.0, change, 1.0);
+            *twist = *twist + *change;
         }
         Ok(report)
     }

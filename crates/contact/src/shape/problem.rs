@@ -193,7 +193,7 @@ where
 
     fn move_to_end(&mut self) {
         for (moved, (free, change)) in self.moved.iter_mut().zip(self.free.iter().zip(&self.changes)) {
-            *moved = free.combine(1.0, change, self.step.velocity_weight);
+            *moved = *free + *change * self.step.velocity_weight;
         }
         self.turn_frames();
     }
@@ -335,7 +335,7 @@ where
         report.iterations += solved.iterations;
         report.residual = solved.residual;
         for change in &mut self.changes {
-            *change = change.combine(1.0 / self.step.velocity_weight, &Twist::default(), 0.0);
+            *change = *change * (1.0 / self.step.velocity_weight);
         }
         for ((row, force), scale) in self.rows.iter_mut().zip(forces).zip(scales) {
             row.force = force * scale;
