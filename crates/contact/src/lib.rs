@@ -38,9 +38,11 @@
 //! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
 
 pub mod broadphase;
+mod delassus;
 mod domain;
 mod error;
 mod graph;
+mod island_projection;
 mod islands;
 mod key;
 mod lattice;
@@ -50,7 +52,7 @@ mod model;
 mod network;
 mod pair_contact;
 mod params;
-mod project;
+mod projection;
 mod push_apart;
 mod rows;
 pub mod shape;

@@ -6,9 +6,10 @@ mod velocity_correction;
 use gluey_geom::{Dim, Space, Twist, Vector};
 
 use crate::graph::Graph;
+use crate::island_projection::{IslandWorkspace, SolveContext};
 use crate::islands::{Islands, Places};
 use crate::model::validate;
-use crate::project::{Failure, Setting, Work};
+use crate::projection::{Failure, Tuning};
 use crate::rows::Row;
 use crate::{
     Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState, Domain,
@@ -27,7 +28,7 @@ pub struct PairContact<const D: usize, M = StokesDrag> {
     contacts: Vec<Contact>,
     graph: Graph<D>,
     islands: Islands<D>,
-    work: Work<D>,
+    workspace: IslandWorkspace<D>,
     buffers: Buffers<D>,
 }
 
@@ -97,7 +98,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
             contacts: Vec::new(),
             graph: Graph::default(),
             islands: Islands::default(),
-            work: Work::default(),
+            workspace: IslandWorkspace::default(),
             buffers: Buffers::default(),
         }
     }
@@ -258,27 +259,31 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let solver = self.params.solver.method();
+        let tuning = Tuning {
+            solver: self.params.solver.method(),
+            tolerance,
+            iteration_limit: self.params.iteration_limit,
+        };
         let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
         let places = Places { positions: &self.graph.positions, free: &self.graph.free, weights };
         let is_fresh = |row: &Row<D>| takes_part[row.link as usize] == Part::Fresh;
         self.islands.part(rows, &places, M::COUPLED, is_fresh);
-        self.work.prepare(&self.islands, solver, |row| {
+        self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
             let PairMemory { gamma, lambda } = memory[row.link as usize];
             (forces[row.link as usize], self.params.floor(gamma, lambda, step))
         });
-        let setting = Setting {
-            step,
+        let context = SolveContext {
             params: &self.params,
             mobility: &self.mobility,
-            solver,
-            tolerance,
+            tuning,
+            velocity_weight: step.velocity_weight,
+            radii: step.radii,
             order: &self.graph.order,
         };
-        self.work.solve(&self.islands, &setting);
+        self.workspace.solve(&self.islands, &context);
 
         for (island, outcome) in
-            self.islands.islands.iter().zip(&self.work.outcomes).filter(|(i, _)| i.is_fresh)
+            self.islands.islands.iter().zip(&self.workspace.outcomes).filter(|(i, _)| i.is_fresh)
         {
             let effort =
                 outcome.as_ref().map_err(|failure| self.explain(failure, island.rows.start, tolerance))?;
@@ -286,11 +291,11 @@ where
             report.passes = report.passes.max(effort.passes);
             report.residual = report.residual.max(effort.residual);
             for k in island.rows.clone() {
-                forces[self.islands.rows[k].link as usize] = self.work.forces[k];
+                forces[self.islands.rows[k].link as usize] = self.workspace.forces[k];
             }
             for k in island.slots.clone().skip(1) {
                 let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
-                changes[place] = self.work.changes[k];
+                changes[place] = self.workspace.changes[k];
                 displacements[place] = slot.free + changes[place] * step.velocity_weight;
             }
         }
@@ -301,8 +306,8 @@ where
     fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
         let key = |row: usize| self.graph.key(&self.graph.links[self.islands.rows[row].link as usize]);
         match failure {
-            Failure::Gap { row, gap, passes } => {
-                ContactError::GapNotClosed { pair: key(*row), gap: *gap, passes: *passes }
+            Failure::Gap { contact, gap, passes } => {
+                ContactError::GapNotClosed { pair: key(start + contact), gap: *gap, passes: *passes }
             }
             Failure::Solve(failure) => ContactError::of_solve(failure, tolerance, |row| key(start + row)),
         }
