@@ -6,8 +6,7 @@
 use std::time::Instant;
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, ContactReport, GammaUpdate, PairContact, SolverKind,
-    StepGeometry,
+    ContactError, ContactParams, ContactReport, GammaUpdate, PairContact, SolverKind, StepGeometry,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::{RngExt, SeedableRng};

@@ -18,7 +18,7 @@ pub(crate) trait JacobianRow: Copy {
     fn zero() -> Self::Motion;
     /// The row times a factor.
     fn scaled(&self, factor: f64) -> Self;
-    /// `A_kk`.
+    /// `A_kk` of a row that is not scaled.
     fn compliance(&self, weights: &[Self::Weight]) -> f64;
     /// Adds `G_k^T force` to the forces on the bodies.
     fn add_force(&self, force: f64, loads: &mut [Self::Motion]);
@@ -26,19 +26,13 @@ pub(crate) trait JacobianRow: Copy {
     fn opening(&self, motions: &[Self::Motion]) -> f64;
 }
 
-/// Scales rows to equal compliance: writes the scaled rows and their scales.
-pub(crate) fn scale_rows<R: JacobianRow>(
-    row: impl Fn(usize) -> R,
-    weights: &[R::Weight],
-    scaled: &mut [R],
-    scales: &mut [f64],
-) {
-    for (k, (scaled, scale)) in scaled.iter_mut().zip(&mut *scales).enumerate() {
-        *scaled = row(k);
-        *scale = scaled.compliance(weights);
+/// Scales rows to equal compliance, and writes their scales.
+pub(crate) fn scale_rows<R: JacobianRow>(weights: &[R::Weight], rows: &mut [R], scales: &mut [f64]) {
+    for (row, scale) in rows.iter().zip(&mut *scales) {
+        *scale = row.compliance(weights);
     }
     let largest = scales.iter().copied().fold(0.0, f64::max);
-    for (row, scale) in scaled.iter_mut().zip(scales) {
+    for (row, scale) in rows.iter_mut().zip(scales) {
         *scale = (largest / *scale).sqrt();
         *row = row.scaled(*scale);
     }

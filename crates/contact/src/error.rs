@@ -1,5 +1,6 @@
-//! What can go wrong in a contact step.
+//! Errors of a contact step.
 
+use crate::projection::Failure;
 use crate::solver::{ResidualHistory, SolveFailure};
 use crate::{ContactLaw, PairKey};
 
@@ -155,7 +156,7 @@ pub enum ContactError {
     NotConverged {
         /// `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
         residual: f64,
-        /// What was asked for; unit: length.
+        /// The residual that was to be reached; unit: length.
         tolerance: f64,
         /// Iterations of the last solve.
         iterations: usize,
@@ -177,8 +178,23 @@ pub enum ContactError {
 }
 
 impl ContactError {
-    /// What the failure of a solver means; `key` names its rows.
-    pub(crate) fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
+    /// The error that the failure of a projection means; `contact_key` and `row_key` name its contacts and its rows.
+    pub(crate) fn of_projection(
+        failure: &Failure,
+        tolerance: f64,
+        contact_key: impl Fn(usize) -> PairKey,
+        row_key: impl Fn(usize) -> PairKey,
+    ) -> Self {
+        match failure {
+            Failure::Gap { contact, gap, passes } => {
+                Self::GapNotClosed { pair: contact_key(*contact), gap: *gap, passes: *passes }
+            }
+            Failure::Solve(failure) => Self::of_solve(failure, tolerance, row_key),
+        }
+    }
+
+    /// The error that the failure of a solver means; `key` names its rows.
+    fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
         match &failure.infeasible {
             Some(rows) => {
                 let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();

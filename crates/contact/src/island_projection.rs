@@ -240,7 +240,8 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
     /// Solves the only island of the slice.
     fn solve_one<M: Mobility<D>>(&mut self, context: &SolveContext<'_, M>) -> Outcome {
         self.scale();
-        let effort = projection::solve(&mut IslandProblem { island: self, context }, context.params)?;
+        let mut effort = Effort::default();
+        projection::solve(&mut IslandProblem { island: self, context }, context.params, &mut effort)?;
         for (force, scale) in self.forces.iter_mut().zip(&*self.scales) {
             *force *= scale;
         }
@@ -248,11 +249,11 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
     }
 
     fn scale(&mut self) {
-        let row = |k: usize| {
-            let [tail, head] = self.ends[k];
-            NormalRow { normal: self.rows[k].normal, tail, head }
-        };
-        scale_rows(row, self.weights, self.scaled_rows, self.scales);
+        for (scaled, (row, [tail, head])) in self.scaled_rows.iter_mut().zip(self.rows.iter().zip(self.ends))
+        {
+            *scaled = NormalRow { normal: row.normal, tail: *tail, head: *head };
+        }
+        scale_rows(self.weights, self.scaled_rows, self.scales);
         for (k, scale) in self.scales.iter().enumerate() {
             self.forces[k] /= scale;
             self.floors[k] /= scale;

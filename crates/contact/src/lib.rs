@@ -63,7 +63,7 @@ pub use error::{ContactError, Quantity};
 pub use key::{PairKey, Partner};
 pub use memory::{ContactState, MemoryError, PairState};
 pub use mobility::{Mobility, StokesDrag, WithFixed};
-pub use model::{Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
+pub use model::{BodyStep, Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
 pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownLaw, UnknownSolver};

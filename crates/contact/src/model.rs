@@ -1,11 +1,11 @@
-//! What a contact model sees of a step, does to it and tells about it.
+//! The interface of contact models: the step they correct, and the report on it.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Pose, Space, Twist, Vector};
 use serde::{Deserialize, Serialize};
 
 use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
 
-/// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry a particle.
+/// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
 pub struct StepGeometry<'a, const D: usize> {
     /// Centres at the beginning of the step.
@@ -20,15 +20,33 @@ pub struct StepGeometry<'a, const D: usize> {
     pub dt: f64,
 }
 
-/// Corrects predicted velocities so that particles do not overlap.
+/// The step `x^{n+1} = x^n + c u^n + drift` of bodies that also turn, by the vector `c w^n + drift`. One entry per body.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyStep<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Centres and orientations at the beginning of the step.
+    pub poses: &'a [Pose<D>],
+    /// Radii of round bodies; not used by models that know the bodies' shapes.
+    pub radii: &'a [f64],
+    /// Displacement and rotation known before the velocity (the history of a multi-step scheme).
+    pub drift: &'a [Twist<D>],
+    /// `c`: the displacement a unit velocity makes.
+    pub velocity_weight: f64,
+    /// Length of the step. `dt - c` is the weight of the last step's velocities in the drift.
+    pub dt: f64,
+}
+
+/// Corrects predicted velocities so that bodies do not overlap.
 pub trait ContactModel<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     /// Corrects `twists`; on an error they and the memory are as before.
-    fn correct(
+    fn correct_bodies(
         &mut self,
-        step: &StepGeometry<'_, D>,
+        step: &BodyStep<'_, D>,
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError>;
 
@@ -83,6 +101,17 @@ pub struct ContactReport {
     pub active_count: usize,
     /// The smallest gap among the pairs that took part.
     pub worst: Option<WorstPair>,
+}
+
+impl ContactReport {
+    /// Counts a pair that took part.
+    pub(crate) fn count_pair(&mut self, gap: f64, force: f64, pair: impl FnOnce() -> PairKey) {
+        self.pair_count += 1;
+        self.active_count += usize::from(force != 0.0);
+        if self.worst.is_none_or(|worst| gap < worst.gap) {
+            self.worst = Some(WorstPair { pair: pair(), gap });
+        }
+    }
 }
 
 /// Checks everything a step depends on.

@@ -35,9 +35,12 @@ pub(crate) trait Linearised {
     fn linearise(&mut self, pass: usize) -> Option<(usize, f64)>;
 }
 
-/// Solves `problem` with as many linearisations as its gaps need.
-pub(crate) fn solve(problem: &mut impl Linearised, params: &ContactParams) -> Result<Effort, Failure> {
-    let mut effort = Effort::default();
+/// Solves `problem` with as many linearisations as its gaps need; adds to the effort so far.
+pub(crate) fn solve(
+    problem: &mut impl Linearised,
+    params: &ContactParams,
+    effort: &mut Effort,
+) -> Result<(), Failure> {
     // The first linearisation is the paper's: about the bodies where they are.
     problem.begin();
     loop {
@@ -46,7 +49,7 @@ pub(crate) fn solve(problem: &mut impl Linearised, params: &ContactParams) -> Re
         effort.iterations += report.iterations;
         effort.residual = report.residual;
         let off = if params.exact_gap { problem.linearise(effort.passes) } else { None };
-        let Some((contact, gap)) = off else { return Ok(effort) };
+        let Some((contact, gap)) = off else { return Ok(()) };
         if effort.passes >= params.pass_limit {
             return Err(Failure::Gap { contact, gap, passes: effort.passes });
         }

@@ -5,7 +5,7 @@
 //! floor `gamma_min` it ends at `T + |gamma_min| / (a v)`, where that is earlier.
 
 use gluey_contact::{
-    ContactLaw, ContactModel, ContactParams, GammaUpdate, Mobility, PairContact, StepGeometry, StokesDrag,
+    ContactLaw, ContactParams, GammaUpdate, Mobility, PairContact, StepGeometry, StokesDrag,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 

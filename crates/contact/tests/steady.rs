@@ -1,7 +1,7 @@
 //! A steady step allocates nothing.
 
 use gluey_contact::{
-    ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, PairContact, SolverKind, StepGeometry, Wall,
+    ContactLaw, ContactParams, Domain, GammaUpdate, PairContact, SolverKind, StepGeometry, Wall,
 };
 use gluey_geom::{Twist, Vector};
 use gluey_testkit::allocation::{CountingAllocator, count_in_thread};

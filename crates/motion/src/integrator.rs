@@ -33,7 +33,7 @@ impl fmt::Display for Scheme {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown time scheme `{name}`: expected `euler` or `adams-bashforth-2`")]
 pub struct UnknownScheme {
-    /// What was asked for.
+    /// The name as it was given.
     pub name: String,
 }
 
@@ -84,12 +84,21 @@ where
         dt - self.history_weight(dt)
     }
 
-    /// Writes the part of the displacement known before `u^n`, one vector a particle.
+    /// Writes the part of the displacement known before `u^n`, one vector per particle.
     pub fn drift(&self, dt: f64, drift: &mut [Vector<D>]) {
         let weight = self.history_weight(dt);
         drift.fill(Vector::zeros());
         for (drift, twist) in drift.iter_mut().zip(&self.history) {
             *drift = twist.velocity * weight;
+        }
+    }
+
+    /// Writes the displacement and rotation known before `u^n`, one twist per particle.
+    pub fn body_drift(&self, dt: f64, drift: &mut [Twist<D>]) {
+        let weight = self.history_weight(dt);
+        drift.fill(Twist::default());
+        for (drift, twist) in drift.iter_mut().zip(&self.history) {
+            *drift = *twist * weight;
         }
     }
 

@@ -30,7 +30,7 @@ where
         buffers.memory.clear();
         buffers.forces.clear();
         buffers.takes_part.clear();
-        for state in &self.state.pairs {
+        for state in &self.record.state.pairs {
             let link = check_known(state, step, &self.domain).map(|()| graph.recall(state.pair))?;
             let size = buffers.memory.len().max(graph.links.len());
             buffers.memory.resize(size, PairMemory::default());

@@ -8,12 +8,13 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 use crate::graph::Graph;
 use crate::island_projection::{IslandWorkspace, SolveContext};
 use crate::islands::{Islands, Places};
+use crate::memory::{ContactRecord, GammaRule};
 use crate::model::validate;
 use crate::projection::{Failure, Tuning};
 use crate::rows::Row;
 use crate::{
-    Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState, Domain,
-    MemoryError, Mobility, PairState, StepGeometry, StokesDrag, WorstPair,
+    BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
+    Domain, MemoryError, Mobility, StepGeometry, StokesDrag,
 };
 
 /// Contacts between discs or spheres, and with walls, by one of the [`ContactLaw`]s.
@@ -24,12 +25,34 @@ pub struct PairContact<const D: usize, M = StokesDrag> {
     params: ContactParams,
     mobility: M,
     domain: Domain<D>,
-    state: ContactState,
-    contacts: Vec<Contact>,
+    record: ContactRecord,
     graph: Graph<D>,
     islands: Islands<D>,
     workspace: IslandWorkspace<D>,
     buffers: Buffers<D>,
+    centers: Centers<D>,
+}
+
+/// The motion of the centres in a step of bodies.
+#[derive(Debug, Default)]
+struct Centers<const D: usize> {
+    positions: Vec<Vector<D>>,
+    drift: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Centers<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The step without its rotations.
+    fn of<'a>(&'a mut self, step: &BodyStep<'a, D>) -> StepGeometry<'a, D> {
+        self.positions.clear();
+        self.positions.extend(step.poses.iter().map(|pose| pose.position));
+        self.drift.clear();
+        self.drift.extend(step.drift.iter().map(|drift| drift.velocity));
+        let (radii, velocity_weight, dt) = (step.radii, step.velocity_weight, step.dt);
+        StepGeometry { positions: &self.positions, radii, drift: &self.drift, velocity_weight, dt }
+    }
 }
 
 /// Vectors of a step, kept from step to step.
@@ -94,12 +117,12 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
             params,
             mobility,
             domain: Domain::default(),
-            state: ContactState::default(),
-            contacts: Vec::new(),
+            record: ContactRecord::default(),
             graph: Graph::default(),
             islands: Islands::default(),
             workspace: IslandWorkspace::default(),
             buffers: Buffers::default(),
+            centers: Centers::default(),
         }
     }
 
@@ -128,11 +151,13 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     }
 }
 
-impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M>
+impl<const D: usize, M: Mobility<D>> PairContact<D, M>
 where
     Dim<D>: Space<D>,
 {
-    fn correct(
+    /// Corrects `twists`; on an error they and the memory are as before. [`ContactModel::correct_bodies`] does the same for a
+    /// step that is given with orientations.
+    pub fn correct(
         &mut self,
         step: &StepGeometry<'_, D>,
         twists: &mut [Twist<D>],
@@ -146,25 +171,37 @@ where
         self.buffers = buffers;
         outcome
     }
+}
+
+impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M>
+where
+    Dim<D>: Space<D>,
+{
+    fn correct_bodies(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<ContactReport, ContactError> {
+        let mut centers = std::mem::take(&mut self.centers);
+        let outcome = self.correct(&centers.of(step), twists);
+        self.centers = centers;
+        outcome
+    }
 
     fn contacts(&self) -> &[Contact] {
-        &self.contacts
+        &self.record.contacts
     }
 
     fn checkpoint(&self) -> ContactState {
-        self.state.clone()
+        self.record.state.clone()
     }
 
     fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
-        self.state = state.checked()?;
-        self.contacts.clear();
-        Ok(())
+        self.record.resume(state)
     }
 
     fn reverse(&mut self) {
-        for pair in &mut self.state.pairs {
-            pair.lambda = -pair.lambda;
-        }
+        self.record.reverse();
     }
 }
 
@@ -259,6 +296,7 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
+        let rule = GammaRule::new(&self.params, step.velocity_weight, step.dt);
         let tuning = Tuning {
             solver: self.params.solver.method(),
             tolerance,
@@ -270,7 +308,7 @@ where
         self.islands.part(rows, &places, M::COUPLED, is_fresh);
         self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
             let PairMemory { gamma, lambda } = memory[row.link as usize];
-            (forces[row.link as usize], self.params.floor(gamma, lambda, step))
+            (forces[row.link as usize], rule.floor(gamma, lambda))
         });
         let context = SolveContext {
             params: &self.params,
@@ -304,50 +342,36 @@ where
 
     /// The error that the failure of an island means; its first row is `start`.
     fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
-        let key = |row: usize| self.graph.key(&self.graph.links[self.islands.rows[row].link as usize]);
-        match failure {
-            Failure::Gap { contact, gap, passes } => {
-                ContactError::GapNotClosed { pair: key(start + contact), gap: *gap, passes: *passes }
-            }
-            Failure::Solve(failure) => ContactError::of_solve(failure, tolerance, |row| key(start + row)),
-        }
+        let key =
+            |row: usize| self.graph.key(&self.graph.links[self.islands.rows[start + row].link as usize]);
+        ContactError::of_projection(failure, tolerance, key, key)
     }
 
-    fn summary(&self, report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
-        let mut worst: Option<WorstPair> = None;
-        let mut active_count = 0;
+    fn summary(&self, mut report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
         for row in &buffers.rows {
             let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
-            if worst.is_none_or(|worst| gap < worst.gap) {
-                worst = Some(WorstPair { pair: self.graph.key(&self.graph.links[row.link as usize]), gap });
-            }
-            active_count += usize::from(buffers.forces[row.link as usize] != 0.0);
+            let force = buffers.forces[row.link as usize];
+            report.count_pair(gap, force, || self.graph.key(&self.graph.links[row.link as usize]));
         }
-        ContactReport { pair_count: buffers.rows.len(), active_count, worst, ..report }
+        report
     }
 
     /// Updates gamma and lists the contacts.
     fn remember(&mut self, step: &StepGeometry<'_, D>, tolerance: f64, buffers: &Buffers<D>) {
-        self.contacts.clear();
-        for row in &buffers.rows {
+        let (graph, rule) = (&self.graph, GammaRule::new(&self.params, step.velocity_weight, step.dt));
+        let contact = |row: &Row<D>| {
             let link = row.link as usize;
             let (PairMemory { gamma, lambda: last }, lambda) = (buffers.memory[link], buffers.forces[link]);
-            let gamma = self.params.update(gamma, last, lambda, step);
+            let gamma = rule.update(gamma, last, lambda);
             // A force that moves the pair by less than the tolerance is rounding noise.
             let moved = [row.head, row.tail]
                 .map(|place| buffers.weights.get(place as usize).unwrap_or(&0.0) * lambda);
-            if gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance {
-                let pair = self.graph.key(&self.graph.links[link]);
-                let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
-                self.contacts.push(Contact { pair, lambda, gamma, gap });
-            }
-        }
-        self.contacts.sort_unstable_by_key(|contact| contact.pair);
-        self.state.pairs.clear();
-        self.state.pairs.extend(self.contacts.iter().map(|contact| PairState {
-            pair: contact.pair,
-            gamma: contact.gamma,
-            lambda: contact.lambda,
-        }));
+            let is_contact = gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance;
+            is_contact.then(|| {
+                let gap = row.gap_after(&graph.positions, &buffers.displacements);
+                Contact { pair: graph.key(&graph.links[link]), lambda, gamma, gap }
+            })
+        };
+        self.record.replace(|contacts| contacts.extend(buffers.rows.iter().filter_map(contact)));
     }
 }

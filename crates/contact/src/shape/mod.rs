@@ -13,24 +13,28 @@
 //! is a point give the same velocities.
 //!
 //! ```
-//! use gluey_contact::ContactParams;
-//! use gluey_contact::shape::{Capsule, ShapeContact, ShapeStep};
+//! use gluey_contact::shape::{Capsule, ShapeContact};
+//! use gluey_contact::{BodyStep, ContactModel, ContactParams};
 //! use gluey_geom::{Pose, Twist, Vector};
 //!
 //! // Two bars, one across the end of the other.
-//! let shapes = [Capsule::new(Vector::<2>::new(2.0, 0.0), 0.5), Capsule::new(Vector::<2>::new(0.0, 2.0), 0.5)];
+//! let shapes = [[2.0, 0.0], [0.0, 2.0]].map(|half| Capsule::new(Vector::from(half), 0.5));
+//! let mut contact = ShapeContact::new(ContactParams::default(), shapes.to_vec());
 //! let poses = [Pose::at(Vector::<2>::zeros()), Pose::at(Vector::<2>::new(2.0, 3.05))];
-//! let step = ShapeStep { shapes: &shapes, poses: &poses, drift: &[Twist::default(); 2], velocity_weight: 0.1, dt: 0.1 };
+//! let drift = [Twist::default(); 2];
+//! let step = BodyStep { poses: &poses, radii: &[], drift: &drift, velocity_weight: 0.1, dt: 0.1 };
 //! let mut twists = [Twist::default(), Twist { velocity: Vector::<2>::new(0.0, -1.0), ..Twist::default() }];
-//! ShapeContact::new(ContactParams::default()).correct(&step, &mut twists)?;
+//! contact.correct_bodies(&step, &mut twists)?;
 //! // The lower bar gives way and turns clockwise.
 //! assert!(twists[0].velocity.y < 0.0 && twists[0].spin[0] < 0.0);
 //! # Ok::<(), gluey_contact::ContactError>(())
 //! ```
 
+mod bodies;
 mod capsule;
 mod closest;
 mod contact;
+mod points;
 mod problem;
 
 use gluey_geom::{Dim, Pose, Space, Twist, Vector};
@@ -58,24 +62,6 @@ pub trait Shape<const D: usize>: Sync {
     fn half_axis(&self) -> Option<Vector<D>> {
         None
     }
-}
-
-/// The step `x^{n+1} = x^n + c u^n + drift`, turned alike by the vector `c w^n + drift`. One entry a body.
-#[derive(Clone, Copy, Debug)]
-pub struct ShapeStep<'a, const D: usize, S>
-where
-    Dim<D>: Space<D>,
-{
-    /// Shapes.
-    pub shapes: &'a [S],
-    /// Centres and orientations at the beginning of the step.
-    pub poses: &'a [Pose<D>],
-    /// Displacement and rotation known before the velocity.
-    pub drift: &'a [Twist<D>],
-    /// `c`: the displacement a unit velocity makes.
-    pub velocity_weight: f64,
-    /// Length of the step.
-    pub dt: f64,
 }
 
 /// A body moved by a displacement and turned by a rotation vector, given as a twist times a time.
