@@ -73,31 +73,31 @@ fn tuning(law: ContactLaw) -> ContactParams {
 }
 
 #[test]
-fn two_thousand_spheres_never_overlap() {
-    let packing = Packing::<3>::fluid(2000, 0.5, 3);
+fn five_hundred_spheres_never_overlap() {
+    let packing = Packing::<3>::fluid(500, 0.5, 3);
     let mut suspension = Suspension::new(&packing, tuning(ContactLaw::Gluey));
     let mut contact_count = 0;
-    for n in 0..10_000 {
-        suspension.step(1e-4);
+    for n in 0..2000 {
+        suspension.step(5e-4);
         let contacts = suspension.contact.contacts();
         contact_count = contact_count.max(contacts.len());
         for Contact { pair, gamma, gap, lambda } in contacts {
             assert!(*gap >= -1e-10 * RADIUS, "step {n}, {pair}: gap {gap:e}");
             assert!(*gamma <= 0.0 && lambda.is_finite(), "step {n}, {pair}: gamma {gamma}, lambda {lambda}");
         }
-        if n % 1000 == 999 {
+        if n % 100 == 99 {
             let smallest = suspension.smallest_gap();
             assert!(smallest >= -1e-10 * RADIUS, "step {n}: {smallest:e}");
         }
     }
     println!("{contact_count} contacts at most");
-    assert!(contact_count > 1000);
+    assert!(contact_count > 800);
 }
 
 /// Positions and contacts after some steps.
 fn run(packing: &Packing<3>, law: ContactLaw) -> (Vec<Vector<3>>, Vec<Contact>) {
     let mut suspension = Suspension::new(packing, tuning(law));
-    (0..12).for_each(|_| suspension.step(0.02));
+    (0..6).for_each(|_| suspension.step(0.04));
     (suspension.positions, suspension.contact.contacts().to_vec())
 }
 
