@@ -4,6 +4,7 @@ use gluey_geom::Vector;
 
 use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};
 use crate::islands::{Island, Islands, Slot};
+use crate::parallel;
 use crate::projection::{self, Effort, Failure, LinearProblem, Linearised, Tuning};
 use crate::rows::{GROUND, Row};
 use crate::solver::{Factor, SolveFailure, SolveReport};
@@ -169,7 +170,7 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
     fn solve<M: Mobility<D>>(self, context: &SolveContext<'_, M>) {
         if self.islands.len() > 1 && self.rows.len() > ROWS_PER_TASK {
             let (left, right) = self.halve();
-            rayon::join(|| left.solve(context), || right.solve(context));
+            parallel::join(|| left.solve(context), || right.solve(context));
         } else {
             self.solve_in_turn(context);
         }

@@ -3,12 +3,14 @@
 use std::fmt;
 
 use gluey_geom::Vector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{ContactError, Domain};
 
 /// A contact of the particle `first` with another particle or a wall.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct PairKey {
     /// The particle; of two, the one with the smaller index.
     pub first: u32,
@@ -17,7 +19,8 @@ pub struct PairKey {
 }
 
 /// What a particle touches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Partner {
     /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a period).
     Particle {

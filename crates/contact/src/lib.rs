@@ -51,10 +51,12 @@ mod mobility;
 mod model;
 mod network;
 mod pair_contact;
+mod parallel;
 mod params;
 mod projection;
 mod push_apart;
 mod rows;
+#[cfg(any(feature = "dim2", feature = "dim3"))]
 pub mod shape;
 pub mod solver;
 
@@ -67,3 +69,8 @@ pub use model::{BodyStep, Contact, ContactModel, ContactReport, StepGeometry, Wo
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
 pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownLaw, UnknownSolver};
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,11 +1,13 @@
 //! The memory of contacts, kept from step to step, and the rule that updates it.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{Contact, ContactLaw, ContactParams, GammaUpdate, PairKey};
 
 /// One pair's memory.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct PairState {
     /// The two particles.
     pub pair: PairKey,
@@ -28,7 +30,8 @@ pub struct MemoryError {
 }
 
 /// The memory of a contact model: pairs with `gamma < 0` or a force, sorted.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactState {
     /// The pairs.
     pub pairs: Vec<PairState>,

@@ -1,6 +1,7 @@
 //! The interface of contact models: the step they correct, and the report on it.
 
 use gluey_geom::{Dim, Pose, Space, Twist, Vector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
@@ -64,7 +65,8 @@ where
 }
 
 /// A contact at the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Contact {
     /// The two particles.
     pub pair: PairKey,
@@ -77,7 +79,8 @@ pub struct Contact {
 }
 
 /// The pair with the smallest gap.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct WorstPair {
     /// The two particles.
     pub pair: PairKey,
@@ -86,7 +89,8 @@ pub struct WorstPair {
 }
 
 /// Effort and outcome of one correction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactReport {
     /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the velocity
     /// correction).

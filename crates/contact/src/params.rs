@@ -2,13 +2,15 @@
 
 use std::{fmt, str::FromStr};
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::solver::{Accelerated, ActiveSet, Auto, ProjectionSolver, Uzawa};
 
 /// The contact law: the response of particles that would overlap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ContactLaw {
     /// Nothing: particles may overlap.
     None,
@@ -58,8 +60,9 @@ impl FromStr for ContactLaw {
 }
 
 /// The update rule of gamma: how it follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and when a contact opens.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum GammaUpdate {
     /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays closed
     /// for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with as many contacts as
@@ -73,8 +76,9 @@ pub enum GammaUpdate {
 }
 
 /// Which method solves the projection; all give the same velocities.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SolverKind {
     /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where that is slow.
     #[default]
@@ -130,7 +134,8 @@ impl FromStr for SolverKind {
 }
 
 /// Tuning of [`crate::PairContact`]. The defaults are the gluey law with the paper's first-order gap.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactParams {
     /// The contact law.
     pub law: ContactLaw,

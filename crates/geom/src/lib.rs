@@ -16,10 +16,15 @@ mod space;
 
 pub use aabb::Aabb;
 pub use motion::{Particle, Pose, Twist};
-pub use space::{Dim, Rotation, Space, Spin};
+pub use space::{Dim, Rotation, Space, Spin, Stored};
 
 /// A point, displacement or velocity in `D` dimensions.
 pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
 
 /// A second-order tensor in `D` dimensions.
 pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,13 +2,15 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{Dim, Rotation, Space, Spin, Vector};
 
 /// Position of the centre and orientation of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Pose<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -30,8 +32,9 @@ where
 }
 
 /// Rigid-body velocity: that of the centre and the spin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Twist<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -106,8 +109,9 @@ where
 }
 
 /// A rigid disc (2D) or sphere (3D).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Particle<const D: usize>
 where
     Dim<D>: Space<D>,

@@ -18,3 +18,8 @@ mod tree;
 pub use ball::{Ball, Body, LevelSet, nearest, nearest_image};
 pub use mixing::{Ramp, ViscosityLaw};
 pub use tree::BallTree;
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -7,16 +7,18 @@
 use std::{fmt, str::FromStr};
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// An explicit time scheme.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Scheme {
     /// First order (Verdon et al. 2010, eq. 11).
-    #[serde(rename = "euler")]
+    #[cfg_attr(feature = "serde", serde(rename = "euler"))]
     Euler,
     /// Second order (Verdon et al. 2010, eq. 12); its first step is Euler.
-    #[serde(rename = "adams-bashforth-2")]
+    #[cfg_attr(feature = "serde", serde(rename = "adams-bashforth-2"))]
     AdamsBashforth2,
 }
 
@@ -52,8 +54,9 @@ impl FromStr for Scheme {
 ///
 /// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`], correct the
 /// velocities for contact, [`Integrator::advance`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Integrator<const D: usize>
 where
     Dim<D>: Space<D>,

@@ -37,3 +37,8 @@ pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};
 pub use pair_mobility::{PairMobility, PairMobilityError};
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -9,7 +9,7 @@ const FAR: f64 = 18.0;
 /// Nodes of the local polynomial.
 const NODE_COUNT: usize = 8;
 
-const TABLE: &str = include_str!("../../../data/reference/sphere_pair_mobility_unbounded.csv");
+const TABLE: &str = include_str!("../data/sphere_pair_mobility_unbounded.csv");
 
 /// Relative motion of a pair: with `r = X2 - X1`, `n = r/|r|`, strain rate `E` and fluid spin `w`,
 /// `U2 - U1 = w x r + n (1-A) n.E.r + (1-B) (I - n n).E.r`, and both spins are `w + C n x (E.n)`.

@@ -1,10 +1,10 @@
 //! Which links take part in a step: those that remember, those that would close, and those that others would push together.
 
 use gluey_geom::{Dim, Space, Vector};
-use rayon::prelude::*;
 
 use super::{Buffers, PairContact, PairMemory, Part};
 use crate::graph::Link;
+use crate::parallel;
 use crate::rows::{Row, closes};
 use crate::{ContactError, Domain, Mobility, PairState, StepGeometry};
 
@@ -50,7 +50,7 @@ where
         let (graph, margin) = (&self.graph, 0.5 * self.margin());
         let Buffers { takes_part, displacements, weights, .. } = buffers;
         let movable = |place: u32| weights.get(place as usize).is_some_and(|weight| *weight > 0.0);
-        let admit = |(part, link): (&mut Part, &Link)| {
+        let admit = |part: &mut Part, link: &Link| {
             let closing = *part == Part::No
                 && closes(link, graph, &self.domain, step.dt, displacements, margin)
                 && (movable(link.head) || movable(link.tail));
@@ -59,12 +59,7 @@ where
             }
             closing
         };
-        takes_part
-            .par_iter_mut()
-            .zip(&graph.links)
-            .with_min_len(4096)
-            .map(admit)
-            .reduce(|| false, |a, b| a | b)
+        parallel::visit_all(takes_part, &graph.links, admit)
     }
 
     /// Lists the links that take part, in the order of space.

@@ -27,8 +27,16 @@ pub(super) fn closest<const D: usize, S: Shape<D>>(
     let size = shapes[0].reach() + shapes[1].reach();
     let turned = [0, 1].map(|k| Turned { shape: shapes[k], frame: frames[k], size });
     let offset = between / size;
-    // D is a constant: one of the two branches is compiled.
-    let found = if D == 2 { planar::closest(&turned, &offset) } else { spatial::closest(&turned, &offset) };
+    const { assert!(D != 2 || cfg!(feature = "dim2"), "shapes in the plane need the feature `dim2`") };
+    const { assert!(D != 3 || cfg!(feature = "dim3"), "shapes in space need the feature `dim3`") };
+    // D is a constant: one of the arms is compiled.
+    let found = match D {
+        #[cfg(feature = "dim2")]
+        2 => planar::closest(&turned, &offset),
+        #[cfg(feature = "dim3")]
+        3 => spatial::closest(&turned, &offset),
+        _ => None,
+    };
     let [p, q] = match turned.each_ref().map(Turned::half_axis) {
         [Some(first), Some(second)] => nearest_end(found?, first, second, &offset),
         _ => found?,
@@ -131,5 +139,7 @@ macro_rules! closest {
     };
 }
 
+#[cfg(feature = "dim2")]
 closest!(planar, parry2d_f64, 2);
+#[cfg(feature = "dim3")]
 closest!(spatial, parry3d_f64, 3);
