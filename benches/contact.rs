@@ -1,7 +1,7 @@
 //! Timings of contact: search, graph, projection and whole steps of spheres in a shear flow.
 //!
-//! Spheres of diameter 1 at the volume fraction 0.4, in no order, `u* = (y, 0, 0)`, `dt = 0.05`, residual below 1e-6
-//! diameters. `cargo bench -p gluey-contact`; `docs/benchmarks.md` has a table of a run.
+//! Spheres of diameter 1 at the volume fraction 0.4, in no order, `u* = (y, 0, 0)`, `dt = 0.05`, residual
+//! below 1e-6 diameters. `cargo bench -p gluey-contact`; `docs/benchmarks.md` has a table of a run.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};

@@ -1,9 +1,10 @@
 //! The Delassus operator of a set of contacts, from the rows of their Jacobian.
 //!
-//! The gap of contact `k` opens at the rate `G_k V`, and its force `lambda_k` acts as `G_k^T lambda_k`; for round particles
-//! the rows are `(-e, e)`, for bodies that turn they have the moments of `e` besides. A unit force opens its own gap by the
-//! compliance `A_kk`, `A = c G M^-1 G^T`. Rows are scaled to the same compliance: with `s_k = sqrt(max A / A_kk)` the solvers
-//! see `S A S`, gaps `s_k w_k` and forces `lambda_k / s_k`.
+//! The gap of contact `k` opens at the rate `G_k V`, and its force `lambda_k` acts as `G_k^T lambda_k`; for
+//! round particles the rows are `(-e, e)`, for bodies that turn they have the moments of `e` besides. A unit
+//! force opens its own gap by the compliance `A_kk`, `A = c G M^-1 G^T`. Rows are scaled to the same
+//! compliance: with `s_k = sqrt(max A / A_kk)` the solvers see `S A S`, gaps `s_k w_k` and forces
+//! `lambda_k / s_k`.
 
 use crate::solver::{DelassusOperator, Factor};
 
@@ -58,7 +59,8 @@ pub(crate) struct ScaledDelassus<'a, R: JacobianRow, C> {
 }
 
 impl<R: JacobianRow, C: Response<R>> ScaledDelassus<'_, R, C> {
-    /// Leaves `c M^-1 G^T S forces` in the motions: forces are added up body by body in the order of the rows.
+    /// Leaves `c M^-1 G^T S forces` in the motions: forces are added up body by body in the order of the
+    /// rows.
     pub(crate) fn move_bodies(&mut self, forces: &[f64]) {
         self.motions.fill(R::zero());
         for (row, force) in self.rows.iter().zip(forces) {

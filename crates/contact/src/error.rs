@@ -129,7 +129,8 @@ pub enum ContactError {
         /// Its period.
         period: f64,
     },
-    /// A particle that crosses half a period in a step, so that contacts could not be told from those of its images.
+    /// A particle that crosses half a period in a step, so that contacts could not be told from those of its
+    /// images.
     #[error(
         "particle {} moves by {displacement} against the others in a step: more than half the period {period}",
         .particle + 1
@@ -178,7 +179,8 @@ pub enum ContactError {
 }
 
 impl ContactError {
-    /// The error that the failure of a projection means; `contact_key` and `row_key` name its contacts and its rows.
+    /// The error that the failure of a projection means; `contact_key` and `row_key` name its contacts and
+    /// its rows.
     pub(crate) fn of_projection(
         failure: &Failure,
         tolerance: f64,

@@ -96,7 +96,8 @@ impl<const D: usize> JacobianRow for NormalRow<D> {
 }
 
 impl<const D: usize> IslandWorkspace<D> {
-    /// Makes room for `islands`, whose rows start with the first and are bounded by the second number of `start`.
+    /// Makes room for `islands`, whose rows start with the first and are bounded by the second number of
+    /// `start`.
     pub(crate) fn prepare(
         &mut self,
         islands: &Islands<D>,
@@ -277,11 +278,13 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
         self.rows[row].gap_at(&separation)
     }
 
-    /// Writes the gaps at the end of the step as linear functions of the velocities, about the displacements `moved`.
+    /// Writes the gaps at the end of the step as linear functions of the velocities, about the displacements
+    /// `moved`.
     ///
-    /// The gaps are exact at `moved`, the normals those of the beginning of the step throughout: contact forces belong to
-    /// `u^n`, which multi-step schemes extrapolate. Normals of the end of the step converge faster (by `phi^2/2` a pass
-    /// here, `phi` the rotation of the pair in the step), but make the encounter of two spheres first order in dt.
+    /// The gaps are exact at `moved`, the normals those of the beginning of the step throughout: contact
+    /// forces belong to `u^n`, which multi-step schemes extrapolate. Normals of the end of the step converge
+    /// faster (by `phi^2/2` a pass here, `phi` the rotation of the pair in the step), but make the encounter
+    /// of two spheres first order in dt.
     fn set_free_gaps(&mut self) {
         for k in 0..self.rows.len() {
             let beyond = self.difference(k, |slot| self.slots[slot].free - self.moved[slot]);

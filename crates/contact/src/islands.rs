@@ -1,4 +1,5 @@
-//! Islands: contacts that are joined by movable particles, solved independently of each other and in parallel.
+//! Islands: contacts that are joined by movable particles, solved independently of each other and in
+//! parallel.
 
 use std::ops::Range;
 
@@ -98,8 +99,8 @@ impl<const D: usize> Islands<D> {
         }
     }
 
-    /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each root. Returns how
-    /// many islands there are.
+    /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each
+    /// root. Returns how many islands there are.
     fn label(&mut self, rows: &[Row<D>], places: &Places<'_, D>, as_one: bool) -> usize {
         let count = places.positions.len();
         self.parents.clear();
@@ -149,7 +150,8 @@ impl<const D: usize> Islands<D> {
         self.islands.push(Island { rows: range, slots: first..self.slots.len(), is_fresh });
     }
 
-    /// Slot of a place in the island whose slots begin at `first`; a fixed particle has one in each of its islands.
+    /// Slot of a place in the island whose slots begin at `first`; a fixed particle has one in each of its
+    /// islands.
     fn slot(&mut self, place: u32, first: usize, places: &Places<'_, D>) -> u32 {
         if place == GROUND {
             return 0;

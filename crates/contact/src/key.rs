@@ -22,7 +22,8 @@ pub struct PairKey {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Partner {
-    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a period).
+    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a
+    /// period).
     Particle {
         /// Its index.
         index: u32,
@@ -58,8 +59,8 @@ impl PairKey {
         }
     }
 
-    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the wall; `None`
-    /// if one of them is not there.
+    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the
+    /// wall; `None` if one of them is not there.
     pub fn branch<const D: usize>(self, positions: &[Vector<D>], domain: &Domain<D>) -> Option<Vector<D>> {
         let x = positions.get(self.first as usize)?;
         match self.second {

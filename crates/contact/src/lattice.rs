@@ -78,7 +78,8 @@ fn bounds<const D: usize>(points: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
     if points.is_empty() { (Vector::zeros(), Vector::zeros()) } else { (lower, upper - lower) }
 }
 
-/// Sorts `0..count` by `key` (smaller than `key_count`), stably: `starts[k]..starts[k + 1]` is the range of key `k`.
+/// Sorts `0..count` by `key` (smaller than `key_count`), stably: `starts[k]..starts[k + 1]` is the range of
+/// key `k`.
 pub(crate) fn sort_by_key(
     count: usize,
     key_count: usize,

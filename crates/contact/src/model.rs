@@ -21,7 +21,8 @@ pub struct StepGeometry<'a, const D: usize> {
     pub dt: f64,
 }
 
-/// The step `x^{n+1} = x^n + c u^n + drift` of bodies that also turn, by the vector `c w^n + drift`. One entry per body.
+/// The step `x^{n+1} = x^n + c u^n + drift` of bodies that also turn, by the vector `c w^n + drift`. One
+/// entry per body.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyStep<'a, const D: usize>
 where
@@ -92,8 +93,8 @@ pub struct WorstPair {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactReport {
-    /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the velocity
-    /// correction).
+    /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the
+    /// velocity correction).
     pub iterations: usize,
     /// Linearisations of the island that took most.
     pub passes: usize,

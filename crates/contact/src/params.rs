@@ -14,13 +14,13 @@ use crate::solver::{Accelerated, ActiveSet, Auto, ProjectionSolver, Uzawa};
 pub enum ContactLaw {
     /// Nothing: particles may overlap.
     None,
-    /// After the move, each pair closer than a threshold gap is pushed apart along its normal, pair after pair; the
-    /// push enters as a correction of the velocities. Neither a projection nor reversible.
+    /// After the move, each pair closer than a threshold gap is pushed apart along its normal, pair after
+    /// pair; the push enters as a correction of the velocities. Neither a projection nor reversible.
     VelocityCorrection,
     /// Projection on the velocities that do not overlap; `gamma = 0` always, contacts never pull.
     Inelastic,
-    /// The gluey model (Maury 2007; Lefebvre 2009): projection, with contacts that stay closed until what pushed them
-    /// together has been pulled out again.
+    /// The gluey model (Maury 2007; Lefebvre 2009): projection, with contacts that stay closed until what
+    /// pushed them together has been pulled out again.
     Gluey,
 }
 
@@ -59,19 +59,21 @@ impl FromStr for ContactLaw {
     }
 }
 
-/// The update rule of gamma: how it follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and when a contact opens.
+/// The update rule of gamma: how it follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and when a
+/// contact opens.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum GammaUpdate {
-    /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays closed
-    /// for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with as many contacts as
-    /// degrees of freedom, the closed pairs may be infeasible; that ends with an error.
+    /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays
+    /// closed for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with
+    /// as many contacts as degrees of freedom, the closed pairs may be infeasible; that ends with an error.
     #[default]
     Paper,
     /// By the scheme that moves the particles, `gamma <- gamma - c lambda^n - (dt - c) lambda^{n-1}`, with
-    /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step. Second order
-    /// for Adams-Bashforth 2, and never infeasible: the pull of a contact is bounded by its memory.
+    /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step.
+    /// Second order for Adams-Bashforth 2, and never infeasible: the pull of a contact is bounded by its
+    /// memory.
     Consistent,
 }
 
@@ -80,7 +82,8 @@ pub enum GammaUpdate {
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SolverKind {
-    /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where that is slow.
+    /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where
+    /// that is slow.
     #[default]
     Auto,
     /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
@@ -139,20 +142,21 @@ impl FromStr for SolverKind {
 pub struct ContactParams {
     /// The contact law.
     pub law: ContactLaw,
-    /// Whether the constraint is re-linearised until the gap at the *end* of the step is exact to round-off. Without it
-    /// a closed pair that turns by `phi` in a step opens by `(a_i + a_j) phi^2 / 2`.
+    /// Whether the constraint is re-linearised until the gap at the *end* of the step is exact to round-off.
+    /// Without it a closed pair that turns by `phi` in a step opens by `(a_i + a_j) phi^2 / 2`.
     pub exact_gap: bool,
     /// The update rule of gamma.
     pub gamma_update: GammaUpdate,
-    /// Floor of gamma (< 0; unit: length^2), for rough particles: however long they were pressed together, they
-    /// separate after this impulse. In lubrication theory `gamma = a^2 ln(gap)` up to a constant, `a = a_i a_j/(a_i+a_j)`.
+    /// Floor of gamma (< 0; unit: length^2), for rough particles: however long they were pressed together,
+    /// they separate after this impulse. In lubrication theory `gamma = a^2 ln(gap)` up to a constant,
+    /// `a = a_i a_j/(a_i+a_j)`.
     pub gamma_min: Option<f64>,
     /// Gap kept by [`ContactLaw::VelocityCorrection`], relative to the mean radius of the pair.
     pub threshold: f64,
     /// Solver of the projection.
     pub solver: SolverKind,
-    /// Residual `max |min(gap, ||A|| (lambda - floor))|` at which the projection has converged, relative to the larger
-    /// of the smallest radius and the largest displacement of the step.
+    /// Residual `max |min(gap, ||A|| (lambda - floor))|` at which the projection has converged, relative to
+    /// the larger of the smallest radius and the largest displacement of the step.
     pub tolerance: f64,
     /// Most iterations of one solve.
     pub iteration_limit: usize,
@@ -177,9 +181,9 @@ impl Default for ContactParams {
 }
 
 impl ContactParams {
-    /// The residual that is asked for, a length: the relative tolerance times a length of the step, but never below what
-    /// positions can resolve. For bodies of at least this `radius` that move by `farthest` at most, no farther than `extent`
-    /// from the origin.
+    /// The residual that is asked for, a length: the relative tolerance times a length of the step, but never
+    /// below what positions can resolve. For bodies of at least this `radius` that move by `farthest` at
+    /// most, no farther than `extent` from the origin.
     pub(crate) fn residual(&self, radius: f64, farthest: f64, extent: f64) -> f64 {
         (self.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest))
     }

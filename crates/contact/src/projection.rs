@@ -1,7 +1,8 @@
-//! The projection of velocities on those that keep gaps open, linearised anew until gaps at the end of the step are exact.
+//! The projection of velocities on those that keep gaps open, linearised anew until gaps at the end of the
+//! step are exact.
 //!
-//! Both contact models solve it this way: what they know of their bodies stands behind [`JacobianRow`], [`Response`] and
-//! [`Linearised`].
+//! Both contact models solve it this way: what they know of their bodies stands behind [`JacobianRow`],
+//! [`Response`] and [`Linearised`].
 
 use crate::ContactParams;
 use crate::delassus::{JacobianRow, Response, ScaledDelassus};
@@ -30,8 +31,8 @@ pub(crate) trait Linearised {
     /// Solves the linear problem, and moves the bodies to the end of the step.
     fn project(&mut self) -> Result<SolveReport, SolveFailure>;
 
-    /// Linearises about the bodies where they are now, after so many passes. Returns the contact whose gap there is farthest
-    /// from what it should be, beyond the tolerance, and that gap.
+    /// Linearises about the bodies where they are now, after so many passes. Returns the contact whose gap
+    /// there is farthest from what it should be, beyond the tolerance, and that gap.
     fn linearise(&mut self, pass: usize) -> Option<(usize, f64)>;
 }
 

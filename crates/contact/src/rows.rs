@@ -8,7 +8,8 @@ use crate::{ContactError, Domain, StepGeometry};
 /// Stands for the tail of a contact with a wall.
 pub(crate) const GROUND: u32 = u32::MAX;
 
-/// A contact that takes part in a step. The normal points from `tail` to `head`, which are in the order of space.
+/// A contact that takes part in a step. The normal points from `tail` to `head`, which are in the order of
+/// space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<const D: usize> {
     pub link: u32,
@@ -19,7 +20,8 @@ pub(crate) struct Row<const D: usize> {
     /// Displacement of the head's image.
     pub shift: Vector<D>,
     pub normal: Vector<D>,
-    /// What to subtract from the distance: the sum of the radii; for a wall, its offset at the end of the step and a radius.
+    /// What to subtract from the distance: the sum of the radii; for a wall, its offset at the end of the
+    /// step and a radius.
     pub rest: f64,
     /// Whether the distance is measured along the normal (a wall) or is that of the centres.
     pub is_flat: bool,
@@ -94,7 +96,8 @@ impl<const D: usize> Row<D> {
     }
 }
 
-/// Whether a link's linearised gap after `displacements` (by place) is below `margin` times its summed radii, or has no direction.
+/// Whether a link's linearised gap after `displacements` (by place) is below `margin` times its summed radii,
+/// or has no direction.
 pub(crate) fn closes<const D: usize>(
     link: &Link,
     graph: &Graph<D>,

@@ -287,7 +287,8 @@ impl Shape<3> for RoundBox {
 
 #[test]
 fn boxes_keep_their_distance() {
-    // Edge over edge, at right angles: the edges (after a turn by 45 degrees about y and x) point at each other.
+    // Edge over edge, at right angles: the edges (after a turn by 45 degrees about y and x) point at each
+    // other.
     let boxes = [RoundBox(Vector::<3>::new(1.0, 2.0, 1.0)), RoundBox(Vector::<3>::new(2.0, 1.0, 1.0))];
     let turned = |axis: Vector<3>, height: f64| {
         let orientation = Dim::<3>::advance(&Dim::<3>::identity(), &(axis * (0.25 * PI)), 1.0);

@@ -11,7 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 const RADIUS: f64 = 0.5;
 
-/// Spheres in a periodic box under the shear `u* = (sin(2 pi y / L) L / (2 pi), 0, 0)`, whose largest rate is 1.
+/// Spheres in a periodic box under the shear `u* = (sin(2 pi y / L) L / (2 pi), 0, 0)`, whose largest rate is
+/// 1.
 struct Suspension {
     positions: Vec<Vector<3>>,
     radii: Vec<f64>,

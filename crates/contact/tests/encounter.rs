@@ -1,5 +1,6 @@
-//! Two spheres passing each other in shear: what each contact law makes of an encounter that the fluid solver does not
-//! resolve (the mobility is evaluated at `gap + offset`). Exact: smallest gap 7.370e-3 a, gap 6.024769 a at t = 15.75.
+//! Two spheres passing each other in shear: what each contact law makes of an encounter that the fluid solver
+//! does not resolve (the mobility is evaluated at `gap + offset`). Exact: smallest gap 7.370e-3 a, gap
+//! 6.024769 a at t = 15.75.
 
 mod common;
 
@@ -59,7 +60,8 @@ fn gluey_contact_comes_back() {
 
 #[test]
 fn consistent_memory_is_second_order_and_the_papers_is_not() {
-    // As dt -> 0 the end error tends to what the law itself costs, 0.249 %: it stops the gap at 0, not at 0.0074 a.
+    // As dt -> 0 the end error tends to what the law itself costs, 0.249 %: it stops the gap at 0, not at
+    // 0.0074 a.
     for (exact_gap, offset) in [(false, 0.05), (true, 0.05), (true, 0.2)] {
         let deviation = |gamma_update, dt| {
             let limit = if offset == 0.05 { 0.2487 } else { 0.2467 };

@@ -1,10 +1,10 @@
-//! A sphere pressed on a plane and pulled off it: the gluey law in closed form (Maury 2007, DOI 10.1051/proc:071812;
-//! Lefebvre 2009, DOI 10.1051/m2an/2008042).
+//! A sphere pressed on a plane and pulled off it: the gluey law in closed form (Maury 2007, DOI
+//! 10.1051/proc:071812; Lefebvre 2009, DOI 10.1051/m2an/2008042).
 //!
-//! Predicted velocity `u* = -cos t` towards the plane, from the gap `h < 1`. Contact begins when `sin t1 = h`. In contact
-//! `d gamma / dt = -a cos t`, so that `gamma = -a (sin t - h)` comes back to 0 at `t2 = pi - t1`; afterwards the gap is
-//! again `h - sin t`. With a floor `gamma_min = -a m`, `m < 1 - h`, contact ends when `sin t = 1 - m`, and afterwards the
-//! gap is `1 - m - sin t`.
+//! Predicted velocity `u* = -cos t` towards the plane, from the gap `h < 1`. Contact begins when
+//! `sin t1 = h`. In contact `d gamma / dt = -a cos t`, so that `gamma = -a (sin t - h)` comes back to 0 at
+//! `t2 = pi - t1`; afterwards the gap is again `h - sin t`. With a floor `gamma_min = -a m`, `m < 1 - h`,
+//! contact ends when `sin t = 1 - m`, and afterwards the gap is `1 - m - sin t`.
 
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, PairContact, PairKey, StepGeometry, Wall,
@@ -58,7 +58,8 @@ where
             assert_eq!(touch.pair, PairKey::wall(0, 0));
             assert!(touch.gamma <= 0.0 && touch.gap > -1e-14);
             begin = if begin.is_nan() { time } else { begin };
-            // A pair that was released may be pulled a little longer by the history of the scheme, its gap open.
+            // A pair that was released may be pulled a little longer by the history of the scheme, its gap
+            // open.
             end = if touch.gap < 1e-12 { time + dt } else { end };
         }
     }
@@ -84,8 +85,8 @@ where
     for (dt, row) in steps.iter().zip(&table) {
         println!("  dt {dt:.4}: begins off by {:.1e}, ends {:.1e}, last gap {:.1e}", row[0], row[1], row[2]);
         assert!(row[0] <= 1.01 * dt, "begins {} steps off", row[0] / dt);
-        // To the end of a step; by Euler also a step for the sum that stands for the integral of `cos`, and one for the
-        // memory that is cut off at 0.
+        // To the end of a step; by Euler also a step for the sum that stands for the integral of `cos`, and
+        // one for the memory that is cut off at 0.
         let step_count = if scheme == Scheme::Euler { 4.0 } else { 2.0 };
         assert!(row[1] <= step_count * dt, "ends {} steps off", row[1] / dt);
     }

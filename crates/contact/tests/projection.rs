@@ -34,8 +34,8 @@ impl<const D: usize> Packing<D>
 where
     Dim<D>: Space<D>,
 {
-    /// A jittered square or cubic lattice of `side^D` particles; without jitter all neighbours touch exactly, and there
-    /// are more contacts than degrees of freedom can tell apart.
+    /// A jittered square or cubic lattice of `side^D` particles; without jitter all neighbours touch exactly,
+    /// and there are more contacts than degrees of freedom can tell apart.
     fn new(side: usize, jitter: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let count = side.pow(D as u32);
@@ -128,8 +128,8 @@ fn params(solver: SolverKind) -> ContactParams {
     ContactParams { solver, ..Default::default() }
 }
 
-/// Feasibility of all pairs (also those the search left out), stationarity, sign and complementarity: these characterise
-/// the solution of a strictly convex problem.
+/// Feasibility of all pairs (also those the search left out), stationarity, sign and complementarity: these
+/// characterise the solution of a strictly convex problem.
 fn assert_optimal<const D: usize>(packing: &Packing<D>, velocities: &[Vector<D>], contact: &PairContact<D>)
 where
     Dim<D>: Space<D>,
@@ -184,7 +184,8 @@ fn velocities_are_optimal() {
     check_optimality::<3>(3);
 }
 
-/// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods so long.
+/// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods
+/// so long.
 fn check_jammed<const D: usize>(side: usize)
 where
     Dim<D>: Space<D>,
@@ -212,7 +213,8 @@ fn jammed_clusters_are_solved_for() {
     check_jammed::<3>(5);
 }
 
-/// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs' constraints.
+/// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs'
+/// constraints.
 fn interior_point<const D: usize>(packing: &Packing<D>) -> Vec<f64>
 where
     Dim<D>: Space<D>,
@@ -282,8 +284,9 @@ where
     contact.contacts().len()
 }
 
-/// 100 packings of 2 to 12 (in 3D 2 to 5) particles a side; small ones now and then with triangular layers, which have more contacts
-/// than degrees of freedom, so that contacts depend on each other linearly; two of three have pairs that must stay closed.
+/// 100 packings of 2 to 12 (in 3D 2 to 5) particles a side; small ones now and then with triangular layers,
+/// which have more contacts than degrees of freedom, so that contacts depend on each other linearly; two of
+/// three have pairs that must stay closed.
 fn check_packings<const D: usize>(largest_side: u64)
 where
     Dim<D>: Space<D>,

@@ -1,8 +1,10 @@
-//! Two particles pressed together at a constant speed, then pulled apart at the same speed: the gluey law in closed form.
+//! Two particles pressed together at a constant speed, then pulled apart at the same speed: the gluey law in
+//! closed form.
 //!
 //! Predicted speeds `-v` until `T`, then `+v` (each particle, along the line of centres). Contact begins at
-//! `t1 = D0 / 2v`, lasts as long in pull as in push, and ends at `2 T - t1`; afterwards `D = 2 v (t - 2T + t1)`. With a
-//! floor `gamma_min` it ends at `T + |gamma_min| / (a v)`, where that is earlier.
+//! `t1 = D0 / 2v`, lasts as long in pull as in push, and ends at `2 T - t1`; afterwards
+//! `D = 2 v (t - 2T + t1)`. With a floor `gamma_min` it ends at `T + |gamma_min| / (a v)`, where that is
+//! earlier.
 
 use gluey_contact::{
     ContactLaw, ContactParams, GammaUpdate, Mobility, PairContact, StepGeometry, StokesDrag,

@@ -1,7 +1,9 @@
-//! Runs with many contacts, compared bit for bit with what they gave when they were recorded: a change of the code that is
-//! not meant to change results changes none of these numbers. Who changes results on purpose replaces those that fail.
+//! Runs with many contacts, compared bit for bit with what they gave when they were recorded: a change of the
+//! code that is not meant to change results changes none of these numbers. Who changes results on purpose
+//! replaces those that fail.
 //!
-//! The cases use no functions but those that IEEE 754 fixes (no sine, no power), so that they are the same on all machines.
+//! The cases use no functions but those that IEEE 754 fixes (no sine, no power), so that they are the same on
+//! all machines.
 
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, Mobility, PairContact, SolverKind,
@@ -47,8 +49,9 @@ impl<const D: usize> Mobility<D> for Coupled {
     }
 }
 
-/// Discs or spheres on a lattice out of order, periodic along x, between a floor and a ceiling, squeezed and sheared there and
-/// back. Returns the most contacts of a step, and the fingerprint of forces, memories and positions.
+/// Discs or spheres on a lattice out of order, periodic along x, between a floor and a ceiling, squeezed and
+/// sheared there and back. Returns the most contacts of a step, and the fingerprint of forces, memories and
+/// positions.
 fn run<const D: usize, M: Mobility<D>>(params: ContactParams, mobility: M, side: usize) -> (usize, u64)
 where
     Dim<D>: Space<D>,

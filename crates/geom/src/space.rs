@@ -13,14 +13,16 @@ mod sealed {
     impl Sealed for super::Dim<3> {}
 }
 
-/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without it.
+/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without
+/// it.
 #[cfg(feature = "serde")]
 pub trait Stored: serde::Serialize + serde::de::DeserializeOwned {}
 
 #[cfg(feature = "serde")]
 impl<T: serde::Serialize + serde::de::DeserializeOwned> Stored for T {}
 
-/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without it.
+/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without
+/// it.
 #[cfg(not(feature = "serde"))]
 pub trait Stored {}
 

@@ -52,8 +52,8 @@ impl FromStr for Scheme {
 
 /// Moves particles with their velocities; owns the velocity history, which serialises for checkpoints.
 ///
-/// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`], correct the
-/// velocities for contact, [`Integrator::advance`].
+/// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`],
+/// correct the velocities for contact, [`Integrator::advance`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
@@ -112,7 +112,8 @@ where
         let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
         for (index, (particle, twist)) in particles.iter_mut().zip(twists).enumerate() {
             let old = self.history.get(index).copied().unwrap_or_default();
-            // The same expression as in the contact constraint, so that gaps closed there stay closed to round-off.
+            // The same expression as in the contact constraint, so that gaps closed there stay closed to
+            // round-off.
             particle.pose.position += twist.velocity * weight + old.velocity * history_weight;
             let spin = twist.spin * (weight / dt) + old.spin * (history_weight / dt);
             particle.pose.orientation = Dim::<D>::advance(&particle.pose.orientation, &spin, dt);
@@ -120,7 +121,8 @@ where
         self.remember(dt, twists);
     }
 
-    /// Forgets the history: the next step is Euler. For a jump of the flow with no relation to what was before.
+    /// Forgets the history: the next step is Euler. For a jump of the flow with no relation to what was
+    /// before.
     pub fn restart(&mut self) {
         self.history.clear();
         self.history_age = 0.0;
@@ -128,10 +130,10 @@ where
 
     /// Tells that the flow has been reversed, `u -> -u` at equal positions (Stokes flow under `-shear rate`).
     ///
-    /// The velocity known from the last position then lies *ahead* on the way back, with the other sign: the next step
-    /// is `dt/2 (u^n - u^{n-1})` and retraces the last one to third order. A step extrapolated from the history with
-    /// the old sign would err by `2 dt |u|`, with the sign flipped but still extrapolated by `dt^2 |u'|`, a restart by
-    /// Euler by `dt^2/2 |u'|`.
+    /// The velocity known from the last position then lies *ahead* on the way back, with the other sign: the
+    /// next step is `dt/2 (u^n - u^{n-1})` and retraces the last one to third order. A step extrapolated from
+    /// the history with the old sign would err by `2 dt |u|`, with the sign flipped but still extrapolated by
+    /// `dt^2 |u'|`, a restart by Euler by `dt^2/2 |u'|`.
     pub fn reverse(&mut self) {
         self.history_age = -self.history_age;
         for twist in &mut self.history {
@@ -139,8 +141,8 @@ where
         }
     }
 
-    /// Weight of `u^{n-1}`: that of the line through `u^{n-1}` and `u^n` integrated over the step; `-dt/2` in a steady
-    /// run, `dt/2` in the step after a reversal.
+    /// Weight of `u^{n-1}`: that of the line through `u^{n-1}` and `u^n` integrated over the step; `-dt/2` in
+    /// a steady run, `dt/2` in the step after a reversal.
     fn history_weight(&self, dt: f64) -> f64 {
         if self.history.is_empty() { 0.0 } else { -0.5 * dt * (dt / self.history_age) }
     }

@@ -1,4 +1,5 @@
-//! parry's bounding volume hierarchy. The only module that knows parry: coordinates cross the border as arrays.
+//! parry's bounding volume hierarchy. The only module that knows parry: coordinates cross the border as
+//! arrays.
 
 use gluey_geom::Vector;
 

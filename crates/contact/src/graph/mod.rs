@@ -1,4 +1,5 @@
-//! Which contacts could close in a step, kept from step to step as long as particles stay near where they were.
+//! Which contacts could close in a step, kept from step to step as long as particles stay near where they
+//! were.
 
 mod affine;
 mod order;
@@ -10,8 +11,8 @@ use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
 use affine::AffineFit;
 use order::SpatialOrder;
 
-/// Pairs nearer than this part of their summed radii are kept in the graph whatever they do, so that one search serves
-/// several steps.
+/// Pairs nearer than this part of their summed radii are kept in the graph whatever they do, so that one
+/// search serves several steps.
 const SKIN: f64 = 0.1;
 
 /// A candidate for contact, in the numbering of the graph.
@@ -51,8 +52,8 @@ pub(crate) struct Graph<const D: usize> {
     left: Vec<f64>,
     /// Gap kept between particles, relative to their radii.
     pub margin: f64,
-    /// Factor of the displacements that are searched for: doubles whenever a step needs a wider search, for contact pushes
-    /// particles elsewhere when it knows more pairs.
+    /// Factor of the displacements that are searched for: doubles whenever a step needs a wider search, for
+    /// contact pushes particles elsewhere when it knows more pairs.
     widening: f64,
     /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
     wall_slack: f64,
@@ -380,8 +381,8 @@ impl<const D: usize> Graph<D> {
 
     /// How much of each reach particles have left by moving since the search.
     ///
-    /// A pair that was not found was farther apart than its two reaches; since then particles moved by an affine motion of
-    /// gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
+    /// A pair that was not found was farther apart than its two reaches; since then particles moved by an
+    /// affine motion of gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
     fn set_left(&mut self, domain: &Domain<D>) {
         let moved = &mut self.search.moved;
         moved.clear();

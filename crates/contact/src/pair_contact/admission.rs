@@ -1,4 +1,5 @@
-//! Which links take part in a step: those that remember, those that would close, and those that others would push together.
+//! Which links take part in a step: those that remember, those that would close, and those that others would
+//! push together.
 
 use gluey_geom::{Dim, Space, Vector};
 

@@ -155,8 +155,8 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M>
 where
     Dim<D>: Space<D>,
 {
-    /// Corrects `twists`; on an error they and the memory are as before. [`ContactModel::correct_bodies`] does the same for a
-    /// step that is given with orientations.
+    /// Corrects `twists`; on an error they and the memory are as before. [`ContactModel::correct_bodies`]
+    /// does the same for a step that is given with orientations.
     pub fn correct(
         &mut self,
         step: &StepGeometry<'_, D>,

@@ -1,5 +1,5 @@
-//! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's tolerances are
-//! absolute.
+//! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's
+//! tolerances are absolute.
 
 use gluey_geom::{Dim, Matrix, Rotation, Space, Vector};
 
@@ -17,8 +17,8 @@ where
     Matrix::from_columns(&std::array::from_fn::<_, D, _>(axis))
 }
 
-/// The points of two cores that are closest to each other, in space, each relative to its own centre. `between` points from
-/// the first centre to the second. `None` if the cores meet.
+/// The points of two cores that are closest to each other, in space, each relative to its own centre.
+/// `between` points from the first centre to the second. `None` if the cores meet.
 pub(super) fn closest<const D: usize, S: Shape<D>>(
     shapes: [&S; 2],
     frames: [&Matrix<D>; 2],
@@ -44,8 +44,8 @@ pub(super) fn closest<const D: usize, S: Shape<D>>(
     Some([p * size, q * size]).filter(|_| (offset + q - p).norm() > MEETING)
 }
 
-/// parry takes segments that are parallel to `1e-8` for parallel. Then, as always unless they cross, one of the closest points
-/// is an end: takes the best of `found` and the ends with their projections.
+/// parry takes segments that are parallel to `1e-8` for parallel. Then, as always unless they cross, one of
+/// the closest points is an end: takes the best of `found` and the ends with their projections.
 fn nearest_end<const D: usize>(
     found: [Vector<D>; 2],
     first: Vector<D>,

@@ -16,13 +16,14 @@ use crate::{
 
 /// Contacts between shapes by one of the contact laws `none`, `inelastic` and `gluey`.
 ///
-/// The memory is the pair's: where shapes touch at several points, their forces add up to the `lambda` that gamma integrates, and
-/// only the point where they are closest can pull. The mobility is that of spheres of [`Shape::drag_radius`], with
-/// [`Mobility::own`] for translation and `3/(4 a^2)` times it for rotation.
+/// The memory is the pair's: where shapes touch at several points, their forces add up to the `lambda` that
+/// gamma integrates, and only the point where they are closest can pull. The mobility is that of spheres of
+/// [`Shape::drag_radius`], with [`Mobility::own`] for translation and `3/(4 a^2)` times it for rotation.
 ///
-/// Set [`ContactParams::exact_gap`] wherever shapes may lie along each other: without it the gap is linear in the rotation, and
-/// ends that swing into each other within a step are not seen. Not for steps in which a shape moves by its own thickness. Walls
-/// are fixed shapes here ([`crate::WithFixed`]); there are no periods. Contacts are solved for all at once, by one thread.
+/// Set [`ContactParams::exact_gap`] wherever shapes may lie along each other: without it the gap is linear in
+/// the rotation, and ends that swing into each other within a step are not seen. Not for steps in which a
+/// shape moves by its own thickness. Walls are fixed shapes here ([`crate::WithFixed`]); there are no
+/// periods. Contacts are solved for all at once, by one thread.
 #[derive(Debug)]
 pub struct ShapeContact<const D: usize, S, M = StokesDrag> {
     params: ContactParams,
@@ -39,7 +40,8 @@ impl<const D: usize, S: Shape<D>> ShapeContact<D, S> {
     }
 }
 
-/// Bodies are sought as far as this many times their displacement without contact, or this part of their size.
+/// Bodies are sought as far as this many times their displacement without contact, or this part of their
+/// size.
 const SLACK: (f64, f64) = (2.0, 0.1);
 
 impl<const D: usize, S: Shape<D>, M: Mobility<D>> ShapeContact<D, S, M> {

@@ -1,16 +1,16 @@
 //! Contact between shapes that are not round, with rotation.
 //!
-//! A shape is a convex *core* (a point, a segment, a polytope) with a rounding radius `r` about it: all points within `r` of the
-//! core. Closest points of the cores are parry's; the gap of a pair is their distance less both radii, and is exact as long as the
-//! cores do not meet. Its rate of change is
+//! A shape is a convex *core* (a point, a segment, a polytope) with a rounding radius `r` about it: all
+//! points within `r` of the core. Closest points of the cores are parry's; the gap of a pair is their
+//! distance less both radii, and is exact as long as the cores do not meet. Its rate of change is
 //!
 //! ```text
 //! G V = n.(v_j + w_j x r_j) - n.(v_i + w_i x r_i) = n.(v_j - v_i) + (r_j x n).w_j - (r_i x n).w_i
 //! ```
 //!
-//! with `n` from `i` to `j` and `r` from the centres to the points of contact. [`ShapeContact`] projects twists on those whose
-//! gaps stay open, `M (v - v*) = G^T lambda`, with the same laws, memory and solvers as [`crate::PairContact`]; shapes whose core
-//! is a point give the same velocities.
+//! with `n` from `i` to `j` and `r` from the centres to the points of contact. [`ShapeContact`] projects
+//! twists on those whose gaps stay open, `M (v - v*) = G^T lambda`, with the same laws, memory and solvers as
+//! [`crate::PairContact`]; shapes whose core is a point give the same velocities.
 //!
 //! ```
 //! use gluey_contact::shape::{Capsule, ShapeContact};
@@ -50,15 +50,16 @@ pub trait Shape<const D: usize>: Sync {
     /// Radius of a ball about the centre that holds the shape.
     fn reach(&self) -> f64;
 
-    /// Radius of the sphere whose drag the shape is taken to feel: `M = a` for translation and `(4/3) a^3` for rotation,
-    /// both over `6 pi eta` (Stokes 1851; force `6 pi eta a u`, torque `8 pi eta a^3 w`).
+    /// Radius of the sphere whose drag the shape is taken to feel: `M = a` for translation and `(4/3) a^3`
+    /// for rotation, both over `6 pi eta` (Stokes 1851; force `6 pi eta a u`, torque `8 pi eta a^3 w`).
     fn drag_radius(&self) -> f64;
 
     /// The point of the core that is farthest in a direction.
     fn core_support(&self, direction: &Vector<D>) -> Vector<D>;
 
-    /// `h` if the core is the segment from `-h` to `h`: its closest points are in closed form. For other cores they are
-    /// iterated (GJK), to `5e-8` of the distance of the cores in the worst case; contact can be no more exact.
+    /// `h` if the core is the segment from `-h` to `h`: its closest points are in closed form. For other
+    /// cores they are iterated (GJK), to `5e-8` of the distance of the cores in the worst case; contact can
+    /// be no more exact.
     fn half_axis(&self) -> Option<Vector<D>> {
         None
     }

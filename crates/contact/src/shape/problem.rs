@@ -1,7 +1,8 @@
 //! The projection of one step, linearised until the gaps at its end are exact.
 //!
-//! Where bodies lie along each other the closest points jump from end to end as they turn. A pair therefore keeps the points
-//! it has met in the step: those where it is closest now carry its memory, the others can push.
+//! Where bodies lie along each other the closest points jump from end to end as they turn. A pair therefore
+//! keeps the points it has met in the step: those where it is closest now carry its memory, the others can
+//! push.
 
 mod linearised;
 
@@ -16,11 +17,13 @@ use crate::memory::GammaRule;
 use crate::projection::{self, Effort, Tuning};
 use crate::{Contact, ContactError, ContactParams, ContactReport, ContactState, PairKey, PairState};
 
-/// Points of contact nearer than this many summed roundings are the same, and follow the bodies; fewer in every further
-/// pass. Points that go on jumping between rods nearly parallel are thus told apart, until they enclose the right one.
+/// Points of contact nearer than this many summed roundings are the same, and follow the bodies; fewer in
+/// every further pass. Points that go on jumping between rods nearly parallel are thus told apart, until they
+/// enclose the right one.
 const SAME_POINT: (f64, f64) = (0.5, 0.75);
-/// Forces act along the normals of the beginning of the step, as in [`crate::PairContact`], in so many passes. That converges
-/// where normals turn as the bodies do; between such rods they turn much faster, and are then taken from the end of the step.
+/// Forces act along the normals of the beginning of the step, as in [`crate::PairContact`], in so many
+/// passes. That converges where normals turn as the bodies do; between such rods they turn much faster, and
+/// are then taken from the end of the step.
 const FIRST_PASSES: usize = 10;
 
 /// Two bodies that may touch.
@@ -203,8 +206,8 @@ where
         at(j) + arms[1] - (at(i) + arms[0])
     }
 
-    /// Gap of a pair where the bodies are now, and the closest points from the centres. Where the cores have passed each other
-    /// the gap is that along the normal, between points known before.
+    /// Gap of a pair where the bodies are now, and the closest points from the centres. Where the cores have
+    /// passed each other the gap is that along the normal, between points known before.
     fn gap_now(&self, pair: &Pair<D>, known: &[Vector<D>; 2]) -> (f64, [Vector<D>; 2]) {
         let is_ahead = |arms: &[Vector<D>; 2]| self.separation(pair.bodies, arms).dot(&pair.normal) > 0.0;
         match self.closest(pair.bodies).filter(is_ahead) {
@@ -231,7 +234,8 @@ where
         gap.min(self.points.get(pair.main).map_or(f64::INFINITY, slack)).abs()
     }
 
-    /// Takes the normals of where the bodies are now; those between round bodies stay, as in [`crate::PairContact`].
+    /// Takes the normals of where the bodies are now; those between round bodies stay, as in
+    /// [`crate::PairContact`].
     fn turn_normals(&mut self) {
         for k in 0..self.points.len() {
             let Point { pair, arms, .. } = &self.points[k];
@@ -283,7 +287,8 @@ where
         if pair.main == k { pair.floor } else { 0.0 }
     }
 
-    /// Forgets the points that push no longer, but for the closest ones: near the others they only make the problem worse.
+    /// Forgets the points that push no longer, but for the closest ones: near the others they only make the
+    /// problem worse.
     fn drop_idle(&mut self) {
         for (k, point) in std::mem::take(&mut self.points).into_iter().enumerate() {
             let is_main = self.pairs[point.pair].main == k;

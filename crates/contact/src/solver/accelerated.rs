@@ -1,9 +1,9 @@
 //! Accelerated projected gradients (Nesterov 1983) with restarts (O'Donoghue and Candes 2015, DOI
 //! 10.1007/s10208-013-9150-3, the gradient scheme; for contact: Mazhar et al. 2015, DOI 10.1145/2735627).
 //!
-//! From the extrapolated forces `y = x + beta (x - x_before)` a projected gradient step `x = max(floor, y - w(y)/||A||)`;
-//! the extrapolation starts anew when it has gone uphill. The number of iterations goes like the square root of that of
-//! Uzawa's algorithm.
+//! From the extrapolated forces `y = x + beta (x - x_before)` a projected gradient step
+//! `x = max(floor, y - w(y)/||A||)`; the extrapolation starts anew when it has gone uphill. The number of
+//! iterations goes like the square root of that of Uzawa's algorithm.
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
@@ -56,7 +56,8 @@ impl ProjectionSolver for Accelerated {
     }
 }
 
-/// `x = max(floor, y - rho w)`; whether the step turns back on the extrapolation: `(y - x) . (x - before) > 0`.
+/// `x = max(floor, y - rho w)`; whether the step turns back on the extrapolation:
+/// `(y - x) . (x - before) > 0`.
 fn descend(x: &mut [f64], y: &[f64], gaps: &[f64], before: &[f64], floors: &[f64], rho: f64) -> bool {
     let mut product = 0.0;
     for k in 0..x.len() {

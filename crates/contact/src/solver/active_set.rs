@@ -1,9 +1,10 @@
 //! Conjugate gradients on the active set: MPRGP, "modified proportioning with reduced gradient projections"
 //! (Dostal 2009, Optimal Quadratic Programming Algorithms, DOI 10.1007/b138610, algorithm 5.8).
 //!
-//! Conjugate gradients move the contacts whose force is above its floor; when a force would pass its floor, a projected
-//! gradient step changes the active set; when the forces at the floor are worse than the others, a step frees them.
-//! The rate of convergence depends on the spectrum of `A` only, and the operator may be singular.
+//! Conjugate gradients move the contacts whose force is above its floor; when a force would pass its floor, a
+//! projected gradient step changes the active set; when the forces at the floor are worse than the others, a
+//! step frees them. The rate of convergence depends on the spectrum of `A` only, and the operator may be
+//! singular.
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
@@ -11,8 +12,9 @@ use super::{
     gaps_under, largest_eigenvalue, residual, split,
 };
 
-/// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they bound the
-/// drift of the recurrence, but each is a restart that costs conjugate gradients what they have learnt.
+/// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they
+/// bound the drift of the recurrence, but each is a restart that costs conjugate gradients what they have
+/// learnt.
 const REFRESH: usize = 50;
 /// `p.A p / (||A|| p.p)` below which a direction is taken for a null vector of `A`.
 const NULL: f64 = 1e-13;

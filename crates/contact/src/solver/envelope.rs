@@ -1,6 +1,6 @@
-//! Cholesky factors of sparse matrices in their envelope: each row from its first entry to the diagonal (George and Liu 1981,
-//! Computer Solution of Large Sparse Positive Definite Systems, chapter 4), in the order of Cuthill and McKee (1969, DOI
-//! 10.1145/800195.805928) reversed.
+//! Cholesky factors of sparse matrices in their envelope: each row from its first entry to the diagonal
+//! (George and Liu 1981, Computer Solution of Large Sparse Positive Definite Systems, chapter 4), in the
+//! order of Cuthill and McKee (1969, DOI 10.1145/800195.805928) reversed.
 
 use super::{Factor, dot};
 

@@ -1,8 +1,9 @@
-//! Detection of infeasible contacts, such as those of a particle between two walls that are too near, by a certificate of
-//! Farkas.
+//! Detection of infeasible contacts, such as those of a particle between two walls that are too near, by a
+//! certificate of Farkas.
 //!
-//! No forces open all gaps if there are forces `y >= 0` (of any sign where a contact must stay closed) with `A y = 0` and
-//! `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run away in that direction.
+//! No forces open all gaps if there are forces `y >= 0` (of any sign where a contact must stay closed) with
+//! `A y = 0` and `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run
+//! away in that direction.
 
 use super::{Projection, dot};
 

@@ -1,12 +1,13 @@
 //! Solvers of the dual projection problem.
 //!
-//! Minimising `1/2 |v - u*|_M^2` over the velocities that keep `d + c B v >= 0` (or `= 0`) is, for the contact forces
-//! `lambda` with `M (v - u*) = B^T lambda`, the complementarity problem
+//! Minimising `1/2 |v - u*|_M^2` over the velocities that keep `d + c B v >= 0` (or `= 0`) is, for the
+//! contact forces `lambda` with `M (v - u*) = B^T lambda`, the complementarity problem
 //!
-//! `w = q + A lambda`, `A = c B M^-1 B^T`, `q = d + c B u*`; `lambda >= floor`, `w >= 0`, `(lambda - floor) w = 0`.
+//! `w = q + A lambda`, `A = c B M^-1 B^T`, `q = d + c B u*`; `lambda >= floor`, `w >= 0`,
+//! `(lambda - floor) w = 0`.
 //!
-//! `w` are the gaps at the end of the step (length), `lambda` forces over `6 pi eta` (length^2/time). A contact that
-//! must stay closed has `floor = -inf`, which leaves `w = 0`.
+//! `w` are the gaps at the end of the step (length), `lambda` forces over `6 pi eta` (length^2/time). A
+//! contact that must stay closed has `floor = -inf`, which leaves `w = 0`.
 //!
 //! | solver | where |
 //! |---|---|
@@ -34,12 +35,14 @@ pub use uzawa::Uzawa;
 
 use infeasibility::InfeasibilityMonitor;
 
-/// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open the gaps.
+/// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open
+/// the gaps.
 pub trait DelassusOperator {
     /// Writes into `gaps` how far `forces` open each gap.
     fn apply(&mut self, forces: &[f64], gaps: &mut [f64]);
 
-    /// `R` with `A = R R^T`, if it is known and sparse: one row per contact, one column per degree of freedom.
+    /// `R` with `A = R R^T`, if it is known and sparse: one row per contact, one column per degree of
+    /// freedom.
     fn factor(&self) -> Option<Factor> {
         None
     }
@@ -64,8 +67,9 @@ pub trait ProjectionSolver: Send + Sync {
     /// How many vectors of the size of the problem [`ProjectionSolver::solve`] works on.
     fn scratch_count(&self) -> usize;
 
-    /// Solves `problem`; on failure `forces` is what was reached. `scratch` holds [`ProjectionSolver::scratch_count`]
-    /// vectors of any content. Nothing is allocated on the way to a solution.
+    /// Solves `problem`; on failure `forces` is what was reached. `scratch` holds
+    /// [`ProjectionSolver::scratch_count`] vectors of any content. Nothing is allocated on the way to a
+    /// solution.
     fn solve(
         &self,
         problem: &mut Projection<'_>,
@@ -162,7 +166,8 @@ impl ConvergenceLog {
     }
 }
 
-/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as largest.
+/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as
+/// largest.
 fn residual(gaps: &[f64], forces: &[f64], floors: &[f64], norm: f64) -> (usize, f64) {
     let mut worst = (0, 0.0);
     for (k, ((gap, force), floor)) in gaps.iter().zip(forces).zip(floors).enumerate() {

@@ -1,4 +1,5 @@
-//! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI 10.3166/REMN.16.365-383).
+//! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI
+//! 10.3166/REMN.16.365-383).
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
@@ -8,9 +9,9 @@ use super::{
 
 /// The paper's solver: gradient steps of fixed length in the forces.
 ///
-/// The step `rho = 1/||A||` comes from an estimate of the norm; it converges below `2/||A||` (in terms of the paper's
-/// multipliers `delta = lambda/c` that is `0 < rho < 2/||c^2 B M^-1 B^T||`), and is halved should the estimate be so
-/// poor that the residual grows.
+/// The step `rho = 1/||A||` comes from an estimate of the norm; it converges below `2/||A||` (in terms of the
+/// paper's multipliers `delta = lambda/c` that is `0 < rho < 2/||c^2 B M^-1 B^T||`), and is halved should the
+/// estimate be so poor that the residual grows.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Uzawa;
 

@@ -1,5 +1,5 @@
-//! The projection of shapes as the core of the crate sees it: scaled rows of the points of contact, and where they are after
-//! each pass.
+//! The projection of shapes as the core of the crate sees it: scaled rows of the points of contact, and where
+//! they are after each pass.
 
 use gluey_geom::{Dim, Space, Twist};
 
