@@ -1,4 +1,4 @@
-//! What surrounds the particles: walls and periodic directions.
+//! Surroundings of the particles: walls and periodic directions.
 
 use gluey_geom::{Aabb, Vector};
 

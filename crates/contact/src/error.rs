@@ -48,7 +48,7 @@ pub enum ContactError {
     NotFinite {
         /// Index of the particle, from 0; messages count from 1.
         particle: usize,
-        /// Which of its vectors.
+        /// Which of its quantities.
         quantity: Quantity,
     },
     /// Two centres so close that the line through them has no direction.

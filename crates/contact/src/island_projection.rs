@@ -10,7 +10,7 @@ use crate::rows::{GROUND, Row};
 use crate::solver::{Factor, SolveFailure, SolveReport};
 use crate::{ContactParams, Mobility};
 
-/// What all islands of a step share.
+/// Context of the solves of a step: what is the same for all islands.
 pub(crate) struct SolveContext<'a, M> {
     pub params: &'a ContactParams,
     pub mobility: &'a M,
@@ -283,8 +283,8 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
     ///
     /// The gaps are exact at `moved`, the normals those of the beginning of the step throughout: contact
     /// forces belong to `u^n`, which multi-step schemes extrapolate. Normals of the end of the step converge
-    /// faster (by `phi^2/2` a pass here, `phi` the rotation of the pair in the step), but make the encounter
-    /// of two spheres first order in dt.
+    /// faster (by `phi^2/2` per pass here, `phi` the rotation of the pair in the step), but make the
+    /// encounter of two spheres first order in dt.
     fn set_free_gaps(&mut self) {
         for k in 0..self.rows.len() {
             let beyond = self.difference(k, |slot| self.slots[slot].free - self.moved[slot]);

@@ -64,8 +64,8 @@ impl<const D: usize> Default for Islands<D> {
     }
 }
 
-/// What islands need to know of the places.
-pub(crate) struct Places<'a, const D: usize> {
+/// Particles in the order of their places.
+pub(crate) struct SortedParticles<'a, const D: usize> {
     pub positions: &'a [Vector<D>],
     pub free: &'a [Vector<D>],
     /// `c` times the mobility: 0 for fixed particles, which join no islands.
@@ -77,7 +77,7 @@ impl<const D: usize> Islands<D> {
     pub(crate) fn part(
         &mut self,
         rows: &[Row<D>],
-        places: &Places<'_, D>,
+        places: &SortedParticles<'_, D>,
         as_one: bool,
         is_fresh: impl Fn(&Row<D>) -> bool,
     ) {
@@ -101,7 +101,7 @@ impl<const D: usize> Islands<D> {
 
     /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each
     /// root. Returns how many islands there are.
-    fn label(&mut self, rows: &[Row<D>], places: &Places<'_, D>, as_one: bool) -> usize {
+    fn label(&mut self, rows: &[Row<D>], places: &SortedParticles<'_, D>, as_one: bool) -> usize {
         let count = places.positions.len();
         self.parents.clear();
         self.parents.extend(0..count as u32);
@@ -131,7 +131,7 @@ impl<const D: usize> Islands<D> {
     fn fill(
         &mut self,
         range: Range<usize>,
-        places: &Places<'_, D>,
+        places: &SortedParticles<'_, D>,
         as_one: bool,
         is_fresh: &impl Fn(&Row<D>) -> bool,
     ) {
@@ -152,7 +152,7 @@ impl<const D: usize> Islands<D> {
 
     /// Slot of a place in the island whose slots begin at `first`; a fixed particle has one in each of its
     /// islands.
-    fn slot(&mut self, place: u32, first: usize, places: &Places<'_, D>) -> u32 {
+    fn slot(&mut self, place: u32, first: usize, places: &SortedParticles<'_, D>) -> u32 {
         if place == GROUND {
             return 0;
         }

@@ -14,11 +14,11 @@ use crate::{ContactError, Domain};
 pub struct PairKey {
     /// The particle; of two, the one with the smaller index.
     pub first: u32,
-    /// What it touches.
+    /// Its partner.
     pub second: Partner,
 }
 
-/// What a particle touches.
+/// The partner of a particle in a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Partner {

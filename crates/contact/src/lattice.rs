@@ -19,7 +19,7 @@ impl<const D: usize> Lattice<D> {
         Self::within(lower, extent, width, most)
     }
 
-    /// A lattice with about a cell a point.
+    /// A lattice with about one cell per point.
     pub(crate) fn fine(points: &[Vector<D>]) -> Self {
         let (lower, extent) = bounds(points);
         Self::within(lower, extent, extent.amax() / points.len().max(1) as f64, points.len())

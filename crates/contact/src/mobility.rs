@@ -1,4 +1,4 @@
-//! What contact forces do to velocities: `u - u* = M^-1 f`.
+//! The mobility, by which contact forces change velocities: `u - u* = M^-1 f`.
 
 use gluey_geom::Vector;
 

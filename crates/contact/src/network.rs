@@ -1,4 +1,4 @@
-//! What the contact network tells: stress, coordination, clusters, and the contacts as a table.
+//! Statistics of the contact network: stress, coordination, clusters, and the contacts as a table.
 
 mod clusters;
 
@@ -38,7 +38,7 @@ pub struct ContactNetwork<'a, const D: usize> {
     domain: &'a Domain<D>,
 }
 
-/// Where a contact is.
+/// Position and direction of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactArm<const D: usize> {
     /// From the centre of the first particle to that of its partner (of its image), or to the foot point on
@@ -50,7 +50,7 @@ pub struct ContactArm<const D: usize> {
     pub point: Vector<D>,
 }
 
-/// Contacts a particle.
+/// Numbers of contacts per particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coordination {
     /// Contacts of a particle on average; those between two particles count for both.
@@ -152,7 +152,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         Clusters::of(self.contacts, self.positions.len())
     }
 
-    /// Writes a table, one row a contact, as comma-separated values with a header:
+    /// Writes a table, one row per contact, as comma-separated values with a header:
     ///
     /// `first` (number of the particle, from 1), `partner` (`particle` or `wall`), `second` (its number, from
     /// 1), `image_x`, ..., `lambda`, `gamma`, `gap`, `normal_x`, ..., `point_x`, .... Numbers are written so

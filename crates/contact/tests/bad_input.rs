@@ -1,4 +1,4 @@
-//! What a contact step refuses, and that it says which particles it means.
+//! Errors of a contact step, and that they say which particles they mean.
 
 use gluey_contact::{
     ContactError, ContactLaw, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState,

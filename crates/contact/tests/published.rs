@@ -1,4 +1,5 @@
-//! The crate as strangers get it: packaged, unpacked, and used by a program that knows nothing of this workspace.
+//! The crate as strangers get it: packaged, unpacked, and used by a program that knows nothing of this
+//! workspace.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

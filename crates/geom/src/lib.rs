@@ -1,8 +1,8 @@
 //! Vectors, rotations, poses and twists in `D` = 2 and 3 dimensions.
 //!
-//! What is the same in every dimension is written once for `D`; what is not (the number of rotations, the
-//! cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and `Dim<3>`
-//! only.
+//! Code that is the same in every dimension is written once for `D`; what is not (the number of rotations,
+//! the cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and
+//! `Dim<3>` only.
 //!
 //! ```
 //! use gluey_geom::{Twist, Vector, Spin};

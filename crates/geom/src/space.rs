@@ -1,4 +1,4 @@
-//! What depends on the dimension without being a dimension: spins, rotations and the cross product.
+//! Types and operations that depend on the dimension: spins, rotations and the cross product.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub};

@@ -1,4 +1,5 @@
-//! A periodic suspension of large and small spheres: draws a slice through it and measures how much of it is solid.
+//! A periodic suspension of large and small spheres: draws a slice through it and measures how much of it is
+//! solid.
 //!
 //! `cargo run --release -p gluey-levelset --example suspension`
 
@@ -48,7 +49,7 @@ pub fn main() {
     let tree = BallTree::new(&balls);
     print!("{}", slice(&tree, 0.08, 78, 39));
     let exact = 4.0 / 3.0 * std::f64::consts::PI * (0.4f64.powi(3) + 0.15f64.powi(3));
-    let found = solid_fraction(&tree, 60);
+    let found = solid_fraction(&tree, 80);
     println!("solid: {found:.4}, exactly {exact:.4}");
     assert!((found - exact).abs() < 2e-3);
 }

@@ -17,7 +17,8 @@ use crate::ball::{Ball, Body, LevelSet, nearest_image};
 const LEAF: usize = 4;
 /// Bodies in a box whose radii differ by more than this factor part by radius.
 const LIKE_RADII: f64 = 4.0;
-/// What bounds must miss by before a box is left out, relative to the coordinates: more than rounding.
+/// Margin by which bounds must miss before a box is left out, relative to the coordinates: more than
+/// rounding.
 const SLACK: f64 = 1e-13;
 
 /// Balls that are found by where they are. Answers are those of a loop over all, bit for bit.

@@ -1,4 +1,5 @@
-//! Two spheres pass each other in shear flow, the flow is reversed, and they go back: exactly, as time steps get shorter.
+//! Two spheres pass each other in shear flow, the flow is reversed, and they go back: exactly, as time steps
+//! get shorter.
 //!
 //! `cargo run --release -p gluey-motion --example encounter`
 

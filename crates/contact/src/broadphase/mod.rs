@@ -1,4 +1,4 @@
-//! Which balls meet: a cell list, and parry's bounding volume hierarchy for very different sizes.
+//! Search for balls that meet: a cell list, and parry's bounding volume hierarchy for very different sizes.
 
 mod cells;
 mod hierarchy;

@@ -5,11 +5,11 @@ mod velocity_correction;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use crate::graph::Graph;
 use crate::island_projection::{IslandWorkspace, SolveContext};
-use crate::islands::{Islands, Places};
+use crate::islands::{Islands, SortedParticles};
 use crate::memory::{ContactRecord, GammaRule};
 use crate::model::validate;
+use crate::neighbours::NeighbourList;
 use crate::projection::{Failure, Tuning};
 use crate::rows::Row;
 use crate::{
@@ -26,7 +26,7 @@ pub struct PairContact<const D: usize, M = StokesDrag> {
     mobility: M,
     domain: Domain<D>,
     record: ContactRecord,
-    graph: Graph<D>,
+    neighbours: NeighbourList<D>,
     islands: Islands<D>,
     workspace: IslandWorkspace<D>,
     buffers: Buffers<D>,
@@ -62,11 +62,11 @@ struct Buffers<const D: usize> {
     free: Vec<Vector<D>>,
     /// Rows of this step in the order of space.
     rows: Vec<Row<D>>,
-    /// One entry a link: whether it takes part, its memory, its force.
-    takes_part: Vec<Part>,
+    /// One entry per candidate: whether it takes part, its memory, its force.
+    takes_part: Vec<Participation>,
     memory: Vec<PairMemory>,
     forces: Vec<f64>,
-    /// One entry a place.
+    /// One entry per place.
     weights: Vec<f64>,
     changes: Vec<Vector<D>>,
     displacements: Vec<Vector<D>>,
@@ -87,16 +87,16 @@ impl<const D: usize> Default for Buffers<D> {
     }
 }
 
-/// Whether a link takes part in a step.
+/// Whether a candidate takes part in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Part {
+enum Participation {
     No,
     /// Not yet solved for.
     Fresh,
     Yes,
 }
 
-/// Memory of a link before the step.
+/// Memory of a candidate before the step.
 #[derive(Clone, Copy, Debug, Default)]
 struct PairMemory {
     gamma: f64,
@@ -118,7 +118,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
             mobility,
             domain: Domain::default(),
             record: ContactRecord::default(),
-            graph: Graph::default(),
+            neighbours: NeighbourList::default(),
             islands: Islands::default(),
             workspace: IslandWorkspace::default(),
             buffers: Buffers::default(),
@@ -135,7 +135,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// Changes the walls or periods, as for walls that move.
     pub fn set_domain(&mut self, domain: Domain<D>) {
         if domain.periods != self.domain.periods {
-            self.graph = Graph::default();
+            self.neighbours = NeighbourList::default();
         }
         self.domain = domain;
     }
@@ -206,9 +206,9 @@ where
 }
 
 /// Whether the search went far enough.
-enum Reach {
-    Enough,
-    TooShort,
+enum Coverage {
+    Complete,
+    Incomplete,
 }
 
 impl<const D: usize, M: Mobility<D>> PairContact<D, M>
@@ -226,26 +226,26 @@ where
         buffers.free.clear();
         buffers.free.extend(moves);
         let tolerance = self.tolerance(step, &buffers.free);
-        self.graph.margin = 0.5 * self.margin();
-        self.graph.begin(step, &self.domain, &buffers.free)?;
+        self.neighbours.margin = 0.5 * self.margin();
+        self.neighbours.begin(step, &self.domain, &buffers.free)?;
         let report = loop {
             self.begin(step, buffers)?;
             let (reach, report) = match self.params.law {
                 ContactLaw::VelocityCorrection => self.push(step, tolerance, buffers)?,
                 _ => self.project(step, tolerance, buffers)?,
             };
-            if let Reach::Enough = reach {
+            if let Coverage::Complete = reach {
                 break report;
             }
             let mut needed = buffers.free.clone();
-            for (place, &particle) in self.graph.order.iter().enumerate() {
+            for (place, &particle) in self.neighbours.order.iter().enumerate() {
                 needed[particle as usize] = buffers.displacements[place];
             }
-            self.graph.widen(step, &self.domain, &buffers.free, &needed)?;
+            self.neighbours.extend(step, &self.domain, &buffers.free, &needed)?;
         };
         let report = self.summary(report, buffers);
         self.remember(step, tolerance, buffers);
-        for (change, &particle) in buffers.changes.iter().zip(&self.graph.order) {
+        for (change, &particle) in buffers.changes.iter().zip(&self.neighbours.order) {
             twists[particle as usize].velocity += change;
         }
         Ok(report)
@@ -270,7 +270,7 @@ where
         step: &StepGeometry<'_, D>,
         tolerance: f64,
         buffers: &mut Buffers<D>,
-    ) -> Result<(Reach, ContactReport), ContactError> {
+    ) -> Result<(Coverage, ContactReport), ContactError> {
         let mut report = ContactReport::default();
         loop {
             self.list_rows(step, buffers)?;
@@ -278,13 +278,13 @@ where
             buffers
                 .takes_part
                 .iter_mut()
-                .filter(|part| **part == Part::Fresh)
-                .for_each(|part| *part = Part::Yes);
-            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
-                return Ok((Reach::TooShort, report));
+                .filter(|part| **part == Participation::Fresh)
+                .for_each(|part| *part = Participation::Yes);
+            if !self.neighbours.is_sufficient(&self.domain, step, &buffers.displacements) {
+                return Ok((Coverage::Incomplete, report));
             }
             if !self.admit(step, buffers) {
-                return Ok((Reach::Enough, report));
+                return Ok((Coverage::Complete, report));
             }
         }
     }
@@ -303,12 +303,13 @@ where
             iteration_limit: self.params.iteration_limit,
         };
         let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
-        let places = Places { positions: &self.graph.positions, free: &self.graph.free, weights };
-        let is_fresh = |row: &Row<D>| takes_part[row.link as usize] == Part::Fresh;
+        let places =
+            SortedParticles { positions: &self.neighbours.positions, free: &self.neighbours.free, weights };
+        let is_fresh = |row: &Row<D>| takes_part[row.candidate as usize] == Participation::Fresh;
         self.islands.part(rows, &places, M::COUPLED, is_fresh);
         self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
-            let PairMemory { gamma, lambda } = memory[row.link as usize];
-            (forces[row.link as usize], rule.floor(gamma, lambda))
+            let PairMemory { gamma, lambda } = memory[row.candidate as usize];
+            (forces[row.candidate as usize], rule.floor(gamma, lambda))
         });
         let context = SolveContext {
             params: &self.params,
@@ -316,7 +317,7 @@ where
             tuning,
             velocity_weight: step.velocity_weight,
             radii: step.radii,
-            order: &self.graph.order,
+            order: &self.neighbours.order,
         };
         self.workspace.solve(&self.islands, &context);
 
@@ -329,7 +330,7 @@ where
             report.passes = report.passes.max(effort.passes);
             report.residual = report.residual.max(effort.residual);
             for k in island.rows.clone() {
-                forces[self.islands.rows[k].link as usize] = self.workspace.forces[k];
+                forces[self.islands.rows[k].candidate as usize] = self.workspace.forces[k];
             }
             for k in island.slots.clone().skip(1) {
                 let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
@@ -342,34 +343,40 @@ where
 
     /// The error that the failure of an island means; its first row is `start`.
     fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
-        let key =
-            |row: usize| self.graph.key(&self.graph.links[self.islands.rows[start + row].link as usize]);
+        let key = |row: usize| {
+            self.neighbours
+                .key(&self.neighbours.candidates[self.islands.rows[start + row].candidate as usize])
+        };
         ContactError::of_projection(failure, tolerance, key, key)
     }
 
     fn summary(&self, mut report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
         for row in &buffers.rows {
-            let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
-            let force = buffers.forces[row.link as usize];
-            report.count_pair(gap, force, || self.graph.key(&self.graph.links[row.link as usize]));
+            let gap = row.gap_after(&self.neighbours.positions, &buffers.displacements);
+            let force = buffers.forces[row.candidate as usize];
+            report.count_pair(gap, force, || {
+                self.neighbours.key(&self.neighbours.candidates[row.candidate as usize])
+            });
         }
         report
     }
 
     /// Updates gamma and lists the contacts.
     fn remember(&mut self, step: &StepGeometry<'_, D>, tolerance: f64, buffers: &Buffers<D>) {
-        let (graph, rule) = (&self.graph, GammaRule::new(&self.params, step.velocity_weight, step.dt));
+        let (neighbours, rule) =
+            (&self.neighbours, GammaRule::new(&self.params, step.velocity_weight, step.dt));
         let contact = |row: &Row<D>| {
-            let link = row.link as usize;
-            let (PairMemory { gamma, lambda: last }, lambda) = (buffers.memory[link], buffers.forces[link]);
+            let candidate = row.candidate as usize;
+            let (PairMemory { gamma, lambda: last }, lambda) =
+                (buffers.memory[candidate], buffers.forces[candidate]);
             let gamma = rule.update(gamma, last, lambda);
             // A force that moves the pair by less than the tolerance is rounding noise.
             let moved = [row.head, row.tail]
                 .map(|place| buffers.weights.get(place as usize).unwrap_or(&0.0) * lambda);
             let is_contact = gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance;
             is_contact.then(|| {
-                let gap = row.gap_after(&graph.positions, &buffers.displacements);
-                Contact { pair: graph.key(&graph.links[link]), lambda, gamma, gap }
+                let gap = row.gap_after(&neighbours.positions, &buffers.displacements);
+                Contact { pair: neighbours.key(&neighbours.candidates[candidate]), lambda, gamma, gap }
             })
         };
         self.record.replace(|contacts| contacts.extend(buffers.rows.iter().filter_map(contact)));

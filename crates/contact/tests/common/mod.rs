@@ -1,4 +1,4 @@
-//! What the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
+//! Set-up that the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
 #![allow(dead_code)]
 
 use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
