@@ -3,7 +3,7 @@
 use gluey_geom::Vector;
 
 use crate::neighbours::{Candidate, NeighbourList};
-use crate::{ContactError, Domain, StepGeometry};
+use crate::{ContactError, Domain, StepGeometry, Wall};
 
 /// Stands for the tail of a contact with a wall.
 pub(crate) const GROUND: u32 = u32::MAX;
@@ -41,20 +41,8 @@ impl<const D: usize> Row<D> {
         step: &StepGeometry<'_, D>,
     ) -> Result<Self, ContactError> {
         let Candidate { tail, head, image } = neighbours.candidates[candidate];
-        if let Some(number) = neighbours.wall(&neighbours.candidates[candidate]) {
-            let wall = &domain.walls[number];
-            let rest = wall.offset + wall.speed * step.dt + neighbours.radii[head as usize];
-            let row = Self {
-                candidate: candidate as u32,
-                tail: GROUND,
-                head,
-                shift: Vector::zeros(),
-                normal: wall.normal,
-                rest,
-                is_flat: true,
-                rank: (tail, neighbours.ranks[head as usize], [0; 3]),
-            };
-            return Ok(row);
+        if let Some(wall) = neighbours.wall(&neighbours.candidates[candidate]) {
+            return Ok(Self::with_wall(candidate, neighbours, &domain.walls[wall], step.dt));
         }
         let ranks = [tail, head].map(|place| neighbours.ranks[place as usize]);
         let (tail, head, image) =
@@ -76,6 +64,20 @@ impl<const D: usize> Row<D> {
             is_flat: false,
             rank: (ranks[0].min(ranks[1]), ranks[0].max(ranks[1]), image),
         })
+    }
+
+    fn with_wall(candidate: usize, neighbours: &NeighbourList<D>, wall: &Wall<D>, dt: f64) -> Self {
+        let Candidate { tail, head, .. } = neighbours.candidates[candidate];
+        Self {
+            candidate: candidate as u32,
+            tail: GROUND,
+            head,
+            shift: Vector::zeros(),
+            normal: wall.normal,
+            rest: wall.offset + wall.speed * dt + neighbours.radii[head as usize],
+            is_flat: true,
+            rank: (tail, neighbours.ranks[head as usize], [0; 3]),
+        }
     }
 
     /// Vector between the centres (from the origin, for a wall) when places have moved by `displacements`.

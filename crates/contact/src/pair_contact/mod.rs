@@ -6,7 +6,7 @@ mod velocity_correction;
 use gluey_geom::{Dim, Space, Twist, Vector};
 
 use crate::island_projection::{IslandWorkspace, SolveContext};
-use crate::islands::{Islands, SortedParticles};
+use crate::islands::{Island, Islands, SortedParticles};
 use crate::memory::{ContactRecord, GammaRule};
 use crate::model::validate;
 use crate::neighbours::NeighbourList;
@@ -296,21 +296,12 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let rule = GammaRule::new(&self.params, step.velocity_weight, step.dt);
         let tuning = Tuning {
             solver: self.params.solver.method(),
             tolerance,
             iteration_limit: self.params.iteration_limit,
         };
-        let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
-        let places =
-            SortedParticles { positions: &self.neighbours.positions, free: &self.neighbours.free, weights };
-        let is_fresh = |row: &Row<D>| takes_part[row.candidate as usize] == Participation::Fresh;
-        self.islands.part(rows, &places, M::COUPLED, is_fresh);
-        self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
-            let PairMemory { gamma, lambda } = memory[row.candidate as usize];
-            (forces[row.candidate as usize], rule.floor(gamma, lambda))
-        });
+        self.part_islands(step, &tuning, buffers);
         let context = SolveContext {
             params: &self.params,
             mobility: &self.mobility,
@@ -320,25 +311,42 @@ where
             order: &self.neighbours.order,
         };
         self.workspace.solve(&self.islands, &context);
-
-        for (island, outcome) in
-            self.islands.islands.iter().zip(&self.workspace.outcomes).filter(|(i, _)| i.is_fresh)
-        {
+        let islands = self.islands.islands.iter().zip(&self.workspace.outcomes);
+        for (island, outcome) in islands.filter(|(island, _)| island.is_fresh) {
             let effort =
                 outcome.as_ref().map_err(|failure| self.explain(failure, island.rows.start, tolerance))?;
             report.iterations = report.iterations.max(effort.iterations);
             report.passes = report.passes.max(effort.passes);
             report.residual = report.residual.max(effort.residual);
-            for k in island.rows.clone() {
-                forces[self.islands.rows[k].candidate as usize] = self.workspace.forces[k];
-            }
-            for k in island.slots.clone().skip(1) {
-                let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
-                changes[place] = self.workspace.changes[k];
-                displacements[place] = slot.free + changes[place] * step.velocity_weight;
-            }
+            self.take_over(island, step.velocity_weight, buffers);
         }
         Ok(())
+    }
+
+    /// Parts the rows into islands, with the forces they start from.
+    fn part_islands(&mut self, step: &StepGeometry<'_, D>, tuning: &Tuning, buffers: &Buffers<D>) {
+        let rule = GammaRule::new(&self.params, step.velocity_weight, step.dt);
+        let Buffers { rows, takes_part, memory, forces, weights, .. } = buffers;
+        let places =
+            SortedParticles { positions: &self.neighbours.positions, free: &self.neighbours.free, weights };
+        let is_fresh = |row: &Row<D>| takes_part[row.candidate as usize] == Participation::Fresh;
+        self.islands.part(rows, &places, M::COUPLED, is_fresh);
+        self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
+            let PairMemory { gamma, lambda } = memory[row.candidate as usize];
+            (forces[row.candidate as usize], rule.floor(gamma, lambda))
+        });
+    }
+
+    /// Takes over the forces and motions of an island that was solved.
+    fn take_over(&self, island: &Island, velocity_weight: f64, buffers: &mut Buffers<D>) {
+        for k in island.rows.clone() {
+            buffers.forces[self.islands.rows[k].candidate as usize] = self.workspace.forces[k];
+        }
+        for k in island.slots.clone().skip(1) {
+            let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
+            buffers.changes[place] = self.workspace.changes[k];
+            buffers.displacements[place] = slot.free + buffers.changes[place] * velocity_weight;
+        }
     }
 
     /// The error that the failure of an island means; its first row is `start`.

@@ -28,21 +28,7 @@ where
         buffers.forces.fill(0.0);
         loop {
             self.list_rows(step, buffers)?;
-            let mut forces: Vec<f64> =
-                buffers.rows.iter().map(|row| buffers.forces[row.candidate as usize]).collect();
-            let mut pushed = Pushed {
-                positions: &self.neighbours.positions,
-                radii: &self.neighbours.radii,
-                weights: &buffers.weights,
-                displacements: &mut buffers.displacements,
-            };
-            let settled = push_apart(&buffers.rows, &mut pushed, &mut forces, &params);
-            let (sweeps, residual) =
-                settled.map_err(|unsettled| self.unsettled(unsettled, &buffers.rows, &params))?;
-            for (row, force) in buffers.rows.iter().zip(forces) {
-                buffers.forces[row.candidate as usize] = force;
-                buffers.takes_part[row.candidate as usize] = Participation::Yes;
-            }
+            let (sweeps, residual) = self.push_rows(buffers, &params)?;
             report.iterations += sweeps;
             report.passes += 1;
             report.residual = residual;
@@ -58,6 +44,25 @@ where
             *change = (end - free) / step.velocity_weight;
         }
         Ok((Coverage::Complete, report))
+    }
+
+    /// Pushes the pairs that take part; the number of sweeps and the largest shortfall left.
+    fn push_rows(&self, buffers: &mut Buffers<D>, params: &PushParams) -> Result<(usize, f64), ContactError> {
+        let rows = &buffers.rows;
+        let mut forces: Vec<f64> = rows.iter().map(|row| buffers.forces[row.candidate as usize]).collect();
+        let mut pushed = Pushed {
+            positions: &self.neighbours.positions,
+            radii: &self.neighbours.radii,
+            weights: &buffers.weights,
+            displacements: &mut buffers.displacements,
+        };
+        let settled = push_apart(rows, &mut pushed, &mut forces, params)
+            .map_err(|unsettled| self.unsettled(unsettled, rows, params))?;
+        for (row, force) in rows.iter().zip(forces) {
+            buffers.forces[row.candidate as usize] = force;
+            buffers.takes_part[row.candidate as usize] = Participation::Yes;
+        }
+        Ok(settled)
     }
 
     fn unsettled(&self, unsettled: Unsettled, rows: &[Row<D>], params: &PushParams) -> ContactError {
