@@ -2,7 +2,7 @@
 
 use crate::projection::Failure;
 use crate::solver::{ResidualHistory, SolveFailure};
-use crate::{ContactLaw, PairKey};
+use crate::{ContactLaw, PairKey, Partner};
 
 /// Why velocities could not be corrected. They are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -179,6 +179,20 @@ pub enum ContactError {
 }
 
 impl ContactError {
+    /// Refuses a pair of particles or walls that are not there.
+    pub(crate) fn unless_known(pair: PairKey, count: usize, wall_count: usize) -> Result<(), Self> {
+        let (first, second) = pair.particles();
+        if first.max(second.unwrap_or(0)) >= count {
+            return Err(Self::UnknownParticle { pair, count });
+        }
+        match pair.second {
+            Partner::Wall(wall) if wall as usize >= wall_count => {
+                Err(Self::UnknownWall { pair, count: wall_count })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The error that the failure of a projection means; `contact_key` and `row_key` name its contacts and
     /// its rows.
     pub(crate) fn of_projection(

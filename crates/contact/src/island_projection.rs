@@ -24,7 +24,7 @@ pub(crate) struct SolveContext<'a, M> {
 }
 
 /// Vectors of all islands.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct IslandWorkspace<const D: usize> {
     /// Forces over `6 pi eta`, one per row.
     pub forces: Vec<f64>,
@@ -38,22 +38,6 @@ pub(crate) struct IslandWorkspace<const D: usize> {
     scaled_rows: Vec<NormalRow<D>>,
     moved: Vec<Vector<D>>,
     scratch: Vec<f64>,
-}
-
-impl<const D: usize> Default for IslandWorkspace<D> {
-    fn default() -> Self {
-        Self {
-            forces: Vec::new(),
-            floors: Vec::new(),
-            changes: Vec::new(),
-            outcomes: Vec::new(),
-            free_gaps: Vec::new(),
-            scales: Vec::new(),
-            scaled_rows: Vec::new(),
-            moved: Vec::new(),
-            scratch: Vec::new(),
-        }
-    }
 }
 
 /// The outcome of an island.

@@ -28,7 +28,7 @@ pub(crate) struct Slot<const D: usize> {
 }
 
 /// The partition of a step's contacts. Rows of an island are in the order they were given in.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Islands<const D: usize> {
     pub islands: Vec<Island>,
     pub rows: Vec<Row<D>>,
@@ -44,24 +44,6 @@ pub(crate) struct Islands<const D: usize> {
     labels: Vec<u32>,
     order: Vec<u32>,
     slot_of: Vec<u32>,
-}
-
-impl<const D: usize> Default for Islands<D> {
-    fn default() -> Self {
-        Self {
-            islands: Vec::new(),
-            rows: Vec::new(),
-            ends: Vec::new(),
-            slots: Vec::new(),
-            weights: Vec::new(),
-            parents: Vec::new(),
-            island_of: Vec::new(),
-            starts: Vec::new(),
-            labels: Vec::new(),
-            order: Vec::new(),
-            slot_of: Vec::new(),
-        }
-    }
 }
 
 /// Particles in the order of their places.

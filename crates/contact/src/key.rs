@@ -6,7 +6,7 @@ use gluey_geom::Vector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactError, Domain};
+use crate::Domain;
 
 /// A contact of the particle `first` with another particle or a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -71,20 +71,6 @@ impl PairKey {
                 let wall = domain.walls.get(wall as usize)?;
                 Some(wall.normal * -wall.distance(x))
             }
-        }
-    }
-
-    /// That there are such particles and such a wall.
-    pub(crate) fn check_known(self, count: usize, wall_count: usize) -> Result<(), ContactError> {
-        let (first, second) = self.particles();
-        if first.max(second.unwrap_or(0)) >= count {
-            return Err(ContactError::UnknownParticle { pair: self, count });
-        }
-        match self.second {
-            Partner::Wall(wall) if wall as usize >= wall_count => {
-                Err(ContactError::UnknownWall { pair: self, count: wall_count })
-            }
-            _ => Ok(()),
         }
     }
 }

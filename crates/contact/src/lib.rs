@@ -57,6 +57,7 @@ mod parallel;
 mod params;
 mod projection;
 mod push_apart;
+mod record;
 mod rows;
 #[cfg(any(feature = "dim2", feature = "dim3"))]
 pub mod shape;

@@ -3,7 +3,7 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{Contact, ContactLaw, ContactParams, GammaUpdate, PairKey};
+use crate::{ContactLaw, ContactParams, GammaUpdate, PairKey};
 
 /// One pair's memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,40 +103,5 @@ impl GammaRule {
         let [now, before] = self.weights;
         let gamma = gamma - now * lambda - before * last;
         gamma.max(self.gamma_min).min(0.0)
-    }
-}
-
-/// The contacts of the last step, and the memory they leave.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct ContactRecord {
-    pub state: ContactState,
-    pub contacts: Vec<Contact>,
-}
-
-impl ContactRecord {
-    /// Replaces the contacts by those that `list` adds, and the memory by theirs.
-    pub(crate) fn replace(&mut self, list: impl FnOnce(&mut Vec<Contact>)) {
-        self.contacts.clear();
-        list(&mut self.contacts);
-        self.contacts.sort_unstable_by_key(|contact| contact.pair);
-        self.state.pairs.clear();
-        let state = |contact: &Contact| PairState {
-            pair: contact.pair,
-            gamma: contact.gamma,
-            lambda: contact.lambda,
-        };
-        self.state.pairs.extend(self.contacts.iter().map(state));
-    }
-
-    /// Goes on from a checkpoint; on an error nothing has changed.
-    pub(crate) fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
-        self.state = state.checked()?;
-        self.contacts.clear();
-        Ok(())
-    }
-
-    /// Changes the sign of remembered forces.
-    pub(crate) fn reverse(&mut self) {
-        self.state.pairs.iter_mut().for_each(|pair| pair.lambda = -pair.lambda);
     }
 }

@@ -71,7 +71,9 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         domain: &'a Domain<D>,
     ) -> Result<Self, ContactError> {
         let count = positions.len().min(radii.len());
-        contacts.iter().try_for_each(|contact| contact.pair.check_known(count, domain.walls.len()))?;
+        contacts
+            .iter()
+            .try_for_each(|contact| ContactError::unless_known(contact.pair, count, domain.walls.len()))?;
         Ok(Self { contacts, positions, radii, domain })
     }
 

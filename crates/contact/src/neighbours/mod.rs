@@ -27,7 +27,7 @@ pub(crate) struct Candidate {
 }
 
 /// The neighbour list of a step. Particles are numbered by their *places*, an order of space.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct NeighbourList<const D: usize> {
     /// Particle of each place.
     pub order: Vec<u32>,
@@ -61,7 +61,7 @@ pub(crate) struct NeighbourList<const D: usize> {
 }
 
 /// Buffers of a search.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Search<const D: usize> {
     spatial: SpatialOrder,
     ranked: Vec<u32>,
@@ -74,47 +74,6 @@ struct Search<const D: usize> {
     ghosts: Vec<(u32, [i32; 3])>,
     pairs: Vec<(u32, u32)>,
     moved: Vec<Vector<D>>,
-}
-
-impl<const D: usize> Default for Search<D> {
-    fn default() -> Self {
-        Self {
-            spatial: SpatialOrder::default(),
-            ranked: Vec::new(),
-            broadphase: BestOf::default(),
-            wrapped: Vec::new(),
-            windings: Vec::new(),
-            centers: Vec::new(),
-            reaches: Vec::new(),
-            ghosts: Vec::new(),
-            pairs: Vec::new(),
-            moved: Vec::new(),
-        }
-    }
-}
-
-impl<const D: usize> Default for NeighbourList<D> {
-    fn default() -> Self {
-        Self {
-            order: Vec::new(),
-            places: Vec::new(),
-            candidates: Vec::new(),
-            starts: Vec::new(),
-            found_count: 0,
-            walls_end: 0,
-            positions: Vec::new(),
-            radii: Vec::new(),
-            free: Vec::new(),
-            ranks: Vec::new(),
-            reference: Vec::new(),
-            reach: Vec::new(),
-            remaining_reach: Vec::new(),
-            margin: 0.0,
-            widening: 1.0,
-            wall_slack: 0.0,
-            search: Search::default(),
-        }
-    }
 }
 
 impl<const D: usize> NeighbourList<D> {

@@ -91,7 +91,7 @@ fn check_known<const D: usize>(
     domain: &Domain<D>,
 ) -> Result<(), ContactError> {
     let PairState { pair, .. } = *state;
-    pair.check_known(step.positions.len(), domain.walls.len())?;
+    ContactError::unless_known(pair, step.positions.len(), domain.walls.len())?;
     let (first, Some(second)) = pair.particles() else { return Ok(()) };
     let distance = pair.branch(step.positions, domain).map_or(0.0, |branch| branch.norm());
     let gap = distance - step.radii[first] - step.radii[second];

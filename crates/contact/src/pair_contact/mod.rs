@@ -7,10 +7,11 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 
 use crate::island_projection::{IslandWorkspace, SolveContext};
 use crate::islands::{Island, Islands, SortedParticles};
-use crate::memory::{ContactRecord, GammaRule};
+use crate::memory::GammaRule;
 use crate::model::validate;
 use crate::neighbours::NeighbourList;
 use crate::projection::{Failure, Tuning};
+use crate::record::ContactRecord;
 use crate::rows::Row;
 use crate::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
@@ -56,7 +57,7 @@ where
 }
 
 /// Vectors of a step, kept from step to step.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Buffers<const D: usize> {
     /// Displacements without contact, by particle.
     free: Vec<Vector<D>>,
@@ -70,21 +71,6 @@ struct Buffers<const D: usize> {
     weights: Vec<f64>,
     changes: Vec<Vector<D>>,
     displacements: Vec<Vector<D>>,
-}
-
-impl<const D: usize> Default for Buffers<D> {
-    fn default() -> Self {
-        Self {
-            free: Vec::new(),
-            rows: Vec::new(),
-            takes_part: Vec::new(),
-            memory: Vec::new(),
-            forces: Vec::new(),
-            weights: Vec::new(),
-            changes: Vec::new(),
-            displacements: Vec::new(),
-        }
-    }
 }
 
 /// Whether a candidate takes part in a step.

@@ -7,8 +7,8 @@ use super::bodies::Bodies;
 use super::closest::frame;
 use super::problem::Problem;
 use crate::broadphase::{BestOf, Broadphase};
-use crate::memory::ContactRecord;
 use crate::model::{is_positive, validate_sizes};
+use crate::record::ContactRecord;
 use crate::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
     MemoryError, Mobility, PairKey, PairState, Partner, Quantity, StokesDrag,
