@@ -145,7 +145,8 @@ where
             }
         }
     }
-    validate_domain(step, domain)
+    validate_walls(&domain.walls)?;
+    validate_periods(step, domain)
 }
 
 /// Checks how many positions, radii (or shapes), drifts and velocities there are, and the step in time.
@@ -171,16 +172,20 @@ pub(crate) fn is_positive(x: f64) -> bool {
 /// Positions may be so many periods away from the origin: images are counted in `i32`.
 const FARTHEST_PERIOD: f64 = 1e8;
 
-fn validate_domain<const D: usize>(
-    step: &StepGeometry<'_, D>,
-    domain: &Domain<D>,
-) -> Result<(), ContactError> {
-    for (wall, Wall { normal, offset, speed }) in domain.walls.iter().enumerate() {
+fn validate_walls<const D: usize>(walls: &[Wall<D>]) -> Result<(), ContactError> {
+    for (wall, Wall { normal, offset, speed }) in walls.iter().enumerate() {
         let is_unit = (normal.norm() - 1.0).abs() <= 1e-12;
         if !(is_unit && offset.is_finite() && speed.is_finite()) {
             return Err(ContactError::BadWall { wall });
         }
     }
+    Ok(())
+}
+
+fn validate_periods<const D: usize>(
+    step: &StepGeometry<'_, D>,
+    domain: &Domain<D>,
+) -> Result<(), ContactError> {
     for (direction, period) in (0..D).filter_map(|d| domain.periods[d].map(|period| (d, period))) {
         let farthest = step.positions.iter().map(|x| x[direction].abs()).fold(0.0, f64::max);
         if !(period > 0.0 && period.is_finite() && farthest < FARTHEST_PERIOD * period) {

@@ -148,8 +148,7 @@ impl<const D: usize> NeighbourList<D> {
         displacements: &[Vector<D>],
     ) -> Result<(), ContactError> {
         (self.widening, self.wall_slack) = (1.0, 0.0);
-        let same = self.radii.len() == step.radii.len()
-            && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
+        let same = self.is_of(step.radii);
         if same {
             self.load(step, displacements);
             self.set_remaining_reach(domain);
@@ -161,6 +160,12 @@ impl<const D: usize> NeighbourList<D> {
         }
         self.add_walls(step, domain);
         Ok(())
+    }
+
+    /// Whether the list is one of particles with these radii.
+    fn is_of(&self, radii: &[f64]) -> bool {
+        self.radii.len() == radii.len()
+            && self.order.iter().zip(&self.radii).all(|(&i, radius)| radii[i as usize] == *radius)
     }
 
     /// Widens the search to what `needed` displacements (by particle) could close.

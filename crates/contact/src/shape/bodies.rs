@@ -1,6 +1,6 @@
 //! The bodies of a step: shapes, displacements without contact, mobilities.
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::{Dim, Space, Twist, Vector};
 
 use super::Shape;
 use crate::{BodyStep, ContactParams, Mobility};
@@ -35,6 +35,13 @@ where
             [translation, translation * 3.0 / (4.0 * a * a)]
         };
         Self { shapes, step, free, weights: shapes.iter().enumerate().map(weight).collect() }
+    }
+
+    /// Centres and radii of balls that hold the bodies and reach so much farther.
+    pub(super) fn balls(&self, slacks: &[f64]) -> (Vec<Vector<D>>, Vec<f64>) {
+        let centers = self.step.poses.iter().map(|pose| pose.position).collect();
+        let radii = self.shapes.iter().zip(slacks).map(|(shape, slack)| shape.reach() + slack).collect();
+        (centers, radii)
     }
 
     /// [`ContactParams::residual`] of bodies that reach beyond their centres.

@@ -136,9 +136,7 @@ fn near<const D: usize, S: Shape<D>>(
 where
     Dim<D>: Space<D>,
 {
-    let centers: Vec<Vector<D>> = bodies.step.poses.iter().map(|pose| pose.position).collect();
-    let radii: Vec<f64> =
-        bodies.shapes.iter().zip(slacks).map(|(shape, slack)| shape.reach() + slack).collect();
+    let (centers, radii) = bodies.balls(slacks);
     let mut pairs = Vec::new();
     broadphase.meeting(&centers, &radii, centers.len(), &mut pairs);
     pairs.extend(state.pairs.iter().filter_map(|state| match state.pair.second {

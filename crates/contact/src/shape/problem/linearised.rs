@@ -10,6 +10,25 @@ use crate::shape::Shape;
 use crate::shape::points::{OwnDrag, PointRow};
 use crate::solver::{SolveFailure, SolveReport};
 
+impl<const D: usize, S: Shape<D>> Problem<'_, D, S>
+where
+    Dim<D>: Space<D>,
+{
+    /// The rows of all points of contact, and their scales.
+    fn scaled_rows(&self) -> (Vec<PointRow<D>>, Vec<f64>) {
+        let mut rows: Vec<PointRow<D>> = self.points.iter().map(|point| self.row(point)).collect();
+        let mut scales = vec![0.0; rows.len()];
+        scale_rows(&self.bodies.weights, &mut rows, &mut scales);
+        (rows, scales)
+    }
+
+    fn set_forces(&mut self, forces: &[f64], scales: &[f64]) {
+        for (point, (force, scale)) in self.points.iter_mut().zip(forces.iter().zip(scales)) {
+            point.force = force * scale;
+        }
+    }
+}
+
 impl<const D: usize, S: Shape<D>> Linearised for Problem<'_, D, S>
 where
     Dim<D>: Space<D>,
@@ -22,9 +41,7 @@ where
 
     fn project(&mut self) -> Result<SolveReport, SolveFailure> {
         let (weights, count) = (&self.bodies.weights, self.points.len());
-        let mut rows: Vec<PointRow<D>> = self.points.iter().map(|point| self.row(point)).collect();
-        let mut scales = vec![0.0; count];
-        scale_rows(weights, &mut rows, &mut scales);
+        let (rows, scales) = self.scaled_rows();
         let of_scaled = |value: &dyn Fn(usize) -> f64| (0..count).map(value).collect::<Vec<f64>>();
         let free_gaps = of_scaled(&|k| scales[k] * self.free_gap(k));
         let floors = of_scaled(&|k| self.floor(k) / scales[k]);
@@ -39,9 +56,7 @@ where
             scratch: &mut scratch,
         };
         let report = problem.solve(&self.tuning)?;
-        for (point, (force, scale)) in self.points.iter_mut().zip(forces.iter().zip(&scales)) {
-            point.force = force * scale;
-        }
+        self.set_forces(&forces, &scales);
         self.drop_idle();
         self.move_to_end();
         Ok(report)
