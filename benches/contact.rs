@@ -1,14 +1,16 @@
 //! Timings of contact: search, graph, projection and whole steps of spheres in a shear flow.
 //!
-//! Spheres of diameter 1 at the volume fraction 0.4, in no order, `u* = (y, 0, 0)`, `dt = 0.05`, residual below 1e-6
-//! diameters. `cargo bench -p gluey-contact`; `docs/benchmarks.md` has a table of a run.
+//! Spheres of diameter 1 at the volume fraction 0.4, in no order, `u* = (y, 0, 0)`, `dt = 0.05`, residual
+//! below 1e-6 diameters. `cargo bench -p gluey-contact`; `docs/benchmarks.md` has a table of a run.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use gluey_contact::broadphase::{Broadphase, CellList, Hierarchy};
-use gluey_contact::{ContactModel, ContactParams, Memory, PairContact, SolverKind, StepGeometry, Strategy};
+use gluey_contact::{
+    ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, SolverKind, StepGeometry,
+};
 use gluey_geom::{Twist, Vector};
 use gluey_testkit::packing::Packing;
 
@@ -27,13 +29,18 @@ struct Shear {
 }
 
 impl Shear {
-    fn new(positions: &[Vector<3>], strategy: Strategy, solver: SolverKind) -> Self {
+    fn new(positions: &[Vector<3>], law: ContactLaw, solver: SolverKind) -> Self {
         let count = positions.len();
         let side = positions.iter().map(|x| x.y).fold(0.0, f64::max);
         // The tolerance is relative to the largest displacement, which grows with the cloud.
         let tolerance = 1e-6 / f64::max(0.5, DT * side);
-        let params =
-            ContactParams { strategy, solver, memory: Memory::Consistent, tolerance, ..Default::default() };
+        let params = ContactParams {
+            law,
+            solver,
+            gamma_update: GammaUpdate::Consistent,
+            tolerance,
+            ..Default::default()
+        };
         Self {
             positions: positions.to_vec(),
             radii: vec![0.5; count],
@@ -51,7 +58,7 @@ impl Shear {
     /// Corrects velocities; the time that takes.
     fn correct(&mut self, twists: &mut [Twist<3>]) -> Duration {
         let (positions, radii, drift) = (&self.positions, &self.radii, &self.drift);
-        let step = StepGeometry { positions, radii, drift, rate: DT, dt: DT };
+        let step = StepGeometry { positions, radii, drift, velocity_weight: DT, dt: DT };
         let start = Instant::now();
         black_box(self.contact.correct(&step, twists).expect("feasible"));
         start.elapsed()
@@ -95,7 +102,7 @@ fn graph(criterion: &mut Criterion, positions: &[Vector<3>]) {
     let mut group = criterion.benchmark_group("graph, no motion");
     group.sample_size(10).throughput(Throughput::Elements(count as u64));
     let still = || {
-        let mut shear = Shear::new(positions, Strategy::Inelastic, SolverKind::ActiveSet);
+        let mut shear = Shear::new(positions, ContactLaw::Inelastic, SolverKind::ActiveSet);
         shear.rate = 0.0;
         shear
     };
@@ -114,7 +121,7 @@ fn steps(criterion: &mut Criterion, positions: &[Vector<3>]) {
     for (name, solver) in [("active set", SolverKind::ActiveSet), ("accelerated", SolverKind::Accelerated)] {
         group.bench_function(BenchmarkId::new(format!("cold, inelastic, {name}"), count), |bencher| {
             bencher.iter_custom(|times| {
-                (0..times).map(|_| Shear::new(positions, Strategy::Inelastic, solver).step()).sum()
+                (0..times).map(|_| Shear::new(positions, ContactLaw::Inelastic, solver).step()).sum()
             });
         });
     }
@@ -126,8 +133,8 @@ fn steps(criterion: &mut Criterion, positions: &[Vector<3>]) {
 }
 
 fn warm_step(positions: &[Vector<3>], turns: bool) -> Duration {
-    let strategy = if turns { Strategy::Gluey } else { Strategy::Inelastic };
-    let mut shear = Shear::new(positions, strategy, SolverKind::ActiveSet);
+    let law = if turns { ContactLaw::Gluey } else { ContactLaw::Inelastic };
+    let mut shear = Shear::new(positions, law, SolverKind::ActiveSet);
     for _ in 0..STEPS_BEFORE {
         shear.step();
     }

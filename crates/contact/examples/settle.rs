@@ -8,7 +8,7 @@ mod picture;
 use std::error::Error;
 
 use gluey_contact::{
-    ContactModel, ContactNetwork, ContactParams, Domain, PairContact, SolverKind, StepGeometry, Strategy,
+    ContactLaw, ContactModel, ContactNetwork, ContactParams, Domain, PairContact, SolverKind, StepGeometry,
     Wall,
 };
 use gluey_geom::{Twist, Vector};
@@ -33,7 +33,7 @@ pub fn settle(count: usize, time: f64) -> Result<String, Box<dyn Error>> {
 
     // Without pulls the gap may stay linear in the step: discs are then a little farther apart, never nearer.
     let params = ContactParams {
-        strategy: Strategy::Inelastic,
+        law: ContactLaw::Inelastic,
         solver: SolverKind::ActiveSet,
         tolerance: 1e-5,
         ..ContactParams::default()
@@ -43,7 +43,8 @@ pub fn settle(count: usize, time: f64) -> Result<String, Box<dyn Error>> {
     let falling = Twist { velocity: -Vector::<2>::y(), ..Twist::default() };
     for _ in 0..(time / dt) as usize {
         let mut twists = vec![falling; count];
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: dt, dt };
         contact.correct(&step, &mut twists)?;
         positions.iter_mut().zip(&twists).for_each(|(x, twist)| *x += twist.velocity * dt);
     }

@@ -8,7 +8,8 @@ mod picture;
 use std::error::Error;
 
 use gluey_contact::{
-    ContactModel, ContactNetwork, ContactParams, Domain, Memory, PairContact, SolverKind, StepGeometry, Wall,
+    ContactModel, ContactNetwork, ContactParams, Domain, GammaUpdate, PairContact, SolverKind, StepGeometry,
+    Wall,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -32,7 +33,7 @@ pub fn shear(columns: usize, rows: usize, strain: f64) -> Result<String, Box<dyn
 
     let params = ContactParams {
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         solver: SolverKind::ActiveSet,
         tolerance: 1e-8,
         ..ContactParams::default()
@@ -42,7 +43,8 @@ pub fn shear(columns: usize, rows: usize, strain: f64) -> Result<String, Box<dyn
     for _ in 0..(strain / dt).round() as usize {
         let flow = |x: &Vector<2>| Twist { velocity: Vector::<2>::new(x.y, 0.0), ..Twist::default() };
         let mut twists: Vec<_> = positions.iter().map(flow).collect();
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: dt, dt };
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: dt, dt };
         contact.correct(&step, &mut twists)?;
         positions.iter_mut().zip(&twists).for_each(|(x, twist)| *x += twist.velocity * dt);
     }

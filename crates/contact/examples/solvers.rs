@@ -1,12 +1,12 @@
 //! Times the solvers of the projection on clusters of touching particles, and prints a table.
 //!
-//! `cargo run --release -p gluey-contact --example solvers [seconds a solve may take]`; `docs/decisions/0020-contact-solver.md`
-//! has a table of a run.
+//! `cargo run --release -p gluey-contact --example solvers [seconds a solve may take]`;
+//! `docs/decisions/0020-contact-solver.md` has a table of a run.
 
 use std::time::Instant;
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, ContactReport, Memory, PairContact, SolverKind, StepGeometry,
+    ContactError, ContactParams, ContactReport, GammaUpdate, PairContact, SolverKind, StepGeometry,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::{RngExt, SeedableRng};
@@ -76,11 +76,11 @@ where
         solver,
         iteration_limit,
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         ..ContactParams::default()
     };
     let (radii, drift) = (vec![0.5; positions.len()], vec![Vector::zeros(); positions.len()]);
-    let step = StepGeometry { positions, radii: &radii, drift: &drift, rate: 0.05, dt: 0.05 };
+    let step = StepGeometry { positions, radii: &radii, drift: &drift, velocity_weight: 0.05, dt: 0.05 };
     let mut contact = PairContact::<D>::new(params);
     let start = Instant::now();
     let outcome = contact.correct(&step, &mut twists);

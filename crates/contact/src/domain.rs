@@ -1,4 +1,4 @@
-//! What surrounds the particles: walls and periodic directions.
+//! Surroundings of the particles: walls and periodic directions.
 
 use gluey_geom::{Aabb, Vector};
 
@@ -32,8 +32,8 @@ impl<const D: usize> Wall<D> {
 
 /// Walls and periodic directions. The default has neither.
 ///
-/// Positions are continuous in time: in a periodic direction they may leave the period and are not to be wrapped, for
-/// contacts name the image of the partner relative to them.
+/// Positions are continuous in time: in a periodic direction they may leave the period and are not to be
+/// wrapped, for contacts name the image of the partner relative to them.
 ///
 /// ```
 /// use gluey_contact::{Domain, Wall};

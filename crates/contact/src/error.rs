@@ -1,7 +1,8 @@
-//! What can go wrong in a contact step.
+//! Errors of a contact step.
 
+use crate::projection::Failure;
 use crate::solver::{ResidualHistory, SolveFailure};
-use crate::{PairKey, Strategy};
+use crate::{ContactLaw, PairKey, Partner};
 
 /// Why velocities could not be corrected. They are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,10 +28,10 @@ pub enum ContactError {
         count: usize,
     },
     /// The step is not a step.
-    #[error("rate {rate} and dt {dt} must be positive and finite")]
+    #[error("velocity weight {velocity_weight} and dt {dt} must be positive and finite")]
     BadStep {
         /// Factor of the velocity in the displacement.
-        rate: f64,
+        velocity_weight: f64,
         /// Length of the step.
         dt: f64,
     },
@@ -47,7 +48,7 @@ pub enum ContactError {
     NotFinite {
         /// Index of the particle, from 0; messages count from 1.
         particle: usize,
-        /// Which of its vectors.
+        /// Which of its quantities.
         quantity: Quantity,
     },
     /// Two centres so close that the line through them has no direction.
@@ -62,11 +63,11 @@ pub enum ContactError {
         /// The shapes.
         pair: PairKey,
     },
-    /// A strategy that round particles know only.
-    #[error("the strategy `{strategy}` does not know other shapes than discs and spheres")]
+    /// A contact law that is defined for round particles only.
+    #[error("the contact law `{law}` is defined for discs and spheres only")]
     NotForShapes {
-        /// The strategy.
-        strategy: Strategy,
+        /// The contact law.
+        law: ContactLaw,
     },
     /// A remembered contact of a particle that is not there.
     #[error("a remembered contact joins {pair}, but there are only {count} particles")]
@@ -128,7 +129,8 @@ pub enum ContactError {
         /// Its period.
         period: f64,
     },
-    /// A particle that crosses half a period in a step, so that contacts could not be told from those of its images.
+    /// A particle that crosses half a period in a step, so that contacts could not be told from those of its
+    /// images.
     #[error(
         "particle {} moves by {displacement} against the others in a step: more than half the period {period}",
         .particle + 1
@@ -143,7 +145,7 @@ pub enum ContactError {
     },
     /// Contacts that no velocities can satisfy, such as a particle between walls that are too near.
     #[error("no velocities keep these contacts from overlapping: {}", Names(pairs))]
-    Contradictory {
+    Infeasible {
         /// The contacts, sorted.
         pairs: Vec<PairKey>,
     },
@@ -155,7 +157,7 @@ pub enum ContactError {
     NotConverged {
         /// `max |min(gap, ||A|| (lambda - floor))|`; unit: length.
         residual: f64,
-        /// What was asked for; unit: length.
+        /// The residual that was to be reached; unit: length.
         tolerance: f64,
         /// Iterations of the last solve.
         iterations: usize,
@@ -177,14 +179,44 @@ pub enum ContactError {
 }
 
 impl ContactError {
-    /// What the failure of a solver means; `key` names its rows.
-    pub(crate) fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
-        match &failure.contradiction {
+    /// Refuses a pair of particles or walls that are not there.
+    pub(crate) fn unless_known(pair: PairKey, count: usize, wall_count: usize) -> Result<(), Self> {
+        let (first, second) = pair.particles();
+        if first.max(second.unwrap_or(0)) >= count {
+            return Err(Self::UnknownParticle { pair, count });
+        }
+        match pair.second {
+            Partner::Wall(wall) if wall as usize >= wall_count => {
+                Err(Self::UnknownWall { pair, count: wall_count })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The error that the failure of a projection means; `contact_key` and `row_key` name its contacts and
+    /// its rows.
+    pub(crate) fn of_projection(
+        failure: &Failure,
+        tolerance: f64,
+        contact_key: impl Fn(usize) -> PairKey,
+        row_key: impl Fn(usize) -> PairKey,
+    ) -> Self {
+        match failure {
+            Failure::Gap { contact, gap, passes } => {
+                Self::GapNotClosed { pair: contact_key(*contact), gap: *gap, passes: *passes }
+            }
+            Failure::Solve(failure) => Self::of_solve(failure, tolerance, row_key),
+        }
+    }
+
+    /// The error that the failure of a solver means; `key` names its rows.
+    fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
+        match &failure.infeasible {
             Some(rows) => {
                 let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();
                 pairs.sort_unstable();
                 pairs.dedup();
-                Self::Contradictory { pairs }
+                Self::Infeasible { pairs }
             }
             None => Self::NotConverged {
                 residual: failure.report.residual,

@@ -1,4 +1,5 @@
-//! Islands: contacts that are joined by movable particles, solved independently of each other and in parallel.
+//! Islands: contacts that are joined by movable particles, solved independently of each other and in
+//! parallel.
 
 use std::ops::Range;
 
@@ -27,7 +28,7 @@ pub(crate) struct Slot<const D: usize> {
 }
 
 /// The partition of a step's contacts. Rows of an island are in the order they were given in.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Islands<const D: usize> {
     pub islands: Vec<Island>,
     pub rows: Vec<Row<D>>,
@@ -45,26 +46,8 @@ pub(crate) struct Islands<const D: usize> {
     slot_of: Vec<u32>,
 }
 
-impl<const D: usize> Default for Islands<D> {
-    fn default() -> Self {
-        Self {
-            islands: Vec::new(),
-            rows: Vec::new(),
-            ends: Vec::new(),
-            slots: Vec::new(),
-            weights: Vec::new(),
-            parents: Vec::new(),
-            island_of: Vec::new(),
-            starts: Vec::new(),
-            labels: Vec::new(),
-            order: Vec::new(),
-            slot_of: Vec::new(),
-        }
-    }
-}
-
-/// What islands need to know of the places.
-pub(crate) struct Places<'a, const D: usize> {
+/// Particles in the order of their places.
+pub(crate) struct SortedParticles<'a, const D: usize> {
     pub positions: &'a [Vector<D>],
     pub free: &'a [Vector<D>],
     /// `c` times the mobility: 0 for fixed particles, which join no islands.
@@ -76,7 +59,7 @@ impl<const D: usize> Islands<D> {
     pub(crate) fn part(
         &mut self,
         rows: &[Row<D>],
-        places: &Places<'_, D>,
+        places: &SortedParticles<'_, D>,
         as_one: bool,
         is_fresh: impl Fn(&Row<D>) -> bool,
     ) {
@@ -98,9 +81,9 @@ impl<const D: usize> Islands<D> {
         }
     }
 
-    /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each root. Returns how
-    /// many islands there are.
-    fn label(&mut self, rows: &[Row<D>], places: &Places<'_, D>, as_one: bool) -> usize {
+    /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each
+    /// root. Returns how many islands there are.
+    fn label(&mut self, rows: &[Row<D>], places: &SortedParticles<'_, D>, as_one: bool) -> usize {
         let count = places.positions.len();
         self.parents.clear();
         self.parents.extend(0..count as u32);
@@ -130,7 +113,7 @@ impl<const D: usize> Islands<D> {
     fn fill(
         &mut self,
         range: Range<usize>,
-        places: &Places<'_, D>,
+        places: &SortedParticles<'_, D>,
         as_one: bool,
         is_fresh: &impl Fn(&Row<D>) -> bool,
     ) {
@@ -149,8 +132,9 @@ impl<const D: usize> Islands<D> {
         self.islands.push(Island { rows: range, slots: first..self.slots.len(), is_fresh });
     }
 
-    /// Slot of a place in the island whose slots begin at `first`; a fixed particle has one in each of its islands.
-    fn slot(&mut self, place: u32, first: usize, places: &Places<'_, D>) -> u32 {
+    /// Slot of a place in the island whose slots begin at `first`; a fixed particle has one in each of its
+    /// islands.
+    fn slot(&mut self, place: u32, first: usize, places: &SortedParticles<'_, D>) -> u32 {
         if place == GROUND {
             return 0;
         }

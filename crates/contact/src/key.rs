@@ -3,23 +3,27 @@
 use std::fmt;
 
 use gluey_geom::Vector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactError, Domain};
+use crate::Domain;
 
 /// A contact of the particle `first` with another particle or a wall.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct PairKey {
     /// The particle; of two, the one with the smaller index.
     pub first: u32,
-    /// What it touches.
+    /// Its partner.
     pub second: Partner,
 }
 
-/// What a particle touches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+/// The partner of a particle in a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Partner {
-    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a period).
+    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a
+    /// period).
     Particle {
         /// Its index.
         index: u32,
@@ -55,8 +59,8 @@ impl PairKey {
         }
     }
 
-    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the wall; `None`
-    /// if one of them is not there.
+    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the
+    /// wall; `None` if one of them is not there.
     pub fn branch<const D: usize>(self, positions: &[Vector<D>], domain: &Domain<D>) -> Option<Vector<D>> {
         let x = positions.get(self.first as usize)?;
         match self.second {
@@ -67,20 +71,6 @@ impl PairKey {
                 let wall = domain.walls.get(wall as usize)?;
                 Some(wall.normal * -wall.distance(x))
             }
-        }
-    }
-
-    /// That there are such particles and such a wall.
-    pub(crate) fn check_known(self, count: usize, wall_count: usize) -> Result<(), ContactError> {
-        let (first, second) = self.particles();
-        if first.max(second.unwrap_or(0)) >= count {
-            return Err(ContactError::UnknownParticle { pair: self, count });
-        }
-        match self.second {
-            Partner::Wall(wall) if wall as usize >= wall_count => {
-                Err(ContactError::UnknownWall { pair: self, count: wall_count })
-            }
-            _ => Ok(()),
         }
     }
 }

@@ -19,7 +19,7 @@ impl<const D: usize> Lattice<D> {
         Self::within(lower, extent, width, most)
     }
 
-    /// A lattice with about a cell a point.
+    /// A lattice with about one cell per point.
     pub(crate) fn fine(points: &[Vector<D>]) -> Self {
         let (lower, extent) = bounds(points);
         Self::within(lower, extent, extent.amax() / points.len().max(1) as f64, points.len())
@@ -78,7 +78,8 @@ fn bounds<const D: usize>(points: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
     if points.is_empty() { (Vector::zeros(), Vector::zeros()) } else { (lower, upper - lower) }
 }
 
-/// Sorts `0..count` by `key` (smaller than `key_count`), stably: `starts[k]..starts[k + 1]` is the range of key `k`.
+/// Sorts `0..count` by `key` (smaller than `key_count`), stably: `starts[k]..starts[k + 1]` is the range of
+/// key `k`.
 pub(crate) fn sort_by_key(
     count: usize,
     key_count: usize,

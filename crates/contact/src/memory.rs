@@ -1,11 +1,13 @@
-//! What pairs remember from step to step.
+//! The memory of contacts, kept from step to step, and the rule that updates it.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactParams, Memory, PairKey, StepGeometry, Strategy};
+use crate::{ContactLaw, ContactParams, GammaUpdate, PairKey};
 
 /// One pair's memory.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct PairState {
     /// The two particles.
     pub pair: PairKey,
@@ -28,7 +30,8 @@ pub struct MemoryError {
 }
 
 /// The memory of a contact model: pairs with `gamma < 0` or a force, sorted.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactState {
     /// The pairs.
     pub pairs: Vec<PairState>,
@@ -43,7 +46,7 @@ impl ContactState {
         }
     }
 
-    /// The same sorted, without pairs that say nothing and without repetitions.
+    /// Sorts by pair, and drops repetitions and pairs without memory or force.
     ///
     /// # Errors
     /// If a gamma is positive, or a number is not finite.
@@ -59,21 +62,33 @@ impl ContactState {
     }
 }
 
-impl ContactParams {
-    /// Weights of this step's and the last step's force in the impulse of a step.
-    fn weights<const D: usize>(&self, step: &StepGeometry<'_, D>) -> (f64, f64) {
-        match self.memory {
-            Memory::Paper => (step.dt, 0.0),
-            Memory::Consistent => (step.rate, step.dt - step.rate),
-        }
+/// The update rule of gamma in a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GammaRule {
+    law: ContactLaw,
+    gamma_update: GammaUpdate,
+    gamma_min: f64,
+    /// Weights of this step's and the last step's force in the impulse of the step.
+    weights: [f64; 2],
+}
+
+impl GammaRule {
+    /// The rule for a step of length `dt` in which velocities have the weight `c`.
+    pub(crate) fn new(params: &ContactParams, velocity_weight: f64, dt: f64) -> Self {
+        let weights = match params.gamma_update {
+            GammaUpdate::Paper => [dt, 0.0],
+            GammaUpdate::Consistent => [velocity_weight, dt - velocity_weight],
+        };
+        let gamma_min = params.gamma_min.unwrap_or(f64::NEG_INFINITY);
+        Self { law: params.law, gamma_update: params.gamma_update, gamma_min, weights }
     }
 
     /// Smallest force a contact with the memory `gamma`, `last` admits: `-inf` keeps it closed.
-    pub(crate) fn floor<const D: usize>(&self, gamma: f64, last: f64, step: &StepGeometry<'_, D>) -> f64 {
-        match (self.strategy, self.memory) {
-            (Strategy::Gluey, Memory::Paper) if gamma < 0.0 => f64::NEG_INFINITY,
-            (Strategy::Gluey, Memory::Consistent) => {
-                let (now, before) = self.weights(step);
+    pub(crate) fn floor(&self, gamma: f64, last: f64) -> f64 {
+        match (self.law, self.gamma_update) {
+            (ContactLaw::Gluey, GammaUpdate::Paper) if gamma < 0.0 => f64::NEG_INFINITY,
+            (ContactLaw::Gluey, GammaUpdate::Consistent) => {
+                let [now, before] = self.weights;
                 (gamma - before * last) / now
             }
             _ => 0.0,
@@ -81,18 +96,12 @@ impl ContactParams {
     }
 
     /// Gamma after a step with the force `lambda` (Verdon et al. 2010, eq. 30).
-    pub(crate) fn update<const D: usize>(
-        &self,
-        gamma: f64,
-        last: f64,
-        lambda: f64,
-        step: &StepGeometry<'_, D>,
-    ) -> f64 {
-        if self.strategy != Strategy::Gluey {
+    pub(crate) fn update(&self, gamma: f64, last: f64, lambda: f64) -> f64 {
+        if self.law != ContactLaw::Gluey {
             return 0.0;
         }
-        let (now, before) = self.weights(step);
+        let [now, before] = self.weights;
         let gamma = gamma - now * lambda - before * last;
-        gamma.max(self.gamma_min.unwrap_or(f64::NEG_INFINITY)).min(0.0)
+        gamma.max(self.gamma_min).min(0.0)
     }
 }

@@ -1,13 +1,14 @@
-//! What contact forces do to velocities: `u - u* = M^-1 f`.
+//! The mobility, by which contact forces change velocities: `u - u* = M^-1 f`.
 
 use gluey_geom::Vector;
 
 /// A symmetric positive semidefinite mobility `M^-1`, the metric of the projection.
 ///
-/// Forces are in units of `6 pi eta` (length^2/time), so that a lone sphere has `M = a`. Fixed bodies have the mobility 0.
+/// Forces are in units of `6 pi eta` (length^2/time), so that a lone sphere has `M = a`. Fixed bodies have
+/// the mobility 0.
 pub trait Mobility<const D: usize>: Sync {
-    /// Whether a force on one particle moves others: then [`Mobility::apply`] must be written, and contacts are solved for
-    /// all at once.
+    /// Whether a force on one particle moves others: then [`Mobility::apply`] must be written, and contacts
+    /// are solved for all at once.
     const COUPLED: bool = false;
 
     /// Velocity that a unit force on a particle gives to itself; unit: 1/length.
@@ -31,8 +32,8 @@ impl<const D: usize> Mobility<D> for StokesDrag {
     }
 }
 
-/// Some particles move only as they are told, the others feel their own Stokes drag: contact does not change the
-/// velocities of fixed particles.
+/// Some particles move only as they are told, the others feel their own Stokes drag: contact does not change
+/// the velocities of fixed particles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WithFixed {
     fixed: Vec<bool>,

@@ -1,11 +1,12 @@
-//! What a contact model sees of a step, does to it and tells about it.
+//! The interface of contact models: the step they correct, and the report on it.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Pose, Space, Twist, Vector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
 
-/// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry a particle.
+/// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
 pub struct StepGeometry<'a, const D: usize> {
     /// Centres at the beginning of the step.
@@ -15,20 +16,39 @@ pub struct StepGeometry<'a, const D: usize> {
     /// Displacement known before the velocity (the history of a multi-step scheme).
     pub drift: &'a [Vector<D>],
     /// `c`: the displacement a unit velocity makes.
-    pub rate: f64,
+    pub velocity_weight: f64,
     /// Length of the step. `dt - c` is the weight of the last step's velocities in the drift.
     pub dt: f64,
 }
 
-/// Corrects predicted velocities so that particles do not overlap.
+/// The step `x^{n+1} = x^n + c u^n + drift` of bodies that also turn, by the vector `c w^n + drift`. One
+/// entry per body.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyStep<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Centres and orientations at the beginning of the step.
+    pub poses: &'a [Pose<D>],
+    /// Radii of round bodies; not used by models that know the bodies' shapes.
+    pub radii: &'a [f64],
+    /// Displacement and rotation known before the velocity (the history of a multi-step scheme).
+    pub drift: &'a [Twist<D>],
+    /// `c`: the displacement a unit velocity makes.
+    pub velocity_weight: f64,
+    /// Length of the step. `dt - c` is the weight of the last step's velocities in the drift.
+    pub dt: f64,
+}
+
+/// Corrects predicted velocities so that bodies do not overlap.
 pub trait ContactModel<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     /// Corrects `twists`; on an error they and the memory are as before.
-    fn correct(
+    fn correct_bodies(
         &mut self,
-        step: &StepGeometry<'_, D>,
+        step: &BodyStep<'_, D>,
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError>;
 
@@ -46,7 +66,8 @@ where
 }
 
 /// A contact at the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Contact {
     /// The two particles.
     pub pair: PairKey,
@@ -59,7 +80,8 @@ pub struct Contact {
 }
 
 /// The pair with the smallest gap.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct WorstPair {
     /// The two particles.
     pub pair: PairKey,
@@ -68,10 +90,11 @@ pub struct WorstPair {
 }
 
 /// Effort and outcome of one correction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactReport {
-    /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the velocity
-    /// correction).
+    /// Iterations of the projection over all linearisations, of the island that took most (sweeps of the
+    /// velocity correction).
     pub iterations: usize,
     /// Linearisations of the island that took most.
     pub passes: usize,
@@ -85,6 +108,17 @@ pub struct ContactReport {
     pub worst: Option<WorstPair>,
 }
 
+impl ContactReport {
+    /// Counts a pair that took part.
+    pub(crate) fn count_pair(&mut self, gap: f64, force: f64, pair: impl FnOnce() -> PairKey) {
+        self.pair_count += 1;
+        self.active_count += usize::from(force != 0.0);
+        if self.worst.is_none_or(|worst| gap < worst.gap) {
+            self.worst = Some(WorstPair { pair: pair(), gap });
+        }
+    }
+}
+
 /// Checks everything a step depends on.
 pub(crate) fn validate<const D: usize>(
     step: &StepGeometry<'_, D>,
@@ -95,7 +129,7 @@ where
     Dim<D>: Space<D>,
 {
     let count = step.positions.len();
-    validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.rate, step.dt)?;
+    validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.velocity_weight, step.dt)?;
     for particle in 0..count {
         let radius = step.radii[particle];
         if !is_positive(radius) {
@@ -111,11 +145,12 @@ where
             }
         }
     }
-    validate_domain(step, domain)
+    validate_walls(&domain.walls)?;
+    validate_periods(step, domain)
 }
 
 /// Checks how many positions, radii (or shapes), drifts and velocities there are, and the step in time.
-pub(crate) fn validate_sizes(lengths: [usize; 4], rate: f64, dt: f64) -> Result<(), ContactError> {
+pub(crate) fn validate_sizes(lengths: [usize; 4], velocity_weight: f64, dt: f64) -> Result<(), ContactError> {
     let [positions, radii, drifts, twists] = lengths;
     if lengths != [positions; 4] {
         return Err(ContactError::LengthMismatch { positions, radii, drifts, twists });
@@ -123,8 +158,8 @@ pub(crate) fn validate_sizes(lengths: [usize; 4], rate: f64, dt: f64) -> Result<
     if positions >= u32::MAX as usize {
         return Err(ContactError::TooManyParticles { count: positions });
     }
-    if !(is_positive(rate) && is_positive(dt)) {
-        return Err(ContactError::BadStep { rate, dt });
+    if !(is_positive(velocity_weight) && is_positive(dt)) {
+        return Err(ContactError::BadStep { velocity_weight, dt });
     }
     Ok(())
 }
@@ -137,16 +172,20 @@ pub(crate) fn is_positive(x: f64) -> bool {
 /// Positions may be so many periods away from the origin: images are counted in `i32`.
 const FARTHEST_PERIOD: f64 = 1e8;
 
-fn validate_domain<const D: usize>(
-    step: &StepGeometry<'_, D>,
-    domain: &Domain<D>,
-) -> Result<(), ContactError> {
-    for (wall, Wall { normal, offset, speed }) in domain.walls.iter().enumerate() {
+fn validate_walls<const D: usize>(walls: &[Wall<D>]) -> Result<(), ContactError> {
+    for (wall, Wall { normal, offset, speed }) in walls.iter().enumerate() {
         let is_unit = (normal.norm() - 1.0).abs() <= 1e-12;
         if !(is_unit && offset.is_finite() && speed.is_finite()) {
             return Err(ContactError::BadWall { wall });
         }
     }
+    Ok(())
+}
+
+fn validate_periods<const D: usize>(
+    step: &StepGeometry<'_, D>,
+    domain: &Domain<D>,
+) -> Result<(), ContactError> {
     for (direction, period) in (0..D).filter_map(|d| domain.periods[d].map(|period| (d, period))) {
         let farthest = step.positions.iter().map(|x| x[direction].abs()).fold(0.0, f64::max);
         if !(period > 0.0 && period.is_finite() && farthest < FARTHEST_PERIOD * period) {

@@ -1,4 +1,4 @@
-//! What the contact network tells: stress, coordination, clusters, and the contacts as a table.
+//! Statistics of the contact network: stress, coordination, clusters, and the contacts as a table.
 
 mod clusters;
 
@@ -12,8 +12,8 @@ use crate::{Contact, ContactError, Domain, Partner};
 
 /// The contacts of one instant, with what they join.
 ///
-/// Forces of a step act along the normals of its beginning: [`ContactNetwork::stress`] is exact with the positions the
-/// step was given, and off by `O(dt)` with those after it.
+/// Forces of a step act along the normals of its beginning: [`ContactNetwork::stress`] is exact with the
+/// positions the step was given, and off by `O(dt)` with those after it.
 ///
 /// ```
 /// use gluey_contact::{Contact, ContactNetwork, Domain, PairKey};
@@ -38,10 +38,11 @@ pub struct ContactNetwork<'a, const D: usize> {
     domain: &'a Domain<D>,
 }
 
-/// Where a contact is.
+/// Position and direction of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactArm<const D: usize> {
-    /// From the centre of the first particle to that of its partner (of its image), or to the foot point on the wall.
+    /// From the centre of the first particle to that of its partner (of its image), or to the foot point on
+    /// the wall.
     pub branch: Vector<D>,
     /// Unit vector along it: the force on the first particle is `-lambda normal`.
     pub normal: Vector<D>,
@@ -49,15 +50,15 @@ pub struct ContactArm<const D: usize> {
     pub point: Vector<D>,
 }
 
-/// Contacts a particle.
+/// Numbers of contacts per particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coordination {
     /// Contacts of a particle on average; those between two particles count for both.
     pub mean: f64,
     /// The same among those that are no rattlers. 0 if all are.
     pub mean_of_backbone: f64,
-    /// Particles that contacts cannot hold: fewer than `D + 1` of them with walls or particles that are themselves no
-    /// rattlers (O'Hern et al. 2003, DOI 10.1103/PhysRevE.68.011306).
+    /// Particles that contacts cannot hold: fewer than `D + 1` of them with walls or particles that are
+    /// themselves no rattlers (O'Hern et al. 2003, DOI 10.1103/PhysRevE.68.011306).
     pub rattler_count: usize,
 }
 
@@ -70,7 +71,9 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         domain: &'a Domain<D>,
     ) -> Result<Self, ContactError> {
         let count = positions.len().min(radii.len());
-        contacts.iter().try_for_each(|contact| contact.pair.check_known(count, domain.walls.len()))?;
+        contacts
+            .iter()
+            .try_for_each(|contact| ContactError::unless_known(contact.pair, count, domain.walls.len()))?;
         Ok(Self { contacts, positions, radii, domain })
     }
 
@@ -99,10 +102,11 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
     ///
     /// `sigma = -(1/V) sum over contacts of lambda n (x) r`,
     ///
-    /// with `n`, `r` the normal and the branch vector of [`ContactArm`] (Love 1927, note B; Christoffersen, Mehrabadi and
-    /// Nemat-Nasser 1981, DOI 10.1115/1.3157619). Tension is positive, so that particles pressed together have a negative
-    /// trace; unit: that of lambda times length over volume, to be multiplied by `6 pi eta`. A wall counts with the arm from
-    /// the centre to the wall. Symmetric, since contact forces are central.
+    /// with `n`, `r` the normal and the branch vector of [`ContactArm`] (Love 1927, note B; Christoffersen,
+    /// Mehrabadi and Nemat-Nasser 1981, DOI 10.1115/1.3157619). Tension is positive, so that particles
+    /// pressed together have a negative trace; unit: that of lambda times length over volume, to be
+    /// multiplied by `6 pi eta`. A wall counts with the arm from the centre to the wall. Symmetric, since
+    /// contact forces are central.
     pub fn stress(&self, volume: f64) -> Matrix<D> {
         let mut sum = Matrix::zeros();
         for contact in self.contacts {
@@ -144,15 +148,17 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         }
     }
 
-    /// The connected components: particles that touch each other directly or by way of others. Walls join nothing.
+    /// The connected components: particles that touch each other directly or by way of others. Walls join
+    /// nothing.
     pub fn clusters(&self) -> Clusters<D> {
         Clusters::of(self.contacts, self.positions.len())
     }
 
-    /// Writes a table, one row a contact, as comma-separated values with a header:
+    /// Writes a table, one row per contact, as comma-separated values with a header:
     ///
-    /// `first` (number of the particle, from 1), `partner` (`particle` or `wall`), `second` (its number, from 1), `image_x`, ..., `lambda`, `gamma`, `gap`,
-    /// `normal_x`, ..., `point_x`, .... Numbers are written so that they are read back exactly.
+    /// `first` (number of the particle, from 1), `partner` (`particle` or `wall`), `second` (its number, from
+    /// 1), `image_x`, ..., `lambda`, `gamma`, `gap`, `normal_x`, ..., `point_x`, .... Numbers are written so
+    /// that they are read back exactly.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let axes = &["x", "y", "z"][..D];
         let columns = |name: &str| -> String { axes.iter().map(|axis| format!(",{name}_{axis}")).collect() };

@@ -1,33 +1,35 @@
-//! Contact laws by name, and what tunes them.
+//! Contact laws and their parameters.
 
 use std::{fmt, str::FromStr};
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::solver::{Accelerated, ActiveSet, Auto, ProjectionSolver, Uzawa};
 
-/// What happens when particles would overlap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Strategy {
+/// The contact law: the response of particles that would overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+pub enum ContactLaw {
     /// Nothing: particles may overlap.
     None,
-    /// After the move, each pair closer than a threshold gap is pushed apart along its normal, pair after pair; the
-    /// push enters as a correction of the velocities. Neither a projection nor reversible.
+    /// After the move, each pair closer than a threshold gap is pushed apart along its normal, pair after
+    /// pair; the push enters as a correction of the velocities. Neither a projection nor reversible.
     VelocityCorrection,
     /// Projection on the velocities that do not overlap; `gamma = 0` always, contacts never pull.
     Inelastic,
-    /// The gluey model (Maury 2007; Lefebvre 2009): projection, with contacts that stay closed until what pushed them
-    /// together has been pulled out again.
+    /// The gluey model (Maury 2007; Lefebvre 2009): projection, with contacts that stay closed until what
+    /// pushed them together has been pulled out again.
     Gluey,
 }
 
-impl Strategy {
-    /// All strategies.
+impl ContactLaw {
+    /// All contact laws.
     pub const ALL: [Self; 4] = [Self::None, Self::VelocityCorrection, Self::Inelastic, Self::Gluey];
 }
 
-impl fmt::Display for Strategy {
+impl fmt::Display for ContactLaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::None => "none",
@@ -38,45 +40,50 @@ impl fmt::Display for Strategy {
     }
 }
 
-/// A name that is none of ours.
+/// A name of no contact law.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown contact strategy `{name}`: expected `none`, `velocity-correction`, `inelastic` or `gluey`")]
-pub struct UnknownStrategy {
-    /// What was asked for.
+#[error("unknown contact law `{name}`: expected `none`, `velocity-correction`, `inelastic` or `gluey`")]
+pub struct UnknownLaw {
+    /// The name as it was given.
     pub name: String,
 }
 
-impl FromStr for Strategy {
-    type Err = UnknownStrategy;
+impl FromStr for ContactLaw {
+    type Err = UnknownLaw;
 
-    fn from_str(name: &str) -> Result<Self, UnknownStrategy> {
+    fn from_str(name: &str) -> Result<Self, UnknownLaw> {
         Self::ALL
             .into_iter()
-            .find(|strategy| strategy.to_string() == name)
-            .ok_or_else(|| UnknownStrategy { name: name.to_owned() })
+            .find(|law| law.to_string() == name)
+            .ok_or_else(|| UnknownLaw { name: name.to_owned() })
     }
 }
 
-/// How gamma follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and how a contact lets go.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Memory {
-    /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays closed
-    /// for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with as many contacts as
-    /// degrees of freedom, the closed pairs may contradict each other; that ends with an error.
+/// The update rule of gamma: how it follows `d gamma / dt = -lambda` (Verdon et al. 2010, eq. 25), and when a
+/// contact opens.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+pub enum GammaUpdate {
+    /// The paper's (eq. 30): `gamma <- min(0, gamma - dt lambda)`; the gap of a pair with `gamma < 0` stays
+    /// closed for the whole step. First order: a contact ends at the end of a step. In jammed clusters, with
+    /// as many contacts as degrees of freedom, the closed pairs may be infeasible; that ends with an error.
     #[default]
     Paper,
     /// By the scheme that moves the particles, `gamma <- gamma - c lambda^n - (dt - c) lambda^{n-1}`, with
-    /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step. Second order
-    /// for Adams-Bashforth 2, and never contradictory: the pull of a contact is bounded by its memory.
+    /// `0 <= gap`, `gamma <= 0` and `gap * gamma = 0` at the end of the step: a contact ends within the step.
+    /// Second order for Adams-Bashforth 2, and never infeasible: the pull of a contact is bounded by its
+    /// memory.
     Consistent,
 }
 
 /// Which method solves the projection; all give the same velocities.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SolverKind {
-    /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where that is slow.
+    /// A closed form for one contact, Uzawa's method for two, the active set for more, and what helps where
+    /// that is slow.
     #[default]
     Auto,
     /// Uzawa's (Verdon et al. 2010, eq. 29). A pair takes one iteration, a chain of n contacts some `30 n^2`.
@@ -110,11 +117,11 @@ impl fmt::Display for SolverKind {
     }
 }
 
-/// A name of a solver that is none of ours.
+/// A name of no solver.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown contact solver `{name}`: expected `auto`, `uzawa`, `accelerated` or `active-set`")]
 pub struct UnknownSolver {
-    /// What was asked for.
+    /// The name as it was given.
     pub name: String,
 }
 
@@ -130,24 +137,26 @@ impl FromStr for SolverKind {
 }
 
 /// Tuning of [`crate::PairContact`]. The defaults are the gluey law with the paper's first-order gap.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ContactParams {
-    /// The law.
-    pub strategy: Strategy,
-    /// Whether the constraint is re-linearised until the gap at the *end* of the step is exact to round-off. Without it
-    /// a closed pair that turns by `phi` in a step opens by `(a_i + a_j) phi^2 / 2`.
+    /// The contact law.
+    pub law: ContactLaw,
+    /// Whether the constraint is re-linearised until the gap at the *end* of the step is exact to round-off.
+    /// Without it a closed pair that turns by `phi` in a step opens by `(a_i + a_j) phi^2 / 2`.
     pub exact_gap: bool,
-    /// How gamma is integrated.
-    pub memory: Memory,
-    /// Floor of gamma (< 0; unit: length^2), for rough particles: however long they were pressed together, they
-    /// separate after this impulse. In lubrication theory `gamma = a^2 ln(gap)` up to a constant, `a = a_i a_j/(a_i+a_j)`.
+    /// The update rule of gamma.
+    pub gamma_update: GammaUpdate,
+    /// Floor of gamma (< 0; unit: length^2), for rough particles: however long they were pressed together,
+    /// they separate after this impulse. In lubrication theory `gamma = a^2 ln(gap)` up to a constant,
+    /// `a = a_i a_j/(a_i+a_j)`.
     pub gamma_min: Option<f64>,
-    /// Gap kept by [`Strategy::VelocityCorrection`], relative to the mean radius of the pair.
+    /// Gap kept by [`ContactLaw::VelocityCorrection`], relative to the mean radius of the pair.
     pub threshold: f64,
     /// Solver of the projection.
     pub solver: SolverKind,
-    /// Residual `max |min(gap, ||A|| (lambda - floor))|` at which the projection has converged, relative to the larger
-    /// of the smallest radius and the largest displacement of the step.
+    /// Residual `max |min(gap, ||A|| (lambda - floor))|` at which the projection has converged, relative to
+    /// the larger of the smallest radius and the largest displacement of the step.
     pub tolerance: f64,
     /// Most iterations of one solve.
     pub iteration_limit: usize,
@@ -158,9 +167,9 @@ pub struct ContactParams {
 impl Default for ContactParams {
     fn default() -> Self {
         Self {
-            strategy: Strategy::Gluey,
+            law: ContactLaw::Gluey,
             exact_gap: false,
-            memory: Memory::Paper,
+            gamma_update: GammaUpdate::Paper,
             gamma_min: None,
             threshold: 1e-4,
             solver: SolverKind::Auto,
@@ -172,9 +181,9 @@ impl Default for ContactParams {
 }
 
 impl ContactParams {
-    /// The residual that is asked for, a length: the relative tolerance times a length of the step, but never below what
-    /// positions can resolve. For bodies of at least this `radius` that move by `farthest` at most, no farther than `extent`
-    /// from the origin.
+    /// The residual that is asked for, a length: the relative tolerance times a length of the step, but never
+    /// below what positions can resolve. For bodies of at least this `radius` that move by `farthest` at
+    /// most, no farther than `extent` from the origin.
     pub(crate) fn residual(&self, radius: f64, farthest: f64, extent: f64) -> f64 {
         (self.tolerance * radius.max(farthest)).max(8.0 * f64::EPSILON * (extent + farthest))
     }

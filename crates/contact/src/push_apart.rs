@@ -1,8 +1,9 @@
 //! The older velocity correction: push near pairs apart after the move, one after the other.
 //!
-//! Verdon et al. (2010, section 2.4) mention it as what the gluey model replaces: each pair whose gap after the move is
-//! below a threshold is moved apart along its normal to the threshold, a particle of radius `a` by a share `1/a`; sweeps
-//! over the pairs are repeated until no pair is too near. Divided by the rate the moves are corrections of velocity.
+//! Verdon et al. (2010, section 2.4) mention it as what the gluey model replaces: each pair whose gap after
+//! the move is below a threshold is moved apart along its normal to the threshold, a particle of radius `a`
+//! by a share `1/a`; sweeps over the pairs are repeated until no pair is too near. Divided by the rate the
+//! moves are corrections of velocity.
 
 use gluey_geom::Vector;
 

@@ -2,16 +2,17 @@
 
 use gluey_geom::Vector;
 
-use crate::graph::{Graph, Link};
-use crate::{ContactError, Domain, StepGeometry};
+use crate::neighbours::{Candidate, NeighbourList};
+use crate::{ContactError, Domain, StepGeometry, Wall};
 
 /// Stands for the tail of a contact with a wall.
 pub(crate) const GROUND: u32 = u32::MAX;
 
-/// A contact that takes part in a step. The normal points from `tail` to `head`, which are in the order of space.
+/// A contact that takes part in a step. The normal points from `tail` to `head`, which are in the order of
+/// space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<const D: usize> {
-    pub link: u32,
+    pub candidate: u32,
     /// Place of the tail, or [`GROUND`].
     pub tail: u32,
     /// Place of the head.
@@ -19,7 +20,8 @@ pub(crate) struct Row<const D: usize> {
     /// Displacement of the head's image.
     pub shift: Vector<D>,
     pub normal: Vector<D>,
-    /// What to subtract from the distance: the sum of the radii; for a wall, its offset at the end of the step and a radius.
+    /// Distance at contact: the sum of the radii; for a wall, its offset at the end of the
+    /// step and a radius.
     pub rest: f64,
     /// Whether the distance is measured along the normal (a wall) or is that of the centres.
     pub is_flat: bool,
@@ -31,40 +33,29 @@ pub(crate) struct Row<const D: usize> {
 const COINCIDENT: f64 = 1e-12;
 
 impl<const D: usize> Row<D> {
-    /// The row of a link.
+    /// The row of a candidate.
     pub(crate) fn new(
-        link: usize,
-        graph: &Graph<D>,
+        candidate: usize,
+        neighbours: &NeighbourList<D>,
         domain: &Domain<D>,
         step: &StepGeometry<'_, D>,
     ) -> Result<Self, ContactError> {
-        let Link { tail, head, image } = graph.links[link];
-        if let Some(number) = graph.wall(&graph.links[link]) {
-            let wall = &domain.walls[number];
-            let rest = wall.offset + wall.speed * step.dt + graph.radii[head as usize];
-            let row = Self {
-                link: link as u32,
-                tail: GROUND,
-                head,
-                shift: Vector::zeros(),
-                normal: wall.normal,
-                rest,
-                is_flat: true,
-                rank: (tail, graph.ranks[head as usize], [0; 3]),
-            };
-            return Ok(row);
+        let Candidate { tail, head, image } = neighbours.candidates[candidate];
+        if let Some(wall) = neighbours.wall(&neighbours.candidates[candidate]) {
+            return Ok(Self::with_wall(candidate, neighbours, &domain.walls[wall], step.dt));
         }
-        let ranks = [tail, head].map(|place| graph.ranks[place as usize]);
+        let ranks = [tail, head].map(|place| neighbours.ranks[place as usize]);
         let (tail, head, image) =
             if ranks[0] < ranks[1] { (tail, head, image) } else { (head, tail, image.map(|n| -n)) };
         let shift = domain.shift(&image);
-        let separation = graph.positions[head as usize] + shift - graph.positions[tail as usize];
-        let (distance, rest) = (separation.norm(), graph.radii[tail as usize] + graph.radii[head as usize]);
+        let separation = neighbours.positions[head as usize] + shift - neighbours.positions[tail as usize];
+        let (distance, rest) =
+            (separation.norm(), neighbours.radii[tail as usize] + neighbours.radii[head as usize]);
         if distance <= COINCIDENT * rest {
-            return Err(ContactError::Coincident { pair: graph.key(&graph.links[link]) });
+            return Err(ContactError::Coincident { pair: neighbours.key(&neighbours.candidates[candidate]) });
         }
         Ok(Self {
-            link: link as u32,
+            candidate: candidate as u32,
             tail,
             head,
             shift,
@@ -73,6 +64,20 @@ impl<const D: usize> Row<D> {
             is_flat: false,
             rank: (ranks[0].min(ranks[1]), ranks[0].max(ranks[1]), image),
         })
+    }
+
+    fn with_wall(candidate: usize, neighbours: &NeighbourList<D>, wall: &Wall<D>, dt: f64) -> Self {
+        let Candidate { tail, head, .. } = neighbours.candidates[candidate];
+        Self {
+            candidate: candidate as u32,
+            tail: GROUND,
+            head,
+            shift: Vector::zeros(),
+            normal: wall.normal,
+            rest: wall.offset + wall.speed * dt + neighbours.radii[head as usize],
+            is_flat: true,
+            rank: (tail, neighbours.ranks[head as usize], [0; 3]),
+        }
     }
 
     /// Vector between the centres (from the origin, for a wall) when places have moved by `displacements`.
@@ -94,25 +99,26 @@ impl<const D: usize> Row<D> {
     }
 }
 
-/// Whether a link's linearised gap after `displacements` (by place) is below `margin` times its summed radii, or has no direction.
+/// Whether a candidate's linearised gap after `displacements` (by place) is below `margin` times its summed
+/// radii, or has no direction.
 pub(crate) fn closes<const D: usize>(
-    link: &Link,
-    graph: &Graph<D>,
+    candidate: &Candidate,
+    neighbours: &NeighbourList<D>,
     domain: &Domain<D>,
     dt: f64,
     displacements: &[Vector<D>],
     margin: f64,
 ) -> bool {
-    let head = link.head as usize;
-    if let Some(number) = graph.wall(link) {
+    let head = candidate.head as usize;
+    if let Some(number) = neighbours.wall(candidate) {
         let wall = &domain.walls[number];
-        let end = graph.positions[head] + displacements[head];
-        return wall.distance(&end) - wall.speed * dt < (1.0 + margin) * graph.radii[head];
+        let end = neighbours.positions[head] + displacements[head];
+        return wall.distance(&end) - wall.speed * dt < (1.0 + margin) * neighbours.radii[head];
     }
-    let tail = link.tail as usize;
-    let separation = graph.positions[head] + domain.shift(&link.image) - graph.positions[tail];
+    let tail = candidate.tail as usize;
+    let separation = neighbours.positions[head] + domain.shift(&candidate.image) - neighbours.positions[tail];
     let approach = displacements[head] - displacements[tail];
-    let (square, rest) = (separation.norm_squared(), graph.radii[tail] + graph.radii[head]);
+    let (square, rest) = (separation.norm_squared(), neighbours.radii[tail] + neighbours.radii[head]);
     if square <= (COINCIDENT * rest).powi(2) {
         return true;
     }

@@ -1,8 +1,8 @@
-//! What a contact step refuses, and that it says which particles it means.
+//! Errors of a contact step, and that they say which particles they mean.
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState, Quantity,
-    SolverKind, StepGeometry, Strategy,
+    ContactError, ContactLaw, ContactModel, ContactParams, ContactState, PairContact, PairKey, PairState,
+    Quantity, SolverKind, StepGeometry,
 };
 use gluey_geom::{Twist, Vector};
 
@@ -42,7 +42,7 @@ fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
         positions: &input.positions,
         radii: &input.radii,
         drift: &input.drift,
-        rate: input.rate,
+        velocity_weight: input.rate,
         dt: 0.1,
     };
     let error = contact.correct(&step, &mut twists).expect_err("must be refused");
@@ -54,10 +54,10 @@ fn refuse(change: impl FnOnce(&mut Input)) -> ContactError {
 #[test]
 fn particles_are_named() {
     let nan = Vector::<2>::new(0.0, f64::NAN);
-    for strategy in Strategy::ALL {
+    for law in ContactLaw::ALL {
         let refuse = |change: fn(&mut Input)| {
             refuse(|input| {
-                input.params.strategy = strategy;
+                input.params.law = law;
                 change(input);
             })
         };
@@ -103,13 +103,13 @@ fn messages_count_from_one() {
 
 #[test]
 fn coincident_centres_are_named() {
-    for strategy in [Strategy::VelocityCorrection, Strategy::Inelastic, Strategy::Gluey] {
+    for law in [ContactLaw::VelocityCorrection, ContactLaw::Inelastic, ContactLaw::Gluey] {
         let error = refuse(|input| {
-            input.params.strategy = strategy;
+            input.params.law = law;
             input.positions[2] = input.positions[0];
             input.twists[2] = input.twists[0];
         });
-        assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{strategy}");
+        assert_eq!(error, ContactError::Coincident { pair: PairKey::new(0, 2) }, "{law}");
         assert_eq!(error.to_string(), "the centres of particles 1 and 3 coincide");
     }
 }
@@ -134,7 +134,7 @@ fn too_few_iterations_are_told_with_the_way_there() {
 }
 
 #[test]
-fn contradictory_contacts_end_with_an_error() {
+fn infeasible_contacts_end_with_an_error() {
     // The outer discs cannot be 2 away from the middle one and 2 from each other, all on a line.
     let pairs = [(0, 1), (1, 2), (0, 2)].map(|(i, j)| PairKey::new(i, j));
     for exact_gap in [false, true] {
@@ -146,7 +146,7 @@ fn contradictory_contacts_end_with_an_error() {
         });
         assert_eq!(
             error,
-            ContactError::Contradictory {
+            ContactError::Infeasible {
                 pairs: vec![PairKey::new(0, 1), PairKey::new(0, 2), PairKey::new(1, 2)]
             }
         );
@@ -184,18 +184,18 @@ fn memories_that_no_step_leaves_are_refused() {
 #[test]
 fn nothing_is_no_error() {
     let mut contact = PairContact::<3>::new(ContactParams::default());
-    let step = StepGeometry { positions: &[], radii: &[], drift: &[], rate: 0.1, dt: 0.1 };
+    let step = StepGeometry { positions: &[], radii: &[], drift: &[], velocity_weight: 0.1, dt: 0.1 };
     let report = contact.correct(&step, &mut []).expect("no particles, no contacts");
     assert_eq!(report.pair_count, 0);
     assert!(contact.contacts().is_empty());
 }
 
 #[test]
-fn strategies_and_solvers_have_names() {
-    for strategy in Strategy::ALL {
-        assert_eq!(strategy.to_string().parse(), Ok(strategy));
+fn contact_laws_and_solvers_have_names() {
+    for law in ContactLaw::ALL {
+        assert_eq!(law.to_string().parse(), Ok(law));
     }
-    assert!("sticky".parse::<Strategy>().is_err());
+    assert!("sticky".parse::<ContactLaw>().is_err());
     for (solver, name) in SolverKind::ALL.into_iter().zip(SolverKind::NAMES) {
         assert_eq!((solver.to_string().as_str(), name.parse()), (name, Ok(solver)));
     }

@@ -1,6 +1,8 @@
 //! A cloud of particles squeezed into a jammed cluster by `u = -x`, then pulled apart by `u = x`.
 
-use gluey_contact::{ContactModel, ContactParams, Memory, PairContact, SolverKind, StepGeometry, Strategy};
+use gluey_contact::{
+    ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, SolverKind, StepGeometry,
+};
 use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
 use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use rand::{RngExt, SeedableRng};
@@ -47,8 +49,9 @@ where
             flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
             integrator.drift(dt, &mut drift);
             let positions: Vec<_> = particles.iter().map(|particle| particle.pose.position).collect();
-            let rate = integrator.rate(dt);
-            let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate, dt };
+            let velocity_weight = integrator.velocity_weight(dt);
+            let step =
+                StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight, dt };
             contact.correct(&step, &mut twists).expect("feasible");
             integrator.advance(dt, &mut particles, &twists);
             outcome.contact_count = outcome.contact_count.max(contact.contacts().len());
@@ -71,21 +74,21 @@ fn check<const D: usize>(side: usize, push: f64, step_count: usize, miss: f64)
 where
     Dim<D>: Space<D>,
 {
-    let law = |strategy| ContactParams {
-        strategy,
+    let tuning = |law| ContactParams {
+        law,
         exact_gap: true,
-        memory: Memory::Consistent,
+        gamma_update: GammaUpdate::Consistent,
         solver: SolverKind::ActiveSet,
         tolerance: 1e-11,
         ..Default::default()
     };
-    let gluey = squeeze_and_release::<D>(side, push, step_count, law(Strategy::Gluey));
+    let gluey = squeeze_and_release::<D>(side, push, step_count, tuning(ContactLaw::Gluey));
     println!("{D}D: {} contacts", gluey.contact_count);
     assert!(2 * gluey.contact_count > side.pow(D as u32), "{} contacts", gluey.contact_count);
     assert!(gluey.smallest_gap >= -1e-10, "{:e}", gluey.smallest_gap);
     println!("{D}D: gluey misses by {:.2e}", gluey.miss);
     assert!(gluey.miss < miss, "{}", gluey.miss);
-    let inelastic = squeeze_and_release::<D>(side, push, step_count, law(Strategy::Inelastic));
+    let inelastic = squeeze_and_release::<D>(side, push, step_count, tuning(ContactLaw::Inelastic));
     assert!(inelastic.smallest_gap >= -1e-10, "{:e}", inelastic.smallest_gap);
     assert!(inelastic.miss > 100.0 * miss, "{}", inelastic.miss);
 }

@@ -1,4 +1,5 @@
-//! The examples run, on smaller cases, and their pictures show discs that do not overlap and the contacts between them.
+//! The examples run, on smaller cases, and their pictures show discs that do not overlap and the contacts
+//! between them.
 // Both examples draw with the same file.
 #![allow(clippy::duplicate_mod)]
 
@@ -53,8 +54,8 @@ fn shear_makes_contacts_across_the_border() {
 
 #[test]
 fn a_thousand_discs_begin_to_settle() {
-    // In the 14th step contact pushes discs farther than was searched; with the pairs that are found then, others farther.
-    // Searches must not take turns for ever.
+    // In the 14th step contact pushes discs farther than was searched; with the pairs that are found then,
+    // others farther. Searches must not take turns for ever.
     let svg = settle::settle(1000, 5.0).unwrap_or_else(|error| panic!("{error}"));
     check(&svg, 1000, 100);
 }

@@ -10,7 +10,8 @@ fn contact(pair: PairKey, lambda: f64) -> Contact {
     Contact { pair, lambda, gamma: -0.5 * lambda, gap: 0.0 }
 }
 
-/// A simple cubic crystal of `side^D` touching unit spheres in a periodic box, every contact pushing with `lambda`.
+/// A simple cubic crystal of `side^D` touching unit spheres in a periodic box, every contact pushing with
+/// `lambda`.
 fn crystal<const D: usize>(side: usize, lambda: f64) -> (Domain<D>, Vec<Vector<D>>, Vec<Contact>) {
     let length = 2.0 * side as f64;
     let domain = Domain::periodic(&Vector::<D>::repeat(length));
@@ -127,7 +128,8 @@ fn two_discs_and_walls() {
     let mut twists = [Twist::<2>::default(); 3];
     twists[..2].iter_mut().for_each(|twist| twist.velocity.y = -1.0);
     let drift = [Vector::zeros(); 3];
-    let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.1, dt: 0.1 };
+    let step =
+        StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: 0.1, dt: 0.1 };
     model.correct(&step, &mut twists).expect("a good step");
     let mut contacts = model.contacts().to_vec();
     contacts.push(contact(PairKey::wall(1, 1), 0.0));
@@ -197,7 +199,8 @@ fn contacts_of_nobody_are_refused() {
 
 #[test]
 fn contacts_name_the_image_of_particles_that_have_left_the_period() {
-    // The second disc is written two periods away; the pair is 2.1 apart, within the period and across its border.
+    // The second disc is written two periods away; the pair is 2.1 apart, within the period and across its
+    // border.
     let domain = Domain::default().with_period(0, 8.0);
     let (radii, drift) = ([1.0; 2], [Vector::zeros(); 2]);
     for (first, second, image) in [(1.0, 3.1 + 16.0, -2), (1.0, -1.1 - 16.0, 2), (7.9 - 8.0, 2.0, 0)] {
@@ -207,7 +210,13 @@ fn contacts_name_the_image_of_particles_that_have_left_the_period() {
             velocity: Vector::<2>::new(sign * towards.signum(), 0.0),
             ..Twist::default()
         });
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate: 0.1, dt: 0.1 };
+        let step = StepGeometry {
+            positions: &positions,
+            radii: &radii,
+            drift: &drift,
+            velocity_weight: 0.1,
+            dt: 0.1,
+        };
         let mut model = PairContact::new(ContactParams::default()).within(domain.clone());
         model.correct(&step, &mut twists).expect("a good step");
         let found = model.contacts().first().unwrap_or_else(|| panic!("no contact of {first} and {second}"));

@@ -1,13 +1,13 @@
-//! A sphere pressed on a plane and pulled off it: the gluey law in closed form (Maury 2007, DOI 10.1051/proc:071812;
-//! Lefebvre 2009, DOI 10.1051/m2an/2008042).
+//! A sphere pressed on a plane and pulled off it: the gluey law in closed form (Maury 2007, DOI
+//! 10.1051/proc:071812; Lefebvre 2009, DOI 10.1051/m2an/2008042).
 //!
-//! Predicted velocity `u* = -cos t` towards the plane, from the gap `h < 1`. Contact begins when `sin t1 = h`. In contact
-//! `d gamma / dt = -a cos t`, so that `gamma = -a (sin t - h)` comes back to 0 at `t2 = pi - t1`; afterwards the gap is
-//! again `h - sin t`. With a floor `gamma_min = -a m`, `m < 1 - h`, contact ends when `sin t = 1 - m`, and afterwards the
-//! gap is `1 - m - sin t`.
+//! Predicted velocity `u* = -cos t` towards the plane, from the gap `h < 1`. Contact begins when
+//! `sin t1 = h`. In contact `d gamma / dt = -a cos t`, so that `gamma = -a (sin t - h)` comes back to 0 at
+//! `t2 = pi - t1`; afterwards the gap is again `h - sin t`. With a floor `gamma_min = -a m`, `m < 1 - h`,
+//! contact ends when `sin t = 1 - m`, and afterwards the gap is `1 - m - sin t`.
 
 use gluey_contact::{
-    ContactModel, ContactParams, Domain, Memory, PairContact, PairKey, StepGeometry, Strategy, Wall,
+    ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, PairContact, PairKey, StepGeometry, Wall,
 };
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::{Integrator, Scheme};
@@ -49,7 +49,7 @@ where
             positions: &positions,
             radii: &[RADIUS],
             drift: &drift,
-            rate: integrator.rate(dt),
+            velocity_weight: integrator.velocity_weight(dt),
             dt,
         };
         contact.correct(&step, &mut twists).expect("a good step");
@@ -58,7 +58,8 @@ where
             assert_eq!(touch.pair, PairKey::wall(0, 0));
             assert!(touch.gamma <= 0.0 && touch.gap > -1e-14);
             begin = if begin.is_nan() { time } else { begin };
-            // A pair that was released may be pulled a little longer by the history of the scheme, its gap open.
+            // A pair that was released may be pulled a little longer by the history of the scheme, its gap
+            // open.
             end = if touch.gap < 1e-12 { time + dt } else { end };
         }
     }
@@ -80,12 +81,12 @@ where
         .collect();
     let steps: Vec<f64> = STEP_COUNTS.iter().map(|count| END / *count as f64).collect();
     let order = convergence_order(&steps, &table.iter().map(|row| row[2]).collect::<Vec<_>>());
-    println!("{:?} {scheme:?}, order of the last gap {order:.2}", params.memory);
+    println!("{:?} {scheme:?}, order of the last gap {order:.2}", params.gamma_update);
     for (dt, row) in steps.iter().zip(&table) {
         println!("  dt {dt:.4}: begins off by {:.1e}, ends {:.1e}, last gap {:.1e}", row[0], row[1], row[2]);
         assert!(row[0] <= 1.01 * dt, "begins {} steps off", row[0] / dt);
-        // To the end of a step; by Euler also a step for the sum that stands for the integral of `cos`, and one for the
-        // memory that is cut off at 0.
+        // To the end of a step; by Euler also a step for the sum that stands for the integral of `cos`, and
+        // one for the memory that is cut off at 0.
         let step_count = if scheme == Scheme::Euler { 4.0 } else { 2.0 };
         assert!(row[1] <= step_count * dt, "ends {} steps off", row[1] / dt);
     }
@@ -102,13 +103,13 @@ where
     let release = std::f64::consts::PI - (1.0 - floor).asin();
     let rough = Fall { begin, end: release, last_gap: 1.0 - floor - END.sin() };
     for (gamma_min, exact) in [(None, smooth), (Some(-RADIUS * floor), rough)] {
-        let law = |memory| ContactParams { memory, gamma_min, ..Default::default() };
-        let (_, order) = errors::<D>(&law(Memory::Paper), Scheme::Euler, &exact);
+        let tuning = |gamma_update| ContactParams { gamma_update, gamma_min, ..Default::default() };
+        let (_, order) = errors::<D>(&tuning(GammaUpdate::Paper), Scheme::Euler, &exact);
         assert!(order > 0.8, "first order, not {order}");
-        let (table, order) = errors::<D>(&law(Memory::Consistent), Scheme::AdamsBashforth2, &exact);
+        let (table, order) = errors::<D>(&tuning(GammaUpdate::Consistent), Scheme::AdamsBashforth2, &exact);
         assert!(order > 1.5 || table[3][2] < 1e-5, "second order, not {order}");
     }
-    let inelastic = ContactParams { strategy: Strategy::Inelastic, ..Default::default() };
+    let inelastic = ContactParams { law: ContactLaw::Inelastic, ..Default::default() };
     let exact = Fall { begin, end: std::f64::consts::FRAC_PI_2, last_gap: 1.0 - END.sin() };
     let (_, order) = errors::<D>(&inelastic, Scheme::Euler, &exact);
     assert!(order > 0.8, "first order, not {order}");

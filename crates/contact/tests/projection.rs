@@ -5,8 +5,8 @@ use clarabel::solver::{
     DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT,
 };
 use gluey_contact::{
-    ContactModel, ContactParams, ContactState, Mobility, PairContact, PairKey, PairState, SolverKind,
-    StepGeometry, StokesDrag, Strategy,
+    ContactLaw, ContactModel, ContactParams, ContactState, Mobility, PairContact, PairKey, PairState,
+    SolverKind, StepGeometry, StokesDrag,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
@@ -34,8 +34,8 @@ impl<const D: usize> Packing<D>
 where
     Dim<D>: Space<D>,
 {
-    /// A jittered square or cubic lattice of `side^D` particles; without jitter all neighbours touch exactly, and there
-    /// are more contacts than degrees of freedom can tell apart.
+    /// A jittered square or cubic lattice of `side^D` particles; without jitter all neighbours touch exactly,
+    /// and there are more contacts than degrees of freedom can tell apart.
     fn new(side: usize, jitter: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let count = side.pow(D as u32);
@@ -49,7 +49,7 @@ where
         let predicted =
             positions.iter().map(|x| spread(&mut random, 0.6) - (x - site(count - 1) * 0.5) * 0.5).collect();
         let drift = (0..count).map(|_| spread(&mut random, 0.02)).collect();
-        // Disjoint pairs, so that gluing them cannot be contradictory.
+        // Disjoint pairs, so that gluing them cannot be infeasible.
         let glued = (0..count).filter(|i| (i % side).is_multiple_of(2) && i % side + 1 < side && i % 3 == 0);
         let glued = glued.map(|i| PairKey::new(i, i + 1)).collect();
         Self { positions, radii, drift, predicted, glued }
@@ -68,7 +68,7 @@ where
             positions: &self.positions,
             radii: &self.radii,
             drift: &self.drift,
-            rate: RATE,
+            velocity_weight: RATE,
             dt: 0.1,
         }
     }
@@ -128,8 +128,8 @@ fn params(solver: SolverKind) -> ContactParams {
     ContactParams { solver, ..Default::default() }
 }
 
-/// Feasibility of all pairs (also those the search left out), stationarity, sign and complementarity: these characterise
-/// the solution of a strictly convex problem.
+/// Feasibility of all pairs (also those the search left out), stationarity, sign and complementarity: these
+/// characterise the solution of a strictly convex problem.
 fn assert_optimal<const D: usize>(packing: &Packing<D>, velocities: &[Vector<D>], contact: &PairContact<D>)
 where
     Dim<D>: Space<D>,
@@ -184,7 +184,8 @@ fn velocities_are_optimal() {
     check_optimality::<3>(3);
 }
 
-/// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods so long.
+/// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods
+/// so long.
 fn check_jammed<const D: usize>(side: usize)
 where
     Dim<D>: Space<D>,
@@ -212,7 +213,8 @@ fn jammed_clusters_are_solved_for() {
     check_jammed::<3>(5);
 }
 
-/// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs' constraints.
+/// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs'
+/// constraints.
 fn interior_point<const D: usize>(packing: &Packing<D>) -> Vec<f64>
 where
     Dim<D>: Space<D>,
@@ -282,8 +284,9 @@ where
     contact.contacts().len()
 }
 
-/// 100 packings of 2 to 12 (in 3D 2 to 5) particles a side; small ones now and then with triangular layers, which have more contacts
-/// than degrees of freedom, so that contacts depend on each other linearly; two of three have pairs that must stay closed.
+/// 100 packings of 2 to 12 (in 3D 2 to 5) particles a side; small ones now and then with triangular layers,
+/// which have more contacts than degrees of freedom, so that contacts depend on each other linearly; two of
+/// three have pairs that must stay closed.
 fn check_packings<const D: usize>(largest_side: u64)
 where
     Dim<D>: Space<D>,
@@ -350,7 +353,7 @@ fn one_pair_has_a_closed_form() {
     check_closed_form::<3>();
 }
 
-fn check_numbering<const D: usize>(side: usize, strategy: Strategy)
+fn check_numbering<const D: usize>(side: usize, law: ContactLaw)
 where
     Dim<D>: Space<D>,
 {
@@ -359,20 +362,20 @@ where
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(3));
     let shuffled = packing.shuffled(&order);
     for solver in SOLVERS {
-        let law = ContactParams { strategy, exact_gap: true, ..params(solver) };
-        let (straight, _) = packing.solve(law.clone());
-        let (other, _) = shuffled.solve(law);
+        let tuning = ContactParams { law, exact_gap: true, ..params(solver) };
+        let (straight, _) = packing.solve(tuning.clone());
+        let (other, _) = shuffled.solve(tuning);
         let back: Vec<_> = order.iter().map(|&i| straight[i]).collect();
         assert_ne!(straight, packing.predicted);
-        assert_eq!(back, other, "{strategy} {solver:?}");
+        assert_eq!(back, other, "{law} {solver:?}");
     }
 }
 
 #[test]
 fn numbering_changes_no_bit() {
-    for strategy in [Strategy::Gluey, Strategy::Inelastic, Strategy::VelocityCorrection] {
-        check_numbering::<2>(5, strategy);
-        check_numbering::<3>(3, strategy);
+    for law in [ContactLaw::Gluey, ContactLaw::Inelastic, ContactLaw::VelocityCorrection] {
+        check_numbering::<2>(5, law);
+        check_numbering::<3>(3, law);
     }
 }
 
@@ -380,17 +383,17 @@ fn check_exact_gaps<const D: usize>(side: usize)
 where
     Dim<D>: Space<D>,
 {
-    for strategy in [Strategy::Gluey, Strategy::Inelastic, Strategy::VelocityCorrection] {
+    for law in [ContactLaw::Gluey, ContactLaw::Inelastic, ContactLaw::VelocityCorrection] {
         for solver in SOLVERS {
             let packing = Packing::<D>::new(side, 0.01, 11);
-            let law = ContactParams { strategy, exact_gap: true, ..params(solver) };
-            let (velocities, _) = packing.solve(law);
+            let tuning = ContactParams { law, exact_gap: true, ..params(solver) };
+            let (velocities, _) = packing.solve(tuning);
             let end = |i: usize| packing.positions[i] + (velocities[i] * RATE + packing.drift[i]);
             for (pair, _, _, glued) in packing.rows() {
                 let (i, j) = ends(pair);
                 let gap = (end(j) - end(i)).norm() - packing.radii[i] - packing.radii[j];
-                assert!(gap > -1e-12, "{strategy} {pair:?}: {gap:e}");
-                assert!(!(glued && strategy == Strategy::Gluey) || gap < 1e-12, "{pair:?}: {gap:e}");
+                assert!(gap > -1e-12, "{law} {pair:?}: {gap:e}");
+                assert!(!(glued && law == ContactLaw::Gluey) || gap < 1e-12, "{pair:?}: {gap:e}");
             }
         }
     }

@@ -1,11 +1,13 @@
-//! Two particles pressed together at a constant speed, then pulled apart at the same speed: the gluey law in closed form.
+//! Two particles pressed together at a constant speed, then pulled apart at the same speed: the gluey law in
+//! closed form.
 //!
 //! Predicted speeds `-v` until `T`, then `+v` (each particle, along the line of centres). Contact begins at
-//! `t1 = D0 / 2v`, lasts as long in pull as in push, and ends at `2 T - t1`; afterwards `D = 2 v (t - 2T + t1)`. With a
-//! floor `gamma_min` it ends at `T + |gamma_min| / (a v)`, where that is earlier.
+//! `t1 = D0 / 2v`, lasts as long in pull as in push, and ends at `2 T - t1`; afterwards
+//! `D = 2 v (t - 2T + t1)`. With a floor `gamma_min` it ends at `T + |gamma_min| / (a v)`, where that is
+//! earlier.
 
 use gluey_contact::{
-    ContactModel, ContactParams, Memory, Mobility, PairContact, StepGeometry, StokesDrag, Strategy,
+    ContactLaw, ContactParams, GammaUpdate, Mobility, PairContact, StepGeometry, StokesDrag,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
 
@@ -34,7 +36,7 @@ where
             positions: &positions,
             radii: &[RADIUS; 2],
             drift: &[Vector::zeros(); 2],
-            rate: dt,
+            velocity_weight: dt,
             dt,
         };
         contact.correct(&step, &mut twists).expect("a good step");
@@ -45,8 +47,8 @@ where
     (positions[1] - positions[0]).norm() - 2.0 * RADIUS
 }
 
-fn law(memory: Memory) -> ContactParams {
-    ContactParams { memory, ..Default::default() }
+fn tuning(gamma_update: GammaUpdate) -> ContactParams {
+    ContactParams { gamma_update, ..Default::default() }
 }
 
 fn check<const D: usize>()
@@ -57,13 +59,13 @@ where
     let exact = 2.0 * SPEED * (END - 2.0 * TURN + begin);
     for step_count in [52, 104, 208] {
         let dt = END / step_count as f64;
-        let error = end_gap::<D, _>(law(Memory::Paper), StokesDrag, step_count) - exact;
+        let error = end_gap::<D, _>(tuning(GammaUpdate::Paper), StokesDrag, step_count) - exact;
         assert!(error.abs() <= 2.0 * SPEED * dt * 1.01, "{step_count} steps: {error}");
         // The impulse of a pair is exact in every step, so the end is exact whatever the step.
-        let error = end_gap::<D, _>(law(Memory::Consistent), StokesDrag, step_count) - exact;
+        let error = end_gap::<D, _>(tuning(GammaUpdate::Consistent), StokesDrag, step_count) - exact;
         assert!(error.abs() < 1e-12, "{step_count} steps: {error:e}");
     }
-    let inelastic = ContactParams { strategy: Strategy::Inelastic, ..Default::default() };
+    let inelastic = ContactParams { law: ContactLaw::Inelastic, ..Default::default() };
     let error = end_gap::<D, _>(inelastic, StokesDrag, 52) - 2.0 * SPEED * (END - TURN);
     assert!(error.abs() < 1e-12, "inelastic contact opens at once: {error:e}");
 }
@@ -79,11 +81,11 @@ fn a_floor_of_gamma_releases_earlier() {
     let pull = 0.25;
     let gamma_min = Some(-RADIUS * SPEED * pull);
     let exact = 2.0 * SPEED * (END - TURN - pull);
-    let rough = |memory| ContactParams { gamma_min, ..law(memory) };
-    let error = end_gap::<3, _>(rough(Memory::Consistent), StokesDrag, 52) - exact;
+    let rough = |gamma_update| ContactParams { gamma_min, ..tuning(gamma_update) };
+    let error = end_gap::<3, _>(rough(GammaUpdate::Consistent), StokesDrag, 52) - exact;
     assert!(error.abs() < 1e-12, "{error:e}");
     for step_count in [52, 104, 208] {
-        let error = end_gap::<3, _>(rough(Memory::Paper), StokesDrag, step_count) - exact;
+        let error = end_gap::<3, _>(rough(GammaUpdate::Paper), StokesDrag, step_count) - exact;
         assert!(error.abs() <= 2.02 * SPEED * END / step_count as f64, "{error}");
     }
 }
@@ -99,9 +101,9 @@ impl<const D: usize> Mobility<D> for Heavier {
 
 #[test]
 fn a_common_factor_of_the_mass_changes_nothing() {
-    for memory in [Memory::Paper, Memory::Consistent] {
-        let one = end_gap::<2, _>(law(memory), StokesDrag, 52);
-        let other = end_gap::<2, _>(law(memory), Heavier(37.0), 52);
-        assert!((one - other).abs() < 1e-12, "{memory:?}: {one} {other}");
+    for gamma_update in [GammaUpdate::Paper, GammaUpdate::Consistent] {
+        let one = end_gap::<2, _>(tuning(gamma_update), StokesDrag, 52);
+        let other = end_gap::<2, _>(tuning(gamma_update), Heavier(37.0), 52);
+        assert!((one - other).abs() < 1e-12, "{gamma_update:?}: {one} {other}");
     }
 }

@@ -1,7 +1,7 @@
 //! Walls, fixed bodies and periodic borders.
 
 use gluey_contact::{
-    ContactError, ContactModel, ContactParams, Domain, PairContact, PairKey, StepGeometry, Strategy, Wall,
+    ContactError, ContactLaw, ContactModel, ContactParams, Domain, PairContact, PairKey, StepGeometry, Wall,
     WithFixed,
 };
 use gluey_geom::{Aabb, Twist, Vector};
@@ -9,7 +9,7 @@ use gluey_geom::{Aabb, Twist, Vector};
 const RATE: f64 = 0.1;
 
 fn inelastic() -> ContactParams {
-    ContactParams { strategy: Strategy::Inelastic, ..Default::default() }
+    ContactParams { law: ContactLaw::Inelastic, ..Default::default() }
 }
 
 fn correct<M: gluey_contact::Mobility<2>>(
@@ -21,7 +21,7 @@ fn correct<M: gluey_contact::Mobility<2>>(
     let mut twists: Vec<Twist<2>> =
         velocities.iter().map(|&velocity| Twist { velocity, ..Twist::default() }).collect();
     let drift = vec![Vector::zeros(); radii.len()];
-    let step = StepGeometry { positions, radii, drift: &drift, rate: RATE, dt: RATE };
+    let step = StepGeometry { positions, radii, drift: &drift, velocity_weight: RATE, dt: RATE };
     contact.correct(&step, &mut twists)?;
     Ok(twists.iter().map(|twist| twist.velocity).collect())
 }
@@ -123,7 +123,7 @@ fn a_disc_between_walls_that_close_is_named() {
         let positions = [at(0.5, 9.0), at(1.05, 0.0)];
         let error = correct(&mut contact, &positions, &[0.1, 1.0], &[at(0.0, 0.0); 2]).expect_err("squeezed");
         let pairs = vec![PairKey::wall(1, 0), PairKey::wall(1, 1)];
-        assert_eq!(error, ContactError::Contradictory { pairs }, "{solver:?}");
+        assert_eq!(error, ContactError::Infeasible { pairs }, "{solver:?}");
         let text = "no velocities keep these contacts from overlapping: particle 2 and wall 1; particle 2 and wall 2";
         assert_eq!(error.to_string(), text);
     }

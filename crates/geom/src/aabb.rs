@@ -1,11 +1,13 @@
 //! Axis-aligned boxes.
 
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::Vector;
 
 /// An axis-aligned box `[lower, upper]`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Aabb<const D: usize> {
     /// Corner with the smallest coordinates.
     pub lower: Vector<D>,

@@ -1,7 +1,8 @@
 //! Vectors, rotations, poses and twists in `D` = 2 and 3 dimensions.
 //!
-//! What is the same in every dimension is written once for `D`; what is not (the number of rotations, the
-//! cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and `Dim<3>` only.
+//! Code that is the same in every dimension is written once for `D`; what is not (the number of rotations,
+//! the cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and
+//! `Dim<3>` only.
 //!
 //! ```
 //! use gluey_geom::{Twist, Vector, Spin};
@@ -16,10 +17,15 @@ mod space;
 
 pub use aabb::Aabb;
 pub use motion::{Particle, Pose, Twist};
-pub use space::{Dim, Rotation, Space, Spin};
+pub use space::{Dim, Rotation, Space, Spin, Stored};
 
 /// A point, displacement or velocity in `D` dimensions.
 pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
 
 /// A second-order tensor in `D` dimensions.
 pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,12 +1,16 @@
 //! Poses, twists and round particles.
 
+use std::ops::{Add, Mul, Neg, Sub};
+
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::{Dim, Rotation, Space, Spin, Vector};
 
 /// Position of the centre and orientation of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Pose<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -28,8 +32,9 @@ where
 }
 
 /// Rigid-body velocity: that of the centre and the spin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Twist<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -57,16 +62,56 @@ where
     pub fn velocity_at(&self, r: &Vector<D>) -> Vector<D> {
         self.velocity + Dim::<D>::cross_spin(&self.spin, r)
     }
+}
 
-    /// The linear combination `a * self + b * other`.
-    pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
-        Self { velocity: self.velocity * a + other.velocity * b, spin: self.spin * a + other.spin * b }
+impl<const D: usize> Neg for Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self { velocity: -self.velocity, spin: -self.spin }
+    }
+}
+
+impl<const D: usize> Add for Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { velocity: self.velocity + other.velocity, spin: self.spin + other.spin }
+    }
+}
+
+impl<const D: usize> Sub for Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { velocity: self.velocity - other.velocity, spin: self.spin - other.spin }
+    }
+}
+
+impl<const D: usize> Mul<f64> for Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self { velocity: self.velocity * factor, spin: self.spin * factor }
     }
 }
 
 /// A rigid disc (2D) or sphere (3D).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Particle<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -89,5 +134,24 @@ where
     /// Gap `D_ij = |X_i X_j| - (a_i + a_j)` to another particle (Verdon et al. 2010, eq. 14).
     pub fn gap(&self, other: &Self) -> f64 {
         (other.pose.position - self.pose.position).norm() - (self.radius + other.radius)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twists_are_vectors() {
+        let [a, b] = [1.0, -0.3].map(|x| Twist::<3> {
+            velocity: Vector::<3>::new(x, 2.0 * x, 0.7),
+            spin: Spin::<3>::new(0.1, x, -x),
+        });
+        assert_eq!(a * 2.0 - b, a + a + -b);
+        assert_eq!(a + -a, Twist::default());
+        assert_eq!(
+            (a + b).velocity_at(&Vector::z()),
+            a.velocity_at(&Vector::z()) + b.velocity_at(&Vector::z())
+        );
     }
 }

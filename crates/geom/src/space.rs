@@ -1,10 +1,9 @@
-//! What depends on the dimension without being a dimension: spins, rotations and the cross product.
+//! Types and operations that depend on the dimension: spins, rotations and the cross product.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub};
 
 use nalgebra::{SVector, UnitComplex, UnitQuaternion};
-use serde::{Serialize, de::DeserializeOwned};
 
 use crate::Vector;
 
@@ -13,6 +12,22 @@ mod sealed {
     impl Sealed for super::Dim<2> {}
     impl Sealed for super::Dim<3> {}
 }
+
+/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without
+/// it.
+#[cfg(feature = "serde")]
+pub trait Stored: serde::Serialize + serde::de::DeserializeOwned {}
+
+#[cfg(feature = "serde")]
+impl<T: serde::Serialize + serde::de::DeserializeOwned> Stored for T {}
+
+/// Types that go into checkpoints: with the feature `serde`, those that can be serialised; all types without
+/// it.
+#[cfg(not(feature = "serde"))]
+pub trait Stored {}
+
+#[cfg(not(feature = "serde"))]
+impl<T> Stored for T {}
 
 /// Tag of the dimension `D`; `Dim<2>` and `Dim<3>` implement [`Space`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,8 +52,7 @@ pub trait Space<const D: usize>: sealed::Sealed + Copy + Debug + Default + Send 
         + Send
         + Sync
         + 'static
-        + Serialize
-        + DeserializeOwned
+        + Stored
         + Add<Output = Self::Spin>
         + AddAssign
         + Sub<Output = Self::Spin>
@@ -47,7 +61,7 @@ pub trait Space<const D: usize>: sealed::Sealed + Copy + Debug + Default + Send 
         + Index<usize, Output = f64>
         + IndexMut<usize>;
     /// Orientation of a body.
-    type Rotation: Copy + Debug + PartialEq + Send + Sync + 'static + Serialize + DeserializeOwned;
+    type Rotation: Copy + Debug + PartialEq + Send + Sync + 'static + Stored;
 
     /// The spin at rest.
     fn zero_spin() -> Self::Spin;

@@ -24,7 +24,7 @@ mod suggest;
 mod validate;
 
 pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem, TooLarge};
-pub use gluey_contact::{Memory, SolverKind as ContactSolver, Strategy};
+pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
 
@@ -139,9 +139,9 @@ impl ContactSpec {
     /// The same for the contact model.
     pub fn params(&self) -> ContactParams {
         ContactParams {
-            strategy: self.strategy,
+            law: self.strategy,
             exact_gap: self.exact_gap,
-            memory: self.memory,
+            gamma_update: self.memory,
             gamma_min: self.gamma_min,
             threshold: self.threshold,
             solver: self.solver,
@@ -229,7 +229,7 @@ pub struct PairMobilitySpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        let ContactParams { strategy, gamma_min, threshold, solver, tolerance, .. } =
+        let ContactParams { law: strategy, gamma_min, threshold, solver, tolerance, .. } =
             ContactParams::default();
         Self {
             strategy,

@@ -1,7 +1,7 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
-use gluey_contact::{Contact, ContactError, ContactModel, ContactState, MemoryError, StepGeometry};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_contact::{BodyStep, Contact, ContactError, ContactModel, ContactState, MemoryError};
+use gluey_geom::{Dim, Particle, Pose, Space, Twist};
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, Integrator, ResumeError, Scheme};
 use thiserror::Error;
 
@@ -41,8 +41,8 @@ where
     integrator: Integrator<D>,
     hydrodynamics: H,
     contact: C,
-    positions: Vec<Vector<D>>,
-    drift: Vec<Vector<D>>,
+    poses: Vec<Pose<D>>,
+    drift: Vec<Twist<D>>,
     twists: Vec<Twist<D>>,
     phases: PhaseTable,
 }
@@ -158,12 +158,12 @@ where
             step: 0,
             reversed: false,
             radii: particles.iter().map(|particle| particle.radius).collect(),
+            poses: particles.iter().map(|particle| particle.pose).collect(),
             particles,
             integrator: Integrator::new(scheme),
             hydrodynamics,
             contact,
-            positions: vec![Vector::zeros(); count],
-            drift: vec![Vector::zeros(); count],
+            drift: vec![Twist::default(); count],
             twists: vec![Twist::default(); count],
             phases: PhaseTable::default(),
         }
@@ -193,20 +193,20 @@ where
     /// Corrects the predicted velocities for contact.
     pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
         let (step, time) = (self.step, self.time());
-        for (position, particle) in self.positions.iter_mut().zip(&self.particles) {
-            *position = particle.pose.position;
+        for (pose, particle) in self.poses.iter_mut().zip(&self.particles) {
+            *pose = particle.pose;
         }
-        self.integrator.drift(self.dt, &mut self.drift);
-        let geometry = StepGeometry {
-            positions: &self.positions,
+        self.integrator.body_drift(self.dt, &mut self.drift);
+        let body_step = BodyStep {
+            poses: &self.poses,
             radii: &self.radii,
             drift: &self.drift,
-            rate: self.integrator.rate(self.dt),
+            velocity_weight: self.integrator.velocity_weight(self.dt),
             dt: self.dt,
         };
         let (contact, twists) = (&mut self.contact, &mut self.twists);
         self.phases
-            .time("contact", || contact.correct(&geometry, twists))
+            .time("contact", || contact.correct_bodies(&body_step, twists))
             .map_err(|source| StepError::Contact { step, time, source })?;
         Ok(())
     }

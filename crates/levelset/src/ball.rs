@@ -71,8 +71,8 @@ pub fn nearest_image(distance: f64, period: Option<f64>) -> f64 {
     }
 }
 
-/// The body with the largest level set at `x`, and its value: `max_i alpha_i(x)`. Of equals, the first. Asks all of them: for many
-/// bodies there is [`crate::BallTree`].
+/// The body with the largest level set at `x`, and its value: `max_i alpha_i(x)`. Of equals, the first. Asks
+/// all of them: for many bodies there is [`crate::BallTree`].
 pub fn nearest<const D: usize, B: LevelSet<D>>(bodies: &[B], x: &Vector<D>) -> Option<(usize, f64)> {
     let values = bodies.iter().map(|b| b.value(x)).enumerate();
     values.reduce(|best, next| if next.1 > best.1 { next } else { best })

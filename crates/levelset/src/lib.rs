@@ -1,7 +1,7 @@
 //! Signed distances of rigid bodies and the laws that mix the properties of fluid and solid.
 //!
-//! The level set `alpha(x)` is positive inside a body and negative outside (Verdon et al. 2010, eq. 1). For a ball
-//! `alpha_i(x) = a_i - |X_i - x|` (eq. 2), for several bodies `alpha = max_i alpha_i` (eq. 3).
+//! The level set `alpha(x)` is positive inside a body and negative outside (Verdon et al. 2010, eq. 1). For a
+//! ball `alpha_i(x) = a_i - |X_i - x|` (eq. 2), for several bodies `alpha = max_i alpha_i` (eq. 3).
 //!
 //! ```
 //! use gluey_geom::Vector;
@@ -18,3 +18,8 @@ mod tree;
 pub use ball::{Ball, Body, LevelSet, nearest, nearest_image};
 pub use mixing::{Ramp, ViscosityLaw};
 pub use tree::BallTree;
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

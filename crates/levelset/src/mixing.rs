@@ -1,7 +1,7 @@
 //! Mixing laws (Verdon et al. 2010, eqs. 4 and 5).
 
-/// The smoothed characteristic function `I(alpha) = clamp(alpha / e, 0, 1)` (eq. 4): the ramp of thickness `e` lies
-/// inside the solid.
+/// The smoothed characteristic function `I(alpha) = clamp(alpha / e, 0, 1)` (eq. 4): the ramp of thickness
+/// `e` lies inside the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {
     thickness: f64,
@@ -19,7 +19,8 @@ impl Ramp {
     }
 }
 
-/// `eta = I eta_s + (1 - I) eta_f` with `eta_s = r eta_f` (eq. 5, where the letter E stands for the number 1).
+/// `eta = I eta_s + (1 - I) eta_f` with `eta_s = r eta_f` (eq. 5, where the letter E stands for the number
+/// 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViscosityLaw {
     /// Viscosity of the fluid, `eta_f`.

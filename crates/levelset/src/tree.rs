@@ -1,10 +1,11 @@
 //! Finding the bodies at a point without asking all of them.
 //!
-//! A binary tree of boxes around the centres (Omohundro, *Five balltree construction algorithms*, ICSI TR-89-063, 1989). No level
-//! set of a box is larger than its largest radius less the distance to it, so a search leaves out every box that cannot
-//! hold an answer: the cost of a point grows with the logarithm of the number of bodies, wherever they gather. Bodies
-//! of unlike sizes part first, so that large ones do not widen the searches among small ones. Along axes in which all
-//! bodies have one period distances to boxes are those of the nearest image.
+//! A binary tree of boxes around the centres (Omohundro, *Five balltree construction algorithms*, ICSI
+//! TR-89-063, 1989). No level set of a box is larger than its largest radius less the distance to it, so a
+//! search leaves out every box that cannot hold an answer: the cost of a point grows with the logarithm of
+//! the number of bodies, wherever they gather. Bodies of unlike sizes part first, so that large ones do not
+//! widen the searches among small ones. Along axes in which all bodies have one period distances to boxes are
+//! those of the nearest image.
 
 use std::ops::Range;
 
@@ -16,7 +17,8 @@ use crate::ball::{Ball, Body, LevelSet, nearest_image};
 const LEAF: usize = 4;
 /// Bodies in a box whose radii differ by more than this factor part by radius.
 const LIKE_RADII: f64 = 4.0;
-/// What bounds must miss by before a box is left out, relative to the coordinates: more than rounding.
+/// Margin by which bounds must miss before a box is left out, relative to the coordinates: more than
+/// rounding.
 const SLACK: f64 = 1e-13;
 
 /// Balls that are found by where they are. Answers are those of a loop over all, bit for bit.
@@ -80,12 +82,14 @@ impl<'a, const D: usize> BallTree<'a, D> {
         self.balls
     }
 
-    /// The body with the largest level set at `x`, and its value, as [`crate::nearest`] gives them. Of equals, the first.
+    /// The body with the largest level set at `x`, and its value, as [`crate::nearest`] gives them. Of
+    /// equals, the first.
     pub fn nearest(&self, x: &Vector<D>) -> Option<(usize, f64)> {
         self.nearest_within(x, f64::INFINITY)
     }
 
-    /// The same where that value is at least `-reach`: where `x` lies in a body or no farther than `reach` from one.
+    /// The same where that value is at least `-reach`: where `x` lies in a body or no farther than `reach`
+    /// from one.
     pub fn nearest_within(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)> {
         let mut best = (usize::MAX, -reach);
         if let Some(root) = self.nodes.first() {
@@ -97,8 +101,8 @@ impl<'a, const D: usize> BallTree<'a, D> {
         (best.0 != usize::MAX).then_some(best)
     }
 
-    /// Whether `test` holds for any body whose level set at `x` is at least `-reach`. Each is tested once, until the first
-    /// for which it holds, in an order that depends on the bodies alone.
+    /// Whether `test` holds for any body whose level set at `x` is at least `-reach`. Each is tested once,
+    /// until the first for which it holds, in an order that depends on the bodies alone.
     pub fn any_within(&self, x: &Vector<D>, reach: f64, mut test: impl FnMut(usize) -> bool) -> bool {
         let slack = self.slack(x);
         let mut index = 0;
@@ -264,8 +268,8 @@ mod tests {
         }
     }
 
-    /// Radii alike or over six decades, bodies all over the box or in its corner, on a lattice with ties everywhere, periodic in
-    /// none, some or all directions, some bodies twice, some beyond the border.
+    /// Radii alike or over six decades, bodies all over the box or in its corner, on a lattice with ties
+    /// everywhere, periodic in none, some or all directions, some bodies twice, some beyond the border.
     fn trees_are_loops<const D: usize>() {
         for (trial, count) in (0..=20).chain([33, 64, 100, 300]).flat_map(|n| [n; 6]).enumerate() {
             let mut random = ChaCha8Rng::seed_from_u64(trial as u64);

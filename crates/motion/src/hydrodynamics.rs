@@ -10,8 +10,8 @@ where
     /// Why a prediction failed.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Writes into `twists` the velocity and spin of each particle at time `t`; both slices have one entry a
-    /// particle, in the same order.
+    /// Writes into `twists` the velocity and spin of each particle at time `t`; both slices have one entry
+    /// per particle, in the same order.
     fn predict(
         &mut self,
         t: f64,
@@ -92,7 +92,7 @@ pub struct FlowStatistics {
 pub struct Fields<const D: usize> {
     /// Node positions.
     pub points: Vec<Vector<D>>,
-    /// Node indices of all cells, `3^D` a cell.
+    /// Node indices of all cells, `3^D` per cell.
     pub cells: Vec<u32>,
     /// Velocity at the nodes.
     pub velocity: Vec<Vector<D>>,

@@ -7,16 +7,18 @@
 use std::{fmt, str::FromStr};
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// An explicit time scheme.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Scheme {
     /// First order (Verdon et al. 2010, eq. 11).
-    #[serde(rename = "euler")]
+    #[cfg_attr(feature = "serde", serde(rename = "euler"))]
     Euler,
     /// Second order (Verdon et al. 2010, eq. 12); its first step is Euler.
-    #[serde(rename = "adams-bashforth-2")]
+    #[cfg_attr(feature = "serde", serde(rename = "adams-bashforth-2"))]
     AdamsBashforth2,
 }
 
@@ -33,7 +35,7 @@ impl fmt::Display for Scheme {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown time scheme `{name}`: expected `euler` or `adams-bashforth-2`")]
 pub struct UnknownScheme {
-    /// What was asked for.
+    /// The name as it was given.
     pub name: String,
 }
 
@@ -50,10 +52,11 @@ impl FromStr for Scheme {
 
 /// Moves particles with their velocities; owns the velocity history, which serialises for checkpoints.
 ///
-/// One step of a simulation: predict `u*`, ask for [`Integrator::rate`] and [`Integrator::drift`], correct the
-/// velocities for contact, [`Integrator::advance`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
+/// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`],
+/// correct the velocities for contact, [`Integrator::advance`].
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
 pub struct Integrator<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -80,11 +83,11 @@ where
     }
 
     /// The factor `c` of `u^n` in the displacement of a step of length `dt`.
-    pub fn rate(&self, dt: f64) -> f64 {
+    pub fn velocity_weight(&self, dt: f64) -> f64 {
         dt - self.history_weight(dt)
     }
 
-    /// Writes the part of the displacement known before `u^n`, one vector a particle.
+    /// Writes the part of the displacement known before `u^n`, one vector per particle.
     pub fn drift(&self, dt: f64, drift: &mut [Vector<D>]) {
         let weight = self.history_weight(dt);
         drift.fill(Vector::zeros());
@@ -93,22 +96,33 @@ where
         }
     }
 
+    /// Writes the displacement and rotation known before `u^n`, one twist per particle.
+    pub fn body_drift(&self, dt: f64, drift: &mut [Twist<D>]) {
+        let weight = self.history_weight(dt);
+        drift.fill(Twist::default());
+        for (drift, twist) in drift.iter_mut().zip(&self.history) {
+            *drift = *twist * weight;
+        }
+    }
+
     /// Moves and turns the particles over `dt` with the (corrected) velocities `twists` and remembers these.
     ///
     /// Orientations turn at the constant spin `(c w^n + drift)/dt`, so the scheme is the same for both.
     pub fn advance(&mut self, dt: f64, particles: &mut [Particle<D>], twists: &[Twist<D>]) {
-        let (rate, weight) = (self.rate(dt), self.history_weight(dt));
+        let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
         for (index, (particle, twist)) in particles.iter_mut().zip(twists).enumerate() {
             let old = self.history.get(index).copied().unwrap_or_default();
-            // The same expression as in the contact constraint, so that gaps closed there stay closed to round-off.
-            particle.pose.position += twist.velocity * rate + old.velocity * weight;
-            let spin = twist.combine(rate / dt, &old, weight / dt).spin;
+            // The same expression as in the contact constraint, so that gaps closed there stay closed to
+            // round-off.
+            particle.pose.position += twist.velocity * weight + old.velocity * history_weight;
+            let spin = twist.spin * (weight / dt) + old.spin * (history_weight / dt);
             particle.pose.orientation = Dim::<D>::advance(&particle.pose.orientation, &spin, dt);
         }
         self.remember(dt, twists);
     }
 
-    /// Forgets the history: the next step is Euler. For a jump of the flow with no relation to what was before.
+    /// Forgets the history: the next step is Euler. For a jump of the flow with no relation to what was
+    /// before.
     pub fn restart(&mut self) {
         self.history.clear();
         self.history_age = 0.0;
@@ -116,19 +130,19 @@ where
 
     /// Tells that the flow has been reversed, `u -> -u` at equal positions (Stokes flow under `-shear rate`).
     ///
-    /// The velocity known from the last position then lies *ahead* on the way back, with the other sign: the next step
-    /// is `dt/2 (u^n - u^{n-1})` and retraces the last one to third order. A step extrapolated from the history with
-    /// the old sign would err by `2 dt |u|`, with the sign flipped but still extrapolated by `dt^2 |u'|`, a restart by
-    /// Euler by `dt^2/2 |u'|`.
+    /// The velocity known from the last position then lies *ahead* on the way back, with the other sign: the
+    /// next step is `dt/2 (u^n - u^{n-1})` and retraces the last one to third order. A step extrapolated from
+    /// the history with the old sign would err by `2 dt |u|`, with the sign flipped but still extrapolated by
+    /// `dt^2 |u'|`, a restart by Euler by `dt^2/2 |u'|`.
     pub fn reverse(&mut self) {
         self.history_age = -self.history_age;
         for twist in &mut self.history {
-            *twist = Twist::default().combine(0.0, twist, -1.0);
+            *twist = -*twist;
         }
     }
 
-    /// Weight of `u^{n-1}`: that of the line through `u^{n-1}` and `u^n` integrated over the step; `-dt/2` in a steady
-    /// run, `dt/2` in the step after a reversal.
+    /// Weight of `u^{n-1}`: that of the line through `u^{n-1}` and `u^n` integrated over the step; `-dt/2` in
+    /// a steady run, `dt/2` in the step after a reversal.
     fn history_weight(&self, dt: f64) -> f64 {
         if self.history.is_empty() { 0.0 } else { -0.5 * dt * (dt / self.history_age) }
     }

@@ -1,9 +1,9 @@
 //! Time integration of rigid particles in a flow, `x^{n+1} = x^n + c u^n + drift`.
 //!
-//! [`Hydrodynamics`] says how the fluid moves the particles. The finite-element solver implements it, and so do two
-//! analytic models that cost nothing: [`BackgroundFlow`] (particles follow a linear flow and do not see each other)
-//! and [`PairMobility`] (two equal spheres in an unbounded linear flow, exact). [`Integrator`] moves the particles by
-//! explicit Euler or Adams-Bashforth 2 and owns the velocity history.
+//! [`Hydrodynamics`] says how the fluid moves the particles. The finite-element solver implements it, and so
+//! do two analytic models that cost nothing: [`BackgroundFlow`] (particles follow a linear flow and do not
+//! see each other) and [`PairMobility`] (two equal spheres in an unbounded linear flow, exact).
+//! [`Integrator`] moves the particles by explicit Euler or Adams-Bashforth 2 and owns the velocity history.
 //!
 //! ```
 //! use gluey_geom::{Particle, Twist, Vector};
@@ -37,3 +37,8 @@ pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};
 pub use pair_mobility::{PairMobility, PairMobilityError};
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -3,12 +3,14 @@
 use std::convert::Infallible;
 
 use gluey_geom::{Dim, Matrix, Particle, Space, Spin, Twist, Vector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::Hydrodynamics;
 
 /// The flow `u(x) = L (x - x0)`, `L[(i, j)] = d u_i / d x_j` (unit: 1/time).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct LinearFlow<const D: usize> {
     /// Velocity gradient `L`.
     pub gradient: Matrix<D>,

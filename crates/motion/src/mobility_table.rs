@@ -1,15 +1,15 @@
 //! Mobility functions of two equal force- and torque-free spheres in a linear flow.
 //!
-//! `A`, `B` are those of Batchelor and Green (1972, J. Fluid Mech. 56, 375, DOI 10.1017/S0022112072002927), `C` the
-//! coefficient of the spin. Tabulated from the exact bispherical series (relative error 1e-9) for gaps of 1e-7 to 18
-//! radii; nearer, the lubrication limit; farther, the method of reflections.
+//! `A`, `B` are those of Batchelor and Green (1972, J. Fluid Mech. 56, 375, DOI 10.1017/S0022112072002927),
+//! `C` the coefficient of the spin. Tabulated from the exact bispherical series (relative error 1e-9) for
+//! gaps of 1e-7 to 18 radii; nearer, the lubrication limit; farther, the method of reflections.
 
 /// Gaps above which the far-field series are used, in radii.
 const FAR: f64 = 18.0;
 /// Nodes of the local polynomial.
 const NODE_COUNT: usize = 8;
 
-const TABLE: &str = include_str!("../../../data/reference/sphere_pair_mobility_unbounded.csv");
+const TABLE: &str = include_str!("../data/sphere_pair_mobility_unbounded.csv");
 
 /// Relative motion of a pair: with `r = X2 - X1`, `n = r/|r|`, strain rate `E` and fluid spin `w`,
 /// `U2 - U1 = w x r + n (1-A) n.E.r + (1-B) (I - n n).E.r`, and both spins are `w + C n x (E.n)`.
@@ -23,8 +23,8 @@ pub struct PairCoefficients {
     pub spin: f64,
 }
 
-/// One row in the variables in which it is interpolated: all three are smooth in `ln xi` and nearly straight at both
-/// ends.
+/// One row in the variables in which it is interpolated: all three are smooth in `ln xi` and nearly straight
+/// at both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
     /// `ln xi`, `xi` the gap in radii.
@@ -40,7 +40,8 @@ impl Row {
     }
 }
 
-/// A function `(p L + q)/(L + s)` of `L = ln(1/xi)`: the form that lubrication gives to tangential mobilities.
+/// A function `(p L + q)/(L + s)` of `L = ln(1/xi)`: the form that lubrication gives to tangential
+/// mobilities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lubricated {
     p: f64,
@@ -95,7 +96,8 @@ impl MobilityTable {
         Self::from_rows(parse(TABLE))
     }
 
-    /// Coefficients at the gap `xi` (in radii). For `xi <= 0` (overlap) those of contact: no relative normal motion.
+    /// Coefficients at the gap `xi` (in radii). For `xi <= 0` (overlap) those of contact: no relative normal
+    /// motion.
     pub fn at(&self, xi: f64) -> PairCoefficients {
         if xi < self.near {
             self.lubrication(xi)

@@ -1,8 +1,8 @@
 //! Two equal, force- and torque-free spheres in an unbounded linear flow, exactly (Batchelor and Green 1972,
 //! DOI 10.1017/S0022112072002927).
 //!
-//! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they should and
-//! overlap, as they do in a fluid solver that does not resolve the lubrication film.
+//! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they
+//! should and overlap, as they do in a fluid solver that does not resolve the lubrication film.
 
 use gluey_geom::{Dim, Particle, Space, Twist};
 
@@ -35,8 +35,8 @@ pub enum PairMobilityError {
 
 /// Exact pair hydrodynamics as a cheap [`Hydrodynamics`].
 ///
-/// Overlapping spheres (gap + offset <= 0) move as at contact: no relative normal velocity, tangential and spin
-/// coefficients at their limits.
+/// Overlapping spheres (gap + offset <= 0) move as at contact: no relative normal velocity, tangential and
+/// spin coefficients at their limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairMobility {
     flow: LinearFlow<3>,

@@ -72,11 +72,12 @@ fn the_linear_form_is_what_advance_does() {
         let mut integrator = Integrator::new(scheme);
         let mut particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
         for rate in rates {
-            assert!((integrator.rate(dt) - rate).abs() < 1e-16);
+            assert!((integrator.velocity_weight(dt) - rate).abs() < 1e-16);
             let (mut drift, mut twists) = ([Vector::zeros()], [Twist::default()]);
             integrator.drift(dt, &mut drift);
             flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
-            let expected = particles[0].pose.position + (twists[0].velocity * integrator.rate(dt) + drift[0]);
+            let expected =
+                particles[0].pose.position + (twists[0].velocity * integrator.velocity_weight(dt) + drift[0]);
             integrator.advance(dt, &mut particles, &twists);
             assert_eq!(particles[0].pose.position, expected);
         }

@@ -92,3 +92,10 @@ fn bad_pairs_are_named() {
         Err(PairMobilityError::NoDirection { .. })
     ));
 }
+
+/// The package carries a copy of the table, for it cannot reach outside its folder.
+#[test]
+fn the_packaged_table_is_the_reference() {
+    let packaged = include_str!("../data/sphere_pair_mobility_unbounded.csv");
+    assert!(packaged == include_str!("../../../data/reference/sphere_pair_mobility_unbounded.csv"));
+}

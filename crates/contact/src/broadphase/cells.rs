@@ -1,4 +1,5 @@
-//! The cell list: balls binned by cells as wide as two of the largest radii, so that those that meet are neighbours.
+//! The cell list: balls binned by cells as wide as two of the largest radii, so that those that meet are
+//! neighbours.
 
 use gluey_geom::Vector;
 

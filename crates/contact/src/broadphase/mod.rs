@@ -1,4 +1,4 @@
-//! Which balls meet: a cell list, and parry's bounding volume hierarchy for very different sizes.
+//! Search for balls that meet: a cell list, and parry's bounding volume hierarchy for very different sizes.
 
 mod cells;
 mod hierarchy;
@@ -10,10 +10,11 @@ pub use hierarchy::Hierarchy;
 
 /// Finds the pairs of balls that meet. All implementations give the same pairs in the same order.
 pub trait Broadphase<const D: usize>: Send {
-    /// Replaces `pairs` by all `(i, j)` with `i < j`, `i < asker_count` and `|x_i - x_j| <= r_i + r_j`, sorted.
+    /// Replaces `pairs` by all `(i, j)` with `i < j`, `i < asker_count` and `|x_i - x_j| <= r_i + r_j`,
+    /// sorted.
     ///
-    /// Balls from `asker_count` on are only looked for (images across a periodic border). Coordinates are finite, radii
-    /// are positive.
+    /// Balls from `asker_count` on are only looked for (images across a periodic border). Coordinates are
+    /// finite, radii are positive.
     fn meeting(
         &mut self,
         centers: &[Vector<D>],

@@ -1,4 +1,5 @@
-//! Clusters by union-find whose edges carry images: a cluster percolates where a way round leads to another image.
+//! Clusters by union-find whose edges carry images: a cluster percolates where a way round leads to another
+//! image.
 
 use crate::{Contact, Partner};
 
@@ -16,7 +17,8 @@ pub struct Clusters<const D: usize> {
 pub struct Cluster<const D: usize> {
     /// How many particles it has.
     pub size: usize,
-    /// In which periodic directions one can walk from contact to contact and arrive at another image of the start.
+    /// In which periodic directions one can walk from contact to contact and arrive at another image of the
+    /// start.
     pub percolates: [bool; D],
     /// The walls it touches, sorted.
     pub walls: Vec<u32>,
@@ -101,10 +103,12 @@ impl Forest {
         }
     }
 
-    /// Joins `i` with the image of `j`. If they were joined already: which image of `i` the way round leads to, if another.
+    /// Joins `i` with the image of `j`. If they were joined already: which image of `i` the way round leads
+    /// to, if another.
     fn join(&mut self, i: u32, j: u32, image: [i32; 3]) -> Option<[i32; 3]> {
         let ((root, of_i), (other, of_j)) = (self.root(i), self.root(j));
-        // The image of j that is in one piece with i's root, by way of this contact, less the one by way of j's root.
+        // The image of j that is in one piece with i's root, by way of this contact, less the one by way of
+        // j's root.
         let apart = difference(sum(of_i, image), of_j);
         if root == other {
             return Some(apart).filter(|apart| *apart != [0; 3]);

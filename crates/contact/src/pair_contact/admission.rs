@@ -1,10 +1,11 @@
-//! Which links take part in a step: those that remember, those that would close, and those that others would push together.
+//! Admission of candidates to a step: those that remember, those that would close, and those that others
+//! would push together.
 
 use gluey_geom::{Dim, Space, Vector};
-use rayon::prelude::*;
 
-use super::{Buffers, PairContact, PairMemory, Part};
-use crate::graph::Link;
+use super::{Buffers, PairContact, PairMemory, Participation};
+use crate::neighbours::Candidate;
+use crate::parallel;
 use crate::rows::{Row, closes};
 use crate::{ContactError, Domain, Mobility, PairState, StepGeometry};
 
@@ -18,64 +19,61 @@ where
         step: &StepGeometry<'_, D>,
         buffers: &mut Buffers<D>,
     ) -> Result<(), ContactError> {
-        let graph = &mut self.graph;
+        let neighbours = &mut self.neighbours;
         buffers.weights.clear();
-        let mobility = |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.rate;
-        buffers.weights.extend(graph.order.iter().map(mobility));
+        let mobility =
+            |&i: &u32| self.mobility.own(i as usize, step.radii[i as usize]) * step.velocity_weight;
+        buffers.weights.extend(neighbours.order.iter().map(mobility));
         buffers.changes.clear();
-        buffers.changes.resize(graph.count(), Vector::zeros());
-        buffers.displacements.clone_from(&graph.free);
+        buffers.changes.resize(neighbours.count(), Vector::zeros());
+        buffers.displacements.clone_from(&neighbours.free);
 
         buffers.memory.clear();
         buffers.forces.clear();
         buffers.takes_part.clear();
-        for state in &self.state.pairs {
-            let link = check_known(state, step, &self.domain).map(|()| graph.recall(state.pair))?;
-            let size = buffers.memory.len().max(graph.links.len());
+        for state in &self.record.state.pairs {
+            let candidate =
+                check_known(state, step, &self.domain).map(|()| neighbours.find_or_add(state.pair))?;
+            let size = buffers.memory.len().max(neighbours.candidates.len());
             buffers.memory.resize(size, PairMemory::default());
-            buffers.takes_part.resize(size, Part::No);
-            buffers.memory[link] = PairMemory { gamma: state.gamma, lambda: state.lambda };
-            buffers.takes_part[link] = Part::Fresh;
+            buffers.takes_part.resize(size, Participation::No);
+            buffers.memory[candidate] = PairMemory { gamma: state.gamma, lambda: state.lambda };
+            buffers.takes_part[candidate] = Participation::Fresh;
         }
-        buffers.memory.resize(graph.links.len(), PairMemory::default());
-        buffers.takes_part.resize(graph.links.len(), Part::No);
+        buffers.memory.resize(neighbours.candidates.len(), PairMemory::default());
+        buffers.takes_part.resize(neighbours.candidates.len(), Participation::No);
         buffers.forces.extend(buffers.memory.iter().map(|memory| memory.lambda));
         self.admit(step, buffers);
         Ok(())
     }
 
-    /// Lets links that `displacements` close take part; whether there are any.
+    /// Lets candidates that `displacements` close take part; whether there are any.
     pub(super) fn admit(&self, step: &StepGeometry<'_, D>, buffers: &mut Buffers<D>) -> bool {
-        let (graph, margin) = (&self.graph, 0.5 * self.margin());
+        let (neighbours, margin) = (&self.neighbours, 0.5 * self.margin());
         let Buffers { takes_part, displacements, weights, .. } = buffers;
         let movable = |place: u32| weights.get(place as usize).is_some_and(|weight| *weight > 0.0);
-        let admit = |(part, link): (&mut Part, &Link)| {
-            let closing = *part == Part::No
-                && closes(link, graph, &self.domain, step.dt, displacements, margin)
-                && (movable(link.head) || movable(link.tail));
+        let admit = |part: &mut Participation, candidate: &Candidate| {
+            let closing = *part == Participation::No
+                && closes(candidate, neighbours, &self.domain, step.dt, displacements, margin)
+                && (movable(candidate.head) || movable(candidate.tail));
             if closing {
-                *part = Part::Fresh;
+                *part = Participation::Fresh;
             }
             closing
         };
-        takes_part
-            .par_iter_mut()
-            .zip(&graph.links)
-            .with_min_len(4096)
-            .map(admit)
-            .reduce(|| false, |a, b| a | b)
+        parallel::visit_all(takes_part, &neighbours.candidates, admit)
     }
 
-    /// Lists the links that take part, in the order of space.
+    /// Lists the candidates that take part, in the order of space.
     pub(super) fn list_rows(
         &self,
         step: &StepGeometry<'_, D>,
         buffers: &mut Buffers<D>,
     ) -> Result<(), ContactError> {
         buffers.rows.clear();
-        for (link, part) in buffers.takes_part.iter().enumerate() {
-            if *part != Part::No {
-                buffers.rows.push(Row::new(link, &self.graph, &self.domain, step)?);
+        for (candidate, part) in buffers.takes_part.iter().enumerate() {
+            if *part != Participation::No {
+                buffers.rows.push(Row::new(candidate, &self.neighbours, &self.domain, step)?);
             }
         }
         buffers.rows.sort_unstable_by_key(|row| row.rank);
@@ -93,7 +91,7 @@ fn check_known<const D: usize>(
     domain: &Domain<D>,
 ) -> Result<(), ContactError> {
     let PairState { pair, .. } = *state;
-    pair.check_known(step.positions.len(), domain.walls.len())?;
+    ContactError::unless_known(pair, step.positions.len(), domain.walls.len())?;
     let (first, Some(second)) = pair.particles() else { return Ok(()) };
     let distance = pair.branch(step.positions, domain).map_or(0.0, |branch| branch.norm());
     let gap = distance - step.radii[first] - step.radii[second];

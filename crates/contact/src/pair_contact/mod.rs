@@ -5,17 +5,20 @@ mod velocity_correction;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use crate::graph::Graph;
-use crate::islands::{Islands, Places};
+use crate::island_projection::{IslandWorkspace, SolveContext};
+use crate::islands::{Island, Islands, SortedParticles};
+use crate::memory::GammaRule;
 use crate::model::validate;
-use crate::project::{Failure, Setting, Work};
+use crate::neighbours::NeighbourList;
+use crate::projection::{Failure, Tuning};
+use crate::record::ContactRecord;
 use crate::rows::Row;
 use crate::{
-    Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, MemoryError,
-    Mobility, PairState, StepGeometry, StokesDrag, Strategy, WorstPair,
+    BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
+    Domain, MemoryError, Mobility, StepGeometry, StokesDrag,
 };
 
-/// Contacts between discs or spheres, and with walls, by one of the [`Strategy`]s.
+/// Contacts between discs or spheres, and with walls, by one of the [`ContactLaw`]s.
 ///
 /// Results do not depend on the numbering of the particles nor on the number of threads, bit for bit.
 #[derive(Debug)]
@@ -23,56 +26,63 @@ pub struct PairContact<const D: usize, M = StokesDrag> {
     params: ContactParams,
     mobility: M,
     domain: Domain<D>,
-    state: ContactState,
-    contacts: Vec<Contact>,
-    graph: Graph<D>,
+    record: ContactRecord,
+    neighbours: NeighbourList<D>,
     islands: Islands<D>,
-    work: Work<D>,
+    workspace: IslandWorkspace<D>,
     buffers: Buffers<D>,
+    centers: Centers<D>,
+}
+
+/// The motion of the centres in a step of bodies.
+#[derive(Debug, Default)]
+struct Centers<const D: usize> {
+    positions: Vec<Vector<D>>,
+    drift: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Centers<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The step without its rotations.
+    fn of<'a>(&'a mut self, step: &BodyStep<'a, D>) -> StepGeometry<'a, D> {
+        self.positions.clear();
+        self.positions.extend(step.poses.iter().map(|pose| pose.position));
+        self.drift.clear();
+        self.drift.extend(step.drift.iter().map(|drift| drift.velocity));
+        let (radii, velocity_weight, dt) = (step.radii, step.velocity_weight, step.dt);
+        StepGeometry { positions: &self.positions, radii, drift: &self.drift, velocity_weight, dt }
+    }
 }
 
 /// Vectors of a step, kept from step to step.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Buffers<const D: usize> {
     /// Displacements without contact, by particle.
     free: Vec<Vector<D>>,
     /// Rows of this step in the order of space.
     rows: Vec<Row<D>>,
-    /// One entry a link: whether it takes part, its memory, its force.
-    takes_part: Vec<Part>,
+    /// One entry per candidate: whether it takes part, its memory, its force.
+    takes_part: Vec<Participation>,
     memory: Vec<PairMemory>,
     forces: Vec<f64>,
-    /// One entry a place.
+    /// One entry per place.
     weights: Vec<f64>,
     changes: Vec<Vector<D>>,
     displacements: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Default for Buffers<D> {
-    fn default() -> Self {
-        Self {
-            free: Vec::new(),
-            rows: Vec::new(),
-            takes_part: Vec::new(),
-            memory: Vec::new(),
-            forces: Vec::new(),
-            weights: Vec::new(),
-            changes: Vec::new(),
-            displacements: Vec::new(),
-        }
-    }
-}
-
-/// Whether a link takes part in a step.
+/// Whether a candidate takes part in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Part {
+enum Participation {
     No,
     /// Not yet solved for.
     Fresh,
     Yes,
 }
 
-/// Memory of a link before the step.
+/// Memory of a candidate before the step.
 #[derive(Clone, Copy, Debug, Default)]
 struct PairMemory {
     gamma: f64,
@@ -93,12 +103,12 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
             params,
             mobility,
             domain: Domain::default(),
-            state: ContactState::default(),
-            contacts: Vec::new(),
-            graph: Graph::default(),
+            record: ContactRecord::default(),
+            neighbours: NeighbourList::default(),
             islands: Islands::default(),
-            work: Work::default(),
+            workspace: IslandWorkspace::default(),
             buffers: Buffers::default(),
+            centers: Centers::default(),
         }
     }
 
@@ -111,7 +121,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// Changes the walls or periods, as for walls that move.
     pub fn set_domain(&mut self, domain: Domain<D>) {
         if domain.periods != self.domain.periods {
-            self.graph = Graph::default();
+            self.neighbours = NeighbourList::default();
         }
         self.domain = domain;
     }
@@ -127,17 +137,19 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     }
 }
 
-impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M>
+impl<const D: usize, M: Mobility<D>> PairContact<D, M>
 where
     Dim<D>: Space<D>,
 {
-    fn correct(
+    /// Corrects `twists`; on an error they and the memory are as before. [`ContactModel::correct_bodies`]
+    /// does the same for a step that is given with orientations.
+    pub fn correct(
         &mut self,
         step: &StepGeometry<'_, D>,
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError> {
         validate(step, twists, &self.domain)?;
-        if self.params.strategy == Strategy::None {
+        if self.params.law == ContactLaw::None {
             return Ok(ContactReport::default());
         }
         let mut buffers = std::mem::take(&mut self.buffers);
@@ -145,32 +157,44 @@ where
         self.buffers = buffers;
         outcome
     }
+}
+
+impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M>
+where
+    Dim<D>: Space<D>,
+{
+    fn correct_bodies(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<ContactReport, ContactError> {
+        let mut centers = std::mem::take(&mut self.centers);
+        let outcome = self.correct(&centers.of(step), twists);
+        self.centers = centers;
+        outcome
+    }
 
     fn contacts(&self) -> &[Contact] {
-        &self.contacts
+        &self.record.contacts
     }
 
     fn checkpoint(&self) -> ContactState {
-        self.state.clone()
+        self.record.state.clone()
     }
 
     fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
-        self.state = state.checked()?;
-        self.contacts.clear();
-        Ok(())
+        self.record.resume(state)
     }
 
     fn reverse(&mut self) {
-        for pair in &mut self.state.pairs {
-            pair.lambda = -pair.lambda;
-        }
+        self.record.reverse();
     }
 }
 
 /// Whether the search went far enough.
-enum Reach {
-    Enough,
-    TooShort,
+enum Coverage {
+    Complete,
+    Incomplete,
 }
 
 impl<const D: usize, M: Mobility<D>> PairContact<D, M>
@@ -183,30 +207,31 @@ where
         twists: &mut [Twist<D>],
         buffers: &mut Buffers<D>,
     ) -> Result<ContactReport, ContactError> {
-        let moves = twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.rate + drift);
+        let moves =
+            twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift);
         buffers.free.clear();
         buffers.free.extend(moves);
         let tolerance = self.tolerance(step, &buffers.free);
-        self.graph.margin = 0.5 * self.margin();
-        self.graph.begin(step, &self.domain, &buffers.free)?;
+        self.neighbours.margin = 0.5 * self.margin();
+        self.neighbours.begin(step, &self.domain, &buffers.free)?;
         let report = loop {
             self.begin(step, buffers)?;
-            let (reach, report) = match self.params.strategy {
-                Strategy::VelocityCorrection => self.push(step, tolerance, buffers)?,
+            let (reach, report) = match self.params.law {
+                ContactLaw::VelocityCorrection => self.push(step, tolerance, buffers)?,
                 _ => self.project(step, tolerance, buffers)?,
             };
-            if let Reach::Enough = reach {
+            if let Coverage::Complete = reach {
                 break report;
             }
             let mut needed = buffers.free.clone();
-            for (place, &particle) in self.graph.order.iter().enumerate() {
+            for (place, &particle) in self.neighbours.order.iter().enumerate() {
                 needed[particle as usize] = buffers.displacements[place];
             }
-            self.graph.widen(step, &self.domain, &buffers.free, &needed)?;
+            self.neighbours.extend(step, &self.domain, &buffers.free, &needed)?;
         };
         let report = self.summary(report, buffers);
         self.remember(step, tolerance, buffers);
-        for (change, &particle) in buffers.changes.iter().zip(&self.graph.order) {
+        for (change, &particle) in buffers.changes.iter().zip(&self.neighbours.order) {
             twists[particle as usize].velocity += change;
         }
         Ok(report)
@@ -222,11 +247,7 @@ where
 
     /// Gap below which pairs are pushed apart, relative to the mean radius.
     fn margin(&self) -> f64 {
-        if self.params.strategy == Strategy::VelocityCorrection {
-            self.params.threshold.max(0.0)
-        } else {
-            0.0
-        }
+        if self.params.law == ContactLaw::VelocityCorrection { self.params.threshold.max(0.0) } else { 0.0 }
     }
 
     /// The projection on the pairs that are admitted, until no other closes.
@@ -235,7 +256,7 @@ where
         step: &StepGeometry<'_, D>,
         tolerance: f64,
         buffers: &mut Buffers<D>,
-    ) -> Result<(Reach, ContactReport), ContactError> {
+    ) -> Result<(Coverage, ContactReport), ContactError> {
         let mut report = ContactReport::default();
         loop {
             self.list_rows(step, buffers)?;
@@ -243,13 +264,13 @@ where
             buffers
                 .takes_part
                 .iter_mut()
-                .filter(|part| **part == Part::Fresh)
-                .for_each(|part| *part = Part::Yes);
-            if !self.graph.covers(&self.domain, step, &buffers.displacements) {
-                return Ok((Reach::TooShort, report));
+                .filter(|part| **part == Participation::Fresh)
+                .for_each(|part| *part = Participation::Yes);
+            if !self.neighbours.is_sufficient(&self.domain, step, &buffers.displacements) {
+                return Ok((Coverage::Incomplete, report));
             }
             if !self.admit(step, buffers) {
-                return Ok((Reach::Enough, report));
+                return Ok((Coverage::Complete, report));
             }
         }
     }
@@ -261,91 +282,97 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let solver = self.params.solver.method();
-        let Buffers { rows, takes_part, memory, forces, weights, changes, displacements, .. } = buffers;
-        let places = Places { positions: &self.graph.positions, free: &self.graph.free, weights };
-        let is_fresh = |row: &Row<D>| takes_part[row.link as usize] == Part::Fresh;
-        self.islands.part(rows, &places, M::COUPLED, is_fresh);
-        self.work.prepare(&self.islands, solver, |row| {
-            let PairMemory { gamma, lambda } = memory[row.link as usize];
-            (forces[row.link as usize], self.params.floor(gamma, lambda, step))
-        });
-        let setting = Setting {
-            step,
+        let tuning = Tuning {
+            solver: self.params.solver.method(),
+            tolerance,
+            iteration_limit: self.params.iteration_limit,
+        };
+        self.part_islands(step, &tuning, buffers);
+        let context = SolveContext {
             params: &self.params,
             mobility: &self.mobility,
-            solver,
-            tolerance,
-            order: &self.graph.order,
+            tuning,
+            velocity_weight: step.velocity_weight,
+            radii: step.radii,
+            order: &self.neighbours.order,
         };
-        self.work.solve(&self.islands, &setting);
-
-        for (island, outcome) in
-            self.islands.islands.iter().zip(&self.work.outcomes).filter(|(i, _)| i.is_fresh)
-        {
+        self.workspace.solve(&self.islands, &context);
+        let islands = self.islands.islands.iter().zip(&self.workspace.outcomes);
+        for (island, outcome) in islands.filter(|(island, _)| island.is_fresh) {
             let effort =
                 outcome.as_ref().map_err(|failure| self.explain(failure, island.rows.start, tolerance))?;
             report.iterations = report.iterations.max(effort.iterations);
             report.passes = report.passes.max(effort.passes);
             report.residual = report.residual.max(effort.residual);
-            for k in island.rows.clone() {
-                forces[self.islands.rows[k].link as usize] = self.work.forces[k];
-            }
-            for k in island.slots.clone().skip(1) {
-                let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
-                changes[place] = self.work.changes[k];
-                displacements[place] = slot.free + changes[place] * step.rate;
-            }
+            self.take_over(island, step.velocity_weight, buffers);
         }
         Ok(())
     }
 
-    /// The error that the failure of an island means; its first row is `start`.
-    fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
-        let key = |row: usize| self.graph.key(&self.graph.links[self.islands.rows[row].link as usize]);
-        match failure {
-            Failure::Gap { row, gap, passes } => {
-                ContactError::GapNotClosed { pair: key(*row), gap: *gap, passes: *passes }
-            }
-            Failure::Solve(failure) => ContactError::of_solve(failure, tolerance, |row| key(start + row)),
+    /// Parts the rows into islands, with the forces they start from.
+    fn part_islands(&mut self, step: &StepGeometry<'_, D>, tuning: &Tuning, buffers: &Buffers<D>) {
+        let rule = GammaRule::new(&self.params, step.velocity_weight, step.dt);
+        let Buffers { rows, takes_part, memory, forces, weights, .. } = buffers;
+        let places =
+            SortedParticles { positions: &self.neighbours.positions, free: &self.neighbours.free, weights };
+        let is_fresh = |row: &Row<D>| takes_part[row.candidate as usize] == Participation::Fresh;
+        self.islands.part(rows, &places, M::COUPLED, is_fresh);
+        self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
+            let PairMemory { gamma, lambda } = memory[row.candidate as usize];
+            (forces[row.candidate as usize], rule.floor(gamma, lambda))
+        });
+    }
+
+    /// Takes over the forces and motions of an island that was solved.
+    fn take_over(&self, island: &Island, velocity_weight: f64, buffers: &mut Buffers<D>) {
+        for k in island.rows.clone() {
+            buffers.forces[self.islands.rows[k].candidate as usize] = self.workspace.forces[k];
+        }
+        for k in island.slots.clone().skip(1) {
+            let (slot, place) = (&self.islands.slots[k], self.islands.slots[k].place as usize);
+            buffers.changes[place] = self.workspace.changes[k];
+            buffers.displacements[place] = slot.free + buffers.changes[place] * velocity_weight;
         }
     }
 
-    fn summary(&self, report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
-        let mut worst: Option<WorstPair> = None;
-        let mut active_count = 0;
+    /// The error that the failure of an island means; its first row is `start`.
+    fn explain(&self, failure: &Failure, start: usize, tolerance: f64) -> ContactError {
+        let key = |row: usize| {
+            self.neighbours
+                .key(&self.neighbours.candidates[self.islands.rows[start + row].candidate as usize])
+        };
+        ContactError::of_projection(failure, tolerance, key, key)
+    }
+
+    fn summary(&self, mut report: ContactReport, buffers: &Buffers<D>) -> ContactReport {
         for row in &buffers.rows {
-            let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
-            if worst.is_none_or(|worst| gap < worst.gap) {
-                worst = Some(WorstPair { pair: self.graph.key(&self.graph.links[row.link as usize]), gap });
-            }
-            active_count += usize::from(buffers.forces[row.link as usize] != 0.0);
+            let gap = row.gap_after(&self.neighbours.positions, &buffers.displacements);
+            let force = buffers.forces[row.candidate as usize];
+            report.count_pair(gap, force, || {
+                self.neighbours.key(&self.neighbours.candidates[row.candidate as usize])
+            });
         }
-        ContactReport { pair_count: buffers.rows.len(), active_count, worst, ..report }
+        report
     }
 
     /// Updates gamma and lists the contacts.
     fn remember(&mut self, step: &StepGeometry<'_, D>, tolerance: f64, buffers: &Buffers<D>) {
-        self.contacts.clear();
-        for row in &buffers.rows {
-            let link = row.link as usize;
-            let (PairMemory { gamma, lambda: last }, lambda) = (buffers.memory[link], buffers.forces[link]);
-            let gamma = self.params.update(gamma, last, lambda, step);
+        let (neighbours, rule) =
+            (&self.neighbours, GammaRule::new(&self.params, step.velocity_weight, step.dt));
+        let contact = |row: &Row<D>| {
+            let candidate = row.candidate as usize;
+            let (PairMemory { gamma, lambda: last }, lambda) =
+                (buffers.memory[candidate], buffers.forces[candidate]);
+            let gamma = rule.update(gamma, last, lambda);
             // A force that moves the pair by less than the tolerance is rounding noise.
             let moved = [row.head, row.tail]
                 .map(|place| buffers.weights.get(place as usize).unwrap_or(&0.0) * lambda);
-            if gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance {
-                let pair = self.graph.key(&self.graph.links[link]);
-                let gap = row.gap_after(&self.graph.positions, &buffers.displacements);
-                self.contacts.push(Contact { pair, lambda, gamma, gap });
-            }
-        }
-        self.contacts.sort_unstable_by_key(|contact| contact.pair);
-        self.state.pairs.clear();
-        self.state.pairs.extend(self.contacts.iter().map(|contact| PairState {
-            pair: contact.pair,
-            gamma: contact.gamma,
-            lambda: contact.lambda,
-        }));
+            let is_contact = gamma < 0.0 || moved[0].abs() + moved[1].abs() > tolerance;
+            is_contact.then(|| {
+                let gap = row.gap_after(&neighbours.positions, &buffers.displacements);
+                Contact { pair: neighbours.key(&neighbours.candidates[candidate]), lambda, gamma, gap }
+            })
+        };
+        self.record.replace(|contacts| contacts.extend(buffers.rows.iter().filter_map(contact)));
     }
 }

@@ -31,7 +31,8 @@ impl<const D: usize> Shape<D> for Capsule<D> {
         self.half_axis.norm() + self.radius
     }
 
-    /// The sphere (disc) of the same volume (area). That understates the drag of slender rods, on their rotation most.
+    /// The sphere (disc) of the same volume (area). That understates the drag of slender rods, on their
+    /// rotation most.
     fn drag_radius(&self) -> f64 {
         let (h, a) = (self.half_axis.norm(), self.radius);
         if D == 2 { (a * (a + 4.0 * h / PI)).sqrt() } else { (a * a * (a + 1.5 * h)).cbrt() }

@@ -1,5 +1,5 @@
-//! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's tolerances are
-//! absolute.
+//! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's
+//! tolerances are absolute.
 
 use gluey_geom::{Dim, Matrix, Rotation, Space, Vector};
 
@@ -17,8 +17,8 @@ where
     Matrix::from_columns(&std::array::from_fn::<_, D, _>(axis))
 }
 
-/// The points of two cores that are closest to each other, in space, each relative to its own centre. `between` points from
-/// the first centre to the second. `None` if the cores meet.
+/// The points of two cores that are closest to each other, in space, each relative to its own centre.
+/// `between` points from the first centre to the second. `None` if the cores meet.
 pub(super) fn closest<const D: usize, S: Shape<D>>(
     shapes: [&S; 2],
     frames: [&Matrix<D>; 2],
@@ -27,8 +27,16 @@ pub(super) fn closest<const D: usize, S: Shape<D>>(
     let size = shapes[0].reach() + shapes[1].reach();
     let turned = [0, 1].map(|k| Turned { shape: shapes[k], frame: frames[k], size });
     let offset = between / size;
-    // D is a constant: one of the two branches is compiled.
-    let found = if D == 2 { planar::closest(&turned, &offset) } else { spatial::closest(&turned, &offset) };
+    const { assert!(D != 2 || cfg!(feature = "dim2"), "shapes in the plane need the feature `dim2`") };
+    const { assert!(D != 3 || cfg!(feature = "dim3"), "shapes in space need the feature `dim3`") };
+    // D is a constant: one of the arms is compiled.
+    let found = match D {
+        #[cfg(feature = "dim2")]
+        2 => planar::closest(&turned, &offset),
+        #[cfg(feature = "dim3")]
+        3 => spatial::closest(&turned, &offset),
+        _ => None,
+    };
     let [p, q] = match turned.each_ref().map(Turned::half_axis) {
         [Some(first), Some(second)] => nearest_end(found?, first, second, &offset),
         _ => found?,
@@ -36,8 +44,8 @@ pub(super) fn closest<const D: usize, S: Shape<D>>(
     Some([p * size, q * size]).filter(|_| (offset + q - p).norm() > MEETING)
 }
 
-/// parry takes segments that are parallel to `1e-8` for parallel. Then, as always unless they cross, one of the closest points
-/// is an end: takes the best of `found` and the ends with their projections.
+/// parry takes segments that are parallel to `1e-8` for parallel. Then, as always unless they cross, one of
+/// the closest points is an end: takes the best of `found` and the ends with their projections.
 fn nearest_end<const D: usize>(
     found: [Vector<D>; 2],
     first: Vector<D>,
@@ -131,5 +139,7 @@ macro_rules! closest {
     };
 }
 
+#[cfg(feature = "dim2")]
 closest!(planar, parry2d_f64, 2);
+#[cfg(feature = "dim3")]
 closest!(spatial, parry3d_f64, 3);

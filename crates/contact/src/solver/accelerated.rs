@@ -1,14 +1,14 @@
 //! Accelerated projected gradients (Nesterov 1983) with restarts (O'Donoghue and Candes 2015, DOI
 //! 10.1007/s10208-013-9150-3, the gradient scheme; for contact: Mazhar et al. 2015, DOI 10.1145/2735627).
 //!
-//! From the extrapolated forces `y = x + beta (x - x_before)` a projected gradient step `x = max(floor, y - w(y)/||A||)`;
-//! the extrapolation starts anew when it has gone uphill. The number of iterations goes like the square root of that of
-//! Uzawa's algorithm.
+//! From the extrapolated forces `y = x + beta (x - x_before)` a projected gradient step
+//! `x = max(floor, y - w(y)/||A||)`; the extrapolation starts anew when it has gone uphill. The number of
+//! iterations goes like the square root of that of Uzawa's algorithm.
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, gaps_under, largest_eigenvalue,
-    residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// Safety of the estimated norm, a lower bound.
@@ -20,7 +20,7 @@ pub struct Accelerated;
 
 impl ProjectionSolver for Accelerated {
     fn scratch_count(&self) -> usize {
-        3 + WATCH_VECTOR_COUNT
+        3 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -31,22 +31,22 @@ impl ProjectionSolver for Accelerated {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, ahead, before, mark, ray, image] = split(scratch, forces.len());
         let mut norm = NORM_SAFETY * largest_eigenvalue(problem.operator, ray, image);
-        let mut watch = Watch::new([mark, ray, image], forces);
-        let mut course = Course::new();
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut log = ConvergenceLog::new();
         let (mut least, mut momentum) = (f64::INFINITY, 1.0);
         ahead.copy_from_slice(forces);
         loop {
             gaps_under(problem, ahead, gaps);
             // At the extrapolated forces, which in the end are the forces.
-            course.note(residual(gaps, ahead, problem.floors, norm));
-            if course.has_arrived(problem) {
+            log.record(residual(gaps, ahead, problem.floors, norm));
+            if log.has_converged(problem) {
                 forces.copy_from_slice(ahead);
-                return Ok(course.report());
+                return Ok(log.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
-            least = least.min(course.residual);
-            if course.residual > 100.0 * least {
-                (norm, least, momentum) = (2.0 * norm, course.residual, 1.0);
+            log.check(&mut monitor, problem, forces, norm)?;
+            least = least.min(log.residual);
+            if log.residual > 100.0 * least {
+                (norm, least, momentum) = (2.0 * norm, log.residual, 1.0);
             }
             before.copy_from_slice(forces);
             let uphill = descend(forces, ahead, gaps, before, problem.floors, 1.0 / norm);
@@ -56,7 +56,8 @@ impl ProjectionSolver for Accelerated {
     }
 }
 
-/// `x = max(floor, y - rho w)`; whether the step turns back on the extrapolation: `(y - x) . (x - before) > 0`.
+/// `x = max(floor, y - rho w)`; whether the step turns back on the extrapolation:
+/// `(y - x) . (x - before) > 0`.
 fn descend(x: &mut [f64], y: &[f64], gaps: &[f64], before: &[f64], floors: &[f64], rho: f64) -> bool {
     let mut product = 0.0;
     for k in 0..x.len() {

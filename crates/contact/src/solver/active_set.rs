@@ -1,18 +1,20 @@
 //! Conjugate gradients on the active set: MPRGP, "modified proportioning with reduced gradient projections"
 //! (Dostal 2009, Optimal Quadratic Programming Algorithms, DOI 10.1007/b138610, algorithm 5.8).
 //!
-//! Conjugate gradients move the contacts whose force is above its floor; when a force would pass its floor, a projected
-//! gradient step changes the active set; when the forces at the floor are worse than the others, a step frees them.
-//! The rate of convergence depends on the spectrum of `A` only, and the operator may be singular.
+//! Conjugate gradients move the contacts whose force is above its floor; when a force would pass its floor, a
+//! projected gradient step changes the active set; when the forces at the floor are worse than the others, a
+//! step frees them. The rate of convergence depends on the spectrum of `A` only, and the operator may be
+//! singular.
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, dot, gaps_under,
-    largest_eigenvalue, residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, dot,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
-/// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they bound the
-/// drift of the recurrence, but each is a restart that costs conjugate gradients what they have learnt.
+/// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they
+/// bound the drift of the recurrence, but each is a restart that costs conjugate gradients what they have
+/// learnt.
 const REFRESH: usize = 50;
 /// `p.A p / (||A|| p.p)` below which a direction is taken for a null vector of `A`.
 const NULL: f64 = 1e-13;
@@ -36,7 +38,7 @@ struct State<'a> {
 
 impl ProjectionSolver for ActiveSet {
     fn scratch_count(&self) -> usize {
-        5 + WATCH_VECTOR_COUNT
+        5 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -47,19 +49,18 @@ impl ProjectionSolver for ActiveSet {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
-        let mut watch = Watch::new([mark, ray, mapped], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], forces);
         let mut state = State { gaps, free, chopped, direction, image };
-        let mut course = Course::new();
+        let mut log = ConvergenceLog::new();
         state.begin(problem, forces);
         let mut fresh = true;
         loop {
-            course.note(residual(state.gaps, forces, problem.floors, norm));
-            if course.has_arrived(problem) && fresh {
-                return Ok(course.report());
+            log.record(residual(state.gaps, forces, problem.floors, norm));
+            if log.has_converged(problem) && fresh {
+                return Ok(log.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
-            fresh =
-                course.has_arrived(problem) || course.iteration.is_multiple_of(REFRESH + 2 * forces.len());
+            log.check(&mut monitor, problem, forces, norm)?;
+            fresh = log.has_converged(problem) || log.iteration.is_multiple_of(REFRESH + 2 * forces.len());
             if fresh {
                 state.begin(problem, forces);
             } else {

@@ -1,4 +1,5 @@
-//! The solver for any number of contacts: which of the others is best was measured (docs/decisions/0020-contact-solver.md).
+//! The solver for any number of contacts: which of the others is best was measured
+//! (docs/decisions/0020-contact-solver.md).
 
 use super::newton::improve;
 use super::{
@@ -7,14 +8,14 @@ use super::{
 
 /// More contacts than this are solved for by the active set.
 const FEW: usize = 2;
-/// Two contacts between particles of similar sizes take Uzawa's method about 70 iterations. Where one of three joined particles is
-/// tiny it would take millions.
+/// Two contacts between particles of similar sizes take Uzawa's method about 70 iterations. Where one of
+/// three joined particles is tiny it would take millions.
 const UZAWA_LIMIT: usize = 10_000;
 /// Iterations of the active set before Newton steps are tried, and one more for each contact.
 const FIRST_TRY: (usize, usize) = (500, 1);
 
-/// Uzawa's method for one or two contacts, the active set for more; where those are slow, as in jammed clusters, the method of
-/// multipliers with Newton steps, after which they are not.
+/// Uzawa's method for one or two contacts, the active set for more; where those are slow, as in jammed
+/// clusters, the method of multipliers with Newton steps, after which they are not.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Auto;
 
@@ -95,7 +96,7 @@ impl Budget {
     fn is_over(&self, outcome: &Result<SolveReport, SolveFailure>) -> bool {
         match outcome {
             Ok(_) => true,
-            Err(failure) => failure.contradiction.is_some() || self.spent >= self.limit,
+            Err(failure) => failure.infeasible.is_some() || self.spent >= self.limit,
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Cholesky factors of sparse matrices in their envelope: each row from its first entry to the diagonal (George and Liu 1981,
-//! Computer Solution of Large Sparse Positive Definite Systems, chapter 4), in the order of Cuthill and McKee (1969, DOI
-//! 10.1145/800195.805928) reversed.
+//! Cholesky factors of sparse matrices in their envelope: each row from its first entry to the diagonal
+//! (George and Liu 1981, Computer Solution of Large Sparse Positive Definite Systems, chapter 4), in the
+//! order of Cuthill and McKee (1969, DOI 10.1145/800195.805928) reversed.
 
 use super::{Factor, dot};
 
@@ -24,13 +24,7 @@ impl Envelope {
     pub(super) fn new(factor: &Factor) -> Option<Self> {
         let count = factor.coordinate_count();
         let places = reversed_cuthill_mckee(factor);
-        let mut first: Vec<usize> = (0..count).collect();
-        for k in 0..factor.row_count() {
-            let least = factor.row(k).map(|(coordinate, _)| places[coordinate]).min().unwrap_or(0);
-            factor.row(k).for_each(|(coordinate, _)| {
-                first[places[coordinate]] = first[places[coordinate]].min(least);
-            });
-        }
+        let first = first_columns(factor, &places);
         let mut starts = vec![0];
         for (row, column) in first.iter().enumerate() {
             starts.push(starts[row] + row + 1 - column);
@@ -104,6 +98,18 @@ impl Envelope {
             *value = right[*place];
         }
     }
+}
+
+/// First column of each row of the matrices, the coordinates in these places.
+fn first_columns(factor: &Factor, places: &[usize]) -> Vec<usize> {
+    let mut first: Vec<usize> = (0..places.len()).collect();
+    for k in 0..factor.row_count() {
+        let least = factor.row(k).map(|(coordinate, _)| places[coordinate]).min().unwrap_or(0);
+        factor.row(k).for_each(|(coordinate, _)| {
+            first[places[coordinate]] = first[places[coordinate]].min(least);
+        });
+    }
+    first
 }
 
 /// Place of each coordinate: breadth first from an end of each component, backwards.

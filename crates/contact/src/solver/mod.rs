@@ -1,12 +1,13 @@
 //! Solvers of the dual projection problem.
 //!
-//! Minimising `1/2 |v - u*|_M^2` over the velocities that keep `d + c B v >= 0` (or `= 0`) is, for the contact forces
-//! `lambda` with `M (v - u*) = B^T lambda`, the complementarity problem
+//! Minimising `1/2 |v - u*|_M^2` over the velocities that keep `d + c B v >= 0` (or `= 0`) is, for the
+//! contact forces `lambda` with `M (v - u*) = B^T lambda`, the complementarity problem
 //!
-//! `w = q + A lambda`, `A = c B M^-1 B^T`, `q = d + c B u*`; `lambda >= floor`, `w >= 0`, `(lambda - floor) w = 0`.
+//! `w = q + A lambda`, `A = c B M^-1 B^T`, `q = d + c B u*`; `lambda >= floor`, `w >= 0`,
+//! `(lambda - floor) w = 0`.
 //!
-//! `w` are the gaps at the end of the step (length), `lambda` forces over `6 pi eta` (length^2/time). A contact that
-//! must stay closed has `floor = -inf`, which leaves `w = 0`.
+//! `w` are the gaps at the end of the step (length), `lambda` forces over `6 pi eta` (length^2/time). A
+//! contact that must stay closed has `floor = -inf`, which leaves `w = 0`.
 //!
 //! | solver | where |
 //! |---|---|
@@ -18,9 +19,9 @@
 mod accelerated;
 mod active_set;
 mod auto;
-mod contradiction;
 mod envelope;
 mod factor;
+mod infeasibility;
 mod newton;
 mod spectrum;
 mod uzawa;
@@ -32,14 +33,16 @@ pub use factor::Factor;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 
-use contradiction::Watch;
+use infeasibility::InfeasibilityMonitor;
 
-/// The symmetric positive semidefinite operator `A`.
-pub trait GapOperator {
+/// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open
+/// the gaps.
+pub trait DelassusOperator {
     /// Writes into `gaps` how far `forces` open each gap.
     fn apply(&mut self, forces: &[f64], gaps: &mut [f64]);
 
-    /// `R` with `A = R R^T`, if it is known and sparse: one row a contact, one column a degree of freedom.
+    /// `R` with `A = R R^T`, if it is known and sparse: one row per contact, one column per degree of
+    /// freedom.
     fn factor(&self) -> Option<Factor> {
         None
     }
@@ -48,7 +51,7 @@ pub trait GapOperator {
 /// One projection problem.
 pub struct Projection<'a> {
     /// `A`.
-    pub operator: &'a mut dyn GapOperator,
+    pub operator: &'a mut dyn DelassusOperator,
     /// `q`: gaps at the end of the step without contact forces.
     pub free_gaps: &'a [f64],
     /// Smallest force of each contact: 0 where it can only push, `-inf` where it must stay closed.
@@ -64,8 +67,9 @@ pub trait ProjectionSolver: Send + Sync {
     /// How many vectors of the size of the problem [`ProjectionSolver::solve`] works on.
     fn scratch_count(&self) -> usize;
 
-    /// Solves `problem`; on failure `forces` is what was reached. `scratch` holds [`ProjectionSolver::scratch_count`]
-    /// vectors of any content. Nothing is allocated on the way to a solution.
+    /// Solves `problem`; on failure `forces` is what was reached. `scratch` holds
+    /// [`ProjectionSolver::scratch_count`] vectors of any content. Nothing is allocated on the way to a
+    /// solution.
     fn solve(
         &self,
         problem: &mut Projection<'_>,
@@ -86,14 +90,14 @@ pub struct SolveReport {
 /// A solve that ended above its tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveFailure {
-    /// What was reached.
+    /// Iterations made and residual reached.
     pub report: SolveReport,
     /// Residuals on the way.
     pub history: ResidualHistory,
     /// Contact with the largest residual.
     pub worst: usize,
-    /// Contacts that contradict each other, if that is why.
-    pub contradiction: Option<Vec<usize>>,
+    /// Contacts that no forces can satisfy together, if that is why the solve failed.
+    pub infeasible: Option<Vec<usize>>,
 }
 
 /// Residuals at iterations 1, 2, 4, 8, ... and at the last one.
@@ -106,21 +110,21 @@ pub struct ResidualHistory {
 /// Most iterations a history can tell are `2^40`.
 const HISTORY_LENGTH: usize = 40;
 
-/// Follows a solve: when to stop, and what to tell if that is too early.
-struct Course {
+/// Residuals of a solve: decides when to stop, and explains a failure.
+struct ConvergenceLog {
     history: [f64; HISTORY_LENGTH],
     iteration: usize,
     residual: f64,
     worst: usize,
 }
 
-impl Course {
+impl ConvergenceLog {
     fn new() -> Self {
         Self { history: [0.0; HISTORY_LENGTH], iteration: 0, residual: f64::INFINITY, worst: 0 }
     }
 
-    /// Notes the residual of the next iteration.
-    fn note(&mut self, (worst, residual): (usize, f64)) {
+    /// Records the residual of the next iteration.
+    fn record(&mut self, (worst, residual): (usize, f64)) {
         self.iteration += 1;
         (self.worst, self.residual) = (worst, residual);
         if self.iteration.is_power_of_two() {
@@ -129,28 +133,28 @@ impl Course {
     }
 
     /// Whether the last residual is small enough.
-    fn has_arrived(&self, problem: &Projection<'_>) -> bool {
+    fn has_converged(&self, problem: &Projection<'_>) -> bool {
         self.residual <= problem.tolerance
     }
 
     /// The failure to report if there is no sense in going on.
     fn check(
         &self,
-        watch: &mut Watch<'_>,
+        monitor: &mut InfeasibilityMonitor<'_>,
         problem: &mut Projection<'_>,
         forces: &[f64],
         norm: f64,
     ) -> Result<(), SolveFailure> {
-        let contradiction = watch.look(self.iteration, problem, forces, norm);
+        let infeasible = monitor.certificate(self.iteration, problem, forces, norm);
         let is_lost = self.iteration >= problem.iteration_limit || !self.residual.is_finite();
-        if contradiction.is_some() || is_lost { Err(self.failure(contradiction)) } else { Ok(()) }
+        if infeasible.is_some() || is_lost { Err(self.failure(infeasible)) } else { Ok(()) }
     }
 
     fn report(&self) -> SolveReport {
         SolveReport { iterations: self.iteration, residual: self.residual }
     }
 
-    fn failure(&self, contradiction: Option<Vec<usize>>) -> SolveFailure {
+    fn failure(&self, infeasible: Option<Vec<usize>>) -> SolveFailure {
         let powers = 0..=self.iteration.max(1).ilog2() as usize;
         let mut entries: Vec<(usize, f64)> =
             powers.map(|power| (1 << power, self.history[power.min(HISTORY_LENGTH - 1)])).collect();
@@ -158,11 +162,12 @@ impl Course {
             entries.push((self.iteration, self.residual));
         }
         let history = ResidualHistory { entries };
-        SolveFailure { report: self.report(), history, worst: self.worst, contradiction }
+        SolveFailure { report: self.report(), history, worst: self.worst, infeasible }
     }
 }
 
-/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as largest.
+/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as
+/// largest.
 fn residual(gaps: &[f64], forces: &[f64], floors: &[f64], norm: f64) -> (usize, f64) {
     let mut worst = (0, 0.0);
     for (k, ((gap, force), floor)) in gaps.iter().zip(forces).zip(floors).enumerate() {

@@ -1,25 +1,25 @@
 //! The method of multipliers with Newton steps (Hestenes 1969, DOI 10.1007/BF00927673; Rockafellar 1976, DOI
 //! 10.1287/moor.1.2.97; with semismooth Newton steps: Li, Sun and Toh 2018, DOI 10.1137/16M1097572).
 //!
-//! With `A = R R^T` and the gaps `w = q + A lambda`, forces are improved by minimising over the changes of velocity `y` (scaled
-//! by the mobility)
+//! With `A = R R^T` and the gaps `w = q + A lambda`, forces are improved by minimising over the changes of
+//! velocity `y` (scaled by the mobility)
 //!
 //! `|y|^2 / 2 + sum_k p_k(w_k + R_k y)`, `p_k' = lambda_k - max(floor_k, lambda_k - sigma (w_k + R_k y))`,
 //!
-//! whose pieces are quadratic: each Newton step solves `(1 + sigma sum_active R_k^T R_k) s = -gradient` directly, and the exact
-//! minimum along `s` is taken. New forces are `max(floor, lambda - sigma (w + R y))`. Rounding is relative to `w`, which tends to
-//! zero, so that it does no harm however large `sigma` is.
+//! whose pieces are quadratic: each Newton step solves `(1 + sigma sum_active R_k^T R_k) s = -gradient`
+//! directly, and the exact minimum along `s` is taken. New forces are `max(floor, lambda - sigma (w + R y))`.
+//! Rounding is relative to `w`, which tends to zero, so that it does no harm however large `sigma` is.
 //!
-//! Where gradient methods need thousands of steps to find out which of many contacts that depend on each other carry
-//! forces (a jammed cluster), some ten or a hundred of these do.
+//! Where gradient methods need thousands of steps to find out which of many contacts that depend on each
+//! other carry forces (a jammed cluster), some ten or a hundred of these do.
 
 use super::envelope::Envelope;
-use super::{Factor, GapOperator, Projection, SolveReport, gaps_under, residual};
+use super::{DelassusOperator, Factor, Projection, SolveReport, gaps_under, residual};
 
 /// Smallest and largest `sigma ||A||`.
 const SIGMAS: (f64, f64) = (1e3, 1e14);
-/// A gap as large as the residual moves forces by so many times the largest of them: through those contacts that have to open,
-/// where contacts depend on each other.
+/// A gap as large as the residual moves forces by so many times the largest of them: through those contacts
+/// that have to open, where contacts depend on each other.
 const STRIDE: f64 = 10.0;
 /// Part of `sigma` that is tried after a round that made things worse, and the smallest such part.
 const CAUTION: (f64, f64) = (1e-2, 1e-6);
@@ -130,7 +130,8 @@ impl<'a> Newton<'a> {
         self.envelope.solve(&mut self.direction);
     }
 
-    /// How far to go along the direction: the root of the slope, which increases. `change` is that of a force for a gap.
+    /// How far to go along the direction: the root of the slope, which increases. `change` is that of a force
+    /// for a gap.
     fn minimum(&mut self, change: impl Fn(usize, f64) -> f64) -> f64 {
         for (k, slope) in self.slopes.iter_mut().enumerate() {
             *slope = self.factor.product(k, &self.direction);
@@ -147,7 +148,8 @@ impl<'a> Newton<'a> {
     }
 }
 
-/// A root from 0 on of a function that is negative at 0 and increases, to a value that is `small`: 1 if that is one.
+/// A root from 0 on of a function that is negative at 0 and increases, to a value that is `small`: 1 if that
+/// is one.
 fn root(function: impl Fn(f64) -> f64, small: f64) -> f64 {
     const FARTHEST: f64 = 1e6;
     const HALVING_COUNT: usize = 60;
@@ -175,13 +177,13 @@ fn root(function: impl Fn(f64) -> f64, small: f64) -> f64 {
     low
 }
 
-/// What Newton steps make of a problem whose factor is known and small enough.
+/// Improves `forces` by Newton steps, if the factor of the operator is known and small enough.
 pub(super) fn improve(
     problem: &mut Projection<'_>,
     forces: &mut [f64],
     norm: f64,
     step_limit: usize,
 ) -> Option<SolveReport> {
-    let factor = GapOperator::factor(problem.operator)?;
+    let factor = DelassusOperator::factor(problem.operator)?;
     Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
 }

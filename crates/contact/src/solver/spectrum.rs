@@ -1,13 +1,13 @@
 //! An estimate of the largest eigenvalue of a symmetric positive semidefinite operator.
 
-use super::{GapOperator, dot};
+use super::{DelassusOperator, dot};
 
 /// Power iterations made: enough to come within a few per cent, and a step length may be off by nearly two.
 const ITERATION_COUNT: usize = 20;
 
-/// Rayleigh quotient after some power iterations: a lower bound of `||A||`, exact for one contact. `x` and `y` are vectors
-/// to work on.
-pub fn largest_eigenvalue(operator: &mut dyn GapOperator, x: &mut [f64], y: &mut [f64]) -> f64 {
+/// Rayleigh quotient after some power iterations: a lower bound of `||A||`, exact for one contact. `x` and
+/// `y` are vectors to work on.
+pub fn largest_eigenvalue(operator: &mut dyn DelassusOperator, x: &mut [f64], y: &mut [f64]) -> f64 {
     // Signs and sizes that no regular packing has, so that the start is not orthogonal to the answer.
     for (k, x) in x.iter_mut().enumerate() {
         *x = (k as f64 * 0.618_033_988_749_894_9).fract() - 0.3;

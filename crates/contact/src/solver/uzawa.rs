@@ -1,22 +1,23 @@
-//! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI 10.3166/REMN.16.365-383).
+//! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI
+//! 10.3166/REMN.16.365-383).
 
-use super::contradiction::WATCH_VECTOR_COUNT;
+use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    Course, Projection, ProjectionSolver, SolveFailure, SolveReport, Watch, gaps_under, largest_eigenvalue,
-    residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
+    gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
 ///
-/// The step `rho = 1/||A||` comes from an estimate of the norm; it converges below `2/||A||` (in terms of the paper's
-/// multipliers `delta = lambda/c` that is `0 < rho < 2/||c^2 B M^-1 B^T||`), and is halved should the estimate be so
-/// poor that the residual grows.
+/// The step `rho = 1/||A||` comes from an estimate of the norm; it converges below `2/||A||` (in terms of the
+/// paper's multipliers `delta = lambda/c` that is `0 < rho < 2/||c^2 B M^-1 B^T||`), and is halved should the
+/// estimate be so poor that the residual grows.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Uzawa;
 
 impl ProjectionSolver for Uzawa {
     fn scratch_count(&self) -> usize {
-        1 + WATCH_VECTOR_COUNT
+        1 + MONITOR_VECTOR_COUNT
     }
 
     fn solve(
@@ -27,19 +28,19 @@ impl ProjectionSolver for Uzawa {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, mark, ray, image] = split(scratch, forces.len());
         let mut norm = largest_eigenvalue(problem.operator, ray, image);
-        let mut watch = Watch::new([mark, ray, image], forces);
-        let mut course = Course::new();
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut log = ConvergenceLog::new();
         let mut least = f64::INFINITY;
         loop {
             gaps_under(problem, forces, gaps);
-            course.note(residual(gaps, forces, problem.floors, norm));
-            if course.has_arrived(problem) {
-                return Ok(course.report());
+            log.record(residual(gaps, forces, problem.floors, norm));
+            if log.has_converged(problem) {
+                return Ok(log.report());
             }
-            course.check(&mut watch, problem, forces, norm)?;
-            least = least.min(course.residual);
-            if course.residual > 100.0 * least {
-                (norm, least) = (2.0 * norm, course.residual);
+            log.check(&mut monitor, problem, forces, norm)?;
+            least = least.min(log.residual);
+            if log.residual > 100.0 * least {
+                (norm, least) = (2.0 * norm, log.residual);
             }
             step(forces, gaps, problem.floors, 1.0 / norm);
         }

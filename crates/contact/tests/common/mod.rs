@@ -1,4 +1,4 @@
-//! What the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
+//! Set-up that the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
 #![allow(dead_code)]
 
 use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
@@ -45,7 +45,7 @@ impl Encounter {
             positions: &positions,
             radii: &[RADIUS; 2],
             drift: &drift,
-            rate: self.integrator.rate(self.dt),
+            velocity_weight: self.integrator.velocity_weight(self.dt),
             dt: self.dt,
         };
         let report = self.contact.correct(&step, &mut twists).expect("a good step");

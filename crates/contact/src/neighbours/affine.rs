@@ -1,7 +1,8 @@
 //! How far particles move against each other: displacements less their best affine part.
 //!
-//! In a shear flow displacements grow with the size of the cloud, those of neighbours against each other do not. With
-//! `s_i = s_0 + L x_i + r_i`, neighbours move by `|s_j - s_i| <= |L| |x_j - x_i| + |r_i| + |r_j|` against each other.
+//! In a shear flow displacements grow with the size of the cloud, those of neighbours against each other do
+//! not. With `s_i = s_0 + L x_i + r_i`, neighbours move by `|s_j - s_i| <= |L| |x_j - x_i| + |r_i| + |r_j|`
+//! against each other.
 
 use gluey_geom::{Matrix, Vector};
 
@@ -19,8 +20,8 @@ pub(crate) struct AffineFit<const D: usize> {
 const LARGEST_STRAIN: f64 = 0.5;
 
 impl<const D: usize> AffineFit<D> {
-    /// Fits `displacements` at `positions`; `L` acts on the directions that are `free` of a period only, so that images of
-    /// a particle move alike.
+    /// Fits `displacements` at `positions`; `L` acts on the directions that are `free` of a period only, so
+    /// that images of a particle move alike.
     pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], free: [bool; D]) -> Self {
         let scale = 1.0 / positions.len().max(1) as f64;
         let center = positions.iter().sum::<Vector<D>>() * scale;
@@ -49,8 +50,8 @@ impl<const D: usize> AffineFit<D> {
 /// Directions whose spread is a smaller part of the largest are left out.
 const FLAT: f64 = 1e-10;
 
-/// `L` with `L moments = products`, by Gaussian elimination; columns of directions that are not `free`, or in which the
-/// positions do not spread independently of the others, are 0.
+/// `L` with `L moments = products`, by Gaussian elimination; columns of directions that are not `free`, or in
+/// which the positions do not spread independently of the others, are 0.
 fn regression<const D: usize>(mut moments: Matrix<D>, mut products: Matrix<D>, free: [bool; D]) -> Matrix<D> {
     let smallest = FLAT * moments.diagonal().max();
     let mut usable = [false; D];

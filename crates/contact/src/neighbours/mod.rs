@@ -1,4 +1,5 @@
-//! Which contacts could close in a step, kept from step to step as long as particles stay near where they were.
+//! The neighbour list (Verlet 1967, DOI 10.1103/PhysRev.159.98): candidates for contact, kept from step to
+//! step as long as particles stay near where they were.
 
 mod affine;
 mod order;
@@ -10,13 +11,13 @@ use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
 use affine::AffineFit;
 use order::SpatialOrder;
 
-/// Pairs nearer than this part of their summed radii are kept in the graph whatever they do, so that one search serves
-/// several steps.
+/// Pairs nearer than this part of their summed radii are kept in the list whatever they do (the skin of the
+/// list), so that one search serves several steps.
 const SKIN: f64 = 0.1;
 
-/// A candidate for contact, in the numbering of the graph.
+/// A candidate for contact, in the numbering of the list.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Link {
+pub(crate) struct Candidate {
     /// A particle's place, or a wall's number plus the number of particles.
     pub tail: u32,
     /// A particle's place.
@@ -25,15 +26,15 @@ pub(crate) struct Link {
     pub image: [i32; 3],
 }
 
-/// The candidates of a step. Particles are numbered by their *places*, an order of space.
-#[derive(Debug)]
-pub(crate) struct Graph<const D: usize> {
+/// The neighbour list of a step. Particles are numbered by their *places*, an order of space.
+#[derive(Debug, Default)]
+pub(crate) struct NeighbourList<const D: usize> {
     /// Particle of each place.
     pub order: Vec<u32>,
     /// Place of each particle.
     places: Vec<u32>,
     /// Candidates: pairs that were found, walls, remembered contacts that are neither.
-    pub links: Vec<Link>,
+    pub candidates: Vec<Candidate>,
     /// First found pair of each place; found pairs are sorted by tail.
     starts: Vec<u32>,
     found_count: usize,
@@ -48,11 +49,11 @@ pub(crate) struct Graph<const D: usize> {
     /// Where places were when the search was made, and the distance up to which it was made.
     reference: Vec<Vector<D>>,
     reach: Vec<f64>,
-    left: Vec<f64>,
+    remaining_reach: Vec<f64>,
     /// Gap kept between particles, relative to their radii.
     pub margin: f64,
-    /// Factor of the displacements that are searched for: doubles whenever a step needs a wider search, for contact pushes
-    /// particles elsewhere when it knows more pairs.
+    /// Factor of the displacements that are searched for: doubles whenever a step needs a wider search, for
+    /// contact pushes particles elsewhere when it knows more pairs.
     widening: f64,
     /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
     wall_slack: f64,
@@ -60,7 +61,7 @@ pub(crate) struct Graph<const D: usize> {
 }
 
 /// Buffers of a search.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Search<const D: usize> {
     spatial: SpatialOrder,
     ranked: Vec<u32>,
@@ -75,102 +76,65 @@ struct Search<const D: usize> {
     moved: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Default for Search<D> {
-    fn default() -> Self {
-        Self {
-            spatial: SpatialOrder::default(),
-            ranked: Vec::new(),
-            broadphase: BestOf::default(),
-            wrapped: Vec::new(),
-            windings: Vec::new(),
-            centers: Vec::new(),
-            reaches: Vec::new(),
-            ghosts: Vec::new(),
-            pairs: Vec::new(),
-            moved: Vec::new(),
-        }
-    }
-}
-
-impl<const D: usize> Default for Graph<D> {
-    fn default() -> Self {
-        Self {
-            order: Vec::new(),
-            places: Vec::new(),
-            links: Vec::new(),
-            starts: Vec::new(),
-            found_count: 0,
-            walls_end: 0,
-            positions: Vec::new(),
-            radii: Vec::new(),
-            free: Vec::new(),
-            ranks: Vec::new(),
-            reference: Vec::new(),
-            reach: Vec::new(),
-            left: Vec::new(),
-            margin: 0.0,
-            widening: 1.0,
-            wall_slack: 0.0,
-            search: Search::default(),
-        }
-    }
-}
-
-impl<const D: usize> Graph<D> {
+impl<const D: usize> NeighbourList<D> {
     /// Number of particles.
     pub(crate) fn count(&self) -> usize {
         self.order.len()
     }
 
-    /// Wall of a link, if it is one.
-    pub(crate) fn wall(&self, link: &Link) -> Option<usize> {
-        (link.tail as usize).checked_sub(self.count())
+    /// Wall of a candidate, if it is one.
+    pub(crate) fn wall(&self, candidate: &Candidate) -> Option<usize> {
+        (candidate.tail as usize).checked_sub(self.count())
     }
 
-    /// What the contact is called outside.
-    pub(crate) fn key(&self, link: &Link) -> PairKey {
-        let head = self.order[link.head as usize] as usize;
-        match self.wall(link) {
+    /// The name of the contact, in the numbering of the caller.
+    pub(crate) fn key(&self, candidate: &Candidate) -> PairKey {
+        let head = self.order[candidate.head as usize] as usize;
+        match self.wall(candidate) {
             Some(wall) => PairKey::wall(head, wall),
-            None => PairKey::across(self.order[link.tail as usize] as usize, head, link.image),
+            None => PairKey::across(self.order[candidate.tail as usize] as usize, head, candidate.image),
         }
     }
 
-    /// The link that a contact's name means.
-    fn link(&self, key: PairKey) -> Link {
+    /// The candidate that a contact's name means.
+    fn candidate(&self, key: PairKey) -> Candidate {
         let first = self.places[key.first as usize];
         match key.second {
-            Partner::Wall(wall) => Link { tail: self.count() as u32 + wall, head: first, image: [0; 3] },
+            Partner::Wall(wall) => Candidate { tail: self.count() as u32 + wall, head: first, image: [0; 3] },
             Partner::Particle { index, image } => {
                 let second = self.places[index as usize];
                 if first <= second {
-                    Link { tail: first, head: second, image }
+                    Candidate { tail: first, head: second, image }
                 } else {
-                    Link { tail: second, head: first, image: image.map(|n| -n) }
+                    Candidate { tail: second, head: first, image: image.map(|n| -n) }
                 }
             }
         }
     }
 
-    /// Index of a contact's link, added if no search found it.
-    pub(crate) fn recall(&mut self, key: PairKey) -> usize {
-        let wanted = self.link(key);
+    /// Index of a contact's candidate, added if no search found it.
+    pub(crate) fn find_or_add(&mut self, key: PairKey) -> usize {
+        let wanted = self.candidate(key);
         let found = match self.wall(&wanted) {
             None => {
                 let tail = wanted.tail as usize;
                 let row = self.starts[tail] as usize..self.starts[tail + 1] as usize;
-                self.links[row.clone()].iter().position(|link| *link == wanted).map(|k| row.start + k)
+                self.candidates[row.clone()]
+                    .iter()
+                    .position(|candidate| *candidate == wanted)
+                    .map(|k| row.start + k)
             }
             Some(_) => {
-                let walls = &self.links[self.found_count..self.walls_end];
-                let place =
-                    walls.binary_search_by_key(&(wanted.tail, wanted.head), |link| (link.tail, link.head));
+                let walls = &self.candidates[self.found_count..self.walls_end];
+                let place = walls.binary_search_by_key(&(wanted.tail, wanted.head), |candidate| {
+                    (candidate.tail, candidate.head)
+                });
                 place.ok().map(|k| self.found_count + k)
             }
         };
         found.unwrap_or_else(|| {
-            self.links.push(wanted);
-            self.links.len() - 1
+            self.candidates.push(wanted);
+            self.candidates.len() - 1
         })
     }
 
@@ -184,23 +148,28 @@ impl<const D: usize> Graph<D> {
         displacements: &[Vector<D>],
     ) -> Result<(), ContactError> {
         (self.widening, self.wall_slack) = (1.0, 0.0);
-        let same = self.radii.len() == step.radii.len()
-            && self.order.iter().zip(&self.radii).all(|(&i, radius)| step.radii[i as usize] == *radius);
+        let same = self.is_of(step.radii);
         if same {
             self.load(step, displacements);
-            self.set_left(domain);
+            self.set_remaining_reach(domain);
         }
-        if same && self.covers_pairs(domain, &self.free) {
+        if same && self.has_all_pairs(domain, &self.free) {
             self.rank(domain);
         } else {
-            self.renew(step, domain, displacements, displacements)?;
+            self.rebuild(step, domain, displacements, displacements)?;
         }
         self.add_walls(step, domain);
         Ok(())
     }
 
+    /// Whether the list is one of particles with these radii.
+    fn is_of(&self, radii: &[f64]) -> bool {
+        self.radii.len() == radii.len()
+            && self.order.iter().zip(&self.radii).all(|(&i, radius)| radii[i as usize] == *radius)
+    }
+
     /// Widens the search to what `needed` displacements (by particle) could close.
-    pub(crate) fn widen(
+    pub(crate) fn extend(
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,
@@ -212,13 +181,13 @@ impl<const D: usize> Graph<D> {
             let farthest = needed.iter().map(|s| wall.normal.dot(s).abs()).fold(0.0, f64::max);
             self.wall_slack = self.wall_slack.max(farthest);
         }
-        self.renew(step, domain, displacements, needed)?;
+        self.rebuild(step, domain, displacements, needed)?;
         self.add_walls(step, domain);
         Ok(())
     }
 
     /// Whether no contact that `displacements` (by place) could close is missing.
-    pub(crate) fn covers(
+    pub(crate) fn is_sufficient(
         &self,
         domain: &Domain<D>,
         step: &StepGeometry<'_, D>,
@@ -231,7 +200,7 @@ impl<const D: usize> Graph<D> {
             };
             (0..self.count()).all(reached)
         });
-        walls && self.covers_pairs(domain, displacements)
+        walls && self.has_all_pairs(domain, displacements)
     }
 
     fn load(&mut self, step: &StepGeometry<'_, D>, displacements: &[Vector<D>]) {
@@ -254,18 +223,18 @@ impl<const D: usize> Graph<D> {
 
     /// Puts the walls behind the found pairs.
     fn add_walls(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) {
-        self.links.truncate(self.found_count);
+        self.candidates.truncate(self.found_count);
         for (number, wall) in domain.walls.iter().enumerate() {
             let tail = (self.count() + number) as u32;
             for place in 0..self.count() {
                 if wall.distance(&self.positions[place]) - self.radii[place]
                     <= self.wall_reach(wall, place, step.dt)
                 {
-                    self.links.push(Link { tail, head: place as u32, image: [0; 3] });
+                    self.candidates.push(Candidate { tail, head: place as u32, image: [0; 3] });
                 }
             }
         }
-        self.walls_end = self.links.len();
+        self.walls_end = self.candidates.len();
     }
 
     /// Gap up to which a wall is a candidate.
@@ -275,7 +244,7 @@ impl<const D: usize> Graph<D> {
     }
 
     /// Searches anew: for places an order of space, for pairs what `needed` could close.
-    fn renew(
+    fn rebuild(
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,
@@ -302,7 +271,7 @@ impl<const D: usize> Graph<D> {
         let Search { broadphase, centers, reaches, pairs, .. } = &mut self.search;
         broadphase.meeting(centers, reaches, self.order.len(), pairs);
         self.collect();
-        self.left.clone_from(&self.reach);
+        self.remaining_reach.clone_from(&self.reach);
         Ok(())
     }
 
@@ -323,7 +292,7 @@ impl<const D: usize> Graph<D> {
         Ok(())
     }
 
-    /// The balls of the search: one a particle, and the images that could meet one.
+    /// The balls of the search: one per particle, and the images that could meet one.
     fn place_balls(&mut self, domain: &Domain<D>) {
         let search = &mut self.search;
         search.centers.clear();
@@ -353,11 +322,11 @@ impl<const D: usize> Graph<D> {
         }
     }
 
-    /// Turns pairs of balls into links; of a pair across the border and its mirror image, one stays.
+    /// Turns pairs of balls into candidates; of a pair across the border and its mirror image, one stays.
     fn collect(&mut self) {
         let count = self.order.len();
         let search = &self.search;
-        self.links.clear();
+        self.candidates.clear();
         self.starts.clear();
         for &(tail, ball) in &search.pairs {
             let (head, image) = match (ball as usize).checked_sub(count) {
@@ -367,38 +336,39 @@ impl<const D: usize> Graph<D> {
             if head <= tail {
                 continue;
             }
-            self.starts.resize(tail as usize + 1, self.links.len() as u32);
+            self.starts.resize(tail as usize + 1, self.candidates.len() as u32);
             // Images count from the positions as they were given.
             let [behind, ahead] =
                 [tail, head].map(|place| search.windings[self.order[place as usize] as usize]);
             let image = std::array::from_fn(|d| image[d] + ahead[d] - behind[d]);
-            self.links.push(Link { tail, head, image });
+            self.candidates.push(Candidate { tail, head, image });
         }
-        self.starts.resize(count + 1, self.links.len() as u32);
-        self.found_count = self.links.len();
+        self.starts.resize(count + 1, self.candidates.len() as u32);
+        self.found_count = self.candidates.len();
     }
 
     /// How much of each reach particles have left by moving since the search.
     ///
-    /// A pair that was not found was farther apart than its two reaches; since then particles moved by an affine motion of
-    /// gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
-    fn set_left(&mut self, domain: &Domain<D>) {
+    /// A pair that was not found was farther apart than its two reaches; since then particles moved by an
+    /// affine motion of gradient `G` and a rest, which left at least `(1 - |G|) reach - rest` of each reach.
+    fn set_remaining_reach(&mut self, domain: &Domain<D>) {
         let moved = &mut self.search.moved;
         moved.clear();
         moved.extend(self.positions.iter().zip(&self.reference).map(|(x, before)| x - before));
         let past = AffineFit::new(&self.reference, moved, free_directions(domain));
         let rests = self.reference.iter().zip(moved).map(|(x, moved)| past.rest(x, moved));
-        self.left.clear();
-        self.left
+        self.remaining_reach.clear();
+        self.remaining_reach
             .extend(self.reach.iter().zip(rests).map(|(reach, rest)| (1.0 - past.strain) * reach - rest));
     }
 
     /// Whether the search reached as far as pairs could come together under `displacements` (by place).
-    fn covers_pairs(&self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
+    fn has_all_pairs(&self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
         let fit = AffineFit::new(&self.positions, displacements, free_directions(domain));
         (0..self.order.len()).all(|place| {
             let rest = fit.rest(&self.positions[place], &displacements[place]);
-            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain) <= self.left[place]
+            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain)
+                <= self.remaining_reach[place]
         })
     }
 }

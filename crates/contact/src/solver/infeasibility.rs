@@ -1,7 +1,9 @@
-//! Contacts that contradict each other, such as a particle between two walls that are too near.
+//! Detection of infeasible contacts, such as those of a particle between two walls that are too near, by a
+//! certificate of Farkas.
 //!
-//! No forces open all gaps if there are forces `y >= 0` (of any sign where a contact must stay closed) with `A y = 0` and
-//! `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run away in that direction.
+//! No forces open all gaps if there are forces `y >= 0` (of any sign where a contact must stay closed) with
+//! `A y = 0` and `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run
+//! away in that direction.
 
 use super::{Projection, dot};
 
@@ -9,27 +11,27 @@ use super::{Projection, dot};
 const INFINITE: f64 = 1e9;
 /// First iteration at which to look.
 const FIRST: usize = 64;
-/// Forces of a contradiction smaller than this part of the largest do not belong to it.
+/// Forces of a certificate smaller than this part of the largest do not belong to it.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// Looks at iterations 64, 128, ... in which direction the forces run.
-pub(super) struct Watch<'a> {
+/// Looks at iterations 64, 128, ... for a Farkas certificate: the direction in which the forces run away.
+pub(super) struct InfeasibilityMonitor<'a> {
     mark: &'a mut [f64],
     ray: &'a mut [f64],
     image: &'a mut [f64],
 }
 
-/// Vectors a watch works on.
-pub(super) const WATCH_VECTOR_COUNT: usize = 3;
+/// Vectors a monitor works on.
+pub(super) const MONITOR_VECTOR_COUNT: usize = 3;
 
-impl<'a> Watch<'a> {
-    pub(super) fn new([mark, ray, image]: [&'a mut [f64]; WATCH_VECTOR_COUNT], forces: &[f64]) -> Self {
+impl<'a> InfeasibilityMonitor<'a> {
+    pub(super) fn new([mark, ray, image]: [&'a mut [f64]; MONITOR_VECTOR_COUNT], forces: &[f64]) -> Self {
         mark.copy_from_slice(forces);
         Self { mark, ray, image }
     }
 
-    /// The contacts of a contradiction, if the forces ran along one since the last look.
-    pub(super) fn look(
+    /// The infeasible contacts, if the forces ran along a certificate since the last look.
+    pub(super) fn certificate(
         &mut self,
         iteration: usize,
         problem: &mut Projection<'_>,

@@ -25,7 +25,7 @@ impl<const D: usize> Cloud<D> {
     }
 
     fn step<'a>(&'a self, drift: &'a [Vector<D>]) -> StepGeometry<'a, D> {
-        StepGeometry { positions: &self.positions, radii: &self.radii, drift, rate: 1.0, dt: 1.0 }
+        StepGeometry { positions: &self.positions, radii: &self.radii, drift, velocity_weight: 1.0, dt: 1.0 }
     }
 
     /// All pairs of particles and images nearer than `reach_i + reach_j`, but for a particle's own images.
@@ -53,8 +53,9 @@ impl<const D: usize> Cloud<D> {
     }
 }
 
-fn keys<const D: usize>(graph: &Graph<D>) -> Vec<PairKey> {
-    let mut keys: Vec<PairKey> = graph.links.iter().map(|link| graph.key(link)).collect();
+fn keys<const D: usize>(neighbours: &NeighbourList<D>) -> Vec<PairKey> {
+    let mut keys: Vec<PairKey> =
+        neighbours.candidates.iter().map(|candidate| neighbours.key(candidate)).collect();
     keys.sort_unstable();
     keys
 }
@@ -70,13 +71,13 @@ fn check_boxes<const D: usize>(box_count: usize) {
         let count = random.random_range(1..40);
         let cloud = Cloud::<D>::new(&mut random, lengths, periodic, count);
         let drift = vec![Vector::zeros(); count];
-        let mut graph = Graph::default();
-        graph.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
+        let mut neighbours = NeighbourList::default();
+        neighbours.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
         let mut reach = vec![0.0; count];
-        graph.order.iter().zip(&graph.reach).for_each(|(&i, r)| reach[i as usize] = *r);
+        neighbours.order.iter().zip(&neighbours.reach).for_each(|(&i, r)| reach[i as usize] = *r);
         assert!(reach.iter().zip(&cloud.radii).all(|(reach, radius)| reach > radius));
         let expected = cloud.brute_force(&reach);
-        assert_eq!(keys(&graph), expected, "box {case} of {lengths:?}");
+        assert_eq!(keys(&neighbours), expected, "box {case} of {lengths:?}");
         pair_count += expected.len();
     }
     assert!(pair_count > 10 * box_count);
@@ -88,13 +89,13 @@ fn periodic_pairs_equal_brute_force() {
     check_boxes::<3>(100);
 }
 
-/// A graph that is kept over steps names every pair that could close in them.
+/// A list that is kept over steps names every pair that could close in them.
 #[test]
 fn a_kept_graph_misses_no_pair() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut cloud = Cloud::<3>::new(&mut random, [6.0; 3], [true, false, false], 300);
     let drift = vec![Vector::zeros(); 300];
-    let mut graph = Graph::default();
+    let mut neighbours = NeighbourList::default();
     let mut search_count = 0;
     for _ in 0..200 {
         // A shear, which moves distant particles apart but neighbours little, and some noise.
@@ -102,10 +103,10 @@ fn a_kept_graph_misses_no_pair() {
             *s = Vector::<3>::new(0.01 * x.y, 0.0, 0.0)
                 + Vector::<3>::from_fn(|_, _| random.random_range(-2e-3..2e-3));
         }
-        let before = graph.reference.clone();
-        graph.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
-        search_count += usize::from(graph.reference != before);
-        let known = keys(&graph);
+        let before = neighbours.reference.clone();
+        neighbours.begin(&cloud.step(&drift), &cloud.domain, &cloud.moves).expect("slow particles");
+        search_count += usize::from(neighbours.reference != before);
+        let known = keys(&neighbours);
         // Could close: the gap is not larger than the relative displacement.
         let far: Vec<f64> = cloud.radii.iter().map(|radius| radius + 0.2).collect();
         for key in cloud.brute_force(&far) {
