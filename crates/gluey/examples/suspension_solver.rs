@@ -105,8 +105,9 @@ impl Suspension {
         let radii = self.particles.map(|particle| particle.radius);
         let mut drift = [Vector::<2>::zeros(); 2];
         self.integrator.drift(DT, &mut drift);
-        let rate = self.integrator.rate(DT);
-        let step = StepGeometry { positions: &positions, radii: &radii, drift: &drift, rate, dt: DT };
+        let velocity_weight = self.integrator.velocity_weight(DT);
+        let step =
+            StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight, dt: DT };
         contact.correct(&step, twists)?;
         Ok(())
     }
