@@ -2,7 +2,6 @@
 //!
 //! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -11,9 +10,9 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_linalg::{LinOp, Preconditioner};
 use gluey_stokes::{
-    DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver, PaperParams, Penalty,
-    PointMatrices, Preparation, Refinement, SaddleSolver, SolidRegion, SolidStress, SolverKind, StokesSystem,
-    SystemOperator, VelocitySpace, WeakPressures, solid_nodes,
+    DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver, PaperParams,
+    PointMatrices, Problem, Refinement, SaddleSolver, SolidRegion, SolverKind, SystemOperator, WeakPressures,
+    solid_nodes,
 };
 use gluey_testkit::packing::Packing;
 
@@ -45,142 +44,93 @@ fn mesh<const D: usize>(surface: u8, gap_fraction: f64, balls: &[Ball<D>]) -> Tr
         .expect("the unit box is a cube and the levels are few")
 }
 
-/// What the linear solvers are given for one formulation.
-struct Problem<const D: usize>
+/// A problem with the residual of the undisturbed flow for its right-hand side.
+struct Case<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    balls: Vec<Ball<D>>,
-    discretisation: Discretisation<D>,
-    system: StokesSystem<D>,
-    touched: Option<Vec<Option<u32>>>,
+    problem: Problem<D>,
     b: Vec<f64>,
 }
 
-impl<const D: usize> Problem<D>
+impl<const D: usize> Case<D>
 where
     Dim<D>: Space<D>,
 {
     /// A uniform mesh without bodies.
     fn empty(level: u8) -> Self {
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level);
-        let discretisation =
-            Discretisation::new(mesh.expect("the unit box is a cube and the levels are few"));
-        Self::eliminated(Vec::new(), discretisation)
+        Self::new(&[], mesh.expect("the unit box is a cube and the levels are few"), RIGID)
     }
 
-    fn rigid(balls: Vec<Ball<D>>, surface: u8) -> Self {
-        let discretisation = Discretisation::new(mesh(surface, 0.0, &balls));
-        Self::eliminated(balls, discretisation)
+    fn rigid(balls: &[Ball<D>], surface: u8) -> Self {
+        Self::new(balls, mesh(surface, 0.0, balls), RIGID)
     }
 
-    fn eliminated(balls: Vec<Ball<D>>, discretisation: Discretisation<D>) -> Self {
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, OFFSET);
-        let space = VelocitySpace::new(discretisation.velocity.clone(), &balls, &solid);
-        let system = StokesSystem::new(&discretisation, space, VISCOSITY, WeakPressures::Aggregate, None);
-        Self::new(balls, discretisation, system, None)
+    fn penalised(balls: &[Ball<D>], surface: u8) -> Self {
+        Self::new(balls, mesh(surface, 0.0, balls), Formulation::Paper(paper()))
     }
 
-    fn penalised(balls: Vec<Ball<D>>, surface: u8) -> Self {
-        let paper = paper();
-        let discretisation = Discretisation::new(mesh(surface, 0.0, &balls));
-        let ramp = Ramp::new(paper.ramp * discretisation.mesh.size(surface));
-        let matrices = PointMatrices::new(paper.quadrature);
-        let region = SolidRegion::new(&discretisation, &balls, ramp, &matrices);
-        let stress = SolidStress::new(
-            &discretisation,
-            &region,
-            &Arc::new(matrices),
-            VISCOSITY * paper.viscosity_ratio,
-        );
-        let touched = region.touched_nodes(&discretisation.velocity, &balls);
-        let nowhere = vec![None; discretisation.velocity.node_count()];
-        let space = VelocitySpace::new::<Ball<D>>(discretisation.velocity.clone(), &[], &nowhere);
-        let penalty = Penalty { factor: 1.0 - 1.0 / paper.viscosity_ratio, stress };
-        let system = StokesSystem::new(&discretisation, space, VISCOSITY, WeakPressures::Keep, Some(penalty));
-        Self::new(balls, discretisation, system, Some(touched))
-    }
-
-    /// The right-hand side is the residual of the undisturbed flow.
-    fn new(
-        balls: Vec<Ball<D>>,
-        discretisation: Discretisation<D>,
-        system: StokesSystem<D>,
-        touched: Option<Vec<Option<u32>>>,
-    ) -> Self {
-        let nodes = &discretisation.velocity;
-        let mut lift: Vec<f64> =
-            (0..nodes.node_count()).flat_map(|n| couette(&nodes.point(n)).data.0[0]).collect();
-        lift.resize(system.velocity_dim(), 0.0);
-        system.space.expand(&mut lift);
-        let mut b = vec![0.0; system.dim()];
-        system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
-        Self { balls, discretisation, system, touched, b }
+    fn new(balls: &[Ball<D>], mesh: TreeMesh<D>, formulation: Formulation) -> Self {
+        let problem = Problem::new(mesh, balls, VISCOSITY, formulation).expect("the bodies are resolved");
+        let b = problem.right_hand_side(&problem.lift(&couette), None);
+        Self { problem, b }
     }
 
     fn prepare(&self, solver: &mut impl SaddleSolver<D>) {
-        let preparation = Preparation {
-            bodies: &self.balls,
-            offset: if self.touched.is_some() { 0.0 } else { OFFSET },
-            viscosity: VISCOSITY,
-            touched: self.touched.as_deref(),
-        };
-        solver.prepare(&self.discretisation, &self.system, &preparation).expect("the bodies are resolved");
+        solver.prepare(&self.problem).expect("the system can be inverted");
     }
 
     fn dofs(&self) -> u64 {
-        self.discretisation.dof_count() as u64
+        self.problem.discretisation().dof_count() as u64
     }
 }
 
 /// One application of the Stokes operator; throughput in unknowns.
-fn operator<const D: usize>(criterion: &mut Criterion, name: &str, problem: &Problem<D>)
+fn operator<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>)
 where
     Dim<D>: Space<D>,
 {
     let mut group = criterion.benchmark_group(format!("operator-{D}d"));
-    group.throughput(Throughput::Elements(problem.dofs()));
-    let mut operator = SystemOperator::new(&problem.system);
-    let x: Vec<f64> = (0..problem.system.dim()).map(|i| (0.7 * i as f64).sin()).collect();
+    group.throughput(Throughput::Elements(case.dofs()));
+    let mut operator = SystemOperator::new(&case.problem.system);
+    let x: Vec<f64> = (0..case.problem.system.dim()).map(|i| (0.7 * i as f64).sin()).collect();
     let mut y = vec![0.0; x.len()];
-    group.bench_function(BenchmarkId::new(name, problem.dofs()), |b| b.iter(|| operator.apply(&x, &mut y)));
+    group.bench_function(BenchmarkId::new(name, case.dofs()), |b| b.iter(|| operator.apply(&x, &mut y)));
     group.finish();
 }
 
 /// One V-cycle on the velocities; throughput in unknowns.
-fn cycle<const D: usize>(criterion: &mut Criterion, name: &str, problem: &Problem<D>)
+fn cycle<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>)
 where
     Dim<D>: Space<D>,
 {
     let mut group = criterion.benchmark_group(format!("cycle-{D}d"));
-    group.throughput(Throughput::Elements(problem.dofs()));
+    group.throughput(Throughput::Elements(case.dofs()));
     let mut solver = MultigridSolver::default();
-    problem.prepare(&mut solver);
+    case.prepare(&mut solver);
     let cycle = solver.velocity_cycle().expect("the solver is prepared");
-    let r = &problem.b[..problem.system.velocity_dim()];
+    let r = &case.b[..case.problem.system.velocity_dim()];
     let mut z = vec![0.0; r.len()];
-    group.bench_function(BenchmarkId::new(name, problem.dofs()), |b| b.iter(|| cycle.apply(r, &mut z)));
+    group.bench_function(BenchmarkId::new(name, case.dofs()), |b| b.iter(|| cycle.apply(r, &mut z)));
     group.finish();
 }
 
 /// Set-up of a solver, and a solve from zero to the tolerance; throughput in unknowns.
-fn solver<const D: usize, S: SaddleSolver<D> + Default>(
-    criterion: &mut Criterion,
-    name: &str,
-    problem: &Problem<D>,
-) where
+fn solver<const D: usize, S: SaddleSolver<D> + Default>(criterion: &mut Criterion, name: &str, case: &Case<D>)
+where
     Dim<D>: Space<D>,
 {
     let mut group = criterion.benchmark_group(format!("solver-{D}d"));
-    group.throughput(Throughput::Elements(problem.dofs()));
+    group.throughput(Throughput::Elements(case.dofs()));
     let mut solver = S::default();
-    group.bench_function(BenchmarkId::new(format!("{name}-prepare"), problem.dofs()), |b| {
-        b.iter(|| problem.prepare(&mut solver));
+    group.bench_function(BenchmarkId::new(format!("{name}-prepare"), case.dofs()), |b| {
+        b.iter(|| case.prepare(&mut solver));
     });
-    group.bench_function(BenchmarkId::new(format!("{name}-solve"), problem.dofs()), |b| {
+    group.bench_function(BenchmarkId::new(format!("{name}-solve"), case.dofs()), |b| {
         b.iter(|| {
-            let mut x = vec![0.0; problem.system.dim()];
-            solver.solve(&problem.system, &problem.b, &mut x, TOLERANCE).expect("it converges")
+            let mut x = vec![0.0; case.problem.system.dim()];
+            solver.solve(&case.problem.system, &case.b, &mut x, TOLERANCE).expect("it converges")
         });
     });
     group.finish();
@@ -199,8 +149,7 @@ fn step<const D: usize>(
 ) where
     Dim<D>: Space<D>,
 {
-    let no_clock = || 0.0;
-    let mut solver = FlowSolver::<D>::new(params, no_clock).expect("the parameters are in range");
+    let mut solver = FlowSolver::<D>::new(params).expect("the parameters are in range");
     let mut flow = |balls: &[Ball<D>]| {
         solver.solve(mesh(surface, gap_fraction, balls), balls, &couette).expect("the bodies are resolved")
     };
@@ -219,34 +168,30 @@ fn step<const D: usize>(
 }
 
 fn operators(criterion: &mut Criterion) {
-    operator(criterion, "constant", &Problem::<2>::empty(8));
-    operator(criterion, "constant", &Problem::<3>::empty(5));
-    operator(criterion, "rigid-dofs", &Problem::rigid(pair_2d(), 8));
-    operator(criterion, "paper", &Problem::penalised(pair_2d(), 7));
-    operator(criterion, "rigid-dofs", &Problem::rigid(pair_3d(), 6));
-    operator(criterion, "paper", &Problem::penalised(pair_3d(), 6));
+    operator(criterion, "constant", &Case::<2>::empty(8));
+    operator(criterion, "constant", &Case::<3>::empty(5));
+    operator(criterion, "rigid-dofs", &Case::rigid(&pair_2d(), 8));
+    operator(criterion, "paper", &Case::penalised(&pair_2d(), 7));
+    operator(criterion, "rigid-dofs", &Case::rigid(&pair_3d(), 6));
+    operator(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn cycles(criterion: &mut Criterion) {
-    cycle(criterion, "rigid-dofs", &Problem::rigid(pair_2d(), 8));
-    cycle(criterion, "paper", &Problem::penalised(pair_2d(), 7));
-    cycle(criterion, "rigid-dofs", &Problem::rigid(pair_3d(), 6));
-    cycle(criterion, "paper", &Problem::penalised(pair_3d(), 6));
+    cycle(criterion, "rigid-dofs", &Case::rigid(&pair_2d(), 8));
+    cycle(criterion, "paper", &Case::penalised(&pair_2d(), 7));
+    cycle(criterion, "rigid-dofs", &Case::rigid(&pair_3d(), 6));
+    cycle(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn solvers(criterion: &mut Criterion) {
-    let (rigid, soft) = (Problem::rigid(pair_2d(), 8), Problem::penalised(pair_2d(), 7));
+    let (rigid, soft) = (Case::rigid(&pair_2d(), 8), Case::penalised(&pair_2d(), 7));
     solver::<2, DirectSolver>(criterion, "rigid-dofs-direct", &rigid);
     solver::<2, MultigridSolver<2>>(criterion, "rigid-dofs-multigrid", &rigid);
     // A further step of Uzawa's iteration is one more solve with what is prepared.
     solver::<2, DirectSolver>(criterion, "paper-direct-uzawa-step", &soft);
     solver::<2, MultigridSolver<2>>(criterion, "paper-multigrid-uzawa-step", &soft);
-    solver::<3, MultigridSolver<3>>(criterion, "rigid-dofs-multigrid", &Problem::rigid(pair_3d(), 6));
-    solver::<3, MultigridSolver<3>>(
-        criterion,
-        "paper-multigrid-uzawa-step",
-        &Problem::penalised(pair_3d(), 6),
-    );
+    solver::<3, MultigridSolver<3>>(criterion, "rigid-dofs-multigrid", &Case::rigid(&pair_3d(), 6));
+    solver::<3, MultigridSolver<3>>(criterion, "paper-multigrid-uzawa-step", &Case::penalised(&pair_3d(), 6));
 }
 
 /// The setting of the tables in `docs/benchmarks.md`: the paper's viscosity ratio, one solve.

@@ -4,15 +4,14 @@
 //! says what is inside. The guess is zero and the tolerance relative to the residual it leaves.
 
 use std::io::IsTerminal;
-use std::sync::Arc;
 
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Twist};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 use gluey_stokes::{
-    MultigridSolver, PointMatrices, Problem, Refinement, SaddleSolver, SolveReport, StokesError,
-    StokesSystem, SystemOperator,
+    MultigridSolver, Problem, Refinement, SaddleSolver, SolveReport, StokesError, StokesSystem,
+    SystemOperator,
 };
 
 use crate::machine::{Stopwatch, Times};
@@ -76,7 +75,7 @@ where
     progress(options, "operator and triad");
     let operator_cpu_s = operator_cpu_s(&problem.system);
     let triad_gb_s = machine::triad_gb_s();
-    let dofs = problem.discretisation.dof_count();
+    let dofs = problem.discretisation().dof_count();
     let dofs_per_s = solved.times.cpu.map(|s| dofs as f64 / s);
     Ok(Report {
         case: options.case,
@@ -87,7 +86,7 @@ where
         contrast: options.contrast_used(),
         threads: options.threads.get(),
         dofs,
-        cells: problem.discretisation.mesh.cell_count(),
+        cells: problem.discretisation().mesh.cell_count(),
         levels: solver.level_count(),
         setup_s: setup.wall,
         setup_cpu_s: setup.cpu,
@@ -113,11 +112,10 @@ where
 {
     let formulation = options.formulation(D);
     let stopwatch = Stopwatch::start();
-    let matrices = Arc::new(PointMatrices::new(formulation.quadrature()));
     let mesh = mesh(options, &options.case.balls_of_the_mesh())?;
-    let problem = Problem::new(mesh, &options.case.balls(), VISCOSITY, formulation, &matrices)?;
+    let problem = Problem::new(mesh, &options.case.balls(), VISCOSITY, formulation)?;
     let mut solver = MultigridSolver::default();
-    problem.prepare(&mut solver)?;
+    solver.prepare(&problem)?;
     Ok((problem, solver, stopwatch.stop()))
 }
 

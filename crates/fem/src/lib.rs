@@ -25,7 +25,7 @@ mod space;
 pub use cells::{CHUNK_CELLS, Chunks};
 pub use element::{ReferenceMatrices, add_viscous};
 pub use mesh::{Cell, MeshError, TreeMesh};
-pub use space::{Constraint, Interpolation, NodeMap};
+pub use space::{Constraint, Evaluator, Interpolation, NodeMap};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -78,7 +78,7 @@ impl Suspension {
         Ok(Self {
             particles: [disc(0.451, 0.51), disc(0.549, 0.49)],
             refinement: method.refinement,
-            flow: FlowSolver::new(params, || 0.0)?,
+            flow: FlowSolver::new(params)?,
             contact: method.has_contact.then_some(contact),
             integrator: Integrator::new(Scheme::AdamsBashforth2),
         })

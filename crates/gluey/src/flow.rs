@@ -14,7 +14,7 @@ use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 pub use gluey_stokes::default_offset;
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, Refinement, SolverKind, StokesError,
+    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, PhaseTimes, Refinement, SolverKind, StokesError,
     WarmStartError, WeakPressures,
 };
 use serde::{Deserialize, Serialize};
@@ -119,7 +119,7 @@ where
     let radii: Vec<f64> = case.particles.iter().map(|p| p.radius).collect();
     let params = flow_params::<D>(case);
     Ok(StokesFlow {
-        solver: FlowSolver::new(params, seconds)?,
+        solver: FlowSolver::new(params)?,
         params,
         refinement: refinement(case, domain.extent()[0] / f64::from(roots[0]), &radii),
         domain,
@@ -161,9 +161,9 @@ where
         twists: &mut [Twist<D>],
     ) -> Result<(), FlowError> {
         let balls = self.balls(particles.iter().map(|p| p.pose.position));
-        let start = seconds();
+        let start = Instant::now();
         let mesh = self.mesh(&balls)?;
-        let meshed = seconds() - start;
+        let meshed = start.elapsed().as_secs_f64();
         let middle = self.domain.center()[1];
         let rate = self.shear_rate * self.shear_factor;
         let shear = move |x: &Vector<D>| {
@@ -172,7 +172,7 @@ where
             u
         };
         let mut flow = self.solver.solve(mesh, &balls, &shear)?;
-        flow.phases[0] += meshed;
+        flow.times.assembly += meshed;
         twists.copy_from_slice(&flow.twists);
         self.last = Some(flow);
         self.last_balls = balls;
@@ -185,13 +185,13 @@ where
 
     fn statistics(&self) -> FlowStatistics {
         let Some(flow) = &self.last else { return FlowStatistics::default() };
-        let names = ["mesh and assembly", "solver set-up", "solve"];
+        let PhaseTimes { assembly, preparation, solve } = flow.times;
         FlowStatistics {
             cell_count: flow.discretisation.mesh.cell_count(),
             dof_count: flow.discretisation.dof_count(),
             solve_count: flow.solve_count,
             iteration_count: flow.iteration_count,
-            phases: names.into_iter().zip(flow.phases).collect(),
+            phases: vec![("mesh and assembly", assembly), ("solver set-up", preparation), ("solve", solve)],
         }
     }
 
@@ -222,12 +222,6 @@ where
         self.last_balls = balls;
         Ok(())
     }
-}
-
-/// Seconds since the first call.
-fn seconds() -> f64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
 
 /// The root cells along each axis of a box.

@@ -13,7 +13,7 @@
 //! let mesh = refinement.mesh(Aabb::unit(), [1, 1], [false; 2], &[disc])?;
 //! let formulation = Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
 //! let params = FlowParams { viscosity: 1.0, formulation, solver: SolverKind::Direct, tolerance: 1e-8 };
-//! let mut solver = FlowSolver::<2>::new(params, || 0.0)?;
+//! let mut solver = FlowSolver::<2>::new(params)?;
 //! let flow = solver.solve(mesh, &[disc], &|x| Vector::<2>::new(x[1] - 0.5, 0.0))?;
 //! assert!((flow.twists[0].velocity[0] - 0.2022).abs() < 1e-3);
 //! # Ok::<(), gluey_stokes::StokesError>(())
@@ -21,51 +21,25 @@
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
-mod assembly;
-mod cell_schur;
-mod coarse_schur;
-mod direct;
-mod discretisation;
-mod element;
 mod error;
 mod flow;
 mod formulation;
-mod gap;
-mod level;
-mod multigrid;
-mod near_bodies;
-mod node_matrix;
-mod patches;
-mod penalised_smoother;
-mod point_matrices;
-mod pressure;
-mod pressure_weights;
-mod problem;
-mod refine;
-mod restricted;
-mod schur;
+mod operator;
+mod precondition;
 mod solid;
-mod solid_block;
-mod solid_cycle;
 mod solver;
 mod space;
-mod system;
-mod transfer;
-mod warm_start;
 
-pub use direct::DirectSolver;
-pub use discretisation::{CellKind, Discretisation, cell_kind, solid_nodes};
 pub use error::{DiagonalError, SmallMatrix, StokesError};
-pub use flow::{Flow, FlowParams, FlowSolver, SolverKind};
-pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
-pub use multigrid::MultigridSolver;
-pub use point_matrices::PointMatrices;
-pub use pressure::{PressureSpace, WeakPressures};
-pub use problem::Problem;
-pub use refine::Refinement;
-pub use solid::{SolidRegion, SolidStress};
-pub use solver::{Preparation, SaddleSolver, SolveReport};
-pub use space::{SolidNodes, VelocitySpace};
-pub use system::{ActiveCell, Penalty, StokesSystem, SystemOperator};
-pub use transfer::Evaluator;
-pub use warm_start::{NodalFields, WarmStartError};
+pub use flow::{
+    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, WarmStartError,
+};
+pub use formulation::{Formulation, PaperParams, ParticleVelocity, Problem, default_offset};
+pub use gluey_fem::Evaluator;
+pub use operator::{StokesSystem, SystemOperator};
+pub use solid::{Penalty, PointMatrices, SolidRegion, SolidStress};
+pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
+pub use space::{
+    ActiveCell, CellKind, Discretisation, PressureSpace, SolidNodes, VelocitySpace, WeakPressures, cell_kind,
+    solid_nodes,
+};

@@ -23,7 +23,7 @@ where
         u[0] = x[1] - 0.5;
         u
     };
-    let mut solver = FlowSolver::<D>::new(params, || 0.0).expect("valid parameters");
+    let mut solver = FlowSolver::<D>::new(params).expect("valid parameters");
     solver.solve(mesh, &[ball], &shear).expect("a flow").twists[0]
 }
 

@@ -9,7 +9,7 @@ use gluey_stokes::{
 };
 
 use crate::support::{
-    RADIUS, RIGID, SOLVERS, balls, bands, bump, couette, mesh, no_clock, pair_at, paper, params, try_solve,
+    RADIUS, RIGID, SOLVERS, balls, bands, bump, couette, mesh, pair_at, paper, params, try_solve,
     twist_distance,
 };
 
@@ -96,13 +96,13 @@ fn parameters_out_of_range_are_named() {
         ("quadrature", soft(PaperParams { quadrature: 0, ..usual })),
     ];
     for (wrong, params) in cases {
-        match FlowSolver::<2>::new(params, no_clock).err() {
+        match FlowSolver::<2>::new(params).err() {
             Some(StokesError::Parameter { name, .. }) => assert_eq!(name, wrong),
             other => panic!("{wrong}: {other:?} for {params:?}"),
         }
     }
-    assert!(FlowSolver::<2>::new(good, no_clock).is_ok());
-    assert!(FlowSolver::<3>::new(soft(usual), no_clock).is_ok());
+    assert!(FlowSolver::<2>::new(good).is_ok());
+    assert!(FlowSolver::<3>::new(soft(usual)).is_ok());
 }
 
 #[test]

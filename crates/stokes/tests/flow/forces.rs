@@ -14,10 +14,9 @@ fn loads<const D: usize>(flow: &Flow<D>) -> Vec<f64>
 where
     Dim<D>: Space<D>,
 {
-    let nodes = &flow.discretisation.velocity;
-    let nowhere = vec![None; nodes.node_count()];
-    let space = VelocitySpace::new::<Ball<D>>(nodes.clone(), &[], &nowhere);
-    let system = StokesSystem::new(&flow.discretisation, space, 1.0, WeakPressures::Keep, None);
+    let nowhere = vec![None; flow.discretisation.velocity.node_count()];
+    let space = VelocitySpace::new::<Ball<D>>(&flow.discretisation, &[], &nowhere);
+    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
     let mut b = vec![0.0; system.dim()];
     system.residual(&flow.velocity, &flow.pressure, &mut b);
     b

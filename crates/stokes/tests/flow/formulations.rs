@@ -3,8 +3,8 @@
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_stokes::{
-    DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices, Preparation, SaddleSolver,
-    SolidRegion, SolverKind, StokesSystem, VelocitySpace, WeakPressures,
+    DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices, SaddleSolver, SolidRegion,
+    SolverKind, StokesSystem, VelocitySpace, WeakPressures,
 };
 
 use crate::support::{
@@ -55,8 +55,8 @@ where
     let discretisation = Discretisation::new(mesh(&bands(level), balls));
     let region = SolidRegion::new(&discretisation, balls, Ramp::new(STEP), &PointMatrices::new(1));
     let solid = region.touched_nodes(&discretisation.velocity, balls);
-    let space = VelocitySpace::new(discretisation.velocity.clone(), balls, &solid);
-    let system = StokesSystem::new(&discretisation, space, 1.0, WeakPressures::Keep, None);
+    let space = VelocitySpace::new(&discretisation, balls, &solid);
+    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
     let nodes = &discretisation.velocity;
     let mut lift: Vec<f64> =
         (0..nodes.node_count()).flat_map(|n| couette(&nodes.point(n)).data.0[0]).collect();
@@ -64,9 +64,8 @@ where
     system.space.expand(&mut lift);
     let (mut b, mut x) = (vec![0.0; system.dim()], vec![0.0; system.dim()]);
     system.residual(&lift, &vec![0.0; system.pressure.dim()], &mut b);
-    let preparation = Preparation { bodies: balls, offset: 0.0, viscosity: 1.0, touched: None };
     let mut solver = DirectSolver::default();
-    solver.prepare(&discretisation, &system, &preparation).unwrap();
+    solver.factorise(&system).unwrap();
     solver.solve(&system, &b, &mut x, 1e-12).unwrap();
     (0..balls.len()).map(|body| system.space.twist(&x, body)).collect()
 }

@@ -1,12 +1,10 @@
 //! The operator in double precision, and one V-cycle as a solver.
 
-use std::sync::Arc;
-
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Preconditioner, vector};
-use gluey_stokes::{Formulation, MultigridSolver, PointMatrices, Problem, SystemOperator};
+use gluey_stokes::{Formulation, MultigridSolver, Problem, SaddleSolver, SystemOperator};
 
 use crate::support::{RIGID, balls, graded, paper};
 
@@ -14,8 +12,7 @@ fn problem<const D: usize>(mesh: TreeMesh<D>, balls: &[Ball<D>], formulation: Fo
 where
     Dim<D>: Space<D>,
 {
-    let matrices = Arc::new(PointMatrices::new(formulation.quadrature()));
-    Problem::new(mesh, balls, 1.0, formulation, &matrices).unwrap()
+    Problem::new(mesh, balls, 1.0, formulation).unwrap()
 }
 
 fn operator_is_symmetric<const D: usize>(formulation: Formulation)
@@ -59,7 +56,7 @@ where
 {
     let (system, split) = (&problem.system, problem.system.velocity_dim());
     let mut solver = MultigridSolver::default();
-    problem.prepare(&mut solver).unwrap();
+    solver.prepare(problem).unwrap();
     let cycle = solver.velocity_cycle().unwrap();
     let mut operator = SystemOperator::new(system);
     let (mut e, mut ae, mut z) = (vec![0.0; system.dim()], vec![0.0; system.dim()], vec![0.0; split]);

@@ -11,7 +11,7 @@ use gluey_testkit::exact::{
     InclusionViscosity, PolynomialFlow, RigidSphere, StokesSolution, ViscousInclusion,
 };
 
-use crate::support::{RIGID, SOLVERS, graded, l2_errors, mesh, no_clock, params, resolved_gaps, solve};
+use crate::support::{RIGID, SOLVERS, graded, l2_errors, mesh, params, resolved_gaps, solve};
 
 fn disc(center: Vector<2>, radius: f64) -> ViscousInclusion {
     ViscousInclusion {
@@ -42,7 +42,7 @@ where
 {
     let sizes: Vec<f64> = levels.iter().map(|&level| 0.5f64.powi(level.into())).collect();
     let errors = levels.iter().map(|&level| {
-        let mut solver = FlowSolver::new(params(RIGID, solver, 1e-9), no_clock).unwrap();
+        let mut solver = FlowSolver::new(params(RIGID, solver, 1e-9)).unwrap();
         let force = |x: &Vector<D>| exact.body_force(x);
         let boundary = |x: &Vector<D>| exact.velocity(x);
         let flow = solver.solve_forced(mesh(level), &[], &boundary, Some(&force)).unwrap();

@@ -59,11 +59,6 @@ pub fn graded<const D: usize>(level: u8) -> TreeMesh<D> {
     .unwrap()
 }
 
-/// The clock of the tests: phases are not measured here.
-pub fn no_clock() -> f64 {
-    0.0
-}
-
 /// One flow, computed from nothing.
 pub fn try_solve<const D: usize>(
     params: FlowParams,
@@ -74,7 +69,7 @@ pub fn try_solve<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    FlowSolver::new(params, no_clock)?.solve(mesh, balls, boundary)
+    FlowSolver::new(params)?.solve(mesh, balls, boundary)
 }
 
 /// As [`try_solve`], where failure fails the test.

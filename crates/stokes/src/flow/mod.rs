@@ -1,0 +1,263 @@
+//! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
+
+mod refinement;
+mod warm_start;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use gluey_fem::TreeMesh;
+use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_levelset::Ball;
+
+use crate::error::StokesError;
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
+use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
+use crate::space::Discretisation;
+use warm_start::WarmStart;
+
+pub use refinement::Refinement;
+pub use warm_start::{NodalFields, WarmStartError};
+
+/// Which linear solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolverKind {
+    /// Sparse direct factorisation.
+    Direct,
+    /// Krylov method with a multigrid preconditioner.
+    Multigrid,
+}
+
+/// Parameters of a [`FlowSolver`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowParams {
+    /// Viscosity of the fluid.
+    pub viscosity: f64,
+    /// How rigidity is imposed.
+    pub formulation: Formulation,
+    /// Linear solver.
+    pub solver: SolverKind,
+    /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed flow.
+    pub tolerance: f64,
+}
+
+/// A computed flow.
+#[derive(Clone, Debug)]
+pub struct Flow<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Mesh and nodes.
+    pub discretisation: Discretisation<D>,
+    /// Nodal velocities, `D` interleaved components.
+    pub velocity: Vec<f64>,
+    /// Pressure at the pressure nodes; its mean over the nodes is zero.
+    pub pressure: Vec<f64>,
+    /// Multiplier of the rigidity, a nodal velocity field; empty in `rigid-dofs`.
+    pub multiplier: Vec<f64>,
+    /// Velocity and spin of each body.
+    pub twists: Vec<Twist<D>>,
+    /// Linear solves made.
+    pub solve_count: usize,
+    /// Krylov iterations or refinements over all solves.
+    pub iteration_count: usize,
+    /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
+    pub fine_operator_applications: f64,
+    /// Where the time went.
+    pub times: PhaseTimes,
+}
+
+/// Seconds of wall time in the phases of a prediction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhaseTimes {
+    /// Nodes, level sets and operator.
+    pub assembly: f64,
+    /// Preparation of the linear solver.
+    pub preparation: f64,
+    /// Solves, with their right-hand sides and the twists.
+    pub solve: f64,
+}
+
+/// Computes flows one after the other, keeping what can be reused.
+pub struct FlowSolver<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    params: FlowParams,
+    solver: Box<dyn SaddleSolver<D> + Send>,
+    method: Arc<dyn Method<D>>,
+    /// The last mesh, which the next one is often equal to.
+    discretisation: Option<Discretisation<D>>,
+    warm_start: Option<WarmStart<D>>,
+}
+
+/// What the solves of one prediction took.
+#[derive(Default)]
+struct Effort {
+    solve_count: usize,
+    iteration_count: usize,
+    fine_operator_applications: f64,
+}
+
+impl Effort {
+    fn add(&mut self, report: &SolveReport) {
+        self.solve_count += 1;
+        self.iteration_count += report.iterations;
+        self.fine_operator_applications += report.fine_operator_applications;
+    }
+}
+
+impl<const D: usize> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// A solver with the given parameters.
+    ///
+    /// # Errors
+    /// [`StokesError::Parameter`] for values out of range.
+    pub fn new(params: FlowParams) -> Result<Self, StokesError> {
+        check(&params)?;
+        let solver: Box<dyn SaddleSolver<D> + Send> = match params.solver {
+            SolverKind::Direct => Box::new(DirectSolver::default()),
+            SolverKind::Multigrid => Box::new(MultigridSolver::default()),
+        };
+        let method = params.formulation.method()?;
+        Ok(Self { params, solver, method, discretisation: None, warm_start: None })
+    }
+
+    /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same function, which
+    /// must be divergence-free, is the undisturbed flow inside.
+    pub fn solve(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
+    ) -> Result<Flow<D>, StokesError> {
+        self.solve_forced(mesh, bodies, boundary, None)
+    }
+
+    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike: `-div(2 eta eps(u)) + grad p = f`.
+    pub fn solve_forced(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
+        force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
+    ) -> Result<Flow<D>, StokesError> {
+        let start = Instant::now();
+        let discretisation = self.discretised(mesh);
+        let problem = Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())?;
+        let assembled = Instant::now();
+        self.solver.prepare(&problem)?;
+        let prepared = Instant::now();
+        let mut flow = self.predict(&problem, boundary, force)?;
+        flow.times = PhaseTimes {
+            assembly: (assembled - start).as_secs_f64(),
+            preparation: (prepared - assembled).as_secs_f64(),
+            solve: prepared.elapsed().as_secs_f64(),
+        };
+        Ok(flow)
+    }
+
+    fn predict(
+        &mut self,
+        problem: &Problem<D>,
+        boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
+        force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
+    ) -> Result<Flow<D>, StokesError> {
+        let lift = problem.lift(boundary);
+        let b = problem.right_hand_side(&lift, force);
+        let (mut x, before) = self.initial_guess(problem);
+        let mut effort = Effort::default();
+        let (solver, tolerance) = (&mut self.solver, self.params.tolerance);
+        let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
+            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
+            Ok(())
+        };
+        let data = Data { lift: &lift, b: &b };
+        let multiplier = problem.rigidity.solve(problem, &data, &mut x, &mut solve)?;
+        let pressure = problem.pressure(&x);
+        let mut velocity = problem.velocity(&lift, &x);
+        let twists = problem.twists(&velocity)?;
+        velocity.truncate(problem.system.space.full_dim());
+        self.keep_for_next(problem, &x, &pressure, before);
+        Ok(Flow {
+            discretisation: problem.discretisation().clone(),
+            velocity,
+            pressure,
+            multiplier,
+            twists,
+            solve_count: effort.solve_count,
+            iteration_count: effort.iteration_count,
+            fine_operator_applications: effort.fine_operator_applications,
+            times: PhaseTimes::default(),
+        })
+    }
+
+    /// The nodes of a mesh: those of the last one, if it is the same.
+    fn discretised(&mut self, mesh: TreeMesh<D>) -> Discretisation<D> {
+        let kept = self.discretisation.take().filter(|last| *last.mesh == mesh);
+        let discretisation = kept.unwrap_or_else(|| Discretisation::new(mesh));
+        self.discretisation = Some(discretisation.clone());
+        discretisation
+    }
+
+    /// The deviations from the undisturbed flow that the next solve starts from, where the solver is iterative: the last
+    /// one, and the one before on the same mesh.
+    pub fn warm_start(&self) -> Option<(&NodalFields, Option<&NodalFields>)> {
+        self.warm_start.as_ref().map(WarmStart::fields)
+    }
+
+    /// Restores what [`FlowSolver::warm_start`] gave, on the mesh it belongs to.
+    ///
+    /// # Errors
+    /// If the lengths do not fit; the solver is as before then.
+    pub fn set_warm_start(
+        &mut self,
+        mesh: TreeMesh<D>,
+        last: NodalFields,
+        before: Option<NodalFields>,
+    ) -> Result<(), WarmStartError> {
+        self.warm_start = Some(WarmStart::restore(mesh, last, before)?);
+        Ok(())
+    }
+
+    /// What the solve starts from, and the last flow on its mesh; zero and nothing at the first step.
+    fn initial_guess(&self, problem: &Problem<D>) -> (Vec<f64>, Option<NodalFields>) {
+        match &self.warm_start {
+            Some(warm) if self.params.solver == SolverKind::Multigrid => {
+                let (guess, last) = warm.moved(problem.discretisation()).into_guess(&problem.system);
+                (guess, Some(last))
+            }
+            _ => (vec![0.0; problem.system.dim()], None),
+        }
+    }
+
+    /// Keeps the solution for the next guess, where the solver is iterative.
+    fn keep_for_next(
+        &mut self,
+        problem: &Problem<D>,
+        x: &[f64],
+        pressure: &[f64],
+        before: Option<NodalFields>,
+    ) {
+        if self.params.solver == SolverKind::Multigrid {
+            let space = &problem.system.space;
+            let mut velocity = x[..space.dim()].to_vec();
+            space.expand(&mut velocity);
+            velocity.truncate(space.full_dim());
+            let last = NodalFields { velocity, pressure: pressure.to_vec() };
+            let before = before.filter(|_| problem.rigidity.is_smooth_in_time());
+            self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
+        }
+    }
+}
+
+fn check(params: &FlowParams) -> Result<(), StokesError> {
+    let wrong = |name, value, wanted| Err(StokesError::Parameter { name, value, wanted });
+    check_viscosity(params.viscosity)?;
+    if !(params.tolerance > 0.0 && params.tolerance < 1.0) {
+        return wrong("tolerance", params.tolerance, "must lie between 0 and 1");
+    }
+    params.formulation.check()
+}

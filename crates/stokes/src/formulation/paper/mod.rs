@@ -1,0 +1,132 @@
+//! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian of eqs. 9 and 10, see
+//! [`uzawa`].
+
+mod params;
+mod uzawa;
+
+use gluey_fem::Evaluator;
+use std::sync::Arc;
+
+use gluey_geom::{Dim, Space, Twist};
+use gluey_levelset::{Ball, Ramp};
+
+use crate::error::StokesError;
+use crate::formulation::problem::check_resolved;
+use crate::formulation::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity};
+use crate::operator::{Elements, StokesSystem};
+use crate::precondition::solid::SolidBlock;
+use crate::precondition::velocity::Smoothing;
+use crate::precondition::{Correction, CycleLevels};
+use crate::solid::{Penalty, PointMatrices, SolidRegion, SolidStress};
+use crate::space::{Discretisation, SolidNodes, VelocitySpace, WeakPressures};
+
+pub use params::{PaperParams, ParticleVelocity};
+
+/// The parameters, and the matrices of quadrature points, which are the same on all meshes.
+pub struct Paper<const D: usize> {
+    params: PaperParams,
+    matrices: Arc<PointMatrices<D>>,
+}
+
+impl<const D: usize> Paper<D> {
+    /// The formulation with these parameters.
+    pub fn new(params: PaperParams) -> Self {
+        Self { params, matrices: Arc::new(PointMatrices::new(params.quadrature)) }
+    }
+}
+
+impl<const D: usize> Method<D> for Paper<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn discretised(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+    ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
+        let Self { params, matrices } = self;
+        let ramp = Ramp::new(params.ramp * discretisation.finest_cell_size());
+        let region = SolidRegion::new(discretisation, bodies, ramp, matrices);
+        let held = region.held(bodies.len());
+        check_resolved(discretisation, bodies, |body| held[body])?;
+        let stress = SolidStress::new(discretisation, &region, matrices, viscosity * params.viscosity_ratio);
+        let touched = region.touched_nodes(&discretisation.velocity, bodies);
+        let nowhere = vec![None; discretisation.velocity.node_count()];
+        let space = VelocitySpace::new::<Ball<D>>(discretisation, &[], &nowhere);
+        let penalty = Penalty { factor: 1.0 - 1.0 / params.viscosity_ratio, stress };
+        let system = StokesSystem::new(space, viscosity, WeakPressures::Keep, Some(penalty));
+        let solid = PenalisedSolid { params: *params, region, touched, matrices: matrices.clone() };
+        Ok((system, Arc::new(solid)))
+    }
+}
+
+/// The penalised solid on one mesh.
+#[derive(Debug)]
+struct PenalisedSolid<const D: usize> {
+    params: PaperParams,
+    region: SolidRegion<D>,
+    /// Nodes of the cells with any solid, each with the body nearest to it.
+    touched: SolidNodes,
+    matrices: Arc<PointMatrices<D>>,
+}
+
+impl<const D: usize> Rigidity<D> for PenalisedSolid<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
+        let (discretisation, bodies) = (problem.discretisation(), &problem.bodies);
+        match self.params.particle_velocity {
+            ParticleVelocity::WeightedMean => {
+                self.region.twists(discretisation, bodies, &self.matrices, velocity)
+            }
+            ParticleVelocity::Center => {
+                let evaluator = Evaluator::new(&discretisation.mesh);
+                let at =
+                    |body: &Ball<D>| evaluator.motion_at(&discretisation.velocity, velocity, body.center());
+                Ok(bodies.iter().map(at).collect())
+            }
+        }
+    }
+
+    fn solve(
+        &self,
+        problem: &Problem<D>,
+        data: &Data<'_>,
+        x: &mut [f64],
+        solve: &mut LinearSolve<'_>,
+    ) -> Result<Multiplier, StokesError> {
+        uzawa::solve(&self.params, problem, data, x, solve)
+    }
+
+    fn is_smooth_in_time(&self) -> bool {
+        true
+    }
+
+    fn coarse_offset(&self) -> f64 {
+        0.0
+    }
+
+    /// Every node the solid touches is rigid: what the penalty makes stiff is invisible to all levels.
+    fn finest_level(&self, problem: &Problem<D>) -> VelocitySpace<D> {
+        VelocitySpace::new(problem.discretisation(), &problem.bodies, &self.touched)
+    }
+
+    fn smoothing(&self, levels: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing> {
+        match levels.are_factorised() {
+            true => Some(Smoothing::of_penalised(is_finest)),
+            // The smoother of the finest mesh is that of the solid.
+            false => (!is_finest).then(|| Smoothing::of_eliminated(is_finest)),
+        }
+    }
+
+    fn correction(
+        &self,
+        elements: &Elements<'_, D>,
+        finest: &VelocitySpace<D>,
+        levels: CycleLevels<'_, D>,
+    ) -> Result<Option<Box<dyn Correction>>, StokesError> {
+        Ok(Some(Box::new(SolidBlock::new(elements, &self.touched, finest, levels)?)))
+    }
+}

@@ -1,0 +1,147 @@
+//! The linear system of a flow around rigid bodies, for those who call the linear solvers themselves.
+//!
+//! The velocity is `lift + T x`: the lift carries the boundary values, and `x` solves `[A, -B^T; -B, 0] x = b` with the
+//! residual `b` of the lift.
+
+use std::sync::Arc;
+
+use gluey_fem::TreeMesh;
+use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_levelset::{Ball, Body};
+use gluey_linalg::vector;
+
+use super::load::add_load;
+use super::{Formulation, Method, Rigidity};
+use crate::error::StokesError;
+use crate::operator::StokesSystem;
+use crate::space::Discretisation;
+
+/// A flow around bodies on one mesh, ready to be solved.
+#[derive(Clone, Debug)]
+pub struct Problem<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The matrix, which knows mesh and nodes.
+    pub system: StokesSystem<D>,
+    /// The rigid bodies.
+    pub bodies: Vec<Ball<D>>,
+    /// How they are rigid.
+    pub rigidity: Arc<dyn Rigidity<D>>,
+}
+
+impl<const D: usize> Problem<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The problem on `mesh` around `bodies` in a fluid of the given viscosity.
+    ///
+    /// # Errors
+    /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller than a cell.
+    pub fn new(
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        formulation: Formulation,
+    ) -> Result<Self, StokesError> {
+        Self::on(&Discretisation::new(mesh), bodies, viscosity, formulation.method()?.as_ref())
+    }
+
+    /// The same on a mesh whose nodes are known, with what a formulation keeps from mesh to mesh.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn on(
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        method: &dyn Method<D>,
+    ) -> Result<Self, StokesError> {
+        check_viscosity(viscosity)?;
+        let (system, rigidity) = method.discretised(discretisation, bodies, viscosity)?;
+        Ok(Self { system, bodies: bodies.to_vec(), rigidity })
+    }
+
+    /// Mesh and nodes.
+    pub fn discretisation(&self) -> &Discretisation<D> {
+        self.system.discretisation()
+    }
+
+    /// Radius of the largest body; zero without bodies.
+    pub fn largest_radius(&self) -> f64 {
+        self.bodies.iter().map(Body::bounding_radius).fold(0.0, f64::max)
+    }
+
+    /// The field closest to `flow` that fulfils all constraints and has its values on the outer boundary: nodal
+    /// velocities, then the twists of eliminated bodies.
+    pub fn lift(&self, flow: &dyn Fn(&Vector<D>) -> Vector<D>) -> Vec<f64> {
+        let (space, nodes) = (&self.system.space, &self.discretisation().velocity);
+        let mut lift: Vec<f64> =
+            (0..nodes.node_count()).flat_map(|n| flow(&nodes.point(n)).data.0[0]).collect();
+        let mut projected = lift.clone();
+        projected.resize(space.dim(), 0.0);
+        space.project(&mut projected);
+        lift.extend_from_slice(&projected[space.full_dim()..]);
+        space.expand(&mut lift);
+        lift
+    }
+
+    /// The load of the force `f(x)` per unit of volume, less what the lift makes of it.
+    pub fn right_hand_side(&self, lift: &[f64], force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
+        let mut b = vec![0.0; self.system.dim()];
+        if let Some(force) = force {
+            add_load(self.discretisation(), force, &mut b);
+            self.system.reduce(&mut b);
+        }
+        self.system.residual(lift, &vec![0.0; self.system.pressure.dim()], &mut b);
+        b
+    }
+
+    /// The velocity `lift + T x`: nodal values, then the twists of eliminated bodies.
+    pub fn velocity(&self, lift: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut velocity = x[..self.system.velocity_dim()].to_vec();
+        self.system.space.expand(&mut velocity);
+        vector::axpy(1.0, lift, &mut velocity);
+        velocity
+    }
+
+    /// The pressure at its nodes.
+    pub fn pressure(&self, x: &[f64]) -> Vec<f64> {
+        let mut pressure = x[self.system.velocity_dim()..].to_vec();
+        self.system.pressure.expand(&mut pressure);
+        pressure
+    }
+
+    /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
+    ///
+    /// # Errors
+    /// [`StokesError::NoSolid`] for a penalised body that others cover.
+    pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
+        self.rigidity.twists(self, velocity)
+    }
+}
+
+/// # Errors
+/// [`StokesError::Parameter`] unless the viscosity is positive and finite.
+pub fn check_viscosity(viscosity: f64) -> Result<(), StokesError> {
+    if viscosity > 0.0 && viscosity.is_finite() {
+        return Ok(());
+    }
+    Err(StokesError::Parameter { name: "viscosity", value: viscosity, wanted: "must be positive and finite" })
+}
+
+/// # Errors
+/// [`StokesError::Unresolved`] for a body that is not held, or smaller than a cell.
+pub fn check_resolved<const D: usize>(
+    discretisation: &Discretisation<D>,
+    bodies: &[Ball<D>],
+    is_held: impl Fn(usize) -> bool,
+) -> Result<(), StokesError> {
+    let cell_size = discretisation.finest_cell_size();
+    match (0..bodies.len()).find(|&b| !is_held(b) || bodies[b].bounding_radius() < cell_size) {
+        Some(body) => {
+            Err(StokesError::Unresolved { body, radius: bodies[body].bounding_radius(), cell_size })
+        }
+        None => Ok(()),
+    }
+}

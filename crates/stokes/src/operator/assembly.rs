@@ -1,0 +1,320 @@
+//! Sparse matrices of the Stokes system, for direct solvers.
+//!
+//! Every nodal unknown is a short linear form in the reduced unknowns (one term for a free node, the masters of a
+//! hanging node, the entries of a body's twist for a rigid node, nothing on the boundary), so a cell contributes
+//! `C^T K C` to its reduced unknowns. These come in blocks that are coupled alike: the components at a free node, the
+//! twist of a body, a pressure.
+
+use std::sync::Arc;
+
+use gluey_fem::ReferenceMatrices;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{
+    AffineConstraints, BlockGroups, BlockPattern, DirectSpd, Ordering, RefinementParams, SparseError,
+    SparseMatrix, Subset, Symbolic,
+};
+
+use super::element::Elements;
+use super::system::StokesSystem;
+use crate::error::StokesError;
+use crate::space::{VelocitySpace, pressure_expansion, velocity_expansion};
+
+/// The factor of a symmetric positive definite matrix.
+pub fn factorised(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Result<DirectSpd, StokesError> {
+    let symbolic = Symbolic::new(matrix.pattern().clone(), ordering)?;
+    let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
+    factor.factorise(matrix.values())?;
+    Ok(factor)
+}
+
+/// The forms in the numbers of the kept unknowns, where those of `forms` are positions less `shift`.
+fn renumbered(forms: &AffineConstraints, shift: usize, unknowns: &Subset) -> AffineConstraints {
+    let mut new = AffineConstraints::zeros(forms.row_count(), unknowns.len());
+    for row in 0..forms.row_count() {
+        let terms = forms.terms(row).iter();
+        new.set(row, terms.filter_map(|&(k, w)| Some((unknowns.number(k as usize + shift)? as u32, w))));
+    }
+    new
+}
+
+/// A sparse matrix in the kept unknowns.
+#[derive(Clone, Debug)]
+pub struct Assembled {
+    /// The kept unknowns.
+    pub unknowns: Subset,
+    /// Their couplings.
+    pub blocks: BlockPattern,
+    /// The matrix.
+    pub matrix: SparseMatrix,
+}
+
+/// Assembles the whole Stokes matrix `[A, -B^T; -B, 0]`. One pressure is left out, since pressures are defined up to a
+/// constant.
+pub fn assemble_stokes<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = system.discretisation();
+    let split = system.velocity_dim();
+    let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
+    let unknowns = Subset::new(split + system.pressure.dim(), |k| match k.checked_sub(split) {
+        Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
+        None => keeps_velocity(&system.space, k),
+    });
+    let velocity = renumbered(&velocity_expansion(&system.space), 0, &unknowns);
+    let pressure = renumbered(&pressure_expansion(&system.pressure), split, &unknowns);
+    let forms = |cell: usize, local: &mut CellForms| {
+        local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
+        discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.terms(q as usize)));
+    };
+    let size = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
+    assemble(system, unknowns, forms, &Elements::new(system, size))
+}
+
+/// Assembles the velocity block alone.
+pub fn assemble_viscous<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
+where
+    Dim<D>: Space<D>,
+{
+    let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
+    assemble_viscous_on(&elements, |_| true)
+}
+
+/// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all twists.
+pub fn assemble_viscous_on<const D: usize>(
+    elements: &Elements<'_, D>,
+    keep: impl Fn(usize) -> bool,
+) -> Result<Assembled, SparseError>
+where
+    Dim<D>: Space<D>,
+{
+    let system = elements.system();
+    let discretisation = system.discretisation();
+    let nodal = system.space.full_dim();
+    let unknowns = Subset::new(system.velocity_dim(), |k| {
+        keeps_velocity(&system.space, k) && (k >= nodal || keep(k / D))
+    });
+    let velocity = renumbered(&velocity_expansion(&system.space), 0, &unknowns);
+    let forms = |cell: usize, local: &mut CellForms| {
+        local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
+    };
+    assemble(system, unknowns, forms, elements)
+}
+
+fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool
+where
+    Dim<D>: Space<D>,
+{
+    match k.checked_sub(space.full_dim()) {
+        Some(twist) => space.is_active(twist / Dim::<D>::RIGID),
+        None => space.is_free(k / D),
+    }
+}
+
+/// Sums up the matrices of the active cells, whose local unknowns are given by `forms`.
+fn assemble<const D: usize>(
+    system: &StokesSystem<D>,
+    unknowns: Subset,
+    forms: impl Fn(usize, &mut CellForms),
+    elements: &Elements<'_, D>,
+) -> Result<Assembled, SparseError>
+where
+    Dim<D>: Space<D>,
+{
+    let numbering = Blocks::new(system, &unknowns);
+    let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
+    let mut cells = Vec::with_capacity(system.cells.len());
+    for (index, cell) in system.cells.iter().enumerate() {
+        forms(cell.cell as usize, &mut local);
+        if !local.terms.is_empty() {
+            groups.push(local.terms.iter().map(|term| numbering.of[term.0 as usize] as usize));
+            cells.push((index, cell));
+        }
+    }
+    let blocks = BlockPattern::new(numbering.first, groups)?;
+    let mut reduction = Reduction::new(unknowns.len(), elements.size());
+    let mut cells = cells.into_iter();
+    let matrix = blocks.sum(|group, target| {
+        let Some((index, cell)) = cells.next() else { return };
+        forms(cell.cell as usize, &mut local);
+        reduction.place(&mut local, blocks.unknowns_of(group));
+        if local.is_identity() {
+            elements.fill(index, target);
+        } else {
+            elements.fill(index, &mut reduction.element);
+            reduction.multiply(&local, target);
+        }
+    });
+    Ok(Assembled { unknowns, blocks, matrix })
+}
+
+/// Blocks of the kept unknowns.
+struct Blocks {
+    /// Block of each unknown.
+    of: Vec<u32>,
+    /// First unknown of each block, and the number of unknowns.
+    first: Vec<u32>,
+}
+
+impl Blocks {
+    fn new<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
+        let starts_block = |k: usize| match k {
+            k if k < nodal => k % D == 0,
+            k if k < split => (k - nodal) % Dim::<D>::RIGID == 0,
+            _ => true,
+        };
+        let mut new = Self { of: Vec::with_capacity(unknowns.len()), first: Vec::new() };
+        for (unknown, &k) in unknowns.positions().iter().enumerate() {
+            if starts_block(k as usize) {
+                new.first.push(unknown as u32);
+            }
+            new.of.push(new.first.len() as u32 - 1);
+        }
+        new.first.push(unknowns.len() as u32);
+        new
+    }
+}
+
+/// The linear forms of a cell's local unknowns, in a row.
+#[derive(Default)]
+struct CellForms {
+    ends: Vec<u32>,
+    terms: Vec<(u32, f64)>,
+    /// The local unknown that each term belongs to.
+    locals: Vec<u32>,
+}
+
+impl CellForms {
+    /// The forms of the velocities at `nodes`, and no others.
+    fn set_velocity(&mut self, velocity: &AffineConstraints, nodes: &[u32], component_count: usize) {
+        self.ends.clear();
+        self.terms.clear();
+        self.locals.clear();
+        for &node in nodes {
+            let first = node as usize * component_count;
+            (first..first + component_count).for_each(|k| self.push(velocity.terms(k)));
+        }
+    }
+
+    fn push(&mut self, form: &[(u32, f64)]) {
+        self.terms.extend_from_slice(form);
+        self.locals.resize(self.terms.len(), self.ends.len() as u32);
+        self.ends.push(self.terms.len() as u32);
+    }
+
+    /// Whether each form is the unknown in its place.
+    fn is_identity(&self) -> bool {
+        let own = |(term, k): (&(u32, f64), u32)| *term == (k, 1.0);
+        self.ends.iter().zip(1..).all(|(&end, k)| end == k) && self.terms.iter().zip(0..).all(own)
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[(u32, f64)]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.terms[start as usize..end as usize])
+    }
+}
+
+/// Workspace of `C^T K C`.
+struct Reduction {
+    /// Place of each unknown among those of the cell at hand.
+    place: Vec<u32>,
+    /// Number of these.
+    count: usize,
+    /// `K`.
+    element: Vec<f64>,
+    /// Its number of rows.
+    size: usize,
+    /// A row of `K C`.
+    row: Vec<f64>,
+}
+
+impl Reduction {
+    fn new(dim: usize, size: usize) -> Self {
+        Self { place: vec![0; dim], count: 0, element: vec![0.0; size * size], size, row: Vec::new() }
+    }
+
+    /// Turns the unknowns in `forms` into places among those of the cell.
+    fn place(&mut self, forms: &mut CellForms, unknowns: impl Iterator<Item = usize>) {
+        self.count = 0;
+        for unknown in unknowns {
+            self.place[unknown] = self.count as u32;
+            self.count += 1;
+        }
+        for term in &mut forms.terms {
+            term.0 = self.place[term.0 as usize];
+        }
+    }
+
+    /// Adds `C^T K C` to `target`.
+    fn multiply(&mut self, forms: &CellForms, target: &mut [f64]) {
+        self.row.resize(self.count, 0.0);
+        for (rows, values) in forms.iter().zip(self.element.chunks_exact(self.size)) {
+            if rows.is_empty() {
+                continue;
+            }
+            self.row.fill(0.0);
+            for (&(column, weight), &local) in forms.terms.iter().zip(&forms.locals) {
+                self.row[column as usize] += weight * values[local as usize];
+            }
+            for &(r, weight) in rows {
+                let target = &mut target[r as usize * self.count..][..self.count];
+                target.iter_mut().zip(&self.row).for_each(|(t, v)| *t += weight * v);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operator::system::SystemOperator;
+    use crate::space::{Discretisation, WeakPressures, solid_nodes};
+    use gluey_fem::TreeMesh;
+    use gluey_geom::{Aabb, Vector};
+    use gluey_levelset::Ball;
+    use gluey_linalg::LinOp;
+
+    /// Two bodies whose cells touch, on a mesh with hanging nodes.
+    fn assembled_and_matrix_free_agree<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let balls = [0.32, 0.6].map(|x| Ball::new(Vector::<D>::repeat(x), 0.14 * (D as f64).sqrt()));
+        let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, h, level| {
+            level < 3 || (0..D).all(|d| lower[d] < 0.5 && lower[d] + h > 0.1)
+        })
+        .unwrap();
+        let discretisation = Discretisation::new(mesh);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
+        let space = VelocitySpace::new(&discretisation, &balls, &solid);
+        let system = StokesSystem::new(space, 1.5, WeakPressures::Aggregate, None);
+        let assembled = assemble_stokes(&system).unwrap();
+        let unknowns = &assembled.unknowns;
+        let x: Vec<f64> = (0..unknowns.len()).map(|i| (0.37 * i as f64).sin()).collect();
+        let mut y = vec![0.0; x.len()];
+        assembled.matrix.multiply(&x, &mut y);
+        let (mut full, mut image) = (vec![0.0; system.dim()], vec![0.0; system.dim()]);
+        unknowns.scatter(&x, &mut full);
+        SystemOperator::new(&system).apply(&full, &mut image);
+        let mut gathered = vec![0.0; x.len()];
+        unknowns.gather(&image, &mut gathered);
+        // The operator makes its divergences sum to zero, so they may differ by one number.
+        let is_pressure = |i: usize| unknowns.positions()[i] as usize >= system.velocity_dim();
+        let first = (0..y.len()).find(|&i| is_pressure(i)).unwrap();
+        let shift = y[first] - gathered[first];
+        for i in 0..y.len() {
+            let expected = gathered[i] + if is_pressure(i) { shift } else { 0.0 };
+            assert!((y[i] - expected).abs() < 1e-10, "{i}: {} {expected}", y[i]);
+        }
+    }
+
+    #[test]
+    fn the_assembled_matrix_is_the_operator() {
+        assembled_and_matrix_free_agree::<2>();
+        assembled_and_matrix_free_agree::<3>();
+    }
+}

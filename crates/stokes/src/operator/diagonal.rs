@@ -1,0 +1,130 @@
+//! The inverse of the operator's diagonal, with a block for every body's twist.
+
+use gluey_fem::ReferenceMatrices;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Preconditioner, invert_spd, vector};
+
+use super::cells::viscous_diagonal;
+use crate::error::DiagonalError;
+use crate::space::{ActiveCell, VelocitySpace};
+
+/// Inverse diagonal on free nodes, inverse blocks on twists, zero elsewhere.
+#[derive(Clone, Debug)]
+pub struct BlockDiagonal {
+    nodal: Vec<f32>,
+    twists: Vec<f32>,
+    rigid: usize,
+}
+
+impl BlockDiagonal {
+    /// Leaves the twists alone.
+    pub fn hold_twists(&mut self) {
+        self.twists.fill(0.0);
+    }
+
+    /// The nodal entries.
+    pub fn into_nodal(self) -> Vec<f32> {
+        self.nodal
+    }
+
+    /// The nodal entries at some positions, and all twists.
+    pub fn restricted(&self, positions: &[u32]) -> Self {
+        let nodal = positions.iter().map(|&k| self.nodal[k as usize]).collect();
+        Self { nodal, twists: self.twists.clone(), rigid: self.rigid }
+    }
+}
+
+impl Preconditioner<f32> for BlockDiagonal {
+    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+        let split = self.nodal.len();
+        vector::multiply(&self.nodal, &r[..split], &mut z[..split]);
+        self.apply_rest(&r[split..], &mut z[split..]);
+    }
+
+    fn diagonal(&self) -> &[f32] {
+        &self.nodal
+    }
+
+    fn apply_rest(&mut self, r: &[f32], z: &mut [f32]) {
+        let n = self.rigid;
+        for (body, block) in self.twists.chunks_exact(n * n).enumerate() {
+            for (i, row) in block.chunks_exact(n).enumerate() {
+                z[body * n + i] = row.iter().zip(&r[body * n..]).map(|(m, r)| m * r).sum();
+            }
+        }
+    }
+}
+
+/// The inverse diagonal of the fluid's operator on the nodes in `smoothed`, and those of the twists.
+pub fn block_diagonal<const D: usize>(
+    space: &VelocitySpace<D>,
+    cells: &[ActiveCell],
+    smoothed: &[bool],
+) -> Result<BlockDiagonal, DiagonalError>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = space.discretisation();
+    let mut nodal = viscous_diagonal(discretisation, cells.iter().map(|c| (c, c.viscous, None)));
+    // The squares keep the sum positive: weights of hanging nodes may be negative.
+    space.nodes().condense(D, |w| w * w, &mut nodal);
+    let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();
+    for (k, value) in nodal.iter_mut().enumerate() {
+        *value = match space.is_free(k / D) && smoothed[k / D] {
+            true if *value > 0.0 => 1.0 / *value,
+            true => return Err(DiagonalError::Node { node: k / D, value: f64::from(*value) }),
+            false => 0.0,
+        };
+    }
+    let twists = twist_blocks(space, cells, &ReferenceMatrices::new())?;
+    Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
+}
+
+/// Inverses of `R^T A R` for every body, zero for those that are not active.
+fn twist_blocks<const D: usize>(
+    space: &VelocitySpace<D>,
+    cells: &[ActiveCell],
+    reference: &ReferenceMatrices<D>,
+) -> Result<Vec<f32>, DiagonalError>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = space.discretisation();
+    let (n, rigid) = (ReferenceMatrices::<D>::VELOCITY, Dim::<D>::RIGID);
+    let mut rows = vec![None; space.nodes().node_count()];
+    for (node, body, matrix) in space.rigid_rows() {
+        rows[node as usize] = Some((body as usize, matrix));
+    }
+    let viscous = nalgebra::DMatrix::from_row_slice(n, n, reference.viscous);
+    let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
+    for cell in cells {
+        let nodes = discretisation.velocity.cell(cell.cell as usize);
+        let mut bodies: Vec<usize> =
+            nodes.iter().filter_map(|&v| rows[v as usize].as_ref().map(|r| r.0)).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        for body in bodies {
+            let mut motion = vec![0.0; n * rigid];
+            for (i, &node) in nodes.iter().enumerate() {
+                if let Some((owner, matrix)) = &rows[node as usize]
+                    && *owner == body
+                {
+                    motion[i * D * rigid..(i + 1) * D * rigid].copy_from_slice(matrix);
+                }
+            }
+            let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
+            let product = motion.transpose() * (&viscous * &motion) * cell.viscous;
+            blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
+        }
+    }
+    let mut inverses = Vec::with_capacity(blocks.len() * rigid * rigid);
+    for (body, mut block) in blocks.into_iter().enumerate() {
+        if !space.is_active(body) {
+            inverses.extend(std::iter::repeat_n(0f32, rigid * rigid));
+            continue;
+        }
+        invert_spd(rigid, &mut block).map_err(|source| DiagonalError::Body { body, source })?;
+        inverses.extend(block.iter().map(|&m| m as f32));
+    }
+    Ok(inverses)
+}

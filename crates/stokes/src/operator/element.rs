@@ -1,0 +1,124 @@
+//! Element matrices of the Stokes system: the viscous one, or the whole saddle.
+
+use gluey_fem::ReferenceMatrices;
+use gluey_geom::{Dim, Space};
+
+use super::system::StokesSystem;
+use crate::space::ActiveCell;
+
+/// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures that no
+/// velocity sees harmless. The solve corrects it.
+const COMPRESSIBILITY: f64 = 1e-9;
+
+/// The matrices of the active cells.
+pub struct Elements<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    system: &'a StokesSystem<D>,
+    reference: ReferenceMatrices<D>,
+    size: usize,
+    /// Scale of the viscous reference matrix in each cell.
+    viscous: Vec<f64>,
+    /// Index of the viscous matrix in `own` that a cell has in addition.
+    additional: Vec<Option<u32>>,
+    own: Vec<f64>,
+}
+
+impl<'a, const D: usize> Elements<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Matrices of `size` rows: velocities only, or velocities and pressures.
+    pub fn new(system: &'a StokesSystem<D>, size: usize) -> Self {
+        let discretisation = system.discretisation();
+        let mut new = Self {
+            system,
+            reference: ReferenceMatrices::new(),
+            size,
+            viscous: system.cells.iter().map(|cell| cell.viscous).collect(),
+            additional: vec![None; system.cells.len()],
+            own: Vec::new(),
+        };
+        new.add_penalty(discretisation.mesh.cell_count());
+        new
+    }
+
+    /// The system whose cells they are.
+    pub fn system(&self) -> &'a StokesSystem<D> {
+        self.system
+    }
+
+    /// Rows of a matrix.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The active cells.
+    pub fn cells(&self) -> &'a [ActiveCell] {
+        &self.system.cells
+    }
+
+    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a surface cuts it.
+    pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
+        let size = ReferenceMatrices::<D>::VELOCITY.pow(2);
+        let own = self.additional[index].map(|own| &self.own[own as usize * size..][..size]);
+        (self.viscous[index], own)
+    }
+
+    fn add_penalty(&mut self, cell_count: usize) {
+        let Some(penalty) = &self.system.penalty else { return };
+        let mut slot = vec![usize::MAX; cell_count];
+        for (k, cell) in self.system.cells.iter().enumerate() {
+            slot[cell.cell as usize] = k;
+        }
+        let mut own_count = 0;
+        self.own.reserve_exact(penalty.stress.cut_cell_count() * ReferenceMatrices::<D>::VELOCITY.pow(2));
+        penalty.stress.for_each_cell(|cell, scale, own| {
+            let slot = slot[cell as usize];
+            let scale = penalty.factor * scale;
+            match own {
+                None => self.viscous[slot] += scale,
+                Some(own) => {
+                    self.own.extend(own.iter().map(|k| scale * k));
+                    self.additional[slot] = Some(own_count);
+                    own_count += 1;
+                }
+            }
+        });
+    }
+
+    /// Writes the matrix of an active cell, row by row.
+    pub fn fill(&self, index: usize, matrix: &mut [f64]) {
+        let (n, size) = (ReferenceMatrices::<D>::VELOCITY, self.size);
+        let (viscous, own) = self.viscous(index);
+        for (row, from) in matrix.chunks_exact_mut(size).zip(self.reference.viscous.chunks_exact(n)) {
+            row.iter_mut().zip(from).for_each(|(value, k)| *value = viscous * k);
+        }
+        if let Some(own) = own {
+            for (row, from) in matrix.chunks_exact_mut(size).zip(own.chunks_exact(n)) {
+                row.iter_mut().zip(from).for_each(|(value, k)| *value += k);
+            }
+        }
+        if size > n {
+            self.fill_pressure(index, matrix);
+        }
+    }
+
+    fn fill_pressure(&self, index: usize, matrix: &mut [f64]) {
+        let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
+        let (reference, cell) = (&self.reference, &self.system.cells[index]);
+        let viscosity = cell.viscous * (cell.volume / cell.divergence).powi(2) / cell.volume;
+        let compressibility = COMPRESSIBILITY * cell.volume / viscosity;
+        for q in 0..m {
+            for r in 0..m {
+                matrix[(n + q) * self.size + n + r] = -compressibility * reference.pressure_mass[q * m + r];
+            }
+            for j in 0..n {
+                let value = -cell.divergence * reference.divergence[q * n + j];
+                matrix[(n + q) * self.size + j] = value;
+                matrix[j * self.size + n + q] = value;
+            }
+        }
+    }
+}

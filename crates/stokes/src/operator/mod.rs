@@ -1,0 +1,15 @@
+//! The Stokes operator of a mesh, its matrices for direct solvers, its diagonal and its restrictions.
+
+mod assembly;
+mod cells;
+mod diagonal;
+mod element;
+mod restricted;
+mod system;
+
+pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, factorised};
+pub use cells::viscous_diagonal;
+pub use diagonal::{BlockDiagonal, block_diagonal};
+pub use element::Elements;
+pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
+pub use system::{StokesSystem, SystemOperator};

@@ -1,0 +1,159 @@
+//! The viscous operator of some of the cells, and that on some of the velocities, with all others at rest: `E^T A E`.
+
+use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{LinOp, Scalar};
+
+use super::cells::cell_operator;
+use crate::solid::Penalty;
+use crate::space::{ActiveCell, Discretisation, VelocitySpace, cells_touching};
+
+/// The viscous operator of some cells, which counts its applications.
+#[derive(Clone, Debug)]
+pub struct CountedOperator<T, const D: usize> {
+    operator: CellOperator<T, D>,
+    work: Workspace<T>,
+    /// Reduced velocities.
+    dim: usize,
+    /// Fraction of all cells.
+    share: f64,
+    applications: usize,
+}
+
+impl<T: CellScalar, const D: usize> CountedOperator<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The operator of these cells, of `cell_count` in all, on the velocities of `space`.
+    pub fn new(
+        space: &VelocitySpace<D>,
+        cells: &[ActiveCell],
+        cell_count: usize,
+        penalty: Option<&Penalty<D>>,
+    ) -> Self {
+        Self {
+            operator: cell_operator(space, cells, penalty),
+            work: Workspace::default(),
+            dim: space.dim(),
+            share: cells.len() as f64 / cell_count.max(1) as f64,
+            applications: 0,
+        }
+    }
+
+    /// The reduced loads of nodal velocities that fulfil the constraints.
+    pub fn apply_to_field(&mut self, x: &[T], y: &mut [T]) {
+        self.applications += 1;
+        self.operator.viscous_of_field(x, y, &mut self.work);
+    }
+
+    /// Fraction of all cells.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Applications since the last call, each as its share of the cells.
+    pub fn take_applications(&mut self) -> f64 {
+        std::mem::take(&mut self.applications) as f64 * self.share
+    }
+}
+
+impl<T: CellScalar, const D: usize> LinOp<T> for CountedOperator<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.dim
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        self.applications += 1;
+        self.operator.viscous(x, y, &mut self.work);
+    }
+}
+
+/// `E^T A E` from the cells that act on its unknowns.
+#[derive(Clone, Debug)]
+pub struct Restricted<T, const D: usize> {
+    /// The unknowns among the reduced velocities.
+    positions: Vec<u32>,
+    operator: CountedOperator<T, D>,
+    /// Reduced velocities, zero away from the unknowns, and their loads.
+    velocity: Vec<T>,
+    load: Vec<T>,
+}
+
+/// The cells whose stress acts on marked nodes.
+pub fn acting<const D: usize>(
+    discretisation: &Discretisation<D>,
+    cells: &[ActiveCell],
+    marked: &[bool],
+) -> Vec<ActiveCell> {
+    let acts = cells_touching(&discretisation.velocity, marked);
+    cells.iter().filter(|c| acts[c.cell as usize]).copied().collect()
+}
+
+impl<T: CellScalar, const D: usize> Restricted<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The operator on the velocities at `positions`, on which `acting` cells of `cell_count` act.
+    pub fn new(
+        space: &VelocitySpace<D>,
+        acting: &[ActiveCell],
+        cell_count: usize,
+        positions: Vec<u32>,
+        penalty: Option<&Penalty<D>>,
+    ) -> Self {
+        Self {
+            operator: CountedOperator::new(space, acting, cell_count, penalty),
+            velocity: vec![T::ZERO; space.dim()],
+            load: vec![T::ZERO; space.dim()],
+            positions,
+        }
+    }
+
+    /// The unknowns among the reduced velocities.
+    pub fn positions(&self) -> &[u32] {
+        &self.positions
+    }
+
+    /// `r = E^T (b - A x)` for reduced velocities `x`.
+    pub fn residual(&mut self, b: &[T], x: &[T], r: &mut [T]) {
+        self.operator.apply(x, &mut self.load);
+        for (r, &k) in r.iter_mut().zip(&self.positions) {
+            *r = b[k as usize] - self.load[k as usize];
+        }
+    }
+
+    /// Applications since the last call, each as its share of the cells.
+    pub fn take_applications(&mut self) -> f64 {
+        self.operator.take_applications()
+    }
+}
+
+impl<T: CellScalar, const D: usize> LinOp<T> for Restricted<T, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn apply(&mut self, x: &[T], y: &mut [T]) {
+        for (&k, &x) in self.positions.iter().zip(x) {
+            self.velocity[k as usize] = x;
+        }
+        self.operator.apply(&self.velocity, &mut self.load);
+        gather(&self.positions, &self.load, y);
+    }
+}
+
+/// `to = E^T from`.
+pub fn gather<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
+    to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
+}
+
+/// `to += E from`.
+pub fn add_at<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
+    positions.iter().zip(from).for_each(|(&k, &value)| to[k as usize] += value);
+}

@@ -1,0 +1,59 @@
+//! The block triangular preconditioner.
+
+use gluey_fem::cells::{CellOperator, Workspace};
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Preconditioner, Scalar, vector};
+
+use crate::operator::StokesSystem;
+use crate::precondition::schur::SchurInverse;
+use crate::precondition::velocity::VCycle;
+
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`.
+pub struct BlockTriangular<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    system: &'a StokesSystem<D>,
+    fluid: &'a CellOperator<f32, D>,
+    cycle: &'a mut VCycle<D>,
+    schur: &'a mut SchurInverse<D>,
+    /// `r_p`, then `z_p` at all nodes.
+    pressure: Vec<f32>,
+    /// `z_p`.
+    answer: Vec<f32>,
+    work: Workspace<f32>,
+}
+
+impl<'a, const D: usize> BlockTriangular<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    pub fn new(
+        system: &'a StokesSystem<D>,
+        fluid: &'a CellOperator<f32, D>,
+        cycle: &'a mut VCycle<D>,
+        schur: &'a mut SchurInverse<D>,
+    ) -> Self {
+        let zeros = || vec![0.0; system.pressure.dim()];
+        Self { system, fluid, cycle, schur, pressure: zeros(), answer: zeros(), work: Workspace::default() }
+    }
+}
+
+impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[S], z: &mut [S]) {
+        let Self { system, fluid, cycle, schur, pressure, answer, work } = self;
+        let (ru, rp) = r.split_at(system.velocity_dim());
+        let (zu, zp) = z.split_at_mut(system.velocity_dim());
+        vector::convert(-1.0, rp, pressure);
+        system.pressure.remove_mean(pressure);
+        schur.apply(&system.pressure, pressure, answer);
+        system.pressure.remove_mean(answer);
+        vector::convert(1.0, answer, zp);
+        vector::copy(answer, pressure);
+        system.pressure.expand(pressure);
+        cycle.answer(ru, |load| fluid.gradient(pressure, load, work), zu);
+    }
+}

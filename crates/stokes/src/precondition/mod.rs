@@ -1,0 +1,46 @@
+//! The preconditioner: a V-cycle on the velocities, what the penalised solid needs beside it, and the Schur complement.
+
+mod block_triangular;
+pub mod schur;
+pub mod solid;
+pub mod velocity;
+
+use crate::space::Discretisation;
+
+pub use block_triangular::BlockTriangular;
+
+/// Cells in the radius of the largest body on a mesh on which what is in it is factorised in 3D, at most.
+const FACTORISED_CELLS: f64 = 2.0;
+
+/// The meshes of a velocity cycle and the bodies in them.
+#[derive(Clone, Copy, Debug)]
+pub struct CycleLevels<'a, const D: usize> {
+    /// The meshes, coarsest first.
+    pub meshes: &'a [Discretisation<D>],
+    /// Radius of the largest body.
+    pub radius: f64,
+}
+
+impl<const D: usize> CycleLevels<'_, D> {
+    /// Whether bodies are factorised on the last of the meshes.
+    pub fn are_factorised(&self) -> bool {
+        let is_small = |mesh: &Discretisation<D>| self.radius <= FACTORISED_CELLS * mesh.finest_cell_size();
+        D == 2 || self.meshes.len() < 2 || self.meshes.last().is_none_or(is_small)
+    }
+
+    /// The first of the levels.
+    pub fn below(&self, count: usize) -> Self {
+        Self { meshes: &self.meshes[..count], ..*self }
+    }
+}
+
+/// A correction around the velocity cycle, for what its levels cannot see.
+pub trait Correction: Send {
+    /// `z = M^-1 r` for reduced velocities, where `levels(f, u)` turns the nodal load `f` into the reduced velocities `u` of the
+    /// finest level.
+    fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32]));
+
+    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and products with
+    /// patches do not count.
+    fn take_applications(&mut self) -> f64;
+}

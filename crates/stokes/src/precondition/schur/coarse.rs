@@ -1,0 +1,245 @@
+//! The Schur complement of the box, from its coarsest mesh.
+//!
+//! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow that would answer them
+//! does not fit between its walls. A mesh of a few cells knows them. With the Schur complement `S_0` of such a mesh, which is dense and
+//! small, the weighted mass `T_0` that stands for it (see [`crate::schur`]), and the interpolation `P` from its pressures,
+//!
+//! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
+//!
+//! leaves all other pressures as they were. The bodies are left out: they change little on this scale, and without them the matrix stays
+//! the same from step to step.
+
+use std::sync::Arc;
+
+use gluey_fem::Interpolation;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{LinOp, Ordering, Preconditioner};
+use nalgebra::{DMatrix, DVector};
+
+use super::mass::pressure_matrix;
+use super::weights::without_bodies;
+use crate::error::{SmallMatrix, StokesError};
+use crate::operator::{Elements, StokesSystem, SystemOperator, assemble_viscous, factorised};
+use crate::space::Discretisation;
+
+/// Largest dense matrix.
+const MOST_PRESSURES: usize = 1000;
+/// Share of the mass that is added to `S_0`, for meshes so coarse that no velocity sees some pressure.
+const SHARE_OF_MASS: f64 = 1e-3;
+
+/// `P (S_0^-1 - T_0^-1) P^T`.
+pub struct CoarseSchur<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The meshes, coarsest first.
+    meshes: Vec<Discretisation<D>>,
+    viscosity: f64,
+    system: StokesSystem<D>,
+    /// `S_0^-1 - T_0^-1` for the unknown pressures in `unknowns`.
+    correction: DMatrix<f32>,
+    unknowns: Vec<u32>,
+    /// `transfers[l]` joins the pressures of mesh `l` to those of mesh `l + 1`.
+    transfers: Vec<Interpolation<D>>,
+    /// Pressures on each mesh.
+    pressures: Vec<Vec<f32>>,
+}
+
+impl<const D: usize> CoarseSchur<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The correction from the coarsest of `meshes` (coarsest first), or, where that is too fine, from its coarsening; `None` where
+    /// even the cells from which the mesh was refined are too many. What stayed the same is taken from `before`.
+    pub fn new(
+        meshes: &[Discretisation<D>],
+        viscosity: f64,
+        before: Option<Self>,
+    ) -> Result<Option<Self>, StokesError> {
+        let Some(meshes) = with_small_coarsest(meshes, before.as_ref()) else { return Ok(None) };
+        let transfers = meshes.windows(2).map(|pair| {
+            Interpolation::new(&pair[0].mesh, pair[0].pressure.clone(), &pair[1].mesh, &pair[1].pressure)
+        });
+        let transfers: Vec<_> = transfers.collect();
+        let pressures = meshes.iter().map(|mesh| vec![0.0; mesh.pressure.node_count()]).collect();
+        let is_same =
+            |old: &Self| Arc::ptr_eq(&old.meshes[0].mesh, &meshes[0].mesh) && old.viscosity == viscosity;
+        if let Some(old) = before.filter(is_same) {
+            return Ok(Some(Self { meshes, transfers, pressures, ..old }));
+        }
+        let coarsest = &meshes[0];
+        let system = without_bodies(coarsest, viscosity);
+        let free = |q: &u32| system.pressure.is_free(*q as usize);
+        let unknowns: Vec<u32> = (0..system.pressure.dim() as u32).filter(free).collect();
+        let correction = correction(&system, viscosity, &unknowns)?;
+        Ok(Some(Self { viscosity, correction, unknowns, transfers, pressures, system, meshes }))
+    }
+
+    /// `z += P (S_0^-1 - T_0^-1) P^T r` on all pressure nodes of the finest mesh. `r` is zero but at unknowns, where its sum vanishes.
+    pub fn add(&mut self, r: &[f32], z: &mut [f32]) {
+        let Self { meshes, system, correction, unknowns, transfers, pressures, .. } = self;
+        let top = meshes.len() - 1;
+        pressures[top].copy_from_slice(r);
+        for level in (0..top).rev() {
+            let (below, above) = pressures.split_at_mut(level + 1);
+            meshes[level + 1].pressure.condense(1, |w| w as f32, &mut above[0]);
+            transfers[level].restrict::<1>(&above[0], &mut below[level]);
+        }
+        system.pressure.reduce(&mut pressures[0]);
+        let load = DVector::from_iterator(unknowns.len(), unknowns.iter().map(|&q| pressures[0][q as usize]));
+        let answer = &*correction * load;
+        unknowns.iter().zip(answer.iter()).for_each(|(&q, &value)| pressures[0][q as usize] = value);
+        for level in 0..top {
+            let (below, above) = pressures.split_at_mut(level + 1);
+            meshes[level].pressure.distribute(1, |w| w as f32, &mut below[level]);
+            transfers[level].prolong::<1>(&below[level], &mut above[0]);
+        }
+        gluey_linalg::vector::axpy(1.0, &pressures[top], z);
+    }
+}
+
+/// The meshes, with coarser ones put before them until the first has few enough pressures.
+fn with_small_coarsest<const D: usize>(
+    meshes: &[Discretisation<D>],
+    before: Option<&CoarseSchur<D>>,
+) -> Option<Vec<Discretisation<D>>>
+where
+    Dim<D>: Space<D>,
+{
+    let mut all = meshes.to_vec();
+    while all[0].pressure.node_count() > MOST_PRESSURES {
+        let level = all[0].mesh.max_level().checked_sub(1)?;
+        let is_it = |old: &&Discretisation<D>| {
+            old.mesh.max_level() == level && old.mesh.is_coarsening_of(&all[0].mesh)
+        };
+        let kept = before.and_then(|before| before.meshes.iter().find(is_it).cloned());
+        all.insert(0, kept.unwrap_or_else(|| Discretisation::new(all[0].mesh.coarsened(level))));
+    }
+    Some(all)
+}
+
+/// `S_0^-1 - T_0^-1`, up to constants, which do not matter for loads without a mean.
+fn correction<const D: usize>(
+    system: &StokesSystem<D>,
+    viscosity: f64,
+    unknowns: &[u32],
+) -> Result<DMatrix<f32>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = system.discretisation();
+    let failed = |matrix| StokesError::BoxPressures {
+        matrix,
+        pressures: unknowns.len(),
+        cells: discretisation.mesh.cell_count(),
+    };
+    let elements = Elements::new(system, gluey_fem::ReferenceMatrices::<D>::VELOCITY);
+    let mass = pressure_matrix(&elements, viscosity)?;
+    let count = unknowns.len();
+    let mass = DMatrix::from_fn(count, count, |i, j| mass.get(unknowns[i] as usize, unknowns[j] as usize));
+    let mut schur = dense_schur(system, unknowns)? + SHARE_OF_MASS * &mass;
+    // Constants, which no velocity sees, get a stiffness like that of the rest.
+    schur.add_scalar_mut(schur.trace() / (count * count) as f64);
+    let schur = schur.cholesky().ok_or_else(|| failed(SmallMatrix::Schur))?;
+    let mass = mass.cholesky().ok_or_else(|| failed(SmallMatrix::Mass))?;
+    Ok((schur.inverse() - mass.inverse()).cast())
+}
+
+/// `B A^-1 B^T` on the unknown pressures.
+fn dense_schur<const D: usize>(
+    system: &StokesSystem<D>,
+    unknowns: &[u32],
+) -> Result<DMatrix<f64>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let assembled = assemble_viscous(system)?;
+    let mut factor = factorised(&assembled.matrix, Ordering::Amd)?;
+    let mut operator = SystemOperator::new(system);
+    let velocities = system.velocity_dim();
+    let zeros = || vec![0.0; assembled.unknowns.len()];
+    let (mut load, mut velocity) = (zeros(), zeros());
+    let (mut x, mut y) = (vec![0.0f64; system.dim()], vec![0.0; system.dim()]);
+    let mut schur = DMatrix::zeros(unknowns.len(), unknowns.len());
+    for (column, &q) in unknowns.iter().enumerate() {
+        x.fill(0.0);
+        x[velocities + q as usize] = 1.0;
+        operator.apply(&x, &mut y);
+        assembled.unknowns.gather(&y, &mut load);
+        factor.apply(&load, &mut velocity);
+        assembled.unknowns.scatter(&velocity, &mut x);
+        operator.apply(&x, &mut y);
+        for (row, &p) in unknowns.iter().enumerate() {
+            schur[(row, column)] = y[velocities + p as usize];
+        }
+    }
+    Ok(schur)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gluey_fem::TreeMesh;
+    use gluey_geom::{Aabb, Vector};
+    use gluey_linalg::vector;
+
+    /// Meshes of a long box, from level 2 on, the finest with hanging nodes.
+    fn long_box(roots: u32) -> Vec<Discretisation<2>> {
+        let domain = Aabb { lower: Vector::zeros(), upper: Vector::from([f64::from(roots), 4.0]) };
+        let mesh = TreeMesh::refine(domain, [roots, 4], [false; 2], 3, |lower, _, level| {
+            level < 2 || lower[0] < 1.0
+        });
+        let mesh = mesh.unwrap();
+        vec![Discretisation::new(mesh.coarsened(2)), Discretisation::new(mesh)]
+    }
+
+    /// `y . C x` for the correction `C` between unknowns.
+    fn product(correction: &mut CoarseSchur<2>, x: &[f32], y: &[f32]) -> f64 {
+        let mut z = vec![0.0; x.len()];
+        correction.add(x, &mut z);
+        vector::dot(y, &z)
+    }
+
+    fn loads(mesh: &Discretisation<2>, seed: u64) -> Vec<f32> {
+        let mut load = vec![0.0; mesh.pressure.node_count()];
+        vector::fill_pseudo_random(seed, &mut load);
+        mesh.pressure.constraints().iter().for_each(|c| load[c.node as usize] = 0.0);
+        load
+    }
+
+    #[test]
+    fn a_box_of_many_roots_is_coarsened_until_its_matrix_is_small() {
+        let meshes = long_box(20);
+        assert!(meshes[0].pressure.node_count() > MOST_PRESSURES);
+        let mut correction = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
+        assert_eq!(correction.meshes.len(), 3);
+        assert_eq!(correction.unknowns.len(), 41 * 9);
+        let [x, y] = [1, 2].map(|seed| loads(&meshes[1], seed));
+        let (xy, yx) = (product(&mut correction, &x, &y), product(&mut correction, &y, &x));
+        assert!((xy - yx).abs() < 1e-4 * xy.abs(), "{xy} {yx}");
+        assert!(CoarseSchur::new(&long_box(300), 2.0, None).unwrap().is_none());
+    }
+
+    /// A negative viscosity makes a negative mass.
+    #[test]
+    fn a_matrix_that_is_not_positive_is_named() {
+        let mesh = &long_box(3)[0];
+        let system = without_bodies(mesh, 2.0);
+        let unknowns: Vec<u32> = (0..system.pressure.dim() as u32).collect();
+        let refused = correction(&system, -2.0, &unknowns).err();
+        let expected =
+            StokesError::BoxPressures { matrix: SmallMatrix::Mass, pressures: 13 * 17, cells: 12 * 16 };
+        assert_eq!(refused, Some(expected));
+    }
+
+    #[test]
+    fn the_matrix_is_kept_while_coarsest_mesh_and_viscosity_stand() {
+        let meshes = long_box(3);
+        let first = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
+        let matrix = first.correction.clone();
+        let again = CoarseSchur::new(&meshes, 2.0, Some(first)).unwrap().unwrap();
+        assert_eq!(again.correction, matrix);
+        let thicker = CoarseSchur::new(&meshes, 4.0, Some(again)).unwrap().unwrap();
+        assert!((thicker.correction - matrix.scale(2.0)).amax() < 1e-4 * matrix.amax());
+    }
+}

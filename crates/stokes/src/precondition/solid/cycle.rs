@@ -1,0 +1,148 @@
+//! What corrects the penalised operator on the nodes of the solid.
+//!
+//! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D, where factors are
+//! small, the operator on these nodes is factorised. In 3D a multigrid cycle answers for it on coarser meshes, with the Galerkin
+//! products `P^T A P` on those of their nodes that lie among the solid's, so a cell that is cut stays cut as it is. [`Patches`]
+//! smooth on all but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{
+    Chebyshev, DirectSpd, Guess, LinOp, Ordering, Preconditioner, SparseMatrix, SpectralInterval,
+    estimate_lambda_max, vector,
+};
+
+use super::node_matrix::NodeMatrix;
+use super::numbered::Numbered;
+use super::patches::Patches;
+use super::prolongation::Prolongation;
+use crate::error::StokesError;
+use crate::operator::factorised;
+use crate::space::Discretisation;
+
+/// Applications of the patches in a sweep.
+const DEGREE: usize = 2;
+/// Largest over smallest eigenvalue that a sweep damps.
+const RATIO: f64 = 4.0;
+/// Lanczos steps for the largest eigenvalue.
+const LANCZOS_STEPS: usize = 8;
+/// Factor by which that estimate is raised.
+const SAFETY: f64 = 1.1;
+
+/// The levels.
+pub struct SolidCycle<const D: usize> {
+    /// From fine to coarse, without the finest; none where that is factorised.
+    coarser: Vec<Coarse<D>>,
+    direct: DirectSpd,
+}
+
+/// A level below the finest.
+struct Coarse<const D: usize> {
+    prolongation: Prolongation,
+    /// Matrix and smoother, but on the coarsest.
+    smoothed: Option<(NodeMatrix<D>, Smoother<D>)>,
+    b: Vec<f64>,
+    x: Vec<f64>,
+    r: Vec<f64>,
+}
+
+struct Smoother<const D: usize> {
+    patches: Patches<f64, D>,
+    chebyshev: Chebyshev<f64>,
+}
+
+impl<const D: usize> SolidCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The cycle that is a factorisation.
+    pub fn factorised(matrix: &SparseMatrix, order: &[usize]) -> Result<Self, StokesError> {
+        Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
+    }
+
+    /// The cycle below the nodes of `solid`, on which the operator is `matrix`. `meshes` are those of the coarser levels, fine
+    /// to coarse.
+    pub fn below<'a>(
+        solid: &Numbered<'a, D>,
+        matrix: &NodeMatrix<D>,
+        meshes: impl Iterator<Item = &'a Discretisation<D>>,
+    ) -> Result<Self, StokesError> {
+        let mut coarser: Vec<Coarse<D>> = Vec::new();
+        let mut last: Option<(Numbered<'a, D>, NodeMatrix<D>)> = None;
+        for mesh in meshes {
+            let (nodes, matrix) = last.as_ref().map_or((solid, matrix), |(nodes, matrix)| (nodes, matrix));
+            let (coarse, prolongation) = nodes.coarsened(mesh);
+            let product = matrix.galerkin(&prolongation);
+            if let (Some(level), Some((nodes, matrix))) = (coarser.last_mut(), last) {
+                let smoother = Smoother::new(&matrix, &nodes)?;
+                level.smoothed = Some((matrix, smoother));
+            }
+            coarser.push(Coarse::new(prolongation));
+            last = Some((coarse, product));
+        }
+        let coarsest = last.as_ref().map_or(matrix, |last| &last.1);
+        let (matrix, order) = coarsest.to_sparse()?;
+        Ok(Self { coarser, direct: factorised(&matrix, Ordering::Custom(&order))? })
+    }
+}
+
+impl<const D: usize> Preconditioner<f64> for SolidCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, b: &[f64], x: &mut [f64]) {
+        if self.coarser.is_empty() {
+            return self.direct.apply(b, x);
+        }
+        x.fill(0.0);
+        correct(&mut self.coarser, &mut self.direct, b, x);
+    }
+}
+
+impl<const D: usize> Coarse<D> {
+    fn new(prolongation: Prolongation) -> Self {
+        let zeros = || vec![0.0; prolongation.coarse_count() * D];
+        Self { b: zeros(), x: zeros(), r: zeros(), smoothed: None, prolongation }
+    }
+}
+
+impl<const D: usize> Smoother<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(matrix: &NodeMatrix<D>, nodes: &Numbered<'_, D>) -> Result<Self, StokesError> {
+        let diagonal = matrix.diagonal().iter().map(|d| 1.0 / d).collect();
+        let patches = Patches::new(matrix, nodes.cells(), diagonal);
+        let mut patches = patches.map_err(StokesError::SolidPatch)?;
+        let largest = estimate_lambda_max(&mut &*matrix, &mut patches, LANCZOS_STEPS)?;
+        let interval = SpectralInterval::upper_part(largest, RATIO, SAFETY);
+        Ok(Self { patches, chebyshev: Chebyshev::new(matrix.dim(), DEGREE, interval) })
+    }
+
+    fn smooth(&mut self, a: &mut impl LinOp<f64>, b: &[f64], x: &mut [f64], guess: Guess) {
+        self.chebyshev.smooth(a, &mut self.patches, b, x, guess);
+    }
+}
+
+/// Adds to `x` what the coarser levels make of the residual `r`.
+fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64])
+where
+    Dim<D>: Space<D>,
+{
+    let Some((level, coarser)) = levels.split_first_mut() else { return };
+    level.prolongation.restrict::<D>(r, &mut level.b);
+    match &mut level.smoothed {
+        None => direct.apply(&level.b, &mut level.x),
+        Some((matrix, smoother)) => {
+            smoother.smooth(matrix, &level.b, &mut level.x, Guess::Zero);
+            residual(matrix, &level.b, &level.x, &mut level.r);
+            correct(coarser, direct, &level.r, &mut level.x);
+            smoother.smooth(matrix, &level.b, &mut level.x, Guess::Given);
+        }
+    }
+    level.prolongation.prolong::<D>(&level.x, x);
+}
+
+fn residual(a: &mut impl LinOp<f64>, b: &[f64], x: &[f64], r: &mut [f64]) {
+    a.apply(x, r);
+    vector::residual_from_product(b, r);
+}

@@ -1,0 +1,137 @@
+//! One V-cycle on the velocity block.
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Preconditioner, Scalar, vector};
+
+use super::coarse::CoarseSolver;
+use super::hierarchy::Hierarchy;
+use super::level::{Level, Smoothing};
+use crate::error::StokesError;
+use crate::precondition::Correction;
+use crate::space::VelocitySpace;
+
+/// A level that a cycle is to have.
+pub struct LevelPlan<const D: usize> {
+    /// Velocities with the bodies' nodes eliminated.
+    pub space: VelocitySpace<D>,
+    /// How it smooths, if it does.
+    pub smoothing: Option<Smoothing>,
+}
+
+/// One V-cycle on the velocity block.
+pub struct VCycle<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The meshes.
+    pub hierarchy: Hierarchy<D>,
+    /// Coarsest first.
+    pub levels: Vec<Level<D>>,
+    coarse: CoarseSolver,
+    /// For what the levels cannot see.
+    correction: Option<Box<dyn Correction>>,
+    /// What it is given and what it answers.
+    wide: [Vec<f64>; 2],
+}
+
+impl<const D: usize> VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity.
+    ///
+    /// # Errors
+    /// If a diagonal or the matrix of the coarsest level has no inverse.
+    pub fn new(
+        hierarchy: Hierarchy<D>,
+        plans: Vec<LevelPlan<D>>,
+        correction: Option<Box<dyn Correction>>,
+        viscosity: f64,
+    ) -> Result<Self, StokesError> {
+        let level = |(level, plan): (usize, LevelPlan<D>)| {
+            Level::new(plan.space, viscosity, plan.smoothing)
+                .map_err(|source| StokesError::Smoother { level, source })
+        };
+        let levels = plans.into_iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
+        let coarse = CoarseSolver::new(levels[0].space.clone(), viscosity)?;
+        Ok(Self { hierarchy, levels, coarse, correction, wide: Default::default() })
+    }
+
+    /// Applications on the finest mesh since the last call, see [`crate::SolveReport::fine_operator_applications`].
+    pub fn take_fine_applications(&mut self) -> f64 {
+        let levels = self.levels.last_mut().map_or(0.0, Level::take_applications);
+        levels + self.correction.as_mut().map_or(0.0, |correction| correction.take_applications())
+    }
+
+    fn run(&mut self, top: usize) {
+        if top == 0 {
+            let level = &mut self.levels[0];
+            self.coarse.solve(&level.b, &mut level.x);
+            return;
+        }
+        let (below, above) = self.levels.split_at_mut(top);
+        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
+        fine.restrict(&mut self.hierarchy.transfers[top - 1], &coarse.space, &mut coarse.b);
+        self.run(top - 1);
+        let (below, above) = self.levels.split_at_mut(top);
+        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
+        let mut x = std::mem::take(&mut coarse.x);
+        fine.correct(&self.hierarchy.transfers[top - 1], &coarse.space, &mut x);
+        coarse.x = x;
+        fine.smooth();
+    }
+}
+
+impl<const D: usize> VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// `z = V r` on the reduced vectors of the finest rigid level.
+    fn rigid_cycle<T: Scalar>(&mut self, r: &[f64], z: &mut [T]) {
+        let norm = vector::norm(r);
+        if norm == 0.0 {
+            z.fill(T::ZERO);
+            return;
+        }
+        let top = self.levels.len() - 1;
+        vector::convert(1.0 / norm, r, &mut self.levels[top].b);
+        self.run(top);
+        vector::convert(norm, &self.levels[top].x, z);
+    }
+
+    /// The reduced velocities `u` with which the finest rigid level answers the nodal load `f`, which it reduces.
+    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
+        self.levels[self.levels.len() - 1].space.reduce(f);
+        self.rigid_cycle(f, u);
+    }
+
+    /// `z = V (r - g)` for the gradient `g` that `gradient` writes.
+    pub fn answer<S: Scalar>(&mut self, r: &[S], gradient: impl FnOnce(&mut [f32]), z: &mut [S]) {
+        let top = self.levels.len() - 1;
+        gradient(&mut self.levels[top].b[..r.len()]);
+        let Some(mut correction) = self.correction.take() else {
+            vector::residual_from_product(r, &mut self.levels[top].b);
+            self.run(top);
+            return vector::convert(1.0, &self.levels[top].x, z);
+        };
+        let [mut load, mut answer] = std::mem::take(&mut self.wide);
+        [&mut load, &mut answer].into_iter().for_each(|v| v.resize(r.len(), 0.0));
+        vector::convert(1.0, &self.levels[top].b[..r.len()], &mut load);
+        vector::residual_from_product(r, &mut load);
+        correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u));
+        vector::convert(1.0, &answer, z);
+        self.wide = [load, answer];
+        self.correction = Some(correction);
+    }
+}
+
+impl<const D: usize> Preconditioner<f64> for VCycle<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        let Some(mut correction) = self.correction.take() else { return self.rigid_cycle(r, z) };
+        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u));
+        self.correction = Some(correction);
+    }
+}

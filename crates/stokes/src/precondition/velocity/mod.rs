@@ -1,0 +1,15 @@
+//! One V-cycle on the velocity block, on levels whose bodies are eliminated.
+
+mod coarse;
+mod cycle;
+mod hierarchy;
+mod level;
+mod near_bodies;
+
+pub use cycle::{LevelPlan, VCycle};
+pub use hierarchy::Hierarchy;
+pub use level::Smoothing;
+
+/// Factor by which [`level::cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not sums over cells: they
+/// add 2 % at most where measured.
+const SAFETY: f64 = 1.05;

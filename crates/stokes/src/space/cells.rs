@@ -1,0 +1,40 @@
+//! The cells in which something flows.
+
+use gluey_geom::{Dim, Space};
+
+use super::marking::{CellKind, cell_kind};
+use super::velocity::VelocitySpace;
+
+/// A cell that is not rigid.
+#[derive(Clone, Copy, Debug)]
+pub struct ActiveCell {
+    /// Index in the mesh.
+    pub cell: u32,
+    /// `eta_f h^(D-2)`.
+    pub viscous: f64,
+    /// `h^(D-1)`.
+    pub divergence: f64,
+    /// `h^D`.
+    pub volume: f64,
+}
+
+/// The cells that are not rigid.
+pub fn active_cells<const D: usize>(space: &VelocitySpace<D>, viscosity: f64) -> Vec<ActiveCell>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = space.discretisation();
+    let kind = |cell: usize| {
+        cell_kind(discretisation.velocity.cell(cell).iter().map(|&n| space.body_of(n as usize)))
+    };
+    let active = |cell: usize| {
+        let h = discretisation.cell_size(cell);
+        ActiveCell {
+            cell: cell as u32,
+            viscous: viscosity * h.powi(D as i32 - 2),
+            divergence: h.powi(D as i32 - 1),
+            volume: h.powi(D as i32),
+        }
+    };
+    (0..discretisation.mesh.cell_count()).filter(|&c| kind(c) != CellKind::Rigid).map(active).collect()
+}

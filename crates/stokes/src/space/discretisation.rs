@@ -1,0 +1,43 @@
+//! A mesh with its velocity and pressure nodes.
+
+use std::sync::Arc;
+
+use gluey_fem::{Chunks, NodeMap, TreeMesh};
+
+/// A mesh with the nodes of the Q2-Q1 pair. Cheap to clone: clones share all of it.
+#[derive(Clone, Debug)]
+pub struct Discretisation<const D: usize> {
+    /// The mesh.
+    pub mesh: Arc<TreeMesh<D>>,
+    /// Nodes of the velocity, degree 2.
+    pub velocity: Arc<NodeMap<D>>,
+    /// Nodes of the pressure, degree 1.
+    pub pressure: Arc<NodeMap<D>>,
+    /// How operators cut the mesh.
+    pub chunks: Arc<Chunks<D>>,
+}
+
+impl<const D: usize> Discretisation<D> {
+    /// Numbers the nodes of `mesh`.
+    pub fn new(mesh: TreeMesh<D>) -> Self {
+        let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
+        let (velocity, pressure) = (nodes(2), nodes(1));
+        let chunks = Arc::new(Chunks::new(&velocity, &pressure));
+        Self { mesh: Arc::new(mesh), velocity, pressure, chunks }
+    }
+
+    /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.
+    pub fn dof_count(&self) -> usize {
+        self.velocity.node_count() * D + self.pressure.node_count()
+    }
+
+    /// Edge length of the smallest cells.
+    pub fn finest_cell_size(&self) -> f64 {
+        self.mesh.size(self.mesh.max_level())
+    }
+
+    /// Edge length of a cell.
+    pub fn cell_size(&self, cell: usize) -> f64 {
+        self.mesh.size(self.mesh.cells()[cell].level)
+    }
+}

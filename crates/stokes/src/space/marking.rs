@@ -1,0 +1,103 @@
+//! Which nodes and cells lie in bodies, near them, or between them.
+
+use gluey_fem::{NodeMap, TreeMesh};
+use gluey_levelset::{Ball, BallTree};
+
+use super::discretisation::Discretisation;
+use super::velocity::SolidNodes;
+
+/// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size of the
+/// smallest cell at the node. A negative offset takes nodes slightly outside the surface.
+pub fn solid_nodes<const D: usize>(
+    mesh: &TreeMesh<D>,
+    nodes: &NodeMap<D>,
+    bodies: &[Ball<D>],
+    offset: f64,
+) -> SolidNodes {
+    let mut finest = vec![0; nodes.node_count()];
+    for (index, cell) in mesh.cells().iter().enumerate() {
+        for &node in nodes.cell(index) {
+            finest[node as usize] = cell.level.max(finest[node as usize]);
+        }
+    }
+    let bodies = BallTree::new(bodies);
+    let at = |node: usize| {
+        let threshold = offset * mesh.size(finest[node]);
+        bodies.nearest_within(&nodes.point(node), -threshold).map(|b| b.0 as u32)
+    };
+    (0..nodes.node_count()).map(at).collect()
+}
+
+/// How the cells of a mesh are made of free and rigid nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellKind {
+    /// Every node belongs to one body: no strain, no flow.
+    Rigid,
+    /// Every node belongs to a body, but not to the same one: it is strained, but nothing flows.
+    Bridge,
+    /// Some nodes are free.
+    Fluid,
+}
+
+/// Kind of a cell from the bodies its nodes belong to.
+pub fn cell_kind(bodies: impl Iterator<Item = Option<u32>>) -> CellKind {
+    let mut first = None;
+    let mut kind = CellKind::Rigid;
+    for body in bodies {
+        match (body, first) {
+            (None, _) => return CellKind::Fluid,
+            (Some(b), None) => first = Some(b),
+            (Some(b), Some(f)) if b != f => kind = CellKind::Bridge,
+            _ => {}
+        }
+    }
+    kind
+}
+
+/// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those of the next
+/// coarser level, which smooths them.
+pub fn around_finest_cells<const D: usize>(discretisation: &Discretisation<D>) -> Vec<bool> {
+    let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
+    let mut finest = vec![false; nodes.node_count()];
+    for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
+        nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
+    }
+    nodes_of_cells_with(nodes, &finest)
+}
+
+/// The nodes of all cells that have a marked node.
+pub fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+    let mut around = vec![false; nodes.node_count()];
+    for cell in 0..nodes.cell_count() {
+        if nodes.cell(cell).iter().any(|&n| marked[n as usize]) {
+            nodes.cell(cell).iter().for_each(|&n| around[n as usize] = true);
+        }
+    }
+    around
+}
+
+/// The cells with a marked node, or with a hanging node that hangs on one: those whose stress acts on marked nodes.
+pub fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
+    let mut acting = marked.to_vec();
+    for constraint in nodes.constraints() {
+        acting[constraint.node as usize] |= constraint.masters.iter().any(|m| marked[m.0 as usize]);
+    }
+    (0..nodes.cell_count()).map(|c| nodes.cell(c).iter().any(|&n| acting[n as usize])).collect()
+}
+
+/// The nodes of all cells next to those with nodes that two bodies touch; `None` without such cells.
+pub fn around_films<const D: usize>(
+    discretisation: &Discretisation<D>,
+    touched: &[Option<u32>],
+) -> Option<Vec<bool>> {
+    let nodes = &discretisation.velocity;
+    let mut film = vec![false; nodes.node_count()];
+    for cell in (0..nodes.cell_count()).map(|cell| nodes.cell(cell)) {
+        let mut bodies = cell.iter().filter_map(|&n| touched[n as usize]);
+        let first = bodies.next();
+        if bodies.any(|body| Some(body) != first) {
+            cell.iter().for_each(|&n| film[n as usize] = true);
+        }
+    }
+    film.contains(&true).then(|| nodes_of_cells_with(nodes, &film))
+}

@@ -1,0 +1,18 @@
+//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures with weak ones aggregated; the marking of
+//! nodes and cells.
+
+mod cells;
+mod discretisation;
+mod expansion;
+mod marking;
+mod pressure;
+mod velocity;
+
+pub use cells::{ActiveCell, active_cells};
+pub use discretisation::Discretisation;
+pub use expansion::{pressure_expansion, velocity_expansion};
+pub use marking::{
+    CellKind, around_films, around_finest_cells, cell_kind, cells_touching, nodes_of_cells_with, solid_nodes,
+};
+pub use pressure::{PressureSpace, WeakPressures};
+pub use velocity::{SolidNodes, VelocitySpace};

@@ -1,0 +1,398 @@
+//! Velocities that are rigid inside bodies, zero on the boundary and continuous across hanging nodes.
+//!
+//! A reduced vector holds the nodal velocities (`D` interleaved components; entries of hanging, boundary and rigid
+//! nodes are zero) and, after them, `RIGID` numbers a body: the velocity `U` of its reference point and its spin times
+//! its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`; a rigid node at `r` from the
+//! reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose: it turns nodal loads into loads on
+//! free nodes, forces and (scaled) torques.
+
+use gluey_fem::NodeMap;
+use gluey_fem::cells;
+use gluey_geom::{Dim, Space, Spin, Twist, Vector};
+use gluey_levelset::Body;
+use gluey_linalg::Scalar;
+
+use super::discretisation::Discretisation;
+
+/// Which body, if any, each node moves with.
+pub type SolidNodes = Vec<Option<u32>>;
+
+const NO_BODY: u32 = u32::MAX;
+
+/// A node that moves with a body, with its arm in units of the body's radius.
+#[derive(Clone, Debug)]
+struct RigidNode<const D: usize> {
+    node: u32,
+    body: u32,
+    arm: Vector<D>,
+}
+
+/// The reduced velocity space of one mesh.
+#[derive(Clone, Debug)]
+pub struct VelocitySpace<const D: usize> {
+    discretisation: Discretisation<D>,
+    boundary: Vec<u32>,
+    rigid: Vec<RigidNode<D>>,
+    /// Body of each node, or [`NO_BODY`].
+    body_of: Vec<u32>,
+    radius: Vec<f64>,
+    /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough nodes.
+    fit: Vec<Option<Vec<f64>>>,
+}
+
+impl<const D: usize> VelocitySpace<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define a rigid
+    /// motion is left out: its nodes stay free, see [`VelocitySpace::is_active`].
+    pub fn new<B: Body<D>>(discretisation: &Discretisation<D>, bodies: &[B], solid: &[Option<u32>]) -> Self {
+        let nodes = &discretisation.velocity;
+        let boundary = (0..nodes.node_count() as u32).filter(|&n| nodes.is_on_boundary(n as usize)).collect();
+        let rigid = rigid_nodes(nodes, bodies, solid);
+        let mut space = Self {
+            body_of: vec![NO_BODY; nodes.node_count()],
+            discretisation: discretisation.clone(),
+            boundary,
+            radius: bodies.iter().map(|b| b.bounding_radius()).collect(),
+            fit: gram_inverses(bodies.len(), &rigid),
+            rigid,
+        };
+        let fit = &space.fit;
+        space.rigid.retain(|r| fit[r.body as usize].is_some());
+        for r in &space.rigid {
+            space.body_of[r.node as usize] = r.body;
+        }
+        space
+    }
+
+    /// The nodes.
+    pub fn nodes(&self) -> &NodeMap<D> {
+        &self.discretisation.velocity
+    }
+
+    /// The mesh with its nodes.
+    pub fn discretisation(&self) -> &Discretisation<D> {
+        &self.discretisation
+    }
+
+    /// Number of bodies, active or not.
+    pub fn body_count(&self) -> usize {
+        self.fit.len()
+    }
+
+    /// Whether the body has enough nodes on this mesh to be rigid.
+    pub fn is_active(&self, body: usize) -> bool {
+        self.fit[body].is_some()
+    }
+
+    /// Length of a reduced vector.
+    pub fn dim(&self) -> usize {
+        self.full_dim() + self.body_count() * Dim::<D>::RIGID
+    }
+
+    /// Length of the nodal part.
+    pub fn full_dim(&self) -> usize {
+        self.nodes().node_count() * D
+    }
+
+    /// The body a node moves with.
+    pub fn body_of(&self, node: usize) -> Option<u32> {
+        Some(self.body_of[node]).filter(|&body| body != NO_BODY)
+    }
+
+    /// Whether the velocity of a node is an unknown of its own.
+    pub fn is_free(&self, node: usize) -> bool {
+        self.body_of[node] == NO_BODY && !self.nodes().is_on_boundary(node) && !self.nodes().is_hanging(node)
+    }
+
+    /// `u = T x` in place: sets the nodal velocities of rigid and hanging nodes; those of the boundary stay as they are.
+    pub fn expand<T: Scalar>(&self, x: &mut [T]) {
+        let (nodal, twists) = x.split_at_mut(self.full_dim());
+        for r in &self.rigid {
+            let twist = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let target = &mut nodal[r.node as usize * D..][..D];
+            for (c, value) in target.iter_mut().enumerate() {
+                *value = twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
+            }
+        }
+        self.nodes().distribute(D, T::from_f64, nodal);
+    }
+
+    /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these are.
+    pub fn add_rigid_motions<S: Scalar, T: Scalar>(&self, x: &[S], u: &mut [T]) {
+        let twists: Vec<T> = x[self.full_dim()..].iter().map(|x| T::from_f64(x.to_f64())).collect();
+        for r in &self.rigid {
+            let twist = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            for (c, value) in u[r.node as usize * D..][..D].iter_mut().enumerate() {
+                *value += twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
+            }
+        }
+    }
+
+    /// `x = T^T f` in place: nodal loads become loads on the unknowns; all other nodal entries are set to zero.
+    pub fn reduce<T: Scalar>(&self, f: &mut [T]) {
+        let (nodal, loads) = f.split_at_mut(self.full_dim());
+        loads.fill(T::ZERO);
+        self.nodes().condense(D, T::from_f64, nodal);
+        for r in &self.rigid {
+            let load = &mut loads[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let source = &mut nodal[r.node as usize * D..][..D];
+            add_moment(&r.arm, source, load);
+            source.fill(T::ZERO);
+        }
+        for &node in &self.boundary {
+            nodal[node as usize * D..][..D].fill(T::ZERO);
+        }
+    }
+
+    /// Replaces the nodal velocities of the rigid nodes by the twists closest to them in the least-squares sense, and
+    /// clears hanging and boundary nodes: from any nodal field to a reduced vector.
+    pub fn project<T: Scalar>(&self, x: &mut [T]) {
+        for constraint in self.nodes().constraints() {
+            x[constraint.node as usize * D..][..D].fill(T::ZERO);
+        }
+        self.reduce(x);
+        self.solve_grams(&mut x[self.full_dim()..]);
+    }
+
+    /// The transpose of [`VelocitySpace::project`] for fields without load on hanging nodes: spreads the load on twists
+    /// over the rigid nodes.
+    pub fn spread<T: Scalar>(&self, f: &mut [T]) {
+        let (nodal, loads) = f.split_at_mut(self.full_dim());
+        self.solve_grams(loads);
+        for r in &self.rigid {
+            let twist = &loads[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            for (c, value) in nodal[r.node as usize * D..][..D].iter_mut().enumerate() {
+                *value = twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
+            }
+        }
+    }
+
+    /// The twist of a body in a reduced vector.
+    pub fn twist<T: Scalar>(&self, x: &[T], body: usize) -> Twist<D> {
+        let entries = &x[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        let mut twist = Twist::default();
+        for c in 0..D {
+            twist.velocity[c] = entries[c].to_f64();
+        }
+        for k in 0..Dim::<D>::ROT {
+            twist.spin[k] = entries[D + k].to_f64() / self.radius[body];
+        }
+        twist
+    }
+
+    /// Writes the twist of a body into a reduced vector.
+    pub fn set_twist<T: Scalar>(&self, x: &mut [T], body: usize, twist: &Twist<D>) {
+        let entries = &mut x[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        for c in 0..D {
+            entries[c] = T::from_f64(twist.velocity[c]);
+        }
+        for k in 0..Dim::<D>::ROT {
+            entries[D + k] = T::from_f64(twist.spin[k] * self.radius[body]);
+        }
+    }
+
+    /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of `RIGID`
+    /// coefficients a component.
+    pub fn rigid_rows(&self) -> impl Iterator<Item = (u32, u32, Vec<f64>)> + '_ {
+        self.rigid.iter().map(|r| (r.node, r.body, rigid_matrix(&r.arm)))
+    }
+
+    /// The rigid nodes, for the operators.
+    pub fn ties(&self) -> Vec<cells::RigidNode<f64, D>> {
+        let tie = |r: &RigidNode<D>| cells::RigidNode {
+            node: r.node,
+            body: r.body,
+            arm: std::array::from_fn(|d| r.arm[d]),
+        };
+        self.rigid.iter().map(tie).collect()
+    }
+
+    fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {
+        let n = Dim::<D>::RIGID;
+        for (load, inverse) in loads.chunks_exact_mut(n).zip(&self.fit) {
+            let old: [f64; 6] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
+            for (i, value) in load.iter_mut().enumerate() {
+                let row = |m: &Vec<f64>| (0..n).map(|j| m[i * n + j] * old[j]).sum::<f64>();
+                *value = T::from_f64(inverse.as_ref().map_or(0.0, row));
+            }
+        }
+    }
+}
+
+fn rigid_nodes<const D: usize, B: Body<D>>(
+    nodes: &NodeMap<D>,
+    bodies: &[B],
+    solid: &[Option<u32>],
+) -> Vec<RigidNode<D>> {
+    let usable = |n: &usize| !nodes.is_on_boundary(*n) && !nodes.is_hanging(*n);
+    let rigid = |n: usize| {
+        solid[n].map(|body| {
+            let b = &bodies[body as usize];
+            RigidNode { node: n as u32, body, arm: b.arm(&nodes.point(n)) / b.bounding_radius() }
+        })
+    };
+    (0..nodes.node_count()).filter(usable).filter_map(rigid).collect()
+}
+
+/// Component `c` of `w x arm`.
+fn rotation_entry<T: Scalar, const D: usize>(arm: &Vector<D>, c: usize, w: &[T]) -> T {
+    let a = |d: usize| T::from_f64(arm[d]);
+    match (D, c) {
+        (2, 0) => -(w[0] * a(1)),
+        (2, _) => w[0] * a(0),
+        (_, c) => {
+            let (i, j) = ((c + 1) % 3, (c + 2) % 3);
+            w[i] * a(j) - w[j] * a(i)
+        }
+    }
+}
+
+/// Adds force and moment of a nodal load to the load on a body.
+fn add_moment<T: Scalar, const D: usize>(arm: &Vector<D>, f: &[T], load: &mut [T]) {
+    let a = |d: usize| T::from_f64(arm[d]);
+    for c in 0..D {
+        load[c] += f[c];
+    }
+    if D == 2 {
+        load[2] += a(0) * f[1] - a(1) * f[0];
+    } else {
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            load[3 + k] += a(i) * f[j] - a(j) * f[i];
+        }
+    }
+}
+
+/// The `D x RIGID` matrix that maps a twist to the velocity at `arm`, row-major.
+fn rigid_matrix<const D: usize>(arm: &Vector<D>) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let n = Dim::<D>::RIGID;
+    let mut rows = vec![0.0; D * n];
+    for c in 0..D {
+        rows[c * n + c] = 1.0;
+    }
+    for k in 0..Dim::<D>::ROT {
+        let mut unit: Spin<D> = Dim::<D>::zero_spin();
+        unit[k] = 1.0;
+        let velocity = Dim::<D>::cross_spin(&unit, arm);
+        for c in 0..D {
+            rows[c * n + D + k] = velocity[c];
+        }
+    }
+    rows
+}
+
+fn gram_inverses<const D: usize>(body_count: usize, rigid: &[RigidNode<D>]) -> Vec<Option<Vec<f64>>>
+where
+    Dim<D>: Space<D>,
+{
+    let n = Dim::<D>::RIGID;
+    let mut grams = vec![vec![0.0; n * n]; body_count];
+    for r in rigid {
+        let rows = rigid_matrix(&r.arm);
+        let gram = &mut grams[r.body as usize];
+        for row in rows.chunks_exact(n) {
+            for i in 0..n {
+                for j in 0..n {
+                    gram[i * n + j] += row[i] * row[j];
+                }
+            }
+        }
+    }
+    grams.iter().map(|gram| invert_gram(n, gram)).collect()
+}
+
+/// Inverse of a symmetric matrix whose conditioning tells whether the nodes define a rigid motion.
+fn invert_gram(n: usize, gram: &[f64]) -> Option<Vec<f64>> {
+    const WORST_CONDITION: f64 = 1e6;
+    let matrix = nalgebra::DMatrix::from_row_slice(n, n, gram);
+    let eigen = matrix.clone().symmetric_eigen().eigenvalues;
+    let (least, most) = (eigen.min(), eigen.max());
+    if !(least > 0.0 && most / least < WORST_CONDITION) {
+        return None;
+    }
+    matrix.cholesky().map(|c| c.inverse().as_slice().to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gluey_fem::TreeMesh;
+    use gluey_geom::Aabb;
+    use gluey_levelset::{Ball, nearest};
+
+    fn space<const D: usize>() -> VelocitySpace<D>
+    where
+        Dim<D>: Space<D>,
+    {
+        let balls = [0.3, 0.7].map(|x| Ball::new(Vector::<D>::repeat(x), 0.2));
+        let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, h, level| {
+            level < 3 || (0..D).all(|d| lower[d] < 0.55 && lower[d] + h > 0.05)
+        })
+        .unwrap();
+        let discretisation = Discretisation::new(mesh);
+        let nodes = &discretisation.velocity;
+        let solid: SolidNodes = (0..nodes.node_count())
+            .map(|n| nearest(&balls, &nodes.point(n)).filter(|b| b.1 >= 0.0).map(|b| b.0 as u32))
+            .collect();
+        VelocitySpace::new(&discretisation, &balls, &solid)
+    }
+
+    fn maps_are_adjoint<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let space = space::<D>();
+        assert!((0..2).all(|b| space.is_active(b)));
+        let wave = |k: f64| (0..space.dim()).map(|i| (k * i as f64).sin()).collect::<Vec<f64>>();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let mut x = wave(0.7);
+        space.reduce(&mut x);
+        let mut full = x.clone();
+        space.expand(&mut full);
+        let mut load = wave(1.1);
+        load[space.full_dim()..].fill(0.0);
+        let mut reduced = load.clone();
+        space.reduce(&mut reduced);
+        let nodal = space.full_dim();
+        assert!((dot(&full[..nodal], &load[..nodal]) - dot(&x, &reduced)).abs() < 1e-9);
+        let mut back = full.clone();
+        space.project(&mut back);
+        assert!(back.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-10));
+        let mut field = wave(0.3);
+        for c in space.nodes().constraints() {
+            field[c.node as usize * D..][..D].fill(0.0);
+        }
+        field[nodal..].fill(0.0);
+        let mut projected = field.clone();
+        space.project(&mut projected);
+        let mut spread = x.clone();
+        space.spread(&mut spread);
+        assert!((dot(&projected, &x) - dot(&field[..nodal], &spread[..nodal])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn reduction_is_the_transpose_of_expansion() {
+        maps_are_adjoint::<2>();
+        maps_are_adjoint::<3>();
+    }
+
+    #[test]
+    fn twists_survive_storage() {
+        let space = space::<3>();
+        let twist = Twist { velocity: Vector::<3>::new(1.0, 2.0, 3.0), spin: Spin::<3>::new(-0.5, 0.1, 0.2) };
+        let mut x = vec![0.0; space.dim()];
+        space.set_twist(&mut x, 1, &twist);
+        let back = space.twist(&x, 1);
+        assert!((back.velocity - twist.velocity).norm() + (back.spin - twist.spin).norm() < 1e-15);
+        space.expand(&mut x);
+        let rim = (0..space.nodes().node_count()).find(|&n| space.body_of(n) == Some(1)).unwrap();
+        let arm = space.nodes().point(rim) - Vector::<3>::repeat(0.7);
+        let want = twist.velocity_at(&arm);
+        assert!((0..3).all(|c| (x[rim * 3 + c] - want[c]).abs() < 1e-14));
+    }
+}
