@@ -7,13 +7,15 @@
 //! ```
 //! use gluey_fem::cells::{CellData, CellOperator, Workspace};
 //! use gluey_fem::{Chunks, NodeMap, TreeMesh};
-//! use gluey_geom::Aabb;
+//! use gluey_geom::{Aabb, Vector};
 //! use std::sync::Arc;
 //!
 //! // A rigid rotation has no strain: the viscous operator makes no force of it, hanging nodes or not.
-//! let mesh = TreeMesh::<2>::refine(Aabb::unit(), [1, 1], [false; 2], 5, |lower, h, _| lower.norm() < 2.0 * h)?;
+//! let wants = |lower: &Vector<2>, h: f64, _| lower.norm() < 2.0 * h;
+//! let mesh = TreeMesh::refine(Aabb::unit(), [1, 1], [false; 2], 5, wants)?;
 //! let (velocity, pressure) = (NodeMap::new(&mesh, 2), NodeMap::new(&mesh, 1));
-//! let cells = (0..mesh.cell_count()).map(|cell| CellData { cell, viscous: 1.0, divergence: 1.0, points: &[] });
+//! let uniform = |cell| CellData { cell, viscous: 1.0, divergence: 1.0, points: &[] };
+//! let cells = (0..mesh.cell_count()).map(uniform);
 //! let chunks = Arc::new(Chunks::new(&velocity, &pressure));
 //! let operator = CellOperator::<f64, 2>::new(&chunks, &velocity, cells, 1, &[], 0);
 //! let points = (0..velocity.node_count()).map(|node| velocity.point(node));
