@@ -5,11 +5,25 @@
 //! Jacobians.
 //!
 //! ```
-//! use gluey_fem::{NodeMap, TreeMesh};
-//! use gluey_geom::Aabb;
-//! let mesh = TreeMesh::<2>::uniform(Aabb::unit(), [1, 1], [false; 2], 3).unwrap();
-//! let nodes = NodeMap::new(&mesh, 2);
-//! assert_eq!((mesh.cell_count(), nodes.node_count()), (64, 17 * 17));
+//! use gluey_fem::cells::{CellData, CellOperator, Workspace};
+//! use gluey_fem::{Chunks, NodeMap, TreeMesh};
+//! use gluey_geom::{Aabb, Vector};
+//! use std::sync::Arc;
+//!
+//! // A rigid rotation has no strain: the viscous operator makes no force of it, hanging nodes or not.
+//! let wants = |lower: &Vector<2>, h: f64, _| lower.norm() < 2.0 * h;
+//! let mesh = TreeMesh::refine(Aabb::unit(), [1, 1], [false; 2], 5, wants)?;
+//! let (velocity, pressure) = (NodeMap::new(&mesh, 2), NodeMap::new(&mesh, 1));
+//! let uniform = |cell| CellData { cell, viscous: 1.0, divergence: 1.0, points: &[] };
+//! let cells = (0..mesh.cell_count()).map(uniform);
+//! let chunks = Arc::new(Chunks::new(&velocity, &pressure));
+//! let operator = CellOperator::<f64, 2>::new(&chunks, &velocity, cells, 1, &[], 0);
+//! let points = (0..velocity.node_count()).map(|node| velocity.point(node));
+//! let rotation: Vec<f64> = points.flat_map(|x| [-x[1], x[0]]).collect();
+//! let mut force = vec![f64::NAN; operator.velocity_dim()];
+//! operator.viscous(&rotation, &mut force, &mut Workspace::default());
+//! assert!(force.iter().all(|force| force.abs() < 1e-12));
+//! # Ok::<(), gluey_fem::MeshError>(())
 //! ```
 //!
 //! The rooms, lowest first; a room knows only those before it: meshes, [`element`] on the unit cube, spaces

@@ -12,7 +12,8 @@ use gluey_linalg::{
     Preconditioner, Reference, RefinementParams, SparseMatrix, Symbolic, vector,
 };
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Prints the table and checks it.
+pub fn main() -> Result<(), Box<dyn Error>> {
     println!("points  iterations");
     let mut counts = Vec::new();
     for n in [15, 31, 63, 127] {
@@ -24,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Iterations of GCR for the five-point Laplacian on `n x n` points, `n` odd, to a residual of 1e-10.
-pub fn iterations(n: usize) -> Result<usize, Box<dyn Error>> {
+fn iterations(n: usize) -> Result<usize, Box<dyn Error>> {
     let mut a = laplacian(n)?;
     let mut cycle = TwoGrid::new(&a, n)?;
     let b = vec![1.0; n * n];

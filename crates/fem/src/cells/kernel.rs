@@ -11,19 +11,14 @@ use crate::element::node_count;
 /// Nodes at the corners of a plane of nine.
 const CORNERS_OF_PLANE: [usize; 4] = [0, 2, 6, 8];
 
-/// The buffers of a chunk: nodes that are read, nodes that are written, room for fields at quadrature points.
-pub(super) struct Fields<'a, T> {
-    pub(super) x: &'a Nodes<T>,
-    pub(super) y: &'a mut Nodes<T>,
-    pub(super) points: &'a mut [T],
-}
-
 /// Fields of as many cells as a vector has lanes.
-pub(super) struct Registers<V> {
+pub(super) struct Registers<'a, V: Lanes> {
     u: [V; UNKNOWNS],
     r: [V; UNKNOWNS],
     p: [V; CORNERS],
     q: [V; CORNERS],
+    /// Room for fields at quadrature points.
+    points: &'a mut [V::Scalar],
 }
 
 /// Reads the nodes of cells, plane by plane: velocities go to Legendre products in the first two directions.
@@ -84,11 +79,11 @@ fn scatter<V: Lanes, const D: usize, const DIVERGENCE: bool>(
     }
 }
 
-impl<V: Lanes> Registers<V> {
+impl<'a, V: Lanes> Registers<'a, V> {
     #[inline(always)]
-    pub(super) fn new() -> Self {
+    pub(super) fn new(points: &'a mut [V::Scalar]) -> Self {
         let zero = V::splat(V::Scalar::ZERO);
-        Self { u: [zero; UNKNOWNS], r: [zero; UNKNOWNS], p: [zero; CORNERS], q: [zero; CORNERS] }
+        Self { u: [zero; UNKNOWNS], r: [zero; UNKNOWNS], p: [zero; CORNERS], q: [zero; CORNERS], points }
     }
 }
 
@@ -104,12 +99,13 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         &self,
         first: usize,
         eta: &[T],
-        Fields { x, y, points }: &mut Fields<'_, T>,
-        registers: &mut Registers<V>,
+        x: &Nodes<T>,
+        y: &mut Nodes<T>,
+        registers: &mut Registers<'_, V>,
     ) {
         let n = node_count::<D>(2);
         let locals = &self.locals[first * n..][..V::COUNT * n];
-        let Registers { u, r, p, q } = registers;
+        let Registers { u, r, p, q, points } = registers;
         gather::<V, D, VISCOUS>(x, locals, u, p);
         if VISCOUS {
             legendre::third::<V, D, true>(u);

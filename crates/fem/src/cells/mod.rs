@@ -1,9 +1,9 @@
 //! The Stokes operator on cubic cells, matrix-free, in the reduced unknowns of a mesh.
 //!
 //! A chunk of cells is worked off in a buffer that stays in the cache: its nodal velocities and pressures are
-//! read, rigid and hanging nodes set, cells taken as many at a time as a vector has lanes ([`simd`]), their
-//! matrices applied in Legendre products ([`legendre`]), a viscosity that varies inside by quadrature
-//! ([`varying`]), and the loads of hanging and rigid nodes moved to where they belong before the owned nodes
+//! read, rigid and hanging nodes set, cells taken as many at a time as a vector has lanes (`simd`), their
+//! matrices applied in Legendre products (`legendre`), a viscosity that varies inside by quadrature
+//! (`varying`), and the loads of hanging and rigid nodes moved to where they belong before the owned nodes
 //! are written. No vector is passed over twice.
 //!
 //! Kernels are compiled for AVX-512, AVX2 and portably, and chosen at run time. Chunks run in parallel on the

@@ -3,7 +3,7 @@
 use gluey_linalg::Scalar;
 
 use super::buffers::Buffers;
-use super::kernel::{Fields, Registers};
+use super::kernel::Registers;
 use super::output::{Input, Output, add_ghost_contributions};
 use super::scalar::CellScalar;
 use super::simd::{Lanes, Nodes, Portable};
@@ -146,8 +146,8 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         buffers: &mut Buffers<T>,
     ) {
         let mut output = output;
-        let registers = &mut Registers::new();
         let (x_buffer, y_buffer, points) = buffers.split();
+        let registers = &mut Registers::new(points);
         for chunk in output.chunks.clone() {
             let output = output.take_first(self);
             let span = &self.spans[chunk];
@@ -157,12 +157,11 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
             }
             self.read::<VISCOUS, PRESSURE, X>(chunk, input, x_buffer);
             y_buffer[..=self.chunks.local_count(chunk)].fill([T::ZERO; 4]);
-            let fields = &mut Fields { x: x_buffer, y: y_buffer, points };
-            self.uniform_cells::<V, VISCOUS, PRESSURE>(span.uniform, fields, registers);
+            self.uniform_cells::<V, VISCOUS, PRESSURE>(span.uniform, x_buffer, y_buffer, registers);
             if VISCOUS {
-                self.varying_cells::<V, PRESSURE>(span, fields, registers);
+                self.varying_cells::<V, PRESSURE>(span, x_buffer, y_buffer, registers);
             } else {
-                self.uniform_cells::<V, VISCOUS, PRESSURE>(span.varying, fields, registers);
+                self.uniform_cells::<V, VISCOUS, PRESSURE>(span.varying, x_buffer, y_buffer, registers);
             }
             self.write(chunk, y_buffer, output);
         }
@@ -173,11 +172,12 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     fn uniform_cells<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool>(
         &self,
         (start, end): (u32, u32),
-        fields: &mut Fields<'_, T>,
-        registers: &mut Registers<V>,
+        x: &Nodes<T>,
+        y: &mut Nodes<T>,
+        registers: &mut Registers<'_, V>,
     ) {
         for first in (start..end).step_by(V::COUNT) {
-            self.cells::<V, VISCOUS, PRESSURE, false>(first as usize, &[], fields, registers);
+            self.cells::<V, VISCOUS, PRESSURE, false>(first as usize, &[], x, y, registers);
         }
     }
 
@@ -186,13 +186,14 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     fn varying_cells<V: Lanes<Scalar = T>, const PRESSURE: bool>(
         &self,
         span: &Span,
-        fields: &mut Fields<'_, T>,
-        registers: &mut Registers<V>,
+        x: &Nodes<T>,
+        y: &mut Nodes<T>,
+        registers: &mut Registers<'_, V>,
     ) {
         let (start, end) = span.varying;
         for first in (start..end).step_by(V::COUNT) {
             let eta = self.points_of(span.first_points, (first - start) as usize);
-            self.cells::<V, true, PRESSURE, true>(first as usize, eta, fields, registers);
+            self.cells::<V, true, PRESSURE, true>(first as usize, eta, x, y, registers);
         }
     }
 
