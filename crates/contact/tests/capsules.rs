@@ -351,6 +351,28 @@ fn boxes_keep_their_distance() {
     assert!((twists[0].velocity.z - 0.5 * found / 0.1).abs() < 1e-6, "{twists:?}");
 }
 
+/// A ball between a box and a capsule, both of which are fixed: all gaps along x are 0.05.
+#[test]
+fn shapes_of_different_kinds_touch() {
+    let shapes: Vec<Box<dyn Shape<3>>> = vec![
+        Box::new(RoundBox(Vector::<3>::new(1.0, 2.0, 2.0))),
+        Box::new(Capsule::new(Vector::<3>::zeros(), 0.5)),
+        Box::new(Capsule::new(Vector::<3>::y(), 0.5)),
+    ];
+    let poses = [0.0, 1.65, 2.7].map(|x| Pose::at(Vector::<3>::new(x, 0.1, 0.0)));
+    let params = ContactParams { tolerance: 1e-6, ..exact(ContactLaw::Inelastic) };
+    let mut contact = ShapeContact::with_mobility(params, shapes, WithFixed::new([0, 2]));
+    for sign in [1.0, -1.0] {
+        let mut twists = [Twist::<3>::default(); 3];
+        twists[1].velocity.x = sign * 2.0;
+        let drift = [Twist::default(); 3];
+        let step = BodyStep { poses: &poses, radii: &[], drift: &drift, velocity_weight: 0.1, dt: 0.1 };
+        let report = contact.correct_bodies(&step, &mut twists).expect("a good step");
+        assert_eq!(report.active_count, 1);
+        assert!((twists[1].velocity.x - 0.5 * sign).abs() < 1e-5, "{:?}", twists[1]);
+    }
+}
+
 #[test]
 fn closest_points_of_capsules_are_the_closest() {
     let mut random = ChaCha8Rng::seed_from_u64(3);
