@@ -15,9 +15,24 @@ pub enum CiError {
 }
 
 /// The steps; what takes longest comes last. The reproduction fails where a row does not hold and is no known disagreement.
-const STEPS: [&[&str]; 4] = [
+const STEPS: [&[&str]; 8] = [
     &["fmt", "--all", "--check"],
     &["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"],
+    // Features one by one: whatever else is compiled turns all of them on.
+    &[
+        "check",
+        "--release",
+        "-p",
+        "gluey-geom",
+        "-p",
+        "gluey-motion",
+        "-p",
+        "gluey-contact",
+        "--no-default-features",
+    ],
+    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "dim2"],
+    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "dim3"],
+    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "parallel,serde"],
     &["test", "--release", "--workspace"],
     &[
         "run",
@@ -32,7 +47,7 @@ const STEPS: [&[&str]; 4] = [
     ],
 ];
 
-/// Formatting, lints, the tests, of which tidy is one, and a quick reproduction; stops at the first failure.
+/// Formatting, lints, features, the tests, of which tidy is one, and a quick reproduction; stops at the first failure.
 pub fn run(root: &Path) -> Result<(), CiError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     for step in STEPS {

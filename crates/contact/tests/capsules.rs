@@ -7,7 +7,8 @@ use gluey_contact::{
     BodyStep, ContactError, ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, PairKey,
     SolverKind, StepGeometry, WithFixed,
 };
-use gluey_geom::{Dim, Pose, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Particle, Pose, Space, Spin, Twist, Vector};
+use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -108,6 +109,50 @@ where
         most = most.max(round.contacts().len());
     }
     assert!(most > count, "{most} contacts");
+}
+
+/// Two balls in a shear flow, stepped by Adams-Bashforth 2 as a simulation does; where they end.
+fn encounter<const D: usize>(mut contact: impl ContactModel<D>) -> [Pose<D>; 2]
+where
+    Dim<D>: Space<D>,
+{
+    let at = |x: f64, y: f64| Vector::<D>::from_fn(|d, _| [x, y, 0.0][d]);
+    let mut particles = [Particle::new(at(-2.0, 0.3), 1.0), Particle::new(at(2.0, -0.3), 1.0)];
+    let mut flow = BackgroundFlow::new(LinearFlow::shear(1.0, 0.0));
+    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let (mut twists, mut drift, dt) = ([Twist::default(); 2], [Twist::default(); 2], 0.05);
+    let mut contact_count = 0;
+    for step in 0..120 {
+        flow.predict(step as f64 * dt, &particles, &mut twists).expect("cannot fail");
+        integrator.body_drift(dt, &mut drift);
+        let poses = particles.map(|particle| particle.pose);
+        let velocity_weight = integrator.velocity_weight(dt);
+        let body_step = BodyStep { poses: &poses, radii: &[1.0; 2], drift: &drift, velocity_weight, dt };
+        contact.correct_bodies(&body_step, &mut twists).expect("a good step");
+        contact_count += contact.contacts().len();
+        integrator.advance(dt, &mut particles, &twists);
+    }
+    assert!(contact_count > 20, "{contact_count}");
+    particles.map(|particle| particle.pose)
+}
+
+#[test]
+fn every_model_takes_the_steps_of_a_simulation() {
+    fn check<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let ball = Capsule::new(Vector::<D>::zeros(), 1.0);
+        let [round, capsules] = [
+            encounter(PairContact::<D>::new(exact(ContactLaw::Gluey))),
+            encounter(ShapeContact::new(exact(ContactLaw::Gluey), vec![ball; 2])),
+        ];
+        for (one, other) in round.iter().zip(&capsules) {
+            assert!((one.position - other.position).norm() < 1e-10, "{one:?} {other:?}");
+        }
+    }
+    check::<2>();
+    check::<3>();
 }
 
 #[test]
@@ -304,6 +349,28 @@ fn boxes_keep_their_distance() {
     let params = ContactParams { tolerance: 1e-6, ..exact(ContactLaw::Inelastic) };
     ShapeContact::new(params, boxes.to_vec()).correct_bodies(&step, &mut twists).expect("a good step");
     assert!((twists[0].velocity.z - 0.5 * found / 0.1).abs() < 1e-6, "{twists:?}");
+}
+
+/// A ball between a box and a capsule, both of which are fixed: all gaps along x are 0.05.
+#[test]
+fn shapes_of_different_kinds_touch() {
+    let shapes: Vec<Box<dyn Shape<3>>> = vec![
+        Box::new(RoundBox(Vector::<3>::new(1.0, 2.0, 2.0))),
+        Box::new(Capsule::new(Vector::<3>::zeros(), 0.5)),
+        Box::new(Capsule::new(Vector::<3>::y(), 0.5)),
+    ];
+    let poses = [0.0, 1.65, 2.7].map(|x| Pose::at(Vector::<3>::new(x, 0.1, 0.0)));
+    let params = ContactParams { tolerance: 1e-6, ..exact(ContactLaw::Inelastic) };
+    let mut contact = ShapeContact::with_mobility(params, shapes, WithFixed::new([0, 2]));
+    for sign in [1.0, -1.0] {
+        let mut twists = [Twist::<3>::default(); 3];
+        twists[1].velocity.x = sign * 2.0;
+        let drift = [Twist::default(); 3];
+        let step = BodyStep { poses: &poses, radii: &[], drift: &drift, velocity_weight: 0.1, dt: 0.1 };
+        let report = contact.correct_bodies(&step, &mut twists).expect("a good step");
+        assert_eq!(report.active_count, 1);
+        assert!((twists[1].velocity.x - 0.5 * sign).abs() < 1e-5, "{:?}", twists[1]);
+    }
 }
 
 #[test]

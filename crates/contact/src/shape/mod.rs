@@ -65,6 +65,29 @@ pub trait Shape<const D: usize>: Sync {
     }
 }
 
+/// Bodies of different kinds are `Box<dyn Shape<D>>`.
+impl<const D: usize, S: Shape<D> + ?Sized> Shape<D> for Box<S> {
+    fn rounding(&self) -> f64 {
+        (**self).rounding()
+    }
+
+    fn reach(&self) -> f64 {
+        (**self).reach()
+    }
+
+    fn drag_radius(&self) -> f64 {
+        (**self).drag_radius()
+    }
+
+    fn core_support(&self, direction: &Vector<D>) -> Vector<D> {
+        (**self).core_support(direction)
+    }
+
+    fn half_axis(&self) -> Option<Vector<D>> {
+        (**self).half_axis()
+    }
+}
+
 /// A body moved by a displacement and turned by a rotation vector, given as a twist times a time.
 pub fn displaced<const D: usize>(pose: &Pose<D>, by: &Twist<D>) -> Pose<D>
 where
