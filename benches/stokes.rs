@@ -1,4 +1,5 @@
-//! Timings of the Stokes core: operator, V-cycle, linear solves, one Uzawa step, and the flow of a whole time step.
+//! Timings of the Stokes core: operator, V-cycle, linear solves, one Uzawa step, and the flow of a whole time
+//! step.
 //!
 //! `cargo bench -p gluey-stokes`; `docs/benchmarks.md` has a table of a run.
 
@@ -136,9 +137,9 @@ where
     group.finish();
 }
 
-/// Mesh, assembly, set-up and solve for a pair that has moved by one step, again and again forth and back, so that every
-/// step starts from the flow before it as in a run. Contact and integration of the motion, which cost microseconds, are
-/// left out.
+/// Mesh, assembly, set-up and solve for a pair that has moved by one step, again and again forth and back, so
+/// that every step starts from the flow before it as in a run. Contact and integration of the motion, which
+/// cost microseconds, are left out.
 fn step<const D: usize>(
     criterion: &mut Criterion,
     name: &str,
@@ -210,7 +211,8 @@ fn steps(criterion: &mut Criterion) {
     step(criterion, "pair-3d-rigid-dofs", params(RIGID, SolverKind::Multigrid), pair_3d(), (7, 0.0), 0.05);
 }
 
-/// Fifty spheres in a periodic cube, and as many copies of it as it takes; `docs/benchmarks.md` names the mesh.
+/// Fifty spheres in a periodic cube, and as many copies of it as it takes; `docs/benchmarks.md` names the
+/// mesh.
 fn suspension(copies: usize) -> (Vec<Ball<3>>, [u32; 3], Vector<3>) {
     let packing = Packing::<3>::fluid(50, 0.2, 1);
     let tiles = [1, 2, 4].map(|before| if copies > before { 2 } else { 1 });

@@ -1,5 +1,5 @@
-//! How right the default settings are near contact: approach of two particles from a run's first step, against exact
-//! mobilities. What is measured here is what README says of `rigid-dofs`.
+//! How right the default settings are near contact: approach of two particles from a run's first step,
+//! against exact mobilities. What is measured here is what README says of `rigid-dofs`.
 
 use gluey::case::Hydrodynamics;
 use gluey::{Case, Formulation, RunOptions, Silent, Strategy, run};
@@ -8,7 +8,8 @@ use tempfile::TempDir;
 /// Spheres so small that the box changes their velocities by less than 2e-4.
 const RADIUS: f64 = 0.0125;
 
-/// Two spheres with their line of centres at 135 degrees to the flow, `gap` radii apart, a part of a cell off the middle.
+/// Two spheres with their line of centres at 135 degrees to the flow, `gap` radii apart, a part of a cell off
+/// the middle.
 fn spheres(gap: f64, shift: [f64; 3]) -> Case {
     let half = (1.0 + 0.5 * gap) * RADIUS * std::f64::consts::FRAC_1_SQRT_2;
     let at = |sign: f64| [0.5 - sign * half + shift[0], 0.5 + sign * half + shift[1], 0.5 + shift[2]];

@@ -7,8 +7,8 @@ use gluey::case::Hydrodynamics;
 use gluey::{Case, RunOptions, Silent, run};
 use tempfile::TempDir;
 
-/// Largest distance from the reference, in radii, after two steps on a coarse mesh: three times what is measured. A case whose
-/// particles do not move at all, or move backwards, is ten times as far away.
+/// Largest distance from the reference, in radii, after two steps on a coarse mesh: three times what is
+/// measured. A case whose particles do not move at all, or move backwards, is ten times as far away.
 const LIMITS: [(&str, f64); 4] =
     [("pair-2d", 3.6e-3), ("pair-3d", 4.2e-4), ("pair-3d-mobility", 2.9e-5), ("trio-2d-couette", 1.7e-3)];
 

@@ -1,4 +1,5 @@
-//! Clusters of up to a thousand touching discs, from the case to the end of a run: contact converges, and nothing overlaps.
+//! Clusters of up to a thousand touching discs, from the case to the end of a run: contact converges, and
+//! nothing overlaps.
 
 use std::fs;
 

@@ -1,7 +1,8 @@
-//! Mutated case files, from text to the first mesh: whatever stands in them is either refused with a message or can be set up.
+//! Mutated case files, from text to the first mesh: whatever stands in them is either refused with a message
+//! or can be set up.
 //!
-//! `GLUEY_FUZZ_COUNT=1000000 cargo test --release -p gluey --test fuzz` tries more of them than usual. The seed is fixed: the same
-//! texts on every machine.
+//! `GLUEY_FUZZ_COUNT=1000000 cargo test --release -p gluey --test fuzz` tries more of them than usual. The
+//! seed is fixed: the same texts on every machine.
 
 use std::panic::catch_unwind;
 

@@ -1,5 +1,6 @@
-//! What the strategies do to two spheres in unbounded shear (Verdon et al. 2010, section 4 and figure 7), with the
-//! mobility of the pair evaluated at a gap 0.05 radii too large: it imitates a solver that does not resolve the film.
+//! What the strategies do to two spheres in unbounded shear (Verdon et al. 2010, section 4 and figure 7),
+//! with the mobility of the pair evaluated at a gap 0.05 radii too large: it imitates a solver that does not
+//! resolve the film.
 
 use gluey::{Case, RunOptions, RunReport, Silent, Strategy, run};
 use tempfile::TempDir;
@@ -100,9 +101,9 @@ fn gluey_particles_return_when_the_shear_is_reversed_and_inelastic_ones_do_not()
     assert!(inelastic > 0.05, "inelastic: {inelastic}");
 }
 
-/// The same for the two discs in the finite-element flow. With r = 100 the solid yields enough for the difference to show
-/// in the positions: an inelastic pair is left with an open gap that reversal does not close. (With r = 1000 the pair is so
-/// stiff that inelastic contact misses by 0.007 radii only.)
+/// The same for the two discs in the finite-element flow. With r = 100 the solid yields enough for the
+/// difference to show in the positions: an inelastic pair is left with an open gap that reversal does not
+/// close. (With r = 1000 the pair is so stiff that inelastic contact misses by 0.007 radii only.)
 #[test]
 fn so_it_is_in_the_finite_element_flow() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");

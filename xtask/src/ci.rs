@@ -14,7 +14,8 @@ pub enum CiError {
     Step(String),
 }
 
-/// The steps; what takes longest comes last. The reproduction fails where a row does not hold and is no known disagreement.
+/// The steps; what takes longest comes last. The reproduction fails where a row does not hold and is no known
+/// disagreement.
 const STEPS: [&[&str]; 8] = [
     &["fmt", "--all", "--check"],
     &["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"],
@@ -47,7 +48,8 @@ const STEPS: [&[&str]; 8] = [
     ],
 ];
 
-/// Formatting, lints, features, the tests, of which tidy is one, and a quick reproduction; stops at the first failure.
+/// Formatting, lints, features, the tests, of which tidy is one, and a quick reproduction; stops at the first
+/// failure.
 pub fn run(root: &Path) -> Result<(), CiError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     for step in STEPS {

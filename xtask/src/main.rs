@@ -1,4 +1,5 @@
-//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask bench-stokes`, `cargo xtask tidy`, `cargo xtask ci`.
+//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask bench-stokes`, `cargo xtask tidy`,
+//! `cargo xtask ci`.
 
 mod bench;
 mod ci;

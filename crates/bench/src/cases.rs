@@ -51,8 +51,8 @@ impl Case {
         }
     }
 
-    /// The balls an adaptive mesh follows: the particles; where there are none, those of the case with two, so that both
-    /// are solved on one mesh.
+    /// The balls an adaptive mesh follows: the particles; where there are none, those of the case with two,
+    /// so that both are solved on one mesh.
     pub fn balls_of_the_mesh<const D: usize>(self) -> Vec<Ball<D>> {
         match self {
             Self::C2 => Self::S2.balls(),
@@ -95,8 +95,8 @@ fn lattice() -> [[f64; 3]; 27] {
     })
 }
 
-/// Marsaglia's generator with the shifts 13, 7, 17 (2003, 10.18637/jss.v008.i14): four lines that give the same lattice
-/// for ever.
+/// Marsaglia's generator with the shifts 13, 7, 17 (2003, 10.18637/jss.v008.i14): four lines that give the
+/// same lattice for ever.
 struct XorShift(u64);
 
 impl XorShift {

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-/// Numbers in each of the three arrays of the triad: together larger than the caches of one core's share of a server.
+/// Numbers in each of the three arrays of the triad: together larger than the caches of one core's share of a
+/// server.
 const TRIAD_LENGTH: usize = 1 << 24;
 /// Runs of the triad, of which the fastest counts, as in STREAM (McCalpin 1995).
 const TRIAD_RUNS: usize = 7;
@@ -64,7 +65,8 @@ fn peak_rss_in(status: &str) -> Option<f64> {
     Some(kibibytes * 1024.0 / 1e6)
 }
 
-/// `a = b + s c` on all threads of the pool, in 1e9 bytes a second: two reads and a write of eight bytes a number.
+/// `a = b + s c` on all threads of the pool, in 1e9 bytes a second: two reads and a write of eight bytes a
+/// number.
 pub fn triad_gb_s() -> f64 {
     let mut a = vec![0.0f64; TRIAD_LENGTH];
     let (b, c) = (vec![1.0f64; TRIAD_LENGTH], vec![2.0f64; TRIAD_LENGTH]);

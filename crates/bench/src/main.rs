@@ -1,6 +1,7 @@
 //! `cargo xtask bench-stokes`: one timed solve of the Stokes core in a unit box, told in one line of JSON.
 //!
-//! A package of its own, since whoever reproduces the figures need not wait until a second copy of the solver is compiled.
+//! A package of its own, since whoever reproduces the figures need not wait until a second copy of the solver
+//! is compiled.
 
 mod cases;
 mod machine;

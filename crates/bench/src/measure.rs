@@ -1,7 +1,8 @@
 //! One timed solve of the Stokes core in a unit box.
 //!
-//! All cases have the Couette velocity `u = (y - 1/2) e_x` on the whole boundary and viscosity 1 in the fluid; [`crate::cases`]
-//! says what is inside. The guess is zero and the tolerance relative to the residual it leaves.
+//! All cases have the Couette velocity `u = (y - 1/2) e_x` on the whole boundary and viscosity 1 in the
+//! fluid; [`crate::cases`] says what is inside. The guess is zero and the tolerance relative to the residual
+//! it leaves.
 
 use std::io::IsTerminal;
 

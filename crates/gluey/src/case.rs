@@ -39,7 +39,8 @@ const MOST_ROOTS: u32 = 16;
 /// The axis across the shear: the box has walls there.
 const WALLED_AXIS: usize = 1;
 
-/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for nodes.
+/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for
+/// nodes.
 const FINEST_LEVEL: u32 = 18;
 
 /// A complete, checked description of one run.
@@ -119,19 +120,20 @@ pub struct ContactSpec {
     pub strategy: Strategy,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     pub exact_gap: bool,
-    /// How gamma, the memory of a contact, is integrated: by the scheme that moves the particles (`consistent`, the
-    /// default: a contact ends within a step, and encounters are reversible to second order) or as in the paper, whole
-    /// steps at a time (`paper`).
+    /// How gamma, the memory of a contact, is integrated: by the scheme that moves the particles
+    /// (`consistent`, the default: a contact ends within a step, and encounters are reversible to second
+    /// order) or as in the paper, whole steps at a time (`paper`).
     pub memory: Memory,
     /// Floor of gamma (< 0) for rough particles; none when absent.
     pub gamma_min: Option<f64>,
     /// Gap kept by the strategy `velocity-correction`, relative to the mean radius of the pair.
     pub threshold: f64,
-    /// How contact forces are solved for: `auto` (a closed form for one contact, Uzawa's method for two, the active set for more),
-    /// `uzawa` (the paper's; slow for clusters), `accelerated` or `active-set`. All give the same velocities.
+    /// How contact forces are solved for: `auto` (a closed form for one contact, Uzawa's method for two, the
+    /// active set for more), `uzawa` (the paper's; slow for clusters), `accelerated` or `active-set`. All
+    /// give the same velocities.
     pub solver: ContactSolver,
-    /// Residual at which contact forces are accepted, relative to the smallest radius (or the largest displacement in a step,
-    /// if that is larger): from 1e-15 to 1e-3. It is the overlap that is left.
+    /// Residual at which contact forces are accepted, relative to the smallest radius (or the largest
+    /// displacement in a step, if that is larger): from 1e-15 to 1e-3. It is the overlap that is left.
     pub tolerance: f64,
 }
 
@@ -179,13 +181,13 @@ pub struct FlowSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSpec {
-    /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when absent, what
-    /// [`crate::flow::default_cells_per_radius`] gives.
+    /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when
+    /// absent, what [`crate::flow::default_cells_per_radius`] gives.
     pub cells_per_radius: Option<f64>,
     /// Cells are at least `2^-coarsest_level` of the box.
     pub coarsest_level: u32,
-    /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside save little and, in
-    /// `paper`, where the interior carries strain and multiplier, change velocities.
+    /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
+    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
     pub band: f64,
 }
 
@@ -195,13 +197,15 @@ pub struct MeshSpec {
 pub struct PaperSpec {
     /// Viscosity of the particles over that of the fluid, `r`.
     pub viscosity_ratio: f64,
-    /// Uzawa iterations per time step; with 1 the multiplier is never used, which is a penalty method and called so in reports.
+    /// Uzawa iterations per time step; with 1 the multiplier is never used, which is a penalty method and
+    /// called so in reports.
     pub uzawa_steps: usize,
     /// Step of the Uzawa iteration, `0 < rho < 4`.
     pub rho: f64,
     /// Width of the viscosity ramp inside the surface, in cells.
     pub ramp: f64,
-    /// How the motion of a particle is taken from the field: `mean`, over the particle, or `center`, the paper's [11].
+    /// How the motion of a particle is taken from the field: `mean`, over the particle, or `center`, the
+    /// paper's [11].
     pub velocity: ParticleVelocity,
 }
 
@@ -209,13 +213,14 @@ pub struct PaperSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RigidDofsSpec {
-    /// A node is rigid where the signed distance (positive inside) is at least this many cells; when absent, what
-    /// [`crate::flow::default_offset`] gives.
+    /// A node is rigid where the signed distance (positive inside) is at least this many cells; when absent,
+    /// what [`crate::flow::default_offset`] gives.
     pub offset: Option<f64>,
-    /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves gaps
-    /// alone.
+    /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves
+    /// gaps alone.
     pub gap_fraction: f64,
-    /// Levels beyond that of the surfaces that gaps may use; when absent, what [`crate::flow::default_gap_levels`] gives.
+    /// Levels beyond that of the surfaces that gaps may use; when absent, what
+    /// [`crate::flow::default_gap_levels`] gives.
     pub gap_levels: Option<u32>,
 }
 
@@ -223,7 +228,8 @@ pub struct RigidDofsSpec {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PairMobilitySpec {
-    /// The mobility is evaluated at the gap plus this many radii, to imitate a solver that does not resolve the film.
+    /// The mobility is evaluated at the gap plus this many radii, to imitate a solver that does not resolve
+    /// the film.
     pub gap_offset: f64,
 }
 
@@ -318,8 +324,8 @@ impl Case {
         is_periodic.then(|| self.upper()[axis] - self.lower()[axis])
     }
 
-    /// What surrounds the particles: walls below and above (y), which move along themselves, and the periods. Nothing
-    /// without a finite-element flow.
+    /// What surrounds the particles: walls below and above (y), which move along themselves, and the periods.
+    /// Nothing without a finite-element flow.
     pub(crate) fn surroundings<const D: usize>(&self) -> Domain<D> {
         if self.flow.hydrodynamics != Hydrodynamics::Stokes {
             return Domain::default();
@@ -333,8 +339,9 @@ impl Case {
         }
     }
 
-    /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the mesh. `None`
-    /// if it takes more than 16 of them along the shortest edge, or more than a tree can number along the longest.
+    /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the
+    /// mesh. `None` if it takes more than 16 of them along the shortest edge, or more than a tree can number
+    /// along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let edges: Vec<f64> =
             self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect();
@@ -348,7 +355,8 @@ impl Case {
         (1..=MOST_ROOTS).find_map(counts)
     }
 
-    /// Name of the output files of this case: case and strategy, and the formulation where it is not the paper's.
+    /// Name of the output files of this case: case and strategy, and the formulation where it is not the
+    /// paper's.
     pub fn file_stem(&self) -> String {
         let stem = format!("{}-{}", self.name, self.contact.strategy);
         match (self.flow.hydrodynamics, self.flow.formulation) {
@@ -362,8 +370,8 @@ impl Case {
         self.flow.formulation == Formulation::Paper && self.flow.paper.uzawa_steps == 1
     }
 
-    /// How the flow is modelled, as reports name it: the formulation, `penalty` for `paper` with a single Uzawa step, or the
-    /// analytic model's name.
+    /// How the flow is modelled, as reports name it: the formulation, `penalty` for `paper` with a single
+    /// Uzawa step, or the analytic model's name.
     pub fn flow_name(&self) -> &'static str {
         match self.flow.hydrodynamics {
             Hydrodynamics::Stokes if self.is_penalty() => "penalty",

@@ -1,7 +1,8 @@
 //! The finite-element flow as [`Hydrodynamics`]: particles in, velocities out.
 //!
-//! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves the Stokes
-//! problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x`, and reads off the twists.
+//! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves
+//! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x`, and reads off
+//! the twists.
 
 mod estimate;
 mod fields;
@@ -258,8 +259,8 @@ pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f
     }
 }
 
-/// Levels that gaps may use beyond that of the surfaces where a case does not state them: enough for any film in 2D, none
-/// in 3D, where they spoil the convergence of the solver.
+/// Levels that gaps may use beyond that of the surfaces where a case does not state them: enough for any film
+/// in 2D, none in 3D, where they spoil the convergence of the solver.
 pub fn default_gap_levels(dimension: usize) -> u32 {
     if dimension == 2 { 9 } else { 0 }
 }

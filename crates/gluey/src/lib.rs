@@ -13,9 +13,9 @@
 //! }
 //! ```
 //!
-//! One step predicts the velocities of all particles from the flow, corrects them for contact and moves the particles:
-//! `x^{n+1} = x^n + c P(u*) + drift`. [`Simulation`] does it step by step, for any [`gluey_motion::Hydrodynamics`] and
-//! any [`gluey_contact::ContactModel`].
+//! One step predicts the velocities of all particles from the flow, corrects them for contact and moves the
+//! particles: `x^{n+1} = x^n + c P(u*) + drift`. [`Simulation`] does it step by step, for any
+//! [`gluey_motion::Hydrodynamics`] and any [`gluey_contact::ContactModel`].
 //!
 //! Not for inertia (Stokes flow only), and not for particles that are not round.
 

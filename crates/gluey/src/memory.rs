@@ -9,8 +9,8 @@ use crate::flow::MeshEstimate;
 /// Nodes and cells are numbered in 32 bits.
 const MOST_UNKNOWNS: f64 = u32::MAX as f64;
 
-/// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how much there is, only the
-/// first is checked.
+/// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how
+/// much there is, only the first is checked.
 pub(crate) fn check(case: &Case) -> Result<(), CaseError> {
     let available = available();
     match MeshEstimate::of(case) {
@@ -26,7 +26,8 @@ fn fits(estimate: &MeshEstimate, available: Option<u64>) -> bool {
     enough && estimate.unknown_count <= MOST_UNKNOWNS
 }
 
-/// Bytes this process may still take: what the machine has left, and what its control groups leave it. Linux only.
+/// Bytes this process may still take: what the machine has left, and what its control groups leave it. Linux
+/// only.
 pub fn available() -> Option<u64> {
     let read = |path: &Path| fs::read_to_string(path).ok();
     let machine = read(Path::new("/proc/meminfo")).and_then(|text| mem_available(&text));
@@ -42,8 +43,9 @@ fn mem_available(text: &str) -> Option<u64> {
     kibibytes.checked_mul(1024)
 }
 
-/// Folders of the control groups this process is in, their parents and the root: version 2 (`0::/a/b`) and the memory controller of
-/// version 1 (`4:memory:/a/b`). In a container the group's path may not be there, the root is.
+/// Folders of the control groups this process is in, their parents and the root: version 2 (`0::/a/b`) and
+/// the memory controller of version 1 (`4:memory:/a/b`). In a container the group's path may not be there,
+/// the root is.
 fn group_folders(text: &str) -> Vec<String> {
     let mut folders = Vec::new();
     for line in text.lines() {

@@ -125,7 +125,8 @@ impl Reference {
         })
     }
 
-    /// Flow in a box needs that box and its boundary; without walls the height at which the shear is at rest counts.
+    /// Flow in a box needs that box and its boundary; without walls the height at which the shear is at rest
+    /// counts.
     fn other_box(&self, case: &Case) -> Option<Mismatch> {
         let (lower, upper, boundary) = (case.lower(), case.upper(), case.domain.boundary);
         if self.hydrodynamics == Hydrodynamics::PairMobility {

@@ -23,7 +23,8 @@ pub enum StokesError {
         /// Size of the finest cells.
         cell_size: f64,
     },
-    /// No quadrature point of the penalised solid belongs to a body, or so few that they fix no rotation: its motion is unknown.
+    /// No quadrature point of the penalised solid belongs to a body, or so few that they fix no rotation: its
+    /// motion is unknown.
     #[error(
         "body {} with a radius of {:.3} cells ({radius}, cells of size {cell_size}) has no solid from which to tell its \
          motion: refine the mesh, or move it out of the body that covers it",

@@ -1,7 +1,7 @@
 //! Stokes flow around rigid bodies by a fictitious-domain Q2-Q1 finite-element method.
 //!
-//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body and no
-//! force or torque on any. [`Formulation`] names the two ways to impose rigidity.
+//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body
+//! and no force or torque on any. [`Formulation`] names the two ways to impose rigidity.
 //!
 //! ```
 //! use gluey_geom::{Aabb, Vector};

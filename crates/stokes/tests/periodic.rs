@@ -36,7 +36,8 @@ where
     let (spin, other) = (Dim::<D>::spin_slice(&inside.spin), Dim::<D>::spin_slice(&across.spin));
     let spin_miss = spin.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!((inside.velocity - across.velocity).norm() < 1e-7 && spin_miss < 1e-6);
-    // The undisturbed velocity at the centre is 0.11; the nearer wall, which moves faster, drags the ball along.
+    // The undisturbed velocity at the centre is 0.11; the nearer wall, which moves faster, drags the ball
+    // along.
     assert!((0.11..0.125).contains(&inside.velocity[0]), "{inside:?}");
     let about_z = *spin.last().expect("a spin");
     assert!((about_z + 0.5).abs() < 0.04, "{inside:?}");

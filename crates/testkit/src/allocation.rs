@@ -36,8 +36,8 @@ fn count() {
     let _ = THIS_THREAD.try_with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: every call goes to `System` with its arguments unchanged, and `System` keeps the contract of `GlobalAlloc`.
-// Counting neither allocates nor unwinds.
+// SAFETY: every call goes to `System` with its arguments unchanged, and `System` keeps the contract of
+// `GlobalAlloc`. Counting neither allocates nor unwinds.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
@@ -71,8 +71,8 @@ pub fn count_in_thread<R>(work: impl FnOnce() -> R) -> (R, usize) {
     (result, THIS_THREAD.with(Cell::get) - before)
 }
 
-/// Runs `work` and counts the allocations of all threads meanwhile. Put such a test in a file of its own, since other
-/// tests in the same process are counted too.
+/// Runs `work` and counts the allocations of all threads meanwhile. Put such a test in a file of its own,
+/// since other tests in the same process are counted too.
 pub fn count_in_all_threads<R>(work: impl FnOnce() -> R) -> (R, usize) {
     let before = ALL_THREADS.load(Ordering::Relaxed);
     let result = work();

@@ -2,8 +2,8 @@
 
 /// The slope of `log(error)` over `log(h)` by least squares.
 ///
-/// NaN, which fails every comparison, unless there are two or more different `h` and all numbers are positive and
-/// finite.
+/// NaN, which fails every comparison, unless there are two or more different `h` and all numbers are positive
+/// and finite.
 pub fn convergence_order(hs: &[f64], errors: &[f64]) -> f64 {
     let usable = |x: &f64| *x > 0.0 && x.is_finite();
     if hs.len() != errors.len() || !hs.iter().chain(errors).all(usable) {

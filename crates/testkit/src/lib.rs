@@ -1,5 +1,5 @@
-//! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings and an allocation
-//! counter.
+//! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings and
+//! an allocation counter.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};

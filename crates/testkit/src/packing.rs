@@ -17,8 +17,8 @@ pub struct Packing<const D: usize> {
 const SWEEP_COUNT: usize = 20;
 
 impl<const D: usize> Packing<D> {
-    /// A hard-sphere fluid at the given fraction of the volume (of the area), sampled by the Metropolis method (1953, DOI
-    /// 10.1063/1.1699114) from a lattice, in a cube that is periodic.
+    /// A hard-sphere fluid at the given fraction of the volume (of the area), sampled by the Metropolis
+    /// method (1953, DOI 10.1063/1.1699114) from a lattice, in a cube that is periodic.
     ///
     /// Sampling is short: neighbours have forgotten the lattice, distant particles have not.
     ///

@@ -1,5 +1,5 @@
-//! The reference data of `data/reference`, read by the names in their headers. Where they come from and how exact they
-//! are is written in `data/reference/README.md`.
+//! The reference data of `data/reference`, read by the names in their headers. Where they come from and how
+//! exact they are is written in `data/reference/README.md`.
 
 use std::collections::BTreeMap;
 
@@ -90,8 +90,8 @@ impl Table {
             .ok_or_else(|| TableError::NoColumn { name: name.to_owned() })
     }
 
-    /// The value of column `of` where column `over`, which must rise, has the value `at`: the cubic through the four
-    /// nearest rows.
+    /// The value of column `of` where column `over`, which must rise, has the value `at`: the cubic through
+    /// the four nearest rows.
     pub fn interpolate(&self, over: &str, of: &str, at: f64) -> Result<f64, TableError> {
         let (x, y) = (self.column(over)?, self.column(of)?);
         let inside = x.len() >= 4 && at >= x[0] && at <= x[x.len() - 1];
@@ -152,7 +152,8 @@ reference_table!(
     "trio2d_trajectory.csv"
 );
 reference_table!(
-    /// Mobility of two equal spheres (Batchelor and Green 1972): `r_over_a, xi, A, B, one_minus_A, one_minus_B, C_rot`.
+    /// Mobility of two equal spheres (Batchelor and Green 1972):
+    /// `r_over_a, xi, A, B, one_minus_A, one_minus_B, C_rot`.
     sphere_pair_mobility,
     "sphere_pair_mobility_unbounded.csv"
 );

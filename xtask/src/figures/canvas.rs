@@ -1,4 +1,5 @@
-//! A drawing surface for what kuva does not draw: legends, set-ups, stacked panels. Plain SVG, one element a call.
+//! A drawing surface for what kuva does not draw: legends, set-ups, stacked panels. Plain SVG, one element a
+//! call.
 
 use std::fmt::Write;
 

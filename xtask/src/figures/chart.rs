@@ -137,7 +137,8 @@ impl Chart {
         if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
     }
 
-    /// Where a point (linear axes) lies on a canvas of this height that has only this chart, with equal scales.
+    /// Where a point (linear axes) lies on a canvas of this height that has only this chart, with equal
+    /// scales.
     pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_height = equal_aspect_height(self);
         self.point(canvas_height - self.margin_bottom() - frame_height, frame_height, at)
@@ -185,8 +186,8 @@ const LEGEND_COLUMNS: usize = 2;
 /// Size of the labels of dots.
 const MARK_SIZE: f64 = 15.0;
 
-/// The centre of a dot's label, in one of sixteen directions: the nearest to the dot whose distance from all `taken` points is
-/// enough, or the one with the largest.
+/// The centre of a dot's label, in one of sixteen directions: the nearest to the dot whose distance from all
+/// `taken` points is enough, or the one with the largest.
 fn place_of_label(dot: (f64, f64), taken: &[(f64, f64)]) -> (f64, f64) {
     const ENOUGH: f64 = 0.6 * MARK_SIZE;
     let mut best = (dot, 0.0);

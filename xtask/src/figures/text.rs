@@ -1,7 +1,7 @@
 //! Labels with a little markup: `*t*` is italic, `_{12}` a subscript, `^{-1}` a superscript.
 //!
-//! kuva writes labels as plain `<text>`; [`typeset`] turns the markup inside them into `<tspan>`s, which resvg and
-//! browsers draw alike.
+//! kuva writes labels as plain `<text>`; [`typeset`] turns the markup inside them into `<tspan>`s, which
+//! resvg and browsers draw alike.
 
 /// Size of sub- and superscripts, as a fraction of the text around them.
 const SCRIPT_SIZE: f64 = 0.7;

@@ -34,8 +34,8 @@ fn paths(figure: FigureName, data: &Data, particle_count: usize) -> Canvas {
     canvas
 }
 
-/// Draws into the empty middle of the circles of figure 6 where they cross the x axis on the right, x stretched:
-/// the orbits differ by less than a line's width elsewhere.
+/// Draws into the empty middle of the circles of figure 6 where they cross the x axis on the right, x
+/// stretched: the orbits differ by less than a line's width elsewhere.
 fn enlarge_right_edge(canvas: &mut Canvas, chart: &Chart) {
     let half_height = 0.01;
     let points = chart.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());

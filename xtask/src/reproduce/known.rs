@@ -1,5 +1,5 @@
-//! Known disagreements: rows that do not hold, with the reason as far as it was found. They are shown as "no" like any other;
-//! they only do not make the reproduction fail.
+//! Known disagreements: rows that do not hold, with the reason as far as it was found. They are shown as "no"
+//! like any other; they only do not make the reproduction fail.
 
 /// How much was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,10 @@
-//! Numbers that say what a trajectory does: smallest gap, half a turn, closest approach, distance from another one.
+//! Numbers that say what a trajectory does: smallest gap, half a turn, closest approach, distance from
+//! another one.
 
 use super::trajectory::Trajectory;
 
-/// Gaps this close to the smallest one (in radii) count as closest approach: a pair in contact has many of them.
+/// Gaps this close to the smallest one (in radii) count as closest approach: a pair in contact has many of
+/// them.
 const CONTACT_BAND: f64 = 1e-6;
 
 /// The smallest gap D/a of all pairs over all times.
@@ -28,7 +30,8 @@ pub fn last_gap(run: &Trajectory, pair: (usize, usize)) -> Option<f64> {
     run.gap(pair)?.last().copied()
 }
 
-/// Least and greatest distance of any particle from the point `(1/2, 1/2)` in the x-y plane, at times `from` and later.
+/// Least and greatest distance of any particle from the point `(1/2, 1/2)` in the x-y plane, at times `from`
+/// and later.
 pub fn distance_from_center(run: &Trajectory, from: f64) -> Option<(f64, f64)> {
     let rows = run.times.iter().zip(0..).filter(|(t, _)| **t >= from).map(|(_, row)| row);
     let distances = rows.flat_map(|row: usize| {
@@ -48,7 +51,8 @@ pub fn line_angles(run: &Trajectory) -> Vec<f64> {
     angles
 }
 
-/// First time when the line of centres has turned by `angle` radians (clockwise is negative), by linear interpolation.
+/// First time when the line of centres has turned by `angle` radians (clockwise is negative), by linear
+/// interpolation.
 pub fn time_to_turn(run: &Trajectory, angle: f64) -> Option<f64> {
     let angles = line_angles(run);
     let wanted = angles.first()? + angle;
@@ -70,15 +74,15 @@ pub fn closest_approach(run: &Trajectory) -> Option<f64> {
     Some(0.5 * (run.times[first] + run.times[last]))
 }
 
-/// Largest relative difference of the gap of particles 1 and 2 from `exact` while the exact gap is at least `floor`
-/// radii. `None` if the run ends before the exact solution does.
+/// Largest relative difference of the gap of particles 1 and 2 from `exact` while the exact gap is at least
+/// `floor` radii. `None` if the run ends before the exact solution does.
 pub fn gap_deviation(run: &Trajectory, exact: &Trajectory, floor: f64) -> Option<f64> {
     let relative = |own: f64, wanted: f64| (own - wanted).abs() / wanted;
     largest_over_exact(run, exact, exact.end(), |wanted| wanted >= floor, relative)
 }
 
-/// Largest difference of the gap of particles 1 and 2 from `exact`, in radii, up to time `until` while the exact gap is at
-/// most `ceiling` radii. `None` if the run ends earlier.
+/// Largest difference of the gap of particles 1 and 2 from `exact`, in radii, up to time `until` while the
+/// exact gap is at most `ceiling` radii. `None` if the run ends earlier.
 pub fn gap_error(run: &Trajectory, exact: &Trajectory, until: f64, ceiling: f64) -> Option<f64> {
     largest_over_exact(run, exact, until, |wanted| wanted <= ceiling, |own, wanted| (own - wanted).abs())
 }
@@ -96,8 +100,8 @@ fn largest_over_exact(
     differences.collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::max)
 }
 
-/// Largest distance between the centres of the same particle in `run` and `other` up to time `until`, box units; `None`
-/// if one of them ends earlier and `until` is finite.
+/// Largest distance between the centres of the same particle in `run` and `other` up to time `until`, box
+/// units; `None` if one of them ends earlier and `until` is finite.
 pub fn center_deviation(run: &Trajectory, other: &Trajectory, until: f64) -> Option<f64> {
     let end = run.end().min(other.end());
     if until.is_finite() && end < until * (1.0 - 1e-9) {
@@ -120,8 +124,8 @@ pub fn largest_gap_after_smallest(run: &Trajectory) -> Option<f64> {
     gap[smallest..].iter().copied().reduce(f64::max)
 }
 
-/// Largest difference of the gaps D/a of particles 1 and 2 in two runs with the same time step, over all times when that of
-/// the first is positive.
+/// Largest difference of the gaps D/a of particles 1 and 2 in two runs with the same time step, over all
+/// times when that of the first is positive.
 pub fn gap_difference_while_apart(run: &Trajectory, other: &Trajectory) -> Option<f64> {
     let (own, others) = (run.gap((1, 2))?, other.gap((1, 2))?);
     let apart = own.iter().zip(others).filter(|(own, _)| **own > 0.0);

@@ -49,8 +49,8 @@ pub struct Options {
     pub jobs: usize,
 }
 
-/// Makes the runs and figures. Failures of single runs or figures are part of the summary; an error means that nothing
-/// could be written.
+/// Makes the runs and figures. Failures of single runs or figures are part of the summary; an error means
+/// that nothing could be written.
 pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
     let start = Instant::now();
     let runs_folder = options.out.join("runs");

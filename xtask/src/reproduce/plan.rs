@@ -31,8 +31,8 @@ impl fmt::Display for CaseName {
     }
 }
 
-/// The ways each case is computed: the paper's three strategies in its formulation, its gluey contact as printed, and gluey
-/// contact in the accurate formulation.
+/// The ways each case is computed: the paper's three strategies in its formulation, its gluey contact as
+/// printed, and gluey contact in the accurate formulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
     /// No contact model, formulation `paper`.
@@ -41,8 +41,8 @@ pub enum Approach {
     Inelastic,
     /// Gluey contact, formulation `paper`.
     Gluey,
-    /// Gluey contact to the letter of the paper: constraint of first order, memory in whole steps, velocity of a particle at
-    /// its centre; formulation `paper`.
+    /// Gluey contact to the letter of the paper: constraint of first order, memory in whole steps, velocity
+    /// of a particle at its centre; formulation `paper`.
     GlueyAsPrinted,
     /// The same with twice the time step, to see what the time step does; in tables only.
     GlueyAsPrintedLargeStep,
@@ -217,8 +217,8 @@ pub fn runs_for(figures: &[FigureName], quick: bool) -> Vec<RunKey> {
     runs
 }
 
-/// The run that `--quick` does without: at its time step, twice that would be four times the paper's, which says nothing about
-/// smaller ones.
+/// The run that `--quick` does without: at its time step, twice that would be four times the paper's, which
+/// says nothing about smaller ones.
 const ONLY_IN_FULL: RunKey = RunKey { case: CaseName::Pair3d, approach: Approach::GlueyAsPrintedLargeStep };
 
 /// What `--quick` changes of a case: the only place for these numbers.
@@ -228,8 +228,8 @@ pub struct QuickSettings {
     pub cells_per_radius: f64,
     /// The time step is multiplied by this.
     pub step_factor: f64,
-    /// Relative tolerance of the linear solves of `paper`. Those of `rigid-dofs` keep theirs: with 1e-4 its spheres, which touch, part
-    /// with an error of 0.11 in their distance, with 1e-6 of 0.02.
+    /// Relative tolerance of the linear solves of `paper`. Those of `rigid-dofs` keep theirs: with 1e-4 its
+    /// spheres, which touch, part with an error of 0.11 in their distance, with 1e-6 of 0.02.
     pub paper_tolerance: f64,
     /// The run ends at this time (units of 1/shear rate) unless the case ends earlier.
     pub latest_end: f64,

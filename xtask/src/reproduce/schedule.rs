@@ -1,14 +1,15 @@
 //! Independent jobs side by side; one that fails or panics does not disturb the others.
 //!
-//! The processor's cores are dealt out among the jobs: each runs in a pool of its own. Jobs that shared one pool would wait
-//! for each other's pieces of work.
+//! The processor's cores are dealt out among the jobs: each runs in a pool of its own. Jobs that shared one
+//! pool would wait for each other's pieces of work.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Does every job, at most `workers` at a time and in the order given; the results stand in the order of the jobs.
+/// Does every job, at most `workers` at a time and in the order given; the results stand in the order of the
+/// jobs.
 pub fn in_parallel<J: Sync, T: Send>(
     jobs: &[J],
     workers: usize,

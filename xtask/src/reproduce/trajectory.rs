@@ -54,7 +54,8 @@ pub enum TrajectoryError {
 }
 
 impl Trajectory {
-    /// Reads a CSV file with columns `t,x1,y1[,z1],x2,...` and gaps `gap12_over_a,...` or, for a pair, `D_over_a`.
+    /// Reads a CSV file with columns `t,x1,y1[,z1],x2,...` and gaps `gap12_over_a,...` or, for a pair,
+    /// `D_over_a`.
     pub fn read(path: &Path) -> Result<Self, TrajectoryError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
@@ -83,7 +84,8 @@ impl Trajectory {
         Some((1.0 - weight) * values[row] + weight * values[next])
     }
 
-    /// Centre of a particle (counted from 1) at time `t` by linear interpolation; `None` outside the trajectory.
+    /// Centre of a particle (counted from 1) at time `t` by linear interpolation; `None` outside the
+    /// trajectory.
     pub fn center_at(&self, particle: usize, t: f64) -> Option<[f64; 3]> {
         let (row, weight) = self.locate(t)?;
         let path = &self.centers[particle - 1];
@@ -101,8 +103,8 @@ impl Trajectory {
         }
     }
 
-    /// The half-turn orbit of a symmetric pair continued to time `end`: after each half turn the particles have
-    /// changed places and everything repeats (data/reference/README.md).
+    /// The half-turn orbit of a symmetric pair continued to time `end`: after each half turn the particles
+    /// have changed places and everything repeats (data/reference/README.md).
     pub fn continue_half_turns(&self, end: f64) -> Self {
         let period = self.end();
         let mut all = self.clone();
@@ -132,7 +134,8 @@ struct Table {
 }
 
 impl Table {
-    /// Reads comma-separated numbers; `#` starts a comment. A last line without its newline (a run cut short) is dropped.
+    /// Reads comma-separated numbers; `#` starts a comment. A last line without its newline (a run cut short)
+    /// is dropped.
     fn parse(text: &str, path: &Path) -> Result<Self, TrajectoryError> {
         let whole = &text[..text.rfind('\n').map_or(0, |at| at + 1)];
         let mut lines =

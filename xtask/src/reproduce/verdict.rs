@@ -13,7 +13,8 @@ pub enum Kind {
     Paper,
     /// A comparison with an exact solution.
     Exact,
-    /// Holds by construction of the contact model, for any flow: no evidence, but a defect if it does not hold.
+    /// Holds by construction of the contact model, for any flow: no evidence, but a defect if it does not
+    /// hold.
     Guarantee,
 }
 
@@ -139,8 +140,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Whether the reproduction fails because of this row: it does not hold and is no known disagreement, or it could not
-    /// be measured at all.
+    /// Whether the reproduction fails because of this row: it does not hold and is no known disagreement, or
+    /// it could not be measured at all.
     pub fn is_failure(&self) -> bool {
         match self.outcome {
             Outcome::Yes => false,

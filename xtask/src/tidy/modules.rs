@@ -1,7 +1,7 @@
 //! Which module of a crate uses which other one, from the syntax of its files.
 //!
-//! A path is followed from the module it stands in, through the re-exports on its way, to the file that defines what it
-//! names. Passing a name on (`pub use`) is not using it. Code of tests does not count.
+//! A path is followed from the module it stands in, through the re-exports on its way, to the file that
+//! defines what it names. Passing a name on (`pub use`) is not using it. Code of tests does not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -163,8 +163,8 @@ impl Modules {
         used.filter(|used| used.to != used.from).collect()
     }
 
-    /// The file that defines what `names` says in the module `at`; none for other crates. `seen` guards against
-    /// re-exports in a circle.
+    /// The file that defines what `names` says in the module `at`; none for other crates. `seen` guards
+    /// against re-exports in a circle.
     fn file_of(&self, at: &[String], names: &[String], seen: &mut BTreeSet<Vec<String>>) -> Option<String> {
         let (mut here, rest) = self.start(at, names)?;
         let mut rest = rest.iter();

@@ -7,8 +7,8 @@ use super::law::Law;
 use super::modules::{self, Use};
 use super::sources::Source;
 
-/// Uses of higher rooms, rooms that the law does not list, listed ones that do not exist, and cycles, in the crates that
-/// have a line of rooms.
+/// Uses of higher rooms, rooms that the law does not list, listed ones that do not exist, and cycles, in the
+/// crates that have a line of rooms.
 pub fn offences(law: &Law, sources: &[Source]) -> Result<Vec<String>, TidyError> {
     let mut offences = Vec::new();
     for (name, rooms) in &law.rooms {

@@ -7,8 +7,6 @@ use super::TidyError;
 use super::modules::is_test;
 use super::sources::Source;
 
-/// Folders whose files keep these limits. A folder that has been put in order is added here.
-const FOLDERS: &[&str] = &["crates/fem", "crates/linalg"];
 /// Most parameters of a function, the receiver and the parts of tuples included.
 const MOST_PARAMETERS: usize = 6;
 /// Most lines of a function, from `fn` to the last brace.
@@ -16,10 +14,10 @@ const LONGEST_FUNCTION: usize = 60;
 /// Most columns of a comment, as for code.
 const WIDEST_COMMENT: usize = 110;
 
-/// Offences in the folders that keep the limits.
+/// Offences against the limits.
 pub fn offences(sources: &[Source]) -> Result<Vec<String>, TidyError> {
     let mut offences = Vec::new();
-    for source in sources.iter().filter(|source| FOLDERS.iter().any(|folder| source.lies_in(folder))) {
+    for source in sources {
         offences.extend(of_source(source)?);
     }
     Ok(offences)

@@ -8,8 +8,8 @@ use super::{
 
 /// More contacts than this are solved for by the active set.
 const FEW: usize = 2;
-/// Uzawa's method solves two contacts between particles of similar sizes in far fewer iterations; where one of
-/// three joined particles is tiny it would take millions.
+/// Uzawa's method solves two contacts between particles of similar sizes in far fewer iterations; where one
+/// of three joined particles is tiny it would take millions.
 const UZAWA_LIMIT: usize = 10_000;
 /// Iterations of the active set before Newton steps are tried, and one more for each contact.
 const FIRST_TRY: (usize, usize) = (500, 1);

@@ -20,8 +20,8 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         Self { mesh }
     }
 
-    /// Sets `to[node] = field(point of node)` for pairs of a field and what it becomes, with interleaved components. Points
-    /// outside the mesh get zero.
+    /// Sets `to[node] = field(point of node)` for pairs of a field and what it becomes, with interleaved
+    /// components. Points outside the mesh get zero.
     pub fn transfer(
         &self,
         from_nodes: &NodeMap<D>,
@@ -65,9 +65,9 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         Some((cell, x))
     }
 
-    /// Velocity and half the vorticity of a nodal velocity field at a point. The gradient jumps between cells: at a face,
-    /// an edge or a corner it is the mean over the `2^D` orthants around the point. A point outside the mesh stands for
-    /// the nearest one of the box.
+    /// Velocity and half the vorticity of a nodal velocity field at a point. The gradient jumps between
+    /// cells: at a face, an edge or a corner it is the mean over the `2^D` orthants around the point. A point
+    /// outside the mesh stands for the nearest one of the box.
     pub fn motion_at(&self, nodes: &NodeMap<D>, velocity: &[f64], point: &Vector<D>) -> Twist<D>
     where
         Dim<D>: Space<D>,
@@ -86,8 +86,8 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         twist
     }
 
-    /// The cell that holds a point and what lies next to it in one of the orthants around it (bit `d` is set for larger
-    /// coordinates along axis `d`), with the coordinates of the point in it.
+    /// The cell that holds a point and what lies next to it in one of the orthants around it (bit `d` is set
+    /// for larger coordinates along axis `d`), with the coordinates of the point in it.
     fn locate_in_orthant(&self, point: &Vector<D>, orthant: usize) -> Option<(usize, [f64; D])> {
         let finest = self.mesh.max_level();
         let offset = (point - self.mesh.domain().lower) / self.mesh.size(finest);
@@ -155,8 +155,9 @@ mod tests {
         Evaluator::new(&mesh).motion_at(&nodes, &field, &x)
     }
 
-    /// In `u = A x + b` and `u = x_1^2 e_0` the velocity is `u` and the spin half the vorticity: inside cells, on faces,
-    /// at corners, where sizes change, on the walls. The first axis has no part in it, so that points may lie beyond it.
+    /// In `u = A x + b` and `u = x_1^2 e_0` the velocity is `u` and the spin half the vorticity: inside
+    /// cells, on faces, at corners, where sizes change, on the walls. The first axis has no part in it, so
+    /// that points may lie beyond it.
     fn linear_and_quadratic_fields_are_exact<const D: usize>()
     where
         Dim<D>: Space<D>,
@@ -194,8 +195,8 @@ mod tests {
         linear_and_quadratic_fields_are_exact::<3>();
     }
 
-    /// Half the vorticity of `|y - 1/2| e_x` is `-1/2` above and `1/2` below: which it is at the border must not depend on
-    /// the order of the cells.
+    /// Half the vorticity of `|y - 1/2| e_x` is `-1/2` above and `1/2` below: which it is at the border must
+    /// not depend on the order of the cells.
     #[test]
     fn where_the_gradient_jumps_the_spin_is_the_mean_of_all_sides() {
         let roof = |x: &Vector<2>| Vector::<2>::new((x[1] - 0.5).abs(), 0.0);

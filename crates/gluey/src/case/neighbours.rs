@@ -22,8 +22,8 @@ pub(crate) struct Neighbours {
     pub contact_distance: f64,
 }
 
-/// The pairs whose surfaces are nearer than `reach`, in the order of the second, then of the first particle. Centres have
-/// `dimension` coordinates and lie in the box.
+/// The pairs whose surfaces are nearer than `reach`, in the order of the second, then of the first particle.
+/// Centres have `dimension` coordinates and lie in the box.
 pub(crate) fn nearer_than(case: &Case, reach: f64) -> Vec<Neighbours> {
     let mut pairs: Vec<(usize, usize)> = Vec::new();
     let (centers, owners) = with_images(case, reach);
@@ -49,7 +49,8 @@ fn neighbours(case: &Case, first: usize, second: usize) -> Neighbours {
     Neighbours { first, second, distance, contact_distance: a.radius + b.radius }
 }
 
-/// Centres of the particles, then of their images that particles in the box can meet; and which particle each is.
+/// Centres of the particles, then of their images that particles in the box can meet; and which particle each
+/// is.
 fn with_images(case: &Case, reach: f64) -> (Vec<Vector<3>>, Vec<usize>) {
     let center = |position: &Vec<f64>| Vector::<3>::from_fn(|d, _| position.get(d).copied().unwrap_or(0.0));
     let mut centers: Vec<_> = case.particles.iter().map(|particle| center(&particle.position)).collect();

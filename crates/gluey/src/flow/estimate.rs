@@ -1,12 +1,13 @@
 //! How large the mesh of a case will be, before it is built.
 //!
-//! Every level of the tree refines the cells that meet a ball a little larger than each particle. A ball of radius `R h` at a random
-//! place meets on average (Steiner 1840, on parallel bodies)
+//! Every level of the tree refines the cells that meet a ball a little larger than each particle. A ball of
+//! radius `R h` at a random place meets on average (Steiner 1840, on parallel bodies)
 //!
 //! `pi R^2 + 4 R + 1` squares or `4/3 pi R^3 + 3 pi R^2 + 6 R + 1` cubes of edge `h`,
 //!
-//! and no more than fill the box. Gaps between particles add those in the lens where they are narrower than their cells. The mesh that is
-//! built has 0.6 to 1.6 times as many cells (`tests/estimate.rs`: the shipped cases, and sixty at random).
+//! and no more than fill the box. Gaps between particles add those in the lens where they are narrower than
+//! their cells. The mesh that is built has 0.6 to 1.6 times as many cells (`tests/estimate.rs`: the shipped
+//! cases, and sixty at random).
 
 use std::f64::consts::PI;
 
@@ -34,7 +35,8 @@ pub struct MeshEstimate {
 }
 
 impl MeshEstimate {
-    /// The estimate for a checked case; `None` if its flow has no mesh. Takes as long as looking at each particle once a level.
+    /// The estimate for a checked case; `None` if its flow has no mesh. Takes as long as looking at each
+    /// particle once a level.
     pub fn of(case: &Case) -> Option<Self> {
         if case.flow.hydrodynamics != Hydrodynamics::Stokes {
             return None;
@@ -109,7 +111,8 @@ impl Tree {
         }
         let size = self.size(level);
         let finest = i32::from(self.refinement.surface) - 1;
-        // Neighbouring leaves differ by one level: the balls of the finest refined level, with a cell more for every level above.
+        // Neighbouring leaves differ by one level: the balls of the finest refined level, with a cell more
+        // for every level above.
         let balance = self.refinement.band * 0.5 * self.size(finest) + (size - self.size(finest));
         let beyond = (self.refinement.band * 0.5 * size).max(balance);
         let met = |radius: f64| cells_met(self.dimension, (radius + beyond) / size);
@@ -134,8 +137,8 @@ impl Tree {
             .sum()
     }
 
-    /// Cells of a size in the lens where the distance of two surfaces, `gap + r^2 (1/a + 1/b) / 2` at the distance `r` from their
-    /// axis, is less than `widest`.
+    /// Cells of a size in the lens where the distance of two surfaces, `gap + r^2 (1/a + 1/b) / 2` at the
+    /// distance `r` from their axis, is less than `widest`.
     fn in_gap(&self, case: &Case, pair: &Neighbours, size: f64, widest: f64) -> f64 {
         let [a, b] = [pair.first, pair.second].map(|particle| case.particles[particle].radius);
         let excess = widest - (pair.distance - pair.contact_distance).max(0.0);

@@ -8,8 +8,8 @@ use gluey_levelset::{Ball, BallTree, Ramp, ViscosityLaw};
 use gluey_motion::Fields;
 use gluey_stokes::{Flow, FlowParams, Formulation};
 
-/// Evaluates velocity, pressure, viscosity, level set and multiplier at the nodes. Where the box is periodic, the nodes
-/// of its far faces become points of their own.
+/// Evaluates velocity, pressure, viscosity, level set and multiplier at the nodes. Where the box is periodic,
+/// the nodes of its far faces become points of their own.
 pub fn fields<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], params: &FlowParams) -> Fields<D>
 where
     Dim<D>: Space<D>,
@@ -28,7 +28,8 @@ where
             let next = fields.points.len() as u32;
             let point = *point_of.entry((node, wrapped)).or_insert(next);
             if point == next {
-                push_point(&mut fields, flow, balls, params, (index, node as usize), &x, &local);
+                let at = Point { cell: index, node: node as usize, x, local };
+                push_point(&mut fields, flow, balls, params, &at);
             }
             fields.cells.push(point);
         }
@@ -36,25 +37,33 @@ where
     fields
 }
 
+/// A node of a cell where fields are written.
+struct Point<const D: usize> {
+    cell: usize,
+    node: usize,
+    x: Vector<D>,
+    /// Its coordinates in the cell, from 0 to 1.
+    local: [f64; D],
+}
+
 fn push_point<const D: usize>(
     fields: &mut Fields<D>,
     flow: &Flow<D>,
     balls: &BallTree<'_, D>,
     params: &FlowParams,
-    (cell, node): (usize, usize),
-    x: &Vector<D>,
-    local: &[f64; D],
+    at: &Point<D>,
 ) where
     Dim<D>: Space<D>,
 {
+    let &Point { cell, node, x, ref local } = at;
     let at_node = |field: &[f64]| match field.is_empty() {
         true => Vector::zeros(),
         false => Vector::from_fn(|d, _| field[node * D + d]),
     };
     let pressure = flow.discretisation.pressure.cell(cell).iter().enumerate();
     let pressure = pressure.map(|(q, &n)| value::<D>(1, q, local) * flow.pressure[n as usize]).sum();
-    let alpha = balls.nearest(x).map_or(f64::NEG_INFINITY, |b| b.1);
-    fields.points.push(*x);
+    let alpha = balls.nearest(&x).map_or(f64::NEG_INFINITY, |b| b.1);
+    fields.points.push(x);
     fields.velocity.push(at_node(&flow.velocity));
     fields.multiplier.push(at_node(&flow.multiplier));
     fields.pressure.push(pressure);

@@ -37,7 +37,8 @@ pub struct FlowParams {
     pub formulation: Formulation,
     /// Linear solver.
     pub solver: SolverKind,
-    /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed flow.
+    /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed
+    /// flow.
     pub tolerance: f64,
 }
 
@@ -125,8 +126,8 @@ where
         Ok(Self { params, solver, method, discretisation: None, warm_start: None })
     }
 
-    /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same function, which
-    /// must be divergence-free, is the undisturbed flow inside.
+    /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same
+    /// function, which must be divergence-free, is the undisturbed flow inside.
     pub fn solve(
         &mut self,
         mesh: TreeMesh<D>,
@@ -136,7 +137,8 @@ where
         self.solve_forced(mesh, bodies, boundary, None)
     }
 
-    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike: `-div(2 eta eps(u)) + grad p = f`.
+    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike:
+    /// `-div(2 eta eps(u)) + grad p = f`.
     pub fn solve_forced(
         &mut self,
         mesh: TreeMesh<D>,
@@ -202,8 +204,8 @@ where
         discretisation
     }
 
-    /// The deviations from the undisturbed flow that the next solve starts from, where the solver is iterative: the last
-    /// one, and the one before on the same mesh.
+    /// The deviations from the undisturbed flow that the next solve starts from, where the solver is
+    /// iterative: the last one, and the one before on the same mesh.
     pub fn warm_start(&self) -> Option<(&NodalFields, Option<&NodalFields>)> {
         self.warm_start.as_ref().map(WarmStart::fields)
     }

@@ -14,10 +14,11 @@ pub struct Refinement {
     pub coarsest: u8,
     /// Level of the cells at the surfaces.
     pub surface: u8,
-    /// Cells of each level are kept to this many cell sizes outside a body, and everywhere inside it: what a coarse interior
-    /// would save is little, see `docs/decisions/0018-band.md`.
+    /// Cells of each level are kept to this many cell sizes outside a body, and everywhere inside it: what a
+    /// coarse interior would save is little, see `docs/decisions/0018-band.md`.
     pub band: f64,
-    /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for none.
+    /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for
+    /// none.
     pub gap_fraction: f64,
     /// Levels beyond `surface` that gaps may use.
     pub gap_levels: u8,
@@ -58,8 +59,8 @@ impl Refinement {
         })
     }
 
-    /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two surfaces is
-    /// their distance from each other there, for points between them and not far inside.
+    /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two
+    /// surfaces is their distance from each other there, for points between them and not far inside.
     fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
         let reach = half_diagonal::<D>(h);
         // What a gap that is too narrow for the cell leaves of either distance.
@@ -92,7 +93,8 @@ fn half_diagonal<const D: usize>(h: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Cells at most `band` of their size from a body are of the finest level, inside it as deep as it goes; farther ones are not.
+    /// Cells at most `band` of their size from a body are of the finest level, inside it as deep as it goes;
+    /// farther ones are not.
     fn fine_cells_fill_bodies_and_their_bands<const D: usize>() {
         let ball = Ball::new(Vector::<D>::repeat(0.47), 0.2);
         let refinement = Refinement { coarsest: 2, surface: 5, band: 1.5, gap_fraction: 0.0, gap_levels: 0 };

@@ -1,12 +1,13 @@
 //! What an iterative solve starts from: the last two flows, extrapolated in time.
 //!
-//! The deviation `d` from the undisturbed flow at the next step is guessed as `2 d^n - d^(n-1)`, both moved to the new
-//! mesh. `d^(n-1)` was already moved to the mesh of `d^n` one step before, so both live on one mesh. The extrapolation
-//! assumes equal steps; others only make it a worse guess.
+//! The deviation `d` from the undisturbed flow at the next step is guessed as `2 d^n - d^(n-1)`, both moved
+//! to the new mesh. `d^(n-1)` was already moved to the mesh of `d^n` one step before, so both live on one
+//! mesh. The extrapolation assumes equal steps; others only make it a worse guess.
 //!
-//! In `rigid-dofs` the guess is `d^n`: nodes enter and leave the bodies one by one, and extrapolation doubles the jumps this
-//! makes. Iterations a step of the two spheres of the paper's figure 7 from zero / `d^n` / `2 d^n - d^(n-1)` / `d^n + c (d^n -
-//! d^(n-1))` with the smallest residual: `paper` 23 / 17 / 12 / 14, `rigid-dofs` 19 / 13 / 14 / 14.
+//! In `rigid-dofs` the guess is `d^n`: nodes enter and leave the bodies one by one, and extrapolation doubles
+//! the jumps this makes. Iterations a step of the two spheres of the paper's figure 7 from zero / `d^n` /
+//! `2 d^n - d^(n-1)` / `d^n + c (d^n - d^(n-1))` with the smallest residual: `paper` 23 / 17 / 12 / 14,
+//! `rigid-dofs` 19 / 13 / 14 / 14.
 
 use gluey_fem::Evaluator;
 use gluey_fem::{NodeMap, TreeMesh};
@@ -16,7 +17,8 @@ use gluey_linalg::vector;
 use crate::operator::StokesSystem;
 use crate::space::Discretisation;
 
-/// Velocity at the velocity nodes (`D` interleaved components) and pressure at the pressure nodes of one mesh.
+/// Velocity at the velocity nodes (`D` interleaved components) and pressure at the pressure nodes of one
+/// mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodalFields {
     /// Velocities.

@@ -5,8 +5,8 @@ use gluey_geom::Vector;
 
 use crate::space::Discretisation;
 
-/// Gauss points per direction for the body force: exact for forces of degree 5, and one order beyond what the elements
-/// resolve for others.
+/// Gauss points per direction for the body force: exact for forces of degree 5, and one order beyond what the
+/// elements resolve for others.
 const FORCE_POINTS: usize = 4;
 
 /// `b += int f . v` for the nodal velocities `v`.

@@ -1,20 +1,103 @@
-//! The linear system of a flow around rigid bodies, for those who call the linear solvers themselves.
+//! The linear system of a flow around rigid bodies, for those who call the linear solvers themselves, and
+//! what a formulation of rigidity provides for it: [`Method`], [`Rigidity`].
 //!
-//! The velocity is `lift + T x`: the lift carries the boundary values, and `x` solves `[A, -B^T; -B, 0] x = b` with the
-//! residual `b` of the lift.
+//! The velocity is `lift + T x`: the lift carries the boundary values, and `x` solves
+//! `[A, -B^T; -B, 0] x = b` with the residual `b` of the lift.
 
+use std::fmt::Debug;
 use std::sync::Arc;
 
-use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 use gluey_linalg::vector;
 
 use super::load::add_load;
-use super::{Formulation, Method, Rigidity};
 use crate::error::StokesError;
-use crate::operator::StokesSystem;
-use crate::space::Discretisation;
+use crate::operator::{Elements, StokesSystem};
+use crate::precondition::velocity::Smoothing;
+use crate::precondition::{Correction, CycleLevels};
+use crate::space::{Discretisation, VelocitySpace};
+
+/// A formulation with what it keeps from mesh to mesh.
+pub trait Method<const D: usize>: Send + Sync
+where
+    Dim<D>: Space<D>,
+{
+    /// The system around `bodies` on a mesh, and what belongs to it.
+    ///
+    /// # Errors
+    /// [`StokesError::Unresolved`] for a body smaller than a cell.
+    fn discretised(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+    ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError>;
+}
+
+/// What a formulation provides for a flow on one mesh, beside its system.
+pub trait Rigidity<const D: usize>: Debug + Send + Sync
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
+    ///
+    /// # Errors
+    /// [`StokesError::NoSolid`] for a body that the field does not know.
+    fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError>;
+
+    /// Predicts the flow from the residual `b` of the `lift` and the guess `x`, by one solve or several.
+    ///
+    /// # Errors
+    /// Those of the solves.
+    fn solve(
+        &self,
+        problem: &Problem<D>,
+        data: &Data<'_>,
+        x: &mut [f64],
+        solve: &mut LinearSolve<'_>,
+    ) -> Result<Multiplier, StokesError>;
+
+    /// Whether the deviation from the undisturbed flow is smooth enough in time to be extrapolated.
+    fn is_smooth_in_time(&self) -> bool;
+
+    /// Offset in cells of the nodes that are rigid on the coarser levels of the velocity cycle, see
+    /// [`crate::solid_nodes`].
+    fn coarse_offset(&self) -> f64;
+
+    /// The velocities of the finest level of the velocity cycle, with the bodies' nodes eliminated.
+    fn finest_level(&self, problem: &Problem<D>) -> VelocitySpace<D>;
+
+    /// How a level of the velocity cycle smooths; `None` if it only joins the coarser ones to what follows.
+    fn smoothing(&self, levels: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing>;
+
+    /// What the levels cannot see: a correction around the velocity cycle.
+    ///
+    /// # Errors
+    /// If it cannot be set up.
+    fn correction(
+        &self,
+        elements: &Elements<'_, D>,
+        finest: &VelocitySpace<D>,
+        levels: CycleLevels<'_, D>,
+    ) -> Result<Option<Box<dyn Correction>>, StokesError>;
+}
+
+/// What a prediction is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Data<'a> {
+    /// The field that carries the boundary values.
+    pub lift: &'a [f64],
+    /// Its residual, with the loads of forces.
+    pub b: &'a [f64],
+}
+
+/// A solve of the linear system: right-hand side, guess and solution, and the factor at most one by which the
+/// tolerance is tightened.
+pub type LinearSolve<'a> = dyn FnMut(&[f64], &mut [f64], f64) -> Result<(), StokesError> + 'a;
+
+/// Multiplier of the rigidity, a nodal velocity field; empty where there is none.
+pub type Multiplier = Vec<f64>;
 
 /// A flow around bodies on one mesh, ready to be solved.
 #[derive(Clone, Debug)]
@@ -34,23 +117,12 @@ impl<const D: usize> Problem<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The problem on `mesh` around `bodies` in a fluid of the given viscosity.
+    /// The problem around `bodies` on a mesh whose nodes are known, with what a formulation keeps from mesh
+    /// to mesh.
     ///
     /// # Errors
-    /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller than a cell.
-    pub fn new(
-        mesh: TreeMesh<D>,
-        bodies: &[Ball<D>],
-        viscosity: f64,
-        formulation: Formulation,
-    ) -> Result<Self, StokesError> {
-        Self::on(&Discretisation::new(mesh), bodies, viscosity, formulation.method()?.as_ref())
-    }
-
-    /// The same on a mesh whose nodes are known, with what a formulation keeps from mesh to mesh.
-    ///
-    /// # Errors
-    /// As [`Problem::new`].
+    /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller
+    /// than a cell.
     pub fn on(
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
@@ -72,8 +144,8 @@ where
         self.bodies.iter().map(Body::bounding_radius).fold(0.0, f64::max)
     }
 
-    /// The field closest to `flow` that fulfils all constraints and has its values on the outer boundary: nodal
-    /// velocities, then the twists of eliminated bodies.
+    /// The field closest to `flow` that fulfils all constraints and has its values on the outer boundary:
+    /// nodal velocities, then the twists of eliminated bodies.
     pub fn lift(&self, flow: &dyn Fn(&Vector<D>) -> Vector<D>) -> Vec<f64> {
         let (space, nodes) = (&self.system.space, &self.discretisation().velocity);
         let mut lift: Vec<f64> =

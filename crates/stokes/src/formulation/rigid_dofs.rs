@@ -1,21 +1,20 @@
-//! `rigid-dofs`: every velocity node with `alpha >= offset h` gets the rigid motion of its body; viscosity is constant, force and
-//! torque on a free body vanish because they are the residual of its own unknowns.
+//! `rigid-dofs`: every velocity node with `alpha >= offset h` gets the rigid motion of its body; viscosity is
+//! constant, force and torque on a free body vanish because they are the residual of its own unknowns.
 
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space, Twist};
 use gluey_levelset::Ball;
 
-use super::problem::{Problem, check_resolved};
-use super::{Data, LinearSolve, Method, Multiplier, Rigidity};
+use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace, WeakPressures, solid_nodes};
 
-/// Offset of the rigid nodes in cells that suits a dimension. In 3D, where films are not resolved, a larger one makes up for the
-/// resistance of the film.
+/// Offset of the rigid nodes in cells that suits a dimension. In 3D, where films are not resolved, a larger
+/// one makes up for the resistance of the film.
 pub fn default_offset(dimension: usize) -> f64 {
     if dimension == 2 { -0.1 } else { -0.2 }
 }

@@ -1,9 +1,9 @@
 //! Sparse matrices of the Stokes system, for direct solvers.
 //!
-//! Every nodal unknown is a short linear form in the reduced unknowns (one term for a free node, the masters of a
-//! hanging node, the entries of a body's twist for a rigid node, nothing on the boundary), so a cell contributes
-//! `C^T K C` to its reduced unknowns. These come in blocks that are coupled alike: the components at a free node, the
-//! twist of a body, a pressure.
+//! Every nodal unknown is a short linear form in the reduced unknowns (one term for a free node, the masters
+//! of a hanging node, the entries of a body's twist for a rigid node, nothing on the boundary), so a cell
+//! contributes `C^T K C` to its reduced unknowns. These come in blocks that are coupled alike: the components
+//! at a free node, the twist of a body, a pressure.
 
 use std::sync::Arc;
 
@@ -48,8 +48,8 @@ pub struct Assembled {
     pub matrix: SparseMatrix,
 }
 
-/// Assembles the whole Stokes matrix `[A, -B^T; -B, 0]`. One pressure is left out, since pressures are defined up to a
-/// constant.
+/// Assembles the whole Stokes matrix `[A, -B^T; -B, 0]`. One pressure is left out, since pressures are
+/// defined up to a constant.
 pub fn assemble_stokes<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
@@ -80,7 +80,8 @@ where
     assemble_viscous_on(&elements, |_| true)
 }
 
-/// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all twists.
+/// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all
+/// twists.
 pub fn assemble_viscous_on<const D: usize>(
     elements: &Elements<'_, D>,
     keep: impl Fn(usize) -> bool,

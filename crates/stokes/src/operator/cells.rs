@@ -7,8 +7,9 @@ use gluey_geom::{Dim, Space};
 use crate::solid::Penalty;
 use crate::space::{ActiveCell, Discretisation, VelocitySpace};
 
-/// The diagonal of `A` in nodal velocities, as cells add it up: each with the multiple of the viscous reference matrix and the
-/// matrix of its own that it has. Boundary, bodies and hanging nodes are nodes like all others.
+/// The diagonal of `A` in nodal velocities, as cells add it up: each with the multiple of the viscous
+/// reference matrix and the matrix of its own that it has. Boundary, bodies and hanging nodes are nodes like
+/// all others.
 pub fn viscous_diagonal<'a, const D: usize>(
     discretisation: &Discretisation<D>,
     cells: impl Iterator<Item = (&'a ActiveCell, f64, Option<&'a [f64]>)>,

@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Space};
 use super::system::StokesSystem;
 use crate::space::ActiveCell;
 
-/// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures that no
-/// velocity sees harmless. The solve corrects it.
+/// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures
+/// that no velocity sees harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
 /// The matrices of the active cells.
@@ -59,7 +59,8 @@ where
         &self.system.cells
     }
 
-    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a surface cuts it.
+    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a
+    /// surface cuts it.
     pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
         let size = ReferenceMatrices::<D>::VELOCITY.pow(2);
         let own = self.additional[index].map(|own| &self.own[own as usize * size..][..size]);

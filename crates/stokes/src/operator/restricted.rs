@@ -1,4 +1,5 @@
-//! The viscous operator of some of the cells, and that on some of the velocities, with all others at rest: `E^T A E`.
+//! The viscous operator of some of the cells, and that on some of the velocities, with all others at rest:
+//! `E^T A E`.
 
 use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};

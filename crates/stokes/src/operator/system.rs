@@ -1,8 +1,8 @@
 //! The discrete Stokes problem on one mesh.
 //!
-//! For `-div(2 eta eps(u)) + grad p = f`, `div u = 0` the matrix is `[A, -B^T; -B, 0]` in the reduced unknowns of
-//! [`VelocitySpace`] and the pressure nodes. Cells that move as one body are left out: they have no strain. Pressure
-//! nodes that see no cell with a free node are dropped.
+//! For `-div(2 eta eps(u)) + grad p = f`, `div u = 0` the matrix is `[A, -B^T; -B, 0]` in the reduced
+//! unknowns of [`VelocitySpace`] and the pressure nodes. Cells that move as one body are left out: they have
+//! no strain. Pressure nodes that see no cell with a free node are dropped.
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
@@ -69,8 +69,8 @@ where
         self.space.dim()
     }
 
-    /// `b -= [A, -B^T; -B, 0] (u, p)` for a nodal velocity field that already fulfils all constraints (it may carry
-    /// boundary values), with the result in reduced form.
+    /// `b -= [A, -B^T; -B, 0] (u, p)` for a nodal velocity field that already fulfils all constraints (it may
+    /// carry boundary values), with the result in reduced form.
     pub fn residual(&self, u: &[f64], p: &[f64], b: &mut [f64]) {
         let mut y = vec![0.0; self.dim()];
         let (yu, yp) = y.split_at_mut(self.velocity_dim());
@@ -79,9 +79,9 @@ where
         vector::axpy(-1.0, &y, b);
     }
 
-    /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made to sum to
-    /// zero: where two bodies share cells without a free node the flow between them is not constrained, and constants
-    /// would not quite be in the kernel.
+    /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made
+    /// to sum to zero: where two bodies share cells without a free node the flow between them is not
+    /// constrained, and constants would not quite be in the kernel.
     pub fn reduce(&self, y: &mut [f64]) {
         let (yu, yp) = y.split_at_mut(self.velocity_dim());
         self.space.reduce(yu);
@@ -101,8 +101,8 @@ where
 
 /// The matrix of a [`StokesSystem`] with the workspace to apply it, to vectors in either precision.
 ///
-/// What a cell does is always computed in double precision. A stress is a small difference of velocities: in single precision
-/// a box of fluid at N = 256 takes 20 iterations in place of 17.
+/// What a cell does is always computed in double precision. A stress is a small difference of velocities: in
+/// single precision a box of fluid at N = 256 takes 20 iterations in place of 17.
 #[derive(Debug)]
 pub struct SystemOperator<'a, const D: usize>
 where

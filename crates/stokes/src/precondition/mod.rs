@@ -1,4 +1,5 @@
-//! The preconditioner: a V-cycle on the velocities, what the penalised solid needs beside it, and the Schur complement.
+//! The preconditioner: a V-cycle on the velocities, what the penalised solid needs beside it, and the Schur
+//! complement.
 
 mod block_triangular;
 pub mod schur;
@@ -36,11 +37,11 @@ impl<const D: usize> CycleLevels<'_, D> {
 
 /// A correction around the velocity cycle, for what its levels cannot see.
 pub trait Correction: Send {
-    /// `z = M^-1 r` for reduced velocities, where `levels(f, u)` turns the nodal load `f` into the reduced velocities `u` of the
-    /// finest level.
+    /// `z = M^-1 r` for reduced velocities, where `levels(f, u)` turns the nodal load `f` into the reduced
+    /// velocities `u` of the finest level.
     fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32]));
 
-    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and products with
-    /// patches do not count.
+    /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and
+    /// products with patches do not count.
     fn take_applications(&mut self) -> f64;
 }

@@ -39,8 +39,8 @@ where
         self.angular += Dim::<D>::moment(arm, u) * weight;
     }
 
-    /// Velocity and spin about the centroid of the weights, the velocity then moved to the reference point; `None` where the
-    /// weights do not fix them.
+    /// Velocity and spin about the centroid of the weights, the velocity then moved to the reference point;
+    /// `None` where the weights do not fix them.
     pub fn twist(&self) -> Option<Twist<D>> {
         if self.mass <= 0.0 {
             return None;

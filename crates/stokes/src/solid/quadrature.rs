@@ -1,8 +1,9 @@
 //! Viscous matrices of cells whose viscosity varies, by quadrature.
 //!
-//! With `S[(i,a),(j,b)] = sum_q w_q eta_q d_a phi_i(x_q) d_b phi_j(x_q)` the matrix of `int 2 eta eps(u):eps(v)` is
-//! `K[(i,a),(j,b)] = S[(i,b),(j,a)] + [a = b] sum_d S[(i,d),(j,d)]`. Points and shape functions are products of those on a
-//! line, so the sum over points is taken one direction after the other (Orszag 1980, 10.1016/0021-9991(80)90005-4).
+//! With `S[(i,a),(j,b)] = sum_q w_q eta_q d_a phi_i(x_q) d_b phi_j(x_q)` the matrix of
+//! `int 2 eta eps(u):eps(v)` is `K[(i,a),(j,b)] = S[(i,b),(j,a)] + [a = b] sum_d S[(i,d),(j,d)]`. Points and
+//! shape functions are products of those on a line, so the sum over points is taken one direction after the
+//! other (Orszag 1980, 10.1016/0021-9991(80)90005-4).
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::element::{derivatives_1d, gauss, gauss_cube, multi_index, value, values_1d};
@@ -20,8 +21,8 @@ pub struct PointMatrices<const D: usize> {
     points: Vec<([f64; D], f64)>,
     /// Values at each point.
     shapes: Vec<Vec<f64>>,
-    /// `f_k(x_q) g_l(x_q)` at the points of a line for all pairs `(k, l)`, where `f` are the shape functions or, in the last
-    /// two, their slopes, and `g` those or, in the second and the last, their slopes.
+    /// `f_k(x_q) g_l(x_q)` at the points of a line for all pairs `(k, l)`, where `f` are the shape functions
+    /// or, in the last two, their slopes, and `g` those or, in the second and the last, their slopes.
     products: [Vec<[f64; PAIRS]>; 4],
     /// The shape functions `(i, j)` whose products [`PointMatrices::sum`] gives one after the other.
     pairs: Vec<(usize, usize)>,
@@ -94,7 +95,8 @@ impl<const D: usize> PointMatrices<D> {
         for d in 0..D {
             let (f, g) = slopes(d);
             let products = &self.products[2 * usize::from(f) + usize::from(g)];
-            // Along x first: numbers of pairs come to stand before the points of the directions that are left.
+            // Along x first: numbers of pairs come to stand before the points of the directions that are
+            // left.
             let inner = PAIRS.pow(d as u32);
             to.clear();
             to.resize(from.len() / self.line * PAIRS, 0.0);
@@ -124,7 +126,8 @@ fn pairs<const D: usize>() -> Vec<(usize, usize)> {
     (0..PAIRS.pow(D as u32)).map(place).collect()
 }
 
-/// Adds what `S[(i,a),(j,b)]` and its mirror image contribute to `K`, for `i` and `j` given by their first rows.
+/// Adds what `S[(i,a),(j,b)]` and its mirror image contribute to `K`, for `i` and `j` given by their first
+/// rows.
 fn add_strain_product<const D: usize>(
     (i, j): (usize, usize),
     (a, b): (usize, usize),

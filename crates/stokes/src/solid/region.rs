@@ -86,11 +86,12 @@ where
         touched
     }
 
-    /// The rigid motions closest to a velocity field in the `I`-weighted mean: `U = int I u / int I` and the spin from
-    /// the angular momentum, `int I r x u = J w` with `J` the `I`-weighted inertia.
+    /// The rigid motions closest to a velocity field in the `I`-weighted mean: `U = int I u / int I` and the
+    /// spin from the angular momentum, `int I r x u = J w` with `J` the `I`-weighted inertia.
     ///
     /// # Errors
-    /// [`StokesError::NoSolid`] for a body that is the nearest at no quadrature point of the solid, or at too few of them.
+    /// [`StokesError::NoSolid`] for a body that is the nearest at no quadrature point of the solid, or at too
+    /// few of them.
     pub fn twists(
         &self,
         discretisation: &Discretisation<D>,

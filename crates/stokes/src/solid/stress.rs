@@ -1,9 +1,9 @@
 //! The viscous stress of the penalised solid, `K(I eta_s)`.
 //!
 //! The mixing law `eta = I eta_s + (1 - I) eta_f` makes the viscous operator of the mixture the sum
-//! `K(eta) = K(eta_f) + (1 - 1/r) K(I eta_s)`, so one solid serves the penalty and, as in eq. 9 of Verdon et al. 2010, the
-//! multiplier. Cells wholly inside (`I = 1`) are scaled cubes; those with a ramp keep `I` at enough Gauss points to see
-//! the surface.
+//! `K(eta) = K(eta_f) + (1 - 1/r) K(I eta_s)`, so one solid serves the penalty and, as in eq. 9 of Verdon et
+//! al. 2010, the multiplier. Cells wholly inside (`I = 1`) are scaled cubes; those with a ramp keep `I` at
+//! enough Gauss points to see the surface.
 
 use std::sync::Arc;
 
@@ -50,7 +50,8 @@ pub struct SolidViscosities {
 }
 
 impl SolidViscosities {
-    /// The viscosity times `h^(D-2)` that the solid adds in all of a cell, and at its quadrature points if it varies.
+    /// The viscosity times `h^(D-2)` that the solid adds in all of a cell, and at its quadrature points if it
+    /// varies.
     pub fn of(&self, cell: usize) -> (f64, &[f64]) {
         let points = match self.start[cell] {
             u32::MAX => &[],
@@ -108,8 +109,8 @@ impl<const D: usize> SolidStress<D> {
         self.cells.iter().filter(|solid| !solid.fraction.is_empty()).count()
     }
 
-    /// Calls `visit(cell, scale, matrix)` for every solid cell: interior ones have the matrix `scale * K`, cut ones
-    /// their own, which is integrated for the visit.
+    /// Calls `visit(cell, scale, matrix)` for every solid cell: interior ones have the matrix `scale * K`,
+    /// cut ones their own, which is integrated for the visit.
     pub fn for_each_cell(&self, mut visit: impl FnMut(u32, f64, Option<&[f64]>)) {
         for (solid, &scale) in self.cells.iter().zip(self.scales.iter()) {
             match solid.fraction.is_empty() {
@@ -119,8 +120,8 @@ impl<const D: usize> SolidStress<D> {
         }
     }
 
-    /// `y += K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes moved to
-    /// their masters.
+    /// `y += K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes
+    /// moved to their masters.
     pub fn apply(&self, nodes: &NodeMap<D>, x: &[f64], y: &mut [f64]) {
         let viscosities = self.viscosities(1.0, nodes.cell_count());
         let data = self.cells.iter().map(|solid| {

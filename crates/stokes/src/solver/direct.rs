@@ -15,14 +15,16 @@ use crate::operator::{StokesSystem, SystemOperator, assemble_stokes};
 
 /// Corrections at most; two or three are enough for any tolerance that rounding allows.
 const MAX_CORRECTIONS: usize = 12;
-/// Corrections between two computations of the true residual, from which the recurrence departs near rounding error.
+/// Corrections between two computations of the true residual, from which the recurrence departs near rounding
+/// error.
 const RESTART: usize = 4;
 
 /// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
 /// approximate minimum degree. The symbolic part is kept as long as the pattern of the matrix stands.
 ///
-/// The factorised matrix is a little compressible and has one pressure left out. Generalised conjugate residuals on the true system, with the
-/// factor as its preconditioner, corrects both in one to three steps and checks the true residual.
+/// The factorised matrix is a little compressible and has one pressure left out. Generalised conjugate
+/// residuals on the true system, with the factor as its preconditioner, corrects both in one to three steps
+/// and checks the true residual.
 #[derive(Debug)]
 pub struct DirectSolver {
     factor: Option<DirectIndefinite>,

@@ -17,8 +17,9 @@ pub use multigrid::MultigridSolver;
 pub struct SolveReport {
     /// Krylov iterations, or corrections by a direct solver.
     pub iterations: usize,
-    /// Applications of the operator on the finest mesh, in `f64` or `f32`, by the Krylov method, by smoothers and for
-    /// residuals. One that leaves cells out counts as its share of the mesh's cells that are not rigid.
+    /// Applications of the operator on the finest mesh, in `f64` or `f32`, by the Krylov method, by smoothers
+    /// and for residuals. One that leaves cells out counts as its share of the mesh's cells that are not
+    /// rigid.
     pub fine_operator_applications: f64,
     /// Norm of the residual at the start and after each iteration; the last is the true one.
     pub residuals: Vec<f64>,
@@ -32,8 +33,8 @@ where
     /// Builds what depends on the system: factors, levels, preconditioners.
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError>;
 
-    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took. The divergences in
-    /// `b` sum to zero, as those of [`StokesSystem::residual`] do.
+    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took. The
+    /// divergences in `b` sum to zero, as those of [`StokesSystem::residual`] do.
     fn solve(
         &mut self,
         system: &StokesSystem<D>,

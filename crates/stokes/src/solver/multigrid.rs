@@ -1,12 +1,13 @@
 //! Krylov solution of the Stokes system with a multigrid preconditioner.
 //!
-//! Generalised conjugate residuals ([`Gcr`]) on `[A, -B^T; -B, 0]` with the block triangular preconditioner `z_p = -S^-1 r_p`,
-//! `z_u = V (r_u + B^T z_p)`: `S` is close to the Schur complement (see [`SchurInverse`]), `V` one V-cycle on the velocity.
-//! Steps are in `f32`, with a residual in `f64` now and then, or in `f64` where rounding would disturb them ([`rounding_noise`]).
-//! The levels are the tree's own: level `l` is the mesh cut at depth `l`. On every level the solid nodes of that level
-//! are eliminated; a coarse correction enters as the rigid motion that fits it best. In the `paper` formulation the
-//! finest level moves every node the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and
-//! left to a correction, [`crate::precondition::solid::SolidBlock`].
+//! Generalised conjugate residuals ([`Gcr`]) on `[A, -B^T; -B, 0]` with the block triangular preconditioner
+//! `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`: `S` is close to the Schur complement (see [`SchurInverse`]),
+//! `V` one V-cycle on the velocity. Steps are in `f32`, with a residual in `f64` now and then, or in `f64`
+//! where rounding would disturb them ([`rounding_noise`]). The levels are the tree's own: level `l` is the
+//! mesh cut at depth `l`. On every level the solid nodes of that level are eliminated; a coarse correction
+//! enters as the rigid motion that fits it best. In the `paper` formulation the finest level moves every node
+//! the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and left to a
+//! correction, [`crate::precondition::solid::SolidBlock`].
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::CellOperator;
@@ -23,8 +24,9 @@ use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::solid::Penalty;
 use crate::space::{VelocitySpace, solid_nodes};
 
-/// Largest [`rounding_noise`] with which steps are taken in single precision. Two spheres in a penalised solid take the same
-/// iterations in either precision up to 2; where it is 5 (N = 64, contrast 1e4) they take 99 in place of 22.
+/// Largest [`rounding_noise`] with which steps are taken in single precision. Two spheres in a penalised
+/// solid take the same iterations in either precision up to 2; where it is 5 (N = 64, contrast 1e4) they take
+/// 99 in place of 22.
 const MOST_NOISE: f64 = 1.0;
 /// Generalised conjugate residuals with a multigrid preconditioner.
 pub struct MultigridSolver<const D: usize>
@@ -154,8 +156,8 @@ fn run<S: Scalar>(
     Ok(krylov.residual_history().to_vec())
 }
 
-/// What rounding a velocity to single precision changes in its viscous force, over the force of a velocity as smooth as the
-/// box: a difference of neighbours, times the viscosity of the solid.
+/// What rounding a velocity to single precision changes in its viscous force, over the force of a velocity as
+/// smooth as the box: a difference of neighbours, times the viscosity of the solid.
 fn rounding_noise<const D: usize>(system: &StokesSystem<D>) -> f64
 where
     Dim<D>: Space<D>,

@@ -1,5 +1,5 @@
-//! Nodal unknowns as linear forms in the reduced ones: one term for a free node, the masters of a hanging node, the entries of a
-//! body's twist for a rigid node, nothing on the boundary.
+//! Nodal unknowns as linear forms in the reduced ones: one term for a free node, the masters of a hanging
+//! node, the entries of a body's twist for a rigid node, nothing on the boundary.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::AffineConstraints;

@@ -6,8 +6,8 @@ use gluey_levelset::{Ball, BallTree};
 use super::discretisation::Discretisation;
 use super::velocity::SolidNodes;
 
-/// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size of the
-/// smallest cell at the node. A negative offset takes nodes slightly outside the surface.
+/// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size
+/// of the smallest cell at the node. A negative offset takes nodes slightly outside the surface.
 pub fn solid_nodes<const D: usize>(
     mesh: &TreeMesh<D>,
     nodes: &NodeMap<D>,
@@ -54,8 +54,8 @@ pub fn cell_kind(bodies: impl Iterator<Item = Option<u32>>) -> CellKind {
     kind
 }
 
-/// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those of the next
-/// coarser level, which smooths them.
+/// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those
+/// of the next coarser level, which smooths them.
 pub fn around_finest_cells<const D: usize>(discretisation: &Discretisation<D>) -> Vec<bool> {
     let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
     let mut finest = vec![false; nodes.node_count()];
@@ -76,7 +76,8 @@ pub fn nodes_of_cells_with<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) 
     around
 }
 
-/// The cells with a marked node, or with a hanging node that hangs on one: those whose stress acts on marked nodes.
+/// The cells with a marked node, or with a hanging node that hangs on one: those whose stress acts on marked
+/// nodes.
 pub fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Vec<bool> {
     let mut acting = marked.to_vec();
     for constraint in nodes.constraints() {

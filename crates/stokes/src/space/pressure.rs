@@ -1,11 +1,11 @@
 //! Pressures that are continuous across hanging nodes and well supported near bodies.
 //!
-//! A pressure node that touches no cell with a free velocity node sees nothing and is dropped. One that lies inside a
-//! body but touches such a cell is *weak*: few free velocities see it, and left alone it makes the Schur complement
-//! nearly singular. With [`WeakPressures::Aggregate`] it takes the mean of the pressures at the nodes outside the bodies
-//! that share a cell with it; the divergence it would have tested is then tested by those, so nothing leaks. In a gap
-//! narrower than a cell, where no such node exists, weak nodes stay unknowns of their own: the lubrication pressure lives
-//! there.
+//! A pressure node that touches no cell with a free velocity node sees nothing and is dropped. One that lies
+//! inside a body but touches such a cell is *weak*: few free velocities see it, and left alone it makes the
+//! Schur complement nearly singular. With [`WeakPressures::Aggregate`] it takes the mean of the pressures at
+//! the nodes outside the bodies that share a cell with it; the divergence it would have tested is then tested
+//! by those, so nothing leaks. In a gap narrower than a cell, where no such node exists, weak nodes stay
+//! unknowns of their own: the lubrication pressure lives there.
 
 use std::sync::Arc;
 
@@ -26,7 +26,8 @@ pub enum WeakPressures {
     Aggregate,
 }
 
-/// The reduced pressure space of one mesh. Vectors have an entry a node; those of nodes that are not free are zero.
+/// The reduced pressure space of one mesh. Vectors have an entry a node; those of nodes that are not free are
+/// zero.
 #[derive(Clone, Debug)]
 pub struct PressureSpace<const D: usize> {
     nodes: Arc<NodeMap<D>>,
@@ -83,7 +84,8 @@ where
         &self.weak
     }
 
-    /// The nodes whose pressure follows from others, in an order in which each can be resolved from those before.
+    /// The nodes whose pressure follows from others, in an order in which each can be resolved from those
+    /// before.
     pub fn constraints(&self) -> &[Constraint] {
         &self.constraints
     }
@@ -116,8 +118,8 @@ where
         }
     }
 
-    /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and what is left of the divergence
-    /// is spread evenly.
+    /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and what is left of the
+    /// divergence is spread evenly.
     pub fn remove_mean<T: Scalar>(&self, q: &mut [T]) {
         let sum: f64 = q.iter().zip(&self.free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum();
         let mean = T::from_f64(sum / self.free_count.max(1) as f64);

@@ -1,10 +1,10 @@
 //! Velocities that are rigid inside bodies, zero on the boundary and continuous across hanging nodes.
 //!
-//! A reduced vector holds the nodal velocities (`D` interleaved components; entries of hanging, boundary and rigid
-//! nodes are zero) and, after them, `RIGID` numbers a body: the velocity `U` of its reference point and its spin times
-//! its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`; a rigid node at `r` from the
-//! reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose: it turns nodal loads into loads on
-//! free nodes, forces and (scaled) torques.
+//! A reduced vector holds the nodal velocities (`D` interleaved components; entries of hanging, boundary and
+//! rigid nodes are zero) and, after them, `RIGID` numbers a body: the velocity `U` of its reference point and
+//! its spin times its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`; a
+//! rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
+//! it turns nodal loads into loads on free nodes, forces and (scaled) torques.
 
 use gluey_fem::NodeMap;
 use gluey_fem::cells;
@@ -36,7 +36,8 @@ pub struct VelocitySpace<const D: usize> {
     /// Body of each node, or [`NO_BODY`].
     body_of: Vec<u32>,
     radius: Vec<f64>,
-    /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough nodes.
+    /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough
+    /// nodes.
     fit: Vec<Option<Vec<f64>>>,
 }
 
@@ -44,8 +45,8 @@ impl<const D: usize> VelocitySpace<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define a rigid
-    /// motion is left out: its nodes stay free, see [`VelocitySpace::is_active`].
+    /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define
+    /// a rigid motion is left out: its nodes stay free, see [`VelocitySpace::is_active`].
     pub fn new<B: Body<D>>(discretisation: &Discretisation<D>, bodies: &[B], solid: &[Option<u32>]) -> Self {
         let nodes = &discretisation.velocity;
         let boundary = (0..nodes.node_count() as u32).filter(|&n| nodes.is_on_boundary(n as usize)).collect();
@@ -106,7 +107,8 @@ where
         self.body_of[node] == NO_BODY && !self.nodes().is_on_boundary(node) && !self.nodes().is_hanging(node)
     }
 
-    /// `u = T x` in place: sets the nodal velocities of rigid and hanging nodes; those of the boundary stay as they are.
+    /// `u = T x` in place: sets the nodal velocities of rigid and hanging nodes; those of the boundary stay
+    /// as they are.
     pub fn expand<T: Scalar>(&self, x: &mut [T]) {
         let (nodal, twists) = x.split_at_mut(self.full_dim());
         for r in &self.rigid {
@@ -119,7 +121,8 @@ where
         self.nodes().distribute(D, T::from_f64, nodal);
     }
 
-    /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these are.
+    /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these
+    /// are.
     pub fn add_rigid_motions<S: Scalar, T: Scalar>(&self, x: &[S], u: &mut [T]) {
         let twists: Vec<T> = x[self.full_dim()..].iter().map(|x| T::from_f64(x.to_f64())).collect();
         for r in &self.rigid {
@@ -130,7 +133,8 @@ where
         }
     }
 
-    /// `x = T^T f` in place: nodal loads become loads on the unknowns; all other nodal entries are set to zero.
+    /// `x = T^T f` in place: nodal loads become loads on the unknowns; all other nodal entries are set to
+    /// zero.
     pub fn reduce<T: Scalar>(&self, f: &mut [T]) {
         let (nodal, loads) = f.split_at_mut(self.full_dim());
         loads.fill(T::ZERO);
@@ -146,8 +150,8 @@ where
         }
     }
 
-    /// Replaces the nodal velocities of the rigid nodes by the twists closest to them in the least-squares sense, and
-    /// clears hanging and boundary nodes: from any nodal field to a reduced vector.
+    /// Replaces the nodal velocities of the rigid nodes by the twists closest to them in the least-squares
+    /// sense, and clears hanging and boundary nodes: from any nodal field to a reduced vector.
     pub fn project<T: Scalar>(&self, x: &mut [T]) {
         for constraint in self.nodes().constraints() {
             x[constraint.node as usize * D..][..D].fill(T::ZERO);
@@ -156,8 +160,8 @@ where
         self.solve_grams(&mut x[self.full_dim()..]);
     }
 
-    /// The transpose of [`VelocitySpace::project`] for fields without load on hanging nodes: spreads the load on twists
-    /// over the rigid nodes.
+    /// The transpose of [`VelocitySpace::project`] for fields without load on hanging nodes: spreads the load
+    /// on twists over the rigid nodes.
     pub fn spread<T: Scalar>(&self, f: &mut [T]) {
         let (nodal, loads) = f.split_at_mut(self.full_dim());
         self.solve_grams(loads);
@@ -193,8 +197,8 @@ where
         }
     }
 
-    /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of `RIGID`
-    /// coefficients a component.
+    /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of
+    /// `RIGID` coefficients a component.
     pub fn rigid_rows(&self) -> impl Iterator<Item = (u32, u32, Vec<f64>)> + '_ {
         self.rigid.iter().map(|r| (r.node, r.body, rigid_matrix(&r.arm)))
     }

@@ -47,8 +47,8 @@ fn a_body_that_is_nowhere_is_refused() {
     }
 }
 
-/// A disc in another, but for a sliver: a cell in the sliver is its own, but no quadrature point is. A field read there would
-/// leave the disc at rest while everything around it moves.
+/// A disc in another, but for a sliver: a cell in the sliver is its own, but no quadrature point is. A field
+/// read there would leave the disc at rest while everything around it moves.
 #[test]
 fn a_body_that_another_hides_is_refused() {
     let (cell, center) = (1.0 / 32.0, Vector::<2>::new(0.4, 0.5 + 1.0 / 64.0));

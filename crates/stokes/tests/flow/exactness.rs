@@ -59,8 +59,8 @@ fn an_empty_box_keeps_its_undisturbed_flow() {
     undisturbed_flow_stays::<3>();
 }
 
-/// `u = y (1 - y) e_x`, `p = -2 x`. A residual at a pressure node is its error times the volume of a cell, so the same
-/// tolerance leaves more of the pressure in 3D.
+/// `u = y (1 - y) e_x`, `p = -2 x`. A residual at a pressure node is its error times the volume of a cell, so
+/// the same tolerance leaves more of the pressure in 3D.
 fn poiseuille_flow_is_found<const D: usize>()
 where
     Dim<D>: Space<D>,

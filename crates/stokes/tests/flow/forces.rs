@@ -9,7 +9,8 @@ use gluey_stokes::{
 
 use crate::support::{RIGID, SOLVERS, bands, couette, mesh, pair_at, paper, params, solve};
 
-/// Loads of the fluid's stress on all nodes of a flow, as if there were no bodies: what a body takes up shows.
+/// Loads of the fluid's stress on all nodes of a flow, as if there were no bodies: what a body takes up
+/// shows.
 fn loads<const D: usize>(flow: &Flow<D>) -> Vec<f64>
 where
     Dim<D>: Space<D>,

@@ -38,8 +38,8 @@ fn the_strain_inside_falls_as_the_viscosity_ratio_rises() {
     }
 }
 
-/// Slower than the strain: the ramp's outermost layer becomes part of the solid as it stiffens. Where no ramp moves the
-/// surface, motions converge as fast, see below.
+/// Slower than the strain: the ramp's outermost layer becomes part of the solid as it stiffens. Where no ramp
+/// moves the surface, motions converge as fast, see below.
 #[test]
 fn motions_tend_to_a_limit_as_the_viscosity_ratio_rises() {
     let motions = [1e2, 1e3, 1e4, 1e5].map(|r| flow(paper(r, 1)).twists);
@@ -47,7 +47,8 @@ fn motions_tend_to_a_limit_as_the_viscosity_ratio_rises() {
     assert!(steps.windows(2).all(|s| s[1] < 0.6 * s[0]), "{steps:?}");
 }
 
-/// Flow around bodies that are the cells whose centre lies inside, eliminated: every node of these cells is rigid.
+/// Flow around bodies that are the cells whose centre lies inside, eliminated: every node of these cells is
+/// rigid.
 fn twists_of_rigid_cells<const D: usize>(balls: &[Ball<D>], level: u8) -> Vec<Twist<D>>
 where
     Dim<D>: Space<D>,
@@ -96,7 +97,8 @@ fn penalised_cells_move_as_rigid_ones_up_to_the_inverse_of_the_viscosity_ratio()
     penalised_cells_become_rigid(&[Ball::new(Vector::<3>::new(0.45, 0.56, 0.52), 0.2)], 4);
 }
 
-/// A step of size `rho` leaves `1 - rho / 2` of the strain, since the form carries `2 eta_s` and the multiplier `eta_s`.
+/// A step of size `rho` leaves `1 - rho / 2` of the strain, since the form carries `2 eta_s` and the
+/// multiplier `eta_s`.
 #[test]
 fn every_uzawa_step_makes_the_body_more_rigid() {
     let after = |rho: f64, uzawa_steps: usize| {
@@ -111,8 +113,8 @@ fn every_uzawa_step_makes_the_body_more_rigid() {
     assert!(after(3.5, 12) < after(3.5, 4), "rho = 3.5 converges, if slowly");
 }
 
-/// Soft as the ball is, it cannot tell one side from the other: in the middle of the shear both readings of its motion
-/// are rest and half the shear rate.
+/// Soft as the ball is, it cannot tell one side from the other: in the middle of the shear both readings of
+/// its motion are rest and half the shear rate.
 fn at_the_middle_both_velocities_agree<const D: usize>(level: u8)
 where
     Dim<D>: Space<D>,

@@ -1,5 +1,5 @@
-//! Tests of the flow against exact answers: identities first, then analytic solutions and their orders, then the
-//! reference data. One binary, since every binary would compile the solvers anew.
+//! Tests of the flow against exact answers: identities first, then analytic solutions and their orders, then
+//! the reference data. One binary, since every binary would compile the solvers anew.
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 

@@ -49,7 +49,8 @@ fn the_operator_is_symmetric_to_round_off() {
     }
 }
 
-/// Factor by which a V-cycle shortens the error in the energy norm, after enough of them to find the worst direction.
+/// Factor by which a V-cycle shortens the error in the energy norm, after enough of them to find the worst
+/// direction.
 fn contraction<const D: usize>(problem: &Problem<D>) -> f64
 where
     Dim<D>: Space<D>,

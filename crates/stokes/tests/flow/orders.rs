@@ -105,8 +105,8 @@ fn flows_under_a_body_force_converge_at_order_three_and_two() {
     check::<3>(&flow, &[3, 4], SolverKind::Multigrid);
 }
 
-/// Errors of the velocity (relative to the rate 1 times the radius) and the spin of a body that is at rest, turning with
-/// the flow, in the exact solution.
+/// Errors of the velocity (relative to the rate 1 times the radius) and the spin of a body that is at rest,
+/// turning with the flow, in the exact solution.
 fn body_error<const D: usize>(
     exact: &impl StokesSolution<D>,
     ball: Ball<D>,

@@ -32,8 +32,8 @@ fn exact(gap: f64, degrees: f64) -> PairMotion {
     }
 }
 
-/// Largest errors of the motion from the exact one: normal speed (relative, where it is not zero by symmetry), line
-/// rotation and spins.
+/// Largest errors of the motion from the exact one: normal speed (relative, where it is not zero by
+/// symmetry), line rotation and spins.
 fn errors(found: &PairMotion, exact: &PairMotion, degrees: f64) -> [f64; 3] {
     let speed = match degrees == 0.0 {
         true => found.normal_speed / RADIUS,
@@ -72,8 +72,8 @@ fn rotation_and_spins_are_right_at_all_gaps_of_the_reference() {
     }
 }
 
-/// Eight positions of a pair in its cells: mean of the relative error of the normal speed, and the largest distance
-/// from that mean.
+/// Eight positions of a pair in its cells: mean of the relative error of the normal speed, and the largest
+/// distance from that mean.
 fn normal_speed_over_positions(gap: f64, surface: u8) -> (f64, f64) {
     let h = 0.5f64.powi(surface.into());
     let errors: Vec<f64> = (0..8)

@@ -1,5 +1,5 @@
-//! The multigrid solver of the penalised formulation: effort and answers do not depend on the viscosity ratio, the mesh or
-//! the number of particles.
+//! The multigrid solver of the penalised formulation: effort and answers do not depend on the viscosity
+//! ratio, the mesh or the number of particles.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Vector};
@@ -62,7 +62,8 @@ fn iterations_stay_bounded_for_spheres() {
     assert!(counts.iter().all(|&c| c <= 34), "{counts:?}");
 }
 
-/// To 1e-8 at a ratio of 100. The direct solver's fluid is compressible by 1e-9 of the pressure, which grows with the ratio.
+/// To 1e-8 at a ratio of 100. The direct solver's fluid is compressible by 1e-9 of the pressure, which grows
+/// with the ratio.
 #[test]
 fn direct_and_multigrid_agree_at_every_viscosity_ratio() {
     for (ratio, balls) in [(1e2, pair::<2>()), (1e3, nine()), (1e4, nine()), (1e6, pair::<2>())] {
@@ -73,7 +74,8 @@ fn direct_and_multigrid_agree_at_every_viscosity_ratio() {
     }
 }
 
-/// The ramp's weak outermost layer stiffens with the ratio, so the limit is that of the touched nodes made rigid.
+/// The ramp's weak outermost layer stiffens with the ratio, so the limit is that of the touched nodes made
+/// rigid.
 #[test]
 fn spheres_stiffen_as_the_viscosity_ratio_rises() {
     let spheres = pair::<3>();

@@ -52,9 +52,9 @@ where
     levels.iter().map(count).collect()
 }
 
-/// Each iteration applies the operator once, and in its V-cycle as often as both sweeps and the residual between them
-/// need it; the initial residual and the two true ones of a solve to 1e-8 are three more. Where the finest cells cover a part of the box only,
-/// so do the smoothing sweeps.
+/// Each iteration applies the operator once, and in its V-cycle as often as both sweeps and the residual
+/// between them need it; the initial residual and the two true ones of a solve to 1e-8 are three more. Where
+/// the finest cells cover a part of the box only, so do the smoothing sweeps.
 #[test]
 fn applications_on_the_finest_mesh_are_counted() {
     let count = |mesh: TreeMesh<2>| {

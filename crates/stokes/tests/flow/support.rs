@@ -14,8 +14,8 @@ use gluey_testkit::exact::StokesSolution;
 pub const RADIUS: f64 = 0.05;
 /// Both linear solvers.
 pub const SOLVERS: [SolverKind; 2] = [SolverKind::Direct, SolverKind::Multigrid];
-/// `rigid-dofs` with the offset that cases have by default in 2D. In 3D the default is -0.2, chosen on one encounter of two
-/// spheres; `tests/accuracy.rs` at the root measures what cases get there.
+/// `rigid-dofs` with the offset that cases have by default in 2D. In 3D the default is -0.2, chosen on one
+/// encounter of two spheres; `tests/accuracy.rs` at the root measures what cases get there.
 pub const RIGID: Formulation =
     Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
 
@@ -92,8 +92,8 @@ pub fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
     u
 }
 
-/// A divergence-free field that vanishes on the boundary of the unit box: added to boundary data, it changes what the
-/// solver starts from and must not change what it finds.
+/// A divergence-free field that vanishes on the boundary of the unit box: added to boundary data, it changes
+/// what the solver starts from and must not change what it finds.
 pub fn bump<const D: usize>(x: &Vector<D>) -> Vector<D> {
     let (g, slope) = (|t: f64| (t * (1.0 - t)).powi(2), |t: f64| 2.0 * t * (1.0 - t) * (1.0 - 2.0 * t));
     let depth: f64 = (2..D).map(|d| 16.0 * g(x[d])).product();
@@ -176,8 +176,8 @@ where
     (0..nodes.node_count()).map(error).fold(0.0, f64::max)
 }
 
-/// Largest deviation of the nodal velocity from the rigid motion of a ball, `depth` or more inside its surface, relative
-/// to `a` times the shear rate 1.
+/// Largest deviation of the nodal velocity from the rigid motion of a ball, `depth` or more inside its
+/// surface, relative to `a` times the shear rate 1.
 pub fn strain_inside<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], depth: f64) -> f64
 where
     Dim<D>: Space<D>,

@@ -1,10 +1,11 @@
 //! A viscous or rigid disc in a linear flow of the plane.
 //!
-//! D. W. Schmid and Y. Y. Podladchikov, Analytical solutions for deformable elliptical inclusions in general shear,
-//! Geophys. J. Int. 155 (2003) 269, 10.1046/j.1365-246X.2003.02042.x, for a circle. With `z = x + iy`, the far strain
-//! `E = e + i g/2` and `K = E R^2 (mu_m - mu_i)/(mu_m + mu_i)`:
+//! D. W. Schmid and Y. Y. Podladchikov, Analytical solutions for deformable elliptical inclusions in general
+//! shear, Geophys. J. Int. 155 (2003) 269, 10.1046/j.1365-246X.2003.02042.x, for a circle. With `z = x + iy`,
+//! the far strain `E = e + i g/2` and `K = E R^2 (mu_m - mu_i)/(mu_m + mu_i)`:
 //!
-//! - outside `u + iv = E conj(z) + K conj(z)/|z|^2 + conj(K) z^3/|z|^4 (1 - R^2/|z|^2)`, `p = 4 mu_m Re(K/z^2)`;
+//! - outside `u + iv = E conj(z) + K conj(z)/|z|^2 + conj(K) z^3/|z|^4 (1 - R^2/|z|^2)`,
+//!   `p = 4 mu_m Re(K/z^2)`;
 //! - inside `u + iv = 2 mu_m/(mu_m + mu_i) E conj(z)`, `p = 0`.
 
 use gluey_geom::Vector;
@@ -21,8 +22,8 @@ pub enum InclusionViscosity {
     Rigid,
 }
 
-/// A disc at rest at `center`, free of force and torque, in the flow `u = (e x + g y / 2 - w y, g x / 2 - e y + w x)`
-/// relative to its centre.
+/// A disc at rest at `center`, free of force and torque, in the flow
+/// `u = (e x + g y / 2 - w y, g x / 2 - e y + w x)` relative to its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViscousInclusion {
     /// Centre of the disc.

@@ -1,8 +1,9 @@
-//! Polynomial flows in the unit box that rest on its boundary: manufactured solutions for orders of convergence.
+//! Polynomial flows in the unit box that rest on its boundary: manufactured solutions for orders of
+//! convergence.
 //!
-//! With `g(t) = t^2 (1-t)^2`, in 2D `u = (psi_y, -psi_x)`, `psi = g(x) g(y)`, `p = xy - 1/4`; in 3D the curl of
-//! `phi (1, 1, 1)`, `u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y)`, `phi = g(x) g(y) g(z)`, `p = xyz - 1/8`. Both
-//! pressures have mean zero. The forcing is `f = grad p - eta laplace u`.
+//! With `g(t) = t^2 (1-t)^2`, in 2D `u = (psi_y, -psi_x)`, `psi = g(x) g(y)`, `p = xy - 1/4`; in 3D the curl
+//! of `phi (1, 1, 1)`, `u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y)`, `phi = g(x) g(y) g(z)`,
+//! `p = xyz - 1/8`. Both pressures have mean zero. The forcing is `f = grad p - eta laplace u`.
 
 use gluey_geom::Vector;
 

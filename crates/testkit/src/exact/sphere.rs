@@ -1,7 +1,8 @@
 //! A rigid sphere, free of force and torque, in a linear flow of space.
 //!
-//! G. K. Batchelor, An Introduction to Fluid Dynamics (1967), section 4.11; S. Kim and S. J. Karrila, Microhydrodynamics
-//! (1991), section 3.3. With the centre as origin, the strain rate `E` (trace-free) and the spin `w`:
+//! G. K. Batchelor, An Introduction to Fluid Dynamics (1967), section 4.11; S. Kim and S. J. Karrila,
+//! Microhydrodynamics (1991), section 3.3. With the centre as origin, the strain rate `E` (trace-free) and
+//! the spin `w`:
 //!
 //! `u = w x X + E.X - E.X a^5/r^5 - (5/2) X (X.E.X) (a^3/r^5 - a^5/r^7)`, `p = -5 mu a^3 X.E.X / r^5`.
 

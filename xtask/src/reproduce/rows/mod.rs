@@ -1,8 +1,8 @@
-//! The rows under each figure: the paper's statements about it, its distance from the exact solution, what holds by
-//! construction.
+//! The rows under each figure: the paper's statements about it, its distance from the exact solution, what
+//! holds by construction.
 //!
-//! Every sentence of section 3 of Verdon et al. (2010) that says what figures 5 to 11 show is a row. The number that decides
-//! it and its limit are ours: the paper gives a few numbers and no data.
+//! Every sentence of section 3 of Verdon et al. (2010) that says what figures 5 to 11 show is a row. The
+//! number that decides it and its limit are ours: the paper gives a few numbers and no data.
 
 mod pair_2d;
 mod pair_3d;
@@ -18,7 +18,8 @@ use super::trajectory::Trajectory;
 use super::verdict::{Claim, Kind, Row, Wanted};
 use crate::figures::Data;
 
-/// Gaps under a contact model that is exact at the end of the step may be negative by round-off only, in radii.
+/// Gaps under a contact model that is exact at the end of the step may be negative by round-off only, in
+/// radii.
 const ROUND_OFF_GAP: f64 = -1e-10;
 /// Radius of the particles in units of the box.
 pub const RADIUS: f64 = 0.05;
@@ -54,7 +55,8 @@ impl Evidence<'_> {
         Mode::of(self.data.quick)
     }
 
-    /// One of two limits: that of the full computation, or that of `--quick`, whose meshes and steps are coarser.
+    /// One of two limits: that of the full computation, or that of `--quick`, whose meshes and steps are
+    /// coarser.
     fn limit(&self, full: f64, quick: f64) -> f64 {
         if self.data.quick { quick } else { full }
     }

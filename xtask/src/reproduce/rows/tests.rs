@@ -9,7 +9,8 @@ use crate::reproduce::verdict::Outcome;
 const RUNS: [(CaseName, f64); 3] =
     [(CaseName::Pair2d, 30.0), (CaseName::Pair3d, 16.8), (CaseName::Trio2d, 12.0)];
 
-/// Data for [`Evidence`] with the exact solutions as if `rigid-dofs` had computed them, with a clock that is `shift` slow.
+/// Data for [`Evidence`] with the exact solutions as if `rigid-dofs` had computed them, with a clock that is
+/// `shift` slow.
 struct Exact {
     data: Data,
     reports: BTreeMap<RunKey, RunReport>,
@@ -34,7 +35,8 @@ impl Exact {
         Self { data, reports: BTreeMap::new() }
     }
 
-    /// The rows that compare `rigid-dofs` with the exact solutions, but for the one that is read from a report.
+    /// The rows that compare `rigid-dofs` with the exact solutions, but for the one that is read from a
+    /// report.
     fn rows(&self) -> Vec<Row> {
         let evidence = Evidence { data: &self.data, reports: &self.reports };
         let mut rows = all(&FigureName::ALL, &evidence);
@@ -54,7 +56,8 @@ fn the_exact_solutions_agree_with_themselves() {
 #[test]
 fn a_clock_ten_percent_slow_is_noticed() {
     let rows = Exact::new(0.1, |end| end).rows();
-    // The shape of the orbit and the smallest gap do not know the time, and the doublet's gap varies by 4e-5 a only.
+    // The shape of the orbit and the smallest gap do not know the time, and the doublet's gap varies by 4e-5
+    // a only.
     let timeless = ["fig5-distance-rigid", "fig6-circle-rigid", "fig7a-smallest-rigid"];
     for row in rows.iter().filter(|row| !timeless.contains(&row.id)) {
         assert_eq!(row.outcome, Outcome::No, "{row:#?}");

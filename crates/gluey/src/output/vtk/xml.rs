@@ -94,8 +94,9 @@ pub(super) struct Piece {
     pub of_cells: Vec<Array>,
 }
 
-/// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in blocks,
-/// since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears 32 kB.
+/// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in
+/// blocks, since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears
+/// 32 kB.
 pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
@@ -145,14 +146,15 @@ fn reals(values: Vec<f64>, precision: Precision) -> IOBuffer {
     }
 }
 
-/// vtkio writes node numbers as unsigned; with those, numpy (in meshio) ends up with floating-point indices. Numbers
-/// below 2^63 have the same bytes in both types, and the data themselves are base64, which holds no `<`.
+/// vtkio writes node numbers as unsigned; with those, numpy (in meshio) ends up with floating-point indices.
+/// Numbers below 2^63 have the same bytes in both types, and the data themselves are base64, which holds no
+/// `<`.
 fn signed_indices(text: &str) -> String {
     text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
 }
 
-/// The same file with its arrays compressed: base64 of the size in 8 bytes and the data, as vtkio wrote it, becomes base64
-/// of compressed blocks.
+/// The same file with its arrays compressed: base64 of the size in 8 bytes and the data, as vtkio wrote it,
+/// becomes base64 of compressed blocks.
 fn compressed_arrays(text: &str, level: u32) -> io::Result<String> {
     let mut file = String::with_capacity(text.len() / 2);
     let mut rest = text;
@@ -174,8 +176,8 @@ fn compressed_arrays(text: &str, level: u32) -> io::Result<String> {
     Ok(file)
 }
 
-/// The header: number of blocks, their size, that of a last partial one, then the size of each when compressed. Header
-/// and blocks are encoded one after the other.
+/// The header: number of blocks, their size, that of a last partial one, then the size of each when
+/// compressed. Header and blocks are encoded one after the other.
 fn compress(data: &[u8], level: u32, file: &mut String) -> io::Result<()> {
     let count = data.len().div_ceil(BLOCK);
     let mut header = vec![count as u64, BLOCK as u64, (data.len() % BLOCK) as u64];

@@ -1,5 +1,5 @@
-//! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian of eqs. 9 and 10, see
-//! [`uzawa`].
+//! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian
+//! of eqs. 9 and 10, see [`uzawa`].
 
 mod params;
 mod uzawa;
@@ -10,9 +10,8 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Space, Twist};
 use gluey_levelset::{Ball, Ramp};
 
+use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
-use crate::formulation::problem::check_resolved;
-use crate::formulation::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::solid::SolidBlock;
 use crate::precondition::velocity::Smoothing;

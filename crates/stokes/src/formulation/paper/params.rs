@@ -4,9 +4,10 @@ use crate::error::StokesError;
 
 /// Parameters of the `paper` formulation.
 ///
-/// The default, r = 100 with two Uzawa steps and a ramp of one cell, is one setting for every mesh and dimension. The paper has
-/// r = 1e3 and says neither the number of steps nor the ramp; with that ratio cells cut by two particles lock the pair on meshes
-/// of three to six cells per radius (`docs/decisions/0019-one-setting-of-paper.md`).
+/// The default, r = 100 with two Uzawa steps and a ramp of one cell, is one setting for every mesh and
+/// dimension. The paper has r = 1e3 and says neither the number of steps nor the ramp; with that ratio cells
+/// cut by two particles lock the pair on meshes of three to six cells per radius
+/// (`docs/decisions/0019-one-setting-of-paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperParams {
     /// `r = eta_s / eta_f`.
@@ -15,8 +16,8 @@ pub struct PaperParams {
     pub ramp: f64,
     /// Step `rho` of the multiplier update, `0 < rho < 4`.
     pub rho: f64,
-    /// Number of solves per prediction, each followed by an update of the multiplier. With one the multiplier, which starts
-    /// from zero, is never used: the formulation is then a penalty method.
+    /// Number of solves per prediction, each followed by an update of the multiplier. With one the
+    /// multiplier, which starts from zero, is never used: the formulation is then a penalty method.
     pub uzawa_steps: usize,
     /// Gauss points a direction in cells near a surface.
     pub quadrature: usize,

@@ -5,16 +5,16 @@
 //! `K(eta) u^k - B^T p^k = -1/2 K(I eta_s) lambda^(k-1)`, `B u^k = 0` (eq. 9),
 //! `lambda^k = lambda^(k-1) + rho u^k` (eq. 10).
 //!
-//! The bilinear form carries `2 eta_s` and the update steps with `eta_s`, so it converges for `0 < rho < 4` to the saddle point of
-//! eq. 8. Each prediction starts cold and makes a fixed number of steps: the softness this leaves is part of the formulation. One step
-//! alone never uses the multiplier: a penalty method.
+//! The bilinear form carries `2 eta_s` and the update steps with `eta_s`, so it converges for `0 < rho < 4`
+//! to the saddle point of eq. 8. Each prediction starts cold and makes a fixed number of steps: the softness
+//! this leaves is part of the formulation. One step alone never uses the multiplier: a penalty method.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
 use super::params::PaperParams;
 use crate::error::StokesError;
-use crate::formulation::{Data, LinearSolve, Multiplier, Problem};
+use crate::formulation::problem::{Data, LinearSolve, Multiplier, Problem};
 use crate::operator::StokesSystem;
 
 /// The steps of a prediction; `x` holds the last velocity and pressure afterwards.
@@ -42,7 +42,8 @@ where
     Ok(multiplier)
 }
 
-/// The right-hand side of eq. 9: `b -= int I eta_s eps(lambda):eps(v)`, half of `K(I eta_s) lambda`, which carries `2 eta_s`.
+/// The right-hand side of eq. 9: `b -= int I eta_s eps(lambda):eps(v)`, half of `K(I eta_s) lambda`, which
+/// carries `2 eta_s`.
 fn subtract_multiplier<const D: usize>(system: &StokesSystem<D>, multiplier: &[f64], b: &mut [f64])
 where
     Dim<D>: Space<D>,

@@ -1,12 +1,14 @@
 //! Schur complements of single cells, `S_c = B_c A_c^+ B_c^T`.
 //!
-//! With `A = sum R_c^T A_c R_c` and `p^T S p = max_v 2 p^T B v - v^T A v` the sum of the cells' own maxima bounds the
-//! Schur complement of the whole system from above, `S <= sum S_c`, whatever the viscosity does inside the cells. A
-//! mass matrix over some mean of the viscosity does not know how much of a cut cell can still flow.
+//! With `A = sum R_c^T A_c R_c` and `p^T S p = max_v 2 p^T B v - v^T A v` the sum of the cells' own maxima
+//! bounds the Schur complement of the whole system from above, `S <= sum S_c`, whatever the viscosity does
+//! inside the cells. A mass matrix over some mean of the viscosity does not know how much of a cut cell can
+//! still flow.
 //!
-//! In a cell of one viscosity `2 S_c` is not the mass matrix, which is close to twice the Schur complement of the whole: a cell alone is
-//! free to expand, and for constant pressures the bound is `D` times too high. So that cut cells fit to those around them, theirs is
-//! `T S_c T` with the symmetric `T` that turns the Schur complement of a plain cell into its mass matrix.
+//! In a cell of one viscosity `2 S_c` is not the mass matrix, which is close to twice the Schur complement of
+//! the whole: a cell alone is free to expand, and for constant pressures the bound is `D` times too high. So
+//! that cut cells fit to those around them, theirs is `T S_c T` with the symmetric `T` that turns the Schur
+//! complement of a plain cell into its mass matrix.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::element::multi_index;
@@ -28,7 +30,8 @@ pub struct PressureMatrices {
 }
 
 impl PressureMatrices {
-    /// Mass matrices over the viscosity, or, where a solid cuts a cell, what its Schur complement makes of them.
+    /// Mass matrices over the viscosity, or, where a solid cuts a cell, what its Schur complement makes of
+    /// them.
     ///
     /// # Errors
     /// [`BlockError`] if the viscosity of a cut cell is not positive.
@@ -155,7 +158,8 @@ fn rigid_projector<const D: usize>() -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A constant pressure drives the expansion `v = x / (2 eta)`: `2 int div v - 2 eta int eps:eps = D V / (2 eta)`.
+    /// A constant pressure drives the expansion `v = x / (2 eta)`:
+    /// `2 int div v - 2 eta int eps:eps = D V / (2 eta)`.
     fn constants_have_the_exact_value<const D: usize>()
     where
         Dim<D>: Space<D>,

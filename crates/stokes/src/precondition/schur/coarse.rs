@@ -1,13 +1,14 @@
 //! The Schur complement of the box, from its coarsest mesh.
 //!
-//! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow that would answer them
-//! does not fit between its walls. A mesh of a few cells knows them. With the Schur complement `S_0` of such a mesh, which is dense and
-//! small, the weighted mass `T_0` that stands for it (see [`crate::schur`]), and the interpolation `P` from its pressures,
+//! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow
+//! that would answer them does not fit between its walls. A mesh of a few cells knows them. With the Schur
+//! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that stands for it (see
+//! [`crate::schur`]), and the interpolation `P` from its pressures,
 //!
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!
-//! leaves all other pressures as they were. The bodies are left out: they change little on this scale, and without them the matrix stays
-//! the same from step to step.
+//! leaves all other pressures as they were. The bodies are left out: they change little on this scale, and
+//! without them the matrix stays the same from step to step.
 
 use std::sync::Arc;
 
@@ -49,8 +50,9 @@ impl<const D: usize> CoarseSchur<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The correction from the coarsest of `meshes` (coarsest first), or, where that is too fine, from its coarsening; `None` where
-    /// even the cells from which the mesh was refined are too many. What stayed the same is taken from `before`.
+    /// The correction from the coarsest of `meshes` (coarsest first), or, where that is too fine, from its
+    /// coarsening; `None` where even the cells from which the mesh was refined are too many. What stayed the
+    /// same is taken from `before`.
     pub fn new(
         meshes: &[Discretisation<D>],
         viscosity: f64,
@@ -75,7 +77,8 @@ where
         Ok(Some(Self { viscosity, correction, unknowns, transfers, pressures, system, meshes }))
     }
 
-    /// `z += P (S_0^-1 - T_0^-1) P^T r` on all pressure nodes of the finest mesh. `r` is zero but at unknowns, where its sum vanishes.
+    /// `z += P (S_0^-1 - T_0^-1) P^T r` on all pressure nodes of the finest mesh. `r` is zero but at
+    /// unknowns, where its sum vanishes.
     pub fn add(&mut self, r: &[f32], z: &mut [f32]) {
         let Self { meshes, system, correction, unknowns, transfers, pressures, .. } = self;
         let top = meshes.len() - 1;

@@ -1,11 +1,12 @@
 //! Schur complements of the pressures in gaps narrower than a cell.
 //!
-//! A pressure inside a body that has no outer neighbour to follow (see [`crate::pressure`]) is seen by a few free velocities
-//! and by the approach of two bodies, and its Schur complement is up to a thousand times less than its mass. Such pressures
-//! come in small clusters. For the pressures `P` of the cells around a cluster and the unknown velocities `V` of all cells
-//! that those pressures act on, `S_P = B_PV A_VV^-1 B_PV^T` is the Schur complement with all other velocities at rest, small
-//! and dense, and a good estimate since the flow in a gap is local. The bodies' twists belong to `V`: a gap that could not
-//! open would hide the lubrication pressure.
+//! A pressure inside a body that has no outer neighbour to follow (see [`crate::pressure`]) is seen by a few
+//! free velocities and by the approach of two bodies, and its Schur complement is up to a thousand times less
+//! than its mass. Such pressures come in small clusters. For the pressures `P` of the cells around a cluster
+//! and the unknown velocities `V` of all cells that those pressures act on, `S_P = B_PV A_VV^-1 B_PV^T` is
+//! the Schur complement with all other velocities at rest, small and dense, and a good estimate since the
+//! flow in a gap is local. The bodies' twists belong to `V`: a gap that could not open would hide the
+//! lubrication pressure.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
@@ -16,7 +17,8 @@ use crate::error::{SmallMatrix, StokesError};
 use crate::operator::StokesSystem;
 use crate::space::{ActiveCell, pressure_expansion, velocity_expansion};
 
-/// Larger clusters are left to the mass matrix: their dense matrices would cost more than the iterations they save.
+/// Larger clusters are left to the mass matrix: their dense matrices would cost more than the iterations they
+/// save.
 const MOST_VELOCITIES: usize = 1000;
 /// Share of the mass that is added to `S_P`, for pressures that no velocity sees.
 const SHARE_OF_MASS: f64 = 1e-3;
@@ -33,7 +35,8 @@ struct Block {
 }
 
 impl GapInverse {
-    /// For the gaps of `system` where the bodies leave any; `mass` approximates the Schur complement elsewhere.
+    /// For the gaps of `system` where the bodies leave any; `mass` approximates the Schur complement
+    /// elsewhere.
     pub fn new<const D: usize>(system: &StokesSystem<D>, mass: &SparseMatrix) -> Result<Self, StokesError>
     where
         Dim<D>: Space<D>,
@@ -133,14 +136,14 @@ where
     }
 
     fn block(&self, gap: Gap, cells: &[(u32, u32)], mass: &SparseMatrix) -> Result<Block, StokesError> {
-        let Gap { pressures, velocities } = gap;
-        let (n, m) = (velocities.len(), pressures.len());
+        let (n, m) = (gap.velocities.len(), gap.pressures.len());
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, m));
         let reference = ReferenceMatrices::<D>::new();
-        for cell in cells_of(cells, &velocities) {
+        for cell in cells_of(cells, &gap.velocities) {
             let cell = &self.system.cells[cell as usize];
-            self.add_cell(cell, &reference, (&velocities, &pressures), (&mut a, &mut b));
+            self.add_cell(cell, &reference, &gap, &mut a, &mut b);
         }
+        let pressures = gap.pressures;
         let failed = |matrix| StokesError::GapPressures {
             matrix,
             place: self.system.discretisation().pressure.point(pressures[0] as usize).data.0[0].to_vec(),
@@ -154,13 +157,14 @@ where
         Ok(Block { pressures, inverse })
     }
 
-    /// Adds the matrices of a cell to those between the given unknowns.
+    /// Adds the matrices of a cell to those between the unknowns of a gap.
     fn add_cell(
         &self,
         cell: &ActiveCell,
         reference: &ReferenceMatrices<D>,
-        (velocities, pressures): (&[u32], &[u32]),
-        (a, b): (&mut DMatrix<f64>, &mut DMatrix<f64>),
+        Gap { pressures, velocities }: &Gap,
+        a: &mut DMatrix<f64>,
+        b: &mut DMatrix<f64>,
     ) {
         let n = ReferenceMatrices::<D>::VELOCITY;
         let forms: Vec<_> = self.nodal(cell).map(|k| placed(self.velocity.terms(k), velocities)).collect();

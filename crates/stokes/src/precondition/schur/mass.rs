@@ -1,4 +1,5 @@
-//! The matrix `T` that stands for the Schur complement: the mass of the pressures over the viscosity, with their weights.
+//! The matrix `T` that stands for the Schur complement: the mass of the pressures over the viscosity, with
+//! their weights.
 
 use std::sync::Arc;
 
@@ -12,7 +13,8 @@ use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::space::{ActiveCell, pressure_expansion};
 
-/// `T`: the pressure mass matrix over twice the viscosity, or what takes its place, scaled by the weights of the pressures.
+/// `T`: the pressure mass matrix over twice the viscosity, or what takes its place, scaled by the weights of
+/// the pressures.
 pub fn pressure_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     viscosity: f64,

@@ -1,12 +1,13 @@
 //! Approximate inverse of the pressure Schur complement `S = B A^-1 B^T`.
 //!
-//! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so `S <= M / (2 eta)` with the
-//! pressure mass matrix `M`, and most pressures come close to equality. Hence `S` is taken to be `T = W^1/2 M W^1/2 / (2 eta)`: the
-//! eigenvalues then gather at one, where those of the velocity block are. The weights `W` are one but for pressures next to walls
-//! and bodies, which fewer velocities see ([`crate::pressure_weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by
-//! its diagonal (Wathen and Rees 2009), in `f32`. Two kinds of pressures are still far from `T`: those as large as the box,
-//! for which a small mesh has the answer ([`crate::coarse_schur`]), and those in gaps narrower than a cell, where the
-//! inverses of small exact Schur complements are added ([`crate::gap`]).
+//! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so
+//! `S <= M / (2 eta)` with the pressure mass matrix `M`, and most pressures come close to equality. Hence `S`
+//! is taken to be `T = W^1/2 M W^1/2 / (2 eta)`: the eigenvalues then gather at one, where those of the
+//! velocity block are. The weights `W` are one but for pressures next to walls and bodies, which fewer
+//! velocities see ([`crate::pressure_weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
+//! diagonal (Wathen and Rees 2009), in `f32`. Two kinds of pressures are still far from `T`: those as large
+//! as the box, for which a small mesh has the answer ([`crate::coarse_schur`]), and those in gaps narrower
+//! than a cell, where the inverses of small exact Schur complements are added ([`crate::gap`]).
 
 mod cells;
 mod coarse;
@@ -28,8 +29,8 @@ use mass::pressure_matrix;
 const LARGEST_ERROR: f64 = 1.0 / 16.0;
 /// Chebyshev steps for it, at most: six in 2D and ten in 3D is usual.
 const MOST_STEPS: usize = 32;
-/// Lanczos steps for the largest eigenvalue. The bound `(3/2)^D` of a cell does not hold for its matrix in the unknowns:
-/// the pressures that an aggregate or a hanging node takes from others add up.
+/// Lanczos steps for the largest eigenvalue. The bound `(3/2)^D` of a cell does not hold for its matrix in
+/// the unknowns: the pressures that an aggregate or a hanging node takes from others add up.
 const LANCZOS_STEPS: usize = 15;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
@@ -51,7 +52,8 @@ impl<const D: usize> SchurInverse<D>
 where
     Dim<D>: Space<D>,
 {
-    /// For the pressures of the system on the finest of `meshes` (coarsest first). What stayed the same is taken from `before`.
+    /// For the pressures of the system on the finest of `meshes` (coarsest first). What stayed the same is
+    /// taken from `before`.
     pub fn new(
         meshes: &[Discretisation<D>],
         elements: &Elements<'_, D>,
@@ -71,7 +73,8 @@ where
         Ok(Self { mass, jacobi, chebyshev, gaps, coarse })
     }
 
-    /// `z` close to `S^-1 r`, up to a constant. `r` is zero but at unknowns, where its sum vanishes; so is `z`.
+    /// `z` close to `S^-1 r`, up to a constant. `r` is zero but at unknowns, where its sum vanishes; so is
+    /// `z`.
     pub fn apply(&mut self, space: &PressureSpace<D>, r: &[f32], z: &mut [f32]) {
         self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
         self.gaps.add(r, z);
@@ -82,9 +85,9 @@ where
     }
 }
 
-/// The smallest even number of Chebyshev steps whose error is small enough, or [`MOST_STEPS`]. An odd number would take too much of the smooth
-/// pressures, at the upper end of the spectrum, where an even one takes too little: 27 spheres take 33 iterations with three
-/// steps, 27 with two and 22 with four.
+/// The smallest even number of Chebyshev steps whose error is small enough, or [`MOST_STEPS`]. An odd number
+/// would take too much of the smooth pressures, at the upper end of the spectrum, where an even one takes too
+/// little: 27 spheres take 33 iterations with three steps, 27 with two and 22 with four.
 fn steps(interval: SpectralInterval) -> usize {
     let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
     (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)

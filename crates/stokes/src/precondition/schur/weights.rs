@@ -1,19 +1,21 @@
 //! How much of its mass a pressure keeps next to walls and bodies.
 //!
-//! Where velocities are fixed fewer of them see a pressure, and oscillations of the size of a cell have a Schur complement far
-//! below their mass: a third in the edges of a box, a fifth in its corners, on any mesh. What the diagonal of `A` makes of it is
-//! cheap and tells most: with
+//! Where velocities are fixed fewer of them see a pressure, and oscillations of the size of a cell have a
+//! Schur complement far below their mass: a third in the edges of a box, a fifth in its corners, on any mesh.
+//! What the diagonal of `A` makes of it is cheap and tells most: with
 //!
 //! `s_q = (B diag(A)^-1 B^T)_qq`, `m_q = M_qq / eta`,
 //!
-//! the *weight* of a pressure is the ratio `s_q / m_q` over the same ratio away from all walls, where the mesh is uniform. It is
-//! 0.78 and 0.55 on the sides and in the corners of a square, 0.69, 0.46 and 0.29 on the faces, edges and in the corners of a
-//! cube. Symmetric scaling of the mass matrix by the weights takes the smallest eigenvalues of `M^-1 S` from 0.19 to 0.34 (cube, 8
-//! cells a side) and leaves the largest at 1.2. Smooth pressures hardly notice: what they have next to walls is of the order of a cell.
+//! the *weight* of a pressure is the ratio `s_q / m_q` over the same ratio away from all walls, where the
+//! mesh is uniform. It is 0.78 and 0.55 on the sides and in the corners of a square, 0.69, 0.46 and 0.29 on
+//! the faces, edges and in the corners of a cube. Symmetric scaling of the mass matrix by the weights takes
+//! the smallest eigenvalues of `M^-1 S` from 0.19 to 0.34 (cube, 8 cells a side) and leaves the largest at
+//! 1.2. Smooth pressures hardly notice: what they have next to walls is of the order of a cell.
 //!
-//! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements ([`crate::cell_schur`]). These leave
-//! out that the solid in one cell holds the nodes of the next and are too large; the diagonal takes a node as held once any cell
-//! around it is stiff and is too small. There the weight is the geometric mean of the two, the root of the ratio.
+//! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements
+//! ([`crate::cell_schur`]). These leave out that the solid in one cell holds the nodes of the next and are
+//! too large; the diagonal takes a node as held once any cell around it is stiff and is too small. There the
+//! weight is the geometric mean of the two, the root of the ratio.
 
 use gluey_fem::{ReferenceMatrices, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
@@ -29,8 +31,8 @@ const LEAST: f64 = 0.05;
 /// The least and the largest weight in cut cells.
 const OF_CUT_CELLS: [f64; 2] = [0.25, 2.0];
 
-/// Multiplies row `q` and column `q` of the pressure mass matrix `mass` over the viscosity by the square root of the weight of
-/// `q`, for every pressure of `system`.
+/// Multiplies row `q` and column `q` of the pressure mass matrix `mass` over the viscosity by the square root
+/// of the weight of `q`, for every pressure of `system`.
 pub fn scale_by_weights<const D: usize>(
     mass: &mut SparseMatrix,
     elements: &Elements<'_, D>,
@@ -331,7 +333,8 @@ mod tests {
         assert!(near.iter().all(|w| (OF_CUT_CELLS[0]..=OF_CUT_CELLS[1]).contains(w)));
     }
 
-    /// A solid like the fluid changes nothing; a stiff one takes velocities from the pressures in the cells it cuts.
+    /// A solid like the fluid changes nothing; a stiff one takes velocities from the pressures in the cells
+    /// it cuts.
     #[test]
     fn a_penalised_surface_lowers_the_weights_of_its_cells() {
         weights_near_a_surface::<2>();

@@ -1,18 +1,19 @@
 //! The preconditioner of the penalised operator: the solid, the rigid levels, the rest.
 //!
-//! Every velocity is a field that is rigid on the nodes the solid touches, plus a field that vanishes away from them. The
-//! first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On the second the penalised
-//! operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers for it with `C`. The two are combined
-//! multiplicatively, then the sweep `G` takes what both leave:
+//! Every velocity is a field that is rigid on the nodes the solid touches, plus a field that vanishes away
+//! from them. The first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On
+//! the second the penalised operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers
+//! for it with `C`. The two are combined multiplicatively, then the sweep `G` takes what both leave:
 //!
 //! `z = E C E^T r`, `z += V (r - A z)`, `z += G (r - A z)`.
 //!
-//! Where the block is factorised, `G` is `E C E^T` once more and the rigid levels smooth on all meshes. Elsewhere `C` has no
-//! smoother and `V` none on the finest mesh: `G` is the smoother of the solid and of the fluid ([`PenalisedSmoother`]), and
-//! where the cells of two bodies meet, a sweep around these comes before all others ([`FilmSmoother`]).
+//! Where the block is factorised, `G` is `E C E^T` once more and the rigid levels smooth on all meshes.
+//! Elsewhere `C` has no smoother and `V` none on the finest mesh: `G` is the smoother of the solid and of the
+//! fluid ([`PenalisedSmoother`]), and where the cells of two bodies meet, a sweep around these comes before
+//! all others ([`FilmSmoother`]).
 //!
-//! A rigid motion costs the solid nothing, so what it leaves is the fluid's stress only: rounding errors of the motion are not
-//! multiplied by the solid's viscosity.
+//! A rigid motion costs the solid nothing, so what it leaves is the fluid's stress only: rounding errors of
+//! the motion are not multiplied by the solid's viscosity.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
@@ -28,7 +29,8 @@ use crate::space::{
     CellKind, VelocitySpace, around_films, around_finest_cells, cell_kind, nodes_of_cells_with,
 };
 
-/// Where the solid is less stiff a sweep around films saves no iterations: at a ratio of viscosities of 1e2 none, at 1e3 one or two.
+/// Where the solid is less stiff a sweep around films saves no iterations: at a ratio of viscosities of 1e2
+/// none, at 1e3 one or two.
 const LEAST_CONTRAST_OF_FILMS: f64 = 300.0;
 /// The cycle on the solid, the sweep, and the operators that tell what is left.
 pub struct SolidBlock<const D: usize>
@@ -42,8 +44,8 @@ where
     smoother: Option<PenalisedSmoother<D>>,
     /// `None` without films.
     film: Option<FilmSmoother<D>>,
-    /// The operator on velocities of the cycle and of the film, and on those of the rigid levels, where the solid's viscosity
-    /// multiplies nothing.
+    /// The operator on velocities of the cycle and of the film, and on those of the rigid levels, where the
+    /// solid's viscosity multiplies nothing.
     around_solid: CountedOperator<f64, D>,
     around_rigid: CountedOperator<f32, D>,
     /// The velocities of the finest rigid level.
@@ -75,7 +77,8 @@ where
         let nodes = &discretisation.velocity;
         let mut block: Vec<bool> = touched.iter().map(Option::is_some).collect();
         let Solid { cycle, positions, smoother, swept } = if levels.are_factorised() {
-            // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for its factorisation.
+            // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for
+            // its factorisation.
             if D == 2 {
                 block = nodes_of_cells_with(nodes, &block);
             }
@@ -87,7 +90,8 @@ where
         let films = (smoother.is_some() && is_stiff).then(|| around_films(discretisation, touched)).flatten();
         let new = |nodes| FilmSmoother::new(elements, nodes, &block);
         let film = films.as_deref().map(new).transpose()?;
-        // Those with solid in them that do not move as one body are strained by rigid motions, since bodies meet there.
+        // Those with solid in them that do not move as one body are strained by rigid motions, since bodies
+        // meet there.
         let mut strained = acting(discretisation, &system.cells, &swept);
         let body_of = |&n: &u32| rigid.body_of(n as usize);
         strained.retain(|c| cell_kind(nodes.cell(c.cell as usize).iter().map(body_of)) != CellKind::Rigid);

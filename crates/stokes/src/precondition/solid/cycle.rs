@@ -1,9 +1,10 @@
 //! What corrects the penalised operator on the nodes of the solid.
 //!
-//! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D, where factors are
-//! small, the operator on these nodes is factorised. In 3D a multigrid cycle answers for it on coarser meshes, with the Galerkin
-//! products `P^T A P` on those of their nodes that lie among the solid's, so a cell that is cut stays cut as it is. [`Patches`]
-//! smooth on all but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
+//! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D,
+//! where factors are small, the operator on these nodes is factorised. In 3D a multigrid cycle answers for it
+//! on coarser meshes, with the Galerkin products `P^T A P` on those of their nodes that lie among the
+//! solid's, so a cell that is cut stays cut as it is. [`Patches`] smooth on all but the coarsest level, which
+//! is factorised; on the finest the smoother of the whole mesh does.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
@@ -59,8 +60,8 @@ where
         Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
     }
 
-    /// The cycle below the nodes of `solid`, on which the operator is `matrix`. `meshes` are those of the coarser levels, fine
-    /// to coarse.
+    /// The cycle below the nodes of `solid`, on which the operator is `matrix`. `meshes` are those of the
+    /// coarser levels, fine to coarse.
     pub fn below<'a>(
         solid: &Numbered<'a, D>,
         matrix: &NodeMatrix<D>,

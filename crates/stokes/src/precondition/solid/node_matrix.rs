@@ -169,7 +169,8 @@ impl<const D: usize> NodeMatrix<D> {
         Ok((matrix, pattern.minimum_degree()?))
     }
 
-    /// `P^T A P`, which is `M + M^T` for `M = P^T (L + D/2) P` with the blocks `L` below and `D` on the diagonal of `A`.
+    /// `P^T A P`, which is `M + M^T` for `M = P^T (L + D/2) P` with the blocks `L` below and `D` on the
+    /// diagonal of `A`.
     pub fn galerkin(&self, prolongation: &Prolongation) -> Self {
         let product = sum_of_rows(self.node_count(), prolongation.coarse_count(), |row, sum: &mut Sum<D>| {
             for (column, block) in self.row(row) {

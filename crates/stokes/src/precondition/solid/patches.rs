@@ -1,9 +1,9 @@
 //! Additive Schwarz smoothing with the cells of the solid as patches.
 //!
-//! A cell that a solid's surface cuts holds motions of every stiffness between that of the fluid and that of the solid, and
-//! no diagonal tells them apart; the operator's block on the nodes of the cell does. With `W` the inverse number of patches
-//! a node belongs to, `z = W^1/2 sum R_c^T A_c^-1 R_c W^1/2 r`. The weights bring the largest eigenvalue from about ten down
-//! to two. Nodes of no patch are divided by their diagonal.
+//! A cell that a solid's surface cuts holds motions of every stiffness between that of the fluid and that of
+//! the solid, and no diagonal tells them apart; the operator's block on the nodes of the cell does. With `W`
+//! the inverse number of patches a node belongs to, `z = W^1/2 sum R_c^T A_c^-1 R_c W^1/2 r`. The weights
+//! bring the largest eigenvalue from about ten down to two. Nodes of no patch are divided by their diagonal.
 
 use gluey_linalg::{BlockError, DenseSymmetric, Preconditioner, Scalar};
 
@@ -24,7 +24,8 @@ pub struct Patches<T, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> Patches<T, D> {
-    /// For the block of `matrix` on the nodes of each cell, and an inverse `diagonal` for the nodes that are in none.
+    /// For the block of `matrix` on the nodes of each cell, and an inverse `diagonal` for the nodes that are
+    /// in none.
     pub fn new(
         matrix: &NodeMatrix<D>,
         cells: impl Iterator<Item = Vec<u32>>,

@@ -1,11 +1,12 @@
 //! The smoother of the finest mesh where the solid is penalised.
 //!
-//! One sweep of Chebyshev's method on the whole operator, after all corrections: in the fluid by its diagonal, in the solid by
-//! [`Patches`]. In single precision: what it is given are residuals, and what it adds holds no rigid motion of a body, whose
-//! rounding the solid's viscosity would multiply.
+//! One sweep of Chebyshev's method on the whole operator, after all corrections: in the fluid by its
+//! diagonal, in the solid by [`Patches`]. In single precision: what it is given are residuals, and what it
+//! adds holds no rigid motion of a body, whose rounding the solid's viscosity would multiply.
 //!
-//! Where the cells of two bodies meet, coarser meshes have fluid between them and are softer, and the forces there are rough: so a
-//! sweep on the nodes of such a *film* and of the cells around it goes before the corrections ([`FilmSmoother`]).
+//! Where the cells of two bodies meet, coarser meshes have fluid between them and are softer, and the forces
+//! there are rough: so a sweep on the nodes of such a *film* and of the cells around it goes before the
+//! corrections ([`FilmSmoother`]).
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, vector};
@@ -36,8 +37,8 @@ impl<const D: usize> PenalisedSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoother on the nodes in `smoothed`, among them those of `solid`, which are all that the solid touches and on which
-    /// the operator is `matrix`.
+    /// The smoother on the nodes in `smoothed`, among them those of `solid`, which are all that the solid
+    /// touches and on which the operator is `matrix`.
     pub fn new(
         system: &StokesSystem<D>,
         smoothed: &[bool],
@@ -247,7 +248,8 @@ mod tests {
         (problem, touched)
     }
 
-    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` adds its answer to the error's load.
+    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` adds its answer to
+    /// the error's load.
     fn energies(problem: &Problem<3>, marked: &[bool], sweep: impl FnOnce(&[f64], &mut [f64])) -> [f64; 2] {
         let system = &problem.system;
         let (cells, penalty) = (&system.cells, system.penalty.as_ref());

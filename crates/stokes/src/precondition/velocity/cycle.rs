@@ -57,7 +57,8 @@ where
         Ok(Self { hierarchy, levels, coarse, correction, wide: Default::default() })
     }
 
-    /// Applications on the finest mesh since the last call, see [`crate::SolveReport::fine_operator_applications`].
+    /// Applications on the finest mesh since the last call, see
+    /// [`crate::SolveReport::fine_operator_applications`].
     pub fn take_fine_applications(&mut self) -> f64 {
         let levels = self.levels.last_mut().map_or(0.0, Level::take_applications);
         levels + self.correction.as_mut().map_or(0.0, |correction| correction.take_applications())
@@ -99,7 +100,8 @@ where
         vector::convert(norm, &self.levels[top].x, z);
     }
 
-    /// The reduced velocities `u` with which the finest rigid level answers the nodal load `f`, which it reduces.
+    /// The reduced velocities `u` with which the finest rigid level answers the nodal load `f`, which it
+    /// reduces.
     fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
         self.levels[self.levels.len() - 1].space.reduce(f);
         self.rigid_cycle(f, u);

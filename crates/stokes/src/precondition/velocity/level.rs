@@ -10,7 +10,8 @@ use crate::error::DiagonalError;
 use crate::operator::{BlockDiagonal, CountedOperator, block_diagonal};
 use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells, cells_touching};
 
-/// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue it damps.
+/// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue
+/// it damps.
 #[derive(Clone, Copy, Debug)]
 pub struct Smoothing {
     degree: usize,
@@ -20,14 +21,14 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// In `rigid-dofs`: one sweep after the correction damps more than two of half its degree, at as many applications, and
-    /// the restriction needs no residual.
+    /// In `rigid-dofs`: one sweep after the correction damps more than two of half its degree, at as many
+    /// applications, and the restriction needs no residual.
     pub fn of_eliminated(is_finest: bool) -> Self {
         Self { degree: if is_finest { 4 } else { 5 }, ratio: 5.0, before: false }
     }
 
-    /// Below a penalised solid, where one sweep after the correction loses robustness: nine discs then take 25 iterations at
-    /// contrast 1e3 and 58 at 1e6.
+    /// Below a penalised solid, where one sweep after the correction loses robustness: nine discs then take
+    /// 25 iterations at contrast 1e3 and 58 at 1e6.
     pub fn of_penalised(is_finest: bool) -> Self {
         Self { degree: if is_finest { 2 } else { 3 }, ratio: 4.0, before: true }
     }
@@ -47,14 +48,15 @@ where
     pub b: Vec<f32>,
     /// Solution.
     pub x: Vec<f32>,
-    /// Residual or correction where a sweep goes before, else forces and torques while `b` holds them at rigid nodes.
+    /// Residual or correction where a sweep goes before, else forces and torques while `b` holds them at
+    /// rigid nodes.
     r: Vec<f32>,
 }
 
 /// The viscous operator `T^T A T` of a level, and how it smooths.
 ///
-/// Only some nodes are smoothed; the cells that act on them take part in the operator. Elsewhere the iterate stays what the
-/// coarser level gave, and all residuals that are used are those of the whole operator.
+/// Only some nodes are smoothed; the cells that act on them take part in the operator. Elsewhere the iterate
+/// stays what the coarser level gave, and all residuals that are used are those of the whole operator.
 #[derive(Clone, Debug)]
 pub struct Relaxation<const D: usize> {
     /// In the reduced velocities.
@@ -137,8 +139,8 @@ where
         }
     }
 
-    /// Restricts what is to be corrected to the right-hand side of the coarser level: the residual of a sweep from zero, or the
-    /// right-hand side of this level.
+    /// Restricts what is to be corrected to the right-hand side of the coarser level: the residual of a sweep
+    /// from zero, or the right-hand side of this level.
     pub fn restrict(
         &mut self,
         transfer: &mut Interpolation<D>,
@@ -189,8 +191,9 @@ fn restrict_load<const D: usize>(
     b[nodal..].copy_from_slice(twist_loads);
 }
 
-/// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds that of sums over
-/// cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 % (3D) too large.
+/// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
+/// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 %
+/// (3D) too large.
 fn cell_lambda_max<const D: usize>() -> f64 {
     let n = ReferenceMatrices::<D>::VELOCITY;
     let viscous = ReferenceMatrices::<D>::new().viscous;

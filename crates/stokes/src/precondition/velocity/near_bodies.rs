@@ -1,14 +1,16 @@
 //! Relaxation of the nodes around the bodies.
 //!
-//! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it cannot correct: errors
-//! that reach over two or three cells from a body, too smooth for the sweep of a level. With two touching discs (N = 256)
-//! the eigenvalues of the V-cycle times the operator that are farthest below one, 0.79 to 0.83, are of this kind, with
-//! three quarters of their energy within two cells of a surface; those of the fluid begin at 0.89. As Brandt (1984) advises for
-//! boundaries, some more relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
-//! are most of the cells of the finest mesh: one or two iterations fewer cost a sixth to a third more time, so there is none.
+//! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it
+//! cannot correct: errors that reach over two or three cells from a body, too smooth for the sweep of a
+//! level. With two touching discs (N = 256) the eigenvalues of the V-cycle times the operator that are
+//! farthest below one, 0.79 to 0.83, are of this kind, with three quarters of their energy within two cells
+//! of a surface; those of the fluid begin at 0.89. As Brandt (1984) advises for boundaries, some more
+//! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
+//! are most of the cells of the finest mesh: one or two iterations fewer cost a sixth to a third more time,
+//! so there is none.
 //!
-//! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists is
-//! smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
+//! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists
+//! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, LinOp, SpectralInterval};
@@ -23,7 +25,8 @@ const MOST_DIMENSIONS: usize = 2;
 const RINGS: usize = 3;
 /// Applications of the diagonal in a sweep.
 const DEGREE: usize = 6;
-/// Largest over smallest eigenvalue that a sweep damps: more than that of a level, since no coarser mesh helps.
+/// Largest over smallest eigenvalue that a sweep damps: more than that of a level, since no coarser mesh
+/// helps.
 const RATIO: f64 = 20.0;
 
 /// The sweep around the bodies of one level.
@@ -42,8 +45,8 @@ impl<const D: usize> NearBodies<D>
 where
     Dim<D>: Space<D>,
 {
-    /// For a level that acts with `cells` and smooths by `diagonal`, with eigenvalues up to `lambda_max`; `None` in 3D and
-    /// without bodies.
+    /// For a level that acts with `cells` and smooths by `diagonal`, with eigenvalues up to `lambda_max`;
+    /// `None` in 3D and without bodies.
     pub fn new(
         space: &VelocitySpace<D>,
         cells: &[ActiveCell],
