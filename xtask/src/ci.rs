@@ -6,57 +6,83 @@ use std::process::Command;
 /// A step that did not pass.
 #[derive(Debug, thiserror::Error)]
 pub enum CiError {
-    /// cargo could not be started.
-    #[error("cannot start cargo: {0}")]
-    Start(#[from] std::io::Error),
-    /// cargo said no.
-    #[error("`cargo {0}` failed")]
+    /// A program could not be started.
+    #[error("cannot start {program}: {source}")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It said no.
+    #[error("`{0}` failed")]
     Step(String),
+}
+
+/// A command of cargo, or of another program that may be missing.
+struct Step {
+    /// Words after `cargo`, separated by blanks.
+    arguments: &'static str,
+    /// An environment variable it needs.
+    variable: Option<(&'static str, &'static str)>,
 }
 
 /// The steps; what takes longest comes last. The reproduction fails where a row does not hold and is no known
 /// disagreement.
-const STEPS: [&[&str]; 8] = [
-    &["fmt", "--all", "--check"],
-    &["clippy", "--workspace", "--all-targets", "--release", "--", "-D", "warnings"],
+const STEPS: &[Step] = &[
+    Step::new("fmt --all --check"),
+    Step::new("clippy --workspace --all-targets --release -- -D warnings"),
+    Step::new("doc --workspace --no-deps --document-private-items --release")
+        .with("RUSTDOCFLAGS", "-D warnings -A rustdoc::private_intra_doc_links"),
     // Features one by one: whatever else is compiled turns all of them on.
-    &[
-        "check",
-        "--release",
-        "-p",
-        "gluey-geom",
-        "-p",
-        "gluey-motion",
-        "-p",
-        "gluey-contact",
-        "--no-default-features",
-    ],
-    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "dim2"],
-    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "dim3"],
-    &["check", "--release", "-p", "gluey-contact", "--no-default-features", "--features", "parallel,serde"],
-    &["test", "--release", "--workspace"],
-    &[
-        "run",
-        "--release",
-        "--package",
-        "xtask",
-        "--",
-        "reproduce-figures",
-        "--quick",
-        "--out",
-        "target/figures-quick",
-    ],
+    Step::new("check --release -p gluey-geom -p gluey-motion -p gluey-contact --no-default-features"),
+    Step::new("check --release -p gluey-contact --no-default-features --features dim2"),
+    Step::new("check --release -p gluey-contact --no-default-features --features dim3"),
+    Step::new("check --release -p gluey-contact --no-default-features --features parallel,serde"),
+    Step::new("package --workspace --no-verify --allow-dirty"),
+    Step::new("test --release --workspace"),
+    Step::new("run --release --package xtask -- reproduce-figures --quick --out target/figures-quick"),
 ];
 
-/// Formatting, lints, features, the tests, of which tidy is one, and a quick reproduction; stops at the first
-/// failure.
-pub fn run(root: &Path) -> Result<(), CiError> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    for step in STEPS {
-        eprintln!("cargo {}", step.join(" "));
-        if !Command::new(&cargo).args(step).current_dir(root).status()?.success() {
-            return Err(CiError::Step(step.join(" ")));
-        }
+/// The spelling checker, if it is there, and how to get it.
+const SPELLING: (&str, &str) = ("typos", "cargo install --locked typos-cli");
+
+impl Step {
+    const fn new(arguments: &'static str) -> Self {
+        Self { arguments, variable: None }
     }
-    Ok(())
+
+    const fn with(self, name: &'static str, value: &'static str) -> Self {
+        Self { variable: Some((name, value)), ..self }
+    }
+
+    fn run(&self, root: &Path) -> Result<(), CiError> {
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        eprintln!("cargo {}", self.arguments);
+        let mut command = Command::new(&cargo);
+        command.args(self.arguments.split(' ')).envs(self.variable).current_dir(root);
+        let status = command.status().map_err(|source| CiError::Start { program: cargo, source })?;
+        if status.success() { Ok(()) } else { Err(CiError::Step(format!("cargo {}", self.arguments))) }
+    }
+}
+
+/// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, and a quick
+/// reproduction; stops at the first failure.
+pub fn run(root: &Path) -> Result<(), CiError> {
+    check_spelling(root)?;
+    STEPS.iter().try_for_each(|step| step.run(root))
+}
+
+/// Spelling, where the program for it is installed; says so where it is not.
+fn check_spelling(root: &Path) -> Result<(), CiError> {
+    let (program, installation) = SPELLING;
+    match Command::new(program).current_dir(root).status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err(CiError::Step(program.to_owned())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            eprintln!("spelling is not checked: {program} is not installed ({installation})");
+            Ok(())
+        }
+        Err(source) => Err(CiError::Start { program: program.to_owned(), source }),
+    }
 }

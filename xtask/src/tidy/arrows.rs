@@ -1,7 +1,7 @@
 //! Dependencies between the crates of the workspace, as cargo sees them, against the law.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::Deserialize;
@@ -15,20 +15,36 @@ const TEST_CRATE: &str = "gluey-testkit";
 /// What is needed of `cargo metadata`.
 #[derive(Debug, Deserialize)]
 pub struct Metadata {
-    packages: Vec<Package>,
+    /// The members of the workspace.
+    pub packages: Vec<Package>,
 }
 
+/// A member of the workspace.
 #[derive(Debug, Deserialize)]
-struct Package {
-    name: String,
-    dependencies: Vec<Dependency>,
+pub struct Package {
+    /// Its name.
+    pub name: String,
+    #[serde(default)]
+    manifest_path: PathBuf,
+    /// What it depends on.
+    pub dependencies: Vec<Dependency>,
 }
 
+impl Package {
+    /// Its folder, from the root of the workspace.
+    pub fn folder(&self, root: &Path) -> String {
+        let folder = self.manifest_path.parent().and_then(|folder| folder.strip_prefix(root).ok());
+        folder.unwrap_or(Path::new("")).to_string_lossy().into_owned()
+    }
+}
+
+/// What a package depends on.
 #[derive(Debug, Deserialize)]
-struct Dependency {
-    name: String,
+pub struct Dependency {
+    /// Its name.
+    pub name: String,
     /// `dev`, `build`, or none for a normal dependency.
-    kind: Option<String>,
+    pub kind: Option<String>,
 }
 
 /// Asks cargo for the members of the workspace.

@@ -8,6 +8,7 @@ mod rooms;
 mod shape;
 mod sources;
 mod style;
+mod unused;
 
 use std::path::{Path, PathBuf};
 
@@ -42,7 +43,9 @@ pub enum TidyError {
 pub fn offences(root: &Path) -> Result<Vec<String>, TidyError> {
     let law = law::Law::read(&root.join("ARCHITECTURE.md"))?;
     let sources = sources::all(root)?;
-    let mut offences = arrows::offences(&law, &arrows::metadata(root)?);
+    let metadata = arrows::metadata(root)?;
+    let mut offences = arrows::offences(&law, &metadata);
+    offences.extend(unused::offences(root, &metadata, &sources));
     offences.extend(confined::offences(&law, &sources));
     offences.extend(rooms::offences(&law, &sources)?);
     offences.extend(style::offences(&sources));

@@ -1,0 +1,60 @@
+//! Dependencies that no source of their package names.
+
+use std::path::Path;
+
+use super::arrows::{Dependency, Metadata, Package};
+use super::sources::Source;
+
+/// Folders at the root whose files belong to several packages.
+const SHARED: [&str; 2] = ["tests", "benches"];
+
+/// Dependencies that are listed but not named, where they could be: under `src` for normal ones, anywhere in the
+/// package or in the shared folders for those of tests.
+pub fn offences(root: &Path, metadata: &Metadata, sources: &[Source]) -> Vec<String> {
+    let of_package = |package: &Package| {
+        let folder = package.folder(root);
+        let unused = package.dependencies.iter().filter(|dependency| !is_used(dependency, &folder, sources));
+        let name = package.name.clone();
+        unused.map(move |dependency| format!("{name}: `{}` is not used", dependency.name)).collect::<Vec<_>>()
+    };
+    metadata.packages.iter().flat_map(of_package).collect()
+}
+
+fn is_used(dependency: &Dependency, folder: &str, sources: &[Source]) -> bool {
+    let name = dependency.name.replace('-', "_");
+    let is_for_tests = dependency.kind.is_some();
+    let could = |source: &&Source| match is_for_tests {
+        true => source.lies_in(folder) || SHARED.iter().any(|shared| source.lies_in(shared)),
+        false => source.lies_in(&format!("{folder}/src")),
+    };
+    sources.iter().filter(could).any(|source| source.lines.iter().any(|line| names(line, &name)))
+}
+
+/// Whether `name` stands in a line as a word of its own.
+fn names(line: &str, name: &str) -> bool {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    line.match_indices(name).any(|(at, _)| {
+        let (before, after) = (&line[..at], &line[at + name.len()..]);
+        !before.chars().next_back().is_some_and(is_part) && !after.chars().next().is_some_and(is_part)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dependency_nobody_names_is_found() {
+        let json = r#"{"packages":[{"name":"a","manifest_path":"/w/crates/a/Cargo.toml","dependencies":
+            [{"name":"used-one","kind":null},{"name":"idle","kind":null},{"name":"for-tests","kind":"dev"}]}]}"#;
+        let metadata: Metadata = serde_json::from_str(json).unwrap();
+        let sources = [
+            Source::new("crates/a/src/lib.rs".into(), "use used_one::X;\nlet idleness = 1;\n"),
+            Source::new("tests/t.rs".into(), "use for_tests::Y;\n"),
+        ];
+        let found = offences(Path::new("/w"), &metadata, &sources);
+        assert_eq!(found, ["a: `idle` is not used"]);
+        let without_tests = offences(Path::new("/w"), &metadata, &sources[..1]);
+        assert_eq!(without_tests, ["a: `idle` is not used", "a: `for-tests` is not used"]);
+    }
+}
