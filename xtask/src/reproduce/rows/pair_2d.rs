@@ -111,7 +111,7 @@ fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig5-half-turn-rigid",
             "pair-2d-gluey-rigid-dofs",
             measured(name, half_turn(Approach::GlueyRigidDofs)),
-            band(evidence.limit(0.0048, 0.013)),
+            band(evidence.limit(0.0047, 0.013)),
         ),
         exact(
             "fig5-distance-rigid",

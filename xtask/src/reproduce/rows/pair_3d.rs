@@ -109,7 +109,7 @@ fn against_the_exact_encounter(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig7a-reversibility-rigid",
             REVERSIBILITY,
             evidence.report(CASE, Approach::GlueyRigidDofs).and_then(|report| report.reversibility_error),
-            Wanted::AtMost(evidence.limit(1.1e-3, 5.1e-3)),
+            Wanted::AtMost(evidence.limit(1.08e-3, 5.1e-3)),
         ),
     ]
 }
