@@ -205,7 +205,7 @@ pub struct PaperSpec {
     /// Width of the viscosity ramp inside the surface, in cells.
     pub ramp: f64,
     /// How the motion of a particle is taken from the field: `mean`, over the particle, or `center`, the
-    /// paper's [11].
+    /// paper's equation 11.
     pub velocity: ParticleVelocity,
 }
 
