@@ -3,7 +3,7 @@
 //! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow
 //! that would answer them does not fit between its walls. A mesh of a few cells knows them. With the Schur
 //! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that stands for it (see
-//! [`crate::schur`]), and the interpolation `P` from its pressures,
+//! [`crate::precondition::schur`]), and the interpolation `P` from its pressures,
 //!
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!

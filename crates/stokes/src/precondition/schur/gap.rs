@@ -1,12 +1,12 @@
 //! Schur complements of the pressures in gaps narrower than a cell.
 //!
-//! A pressure inside a body that has no outer neighbour to follow (see [`crate::pressure`]) is seen by a few
-//! free velocities and by the approach of two bodies, and its Schur complement is up to a thousand times less
-//! than its mass. Such pressures come in small clusters. For the pressures `P` of the cells around a cluster
-//! and the unknown velocities `V` of all cells that those pressures act on, `S_P = B_PV A_VV^-1 B_PV^T` is
-//! the Schur complement with all other velocities at rest, small and dense, and a good estimate since the
-//! flow in a gap is local. The bodies' twists belong to `V`: a gap that could not open would hide the
-//! lubrication pressure.
+//! A pressure inside a body that has no outer neighbour to follow (see [`crate::WeakPressures`]) is seen by a
+//! few free velocities and by the approach of two bodies, and its Schur complement is up to a thousand times
+//! less than its mass. Such pressures come in small clusters. For the pressures `P` of the cells around a
+//! cluster and the unknown velocities `V` of all cells that those pressures act on,
+//! `S_P = B_PV A_VV^-1 B_PV^T` is the Schur complement with all other velocities at rest, small and dense,
+//! and a good estimate since the flow in a gap is local. The bodies' twists belong to `V`: a gap that could
+//! not open would hide the lubrication pressure.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};

@@ -4,10 +4,10 @@
 //! `S <= M / (2 eta)` with the pressure mass matrix `M`, and most pressures come close to equality. Hence `S`
 //! is taken to be `T = W^1/2 M W^1/2 / (2 eta)`: the eigenvalues then gather at one, where those of the
 //! velocity block are. The weights `W` are one but for pressures next to walls and bodies, which fewer
-//! velocities see ([`crate::pressure_weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
+//! velocities see ([`weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
 //! diagonal (Wathen and Rees 2009), in `f32`. Two kinds of pressures are still far from `T`: those as large
-//! as the box, for which a small mesh has the answer ([`crate::coarse_schur`]), and those in gaps narrower
-//! than a cell, where the inverses of small exact Schur complements are added ([`crate::gap`]).
+//! as the box, for which a small mesh has the answer ([`coarse`]), and those in gaps narrower
+//! than a cell, where the inverses of small exact Schur complements are added ([`gap`]).
 
 mod cells;
 mod coarse;

@@ -13,7 +13,7 @@
 //! 1.2. Smooth pressures hardly notice: what they have next to walls is of the order of a cell.
 //!
 //! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements
-//! ([`crate::cell_schur`]). These leave out that the solid in one cell holds the nodes of the next and are
+//! ([`super::cells`]). These leave out that the solid in one cell holds the nodes of the next and are
 //! too large; the diagonal takes a node as held once any cell around it is stiff and is too small. There the
 //! weight is the geometric mean of the two, the root of the ratio.
 

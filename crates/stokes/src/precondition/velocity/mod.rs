@@ -10,6 +10,6 @@ pub use cycle::{LevelPlan, VCycle};
 pub use hierarchy::Hierarchy;
 pub use level::Smoothing;
 
-/// Factor by which [`level::cell_lambda_max`] is raised for hanging nodes and twists, whose diagonals are not
-/// sums over cells: they add 2 % at most where measured.
+/// Factor by which the bound of the largest eigenvalue is raised for hanging nodes and twists, whose
+/// diagonals are not sums over cells: they add 2 % at most where measured.
 const SAFETY: f64 = 1.05;
