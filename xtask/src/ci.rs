@@ -66,8 +66,8 @@ impl Step {
     }
 }
 
-/// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, and a quick
-/// reproduction; stops at the first failure.
+/// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, and a
+/// quick reproduction; stops at the first failure.
 pub fn run(root: &Path) -> Result<(), CiError> {
     check_spelling(root)?;
     STEPS.iter().try_for_each(|step| step.run(root))

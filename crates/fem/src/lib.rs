@@ -32,6 +32,7 @@
 //! Not for curved boundaries or unstructured meshes: the domain is a box, particles are immersed.
 
 pub mod cells;
+pub mod cut;
 pub mod element;
 mod mesh;
 mod space;

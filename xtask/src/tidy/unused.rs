@@ -8,8 +8,8 @@ use super::sources::Source;
 /// Folders at the root whose files belong to several packages.
 const SHARED: [&str; 2] = ["tests", "benches"];
 
-/// Dependencies that are listed but not named, where they could be: under `src` for normal ones, anywhere in the
-/// package or in the shared folders for those of tests.
+/// Dependencies that are listed but not named, where they could be: under `src` for normal ones, anywhere in
+/// the package or in the shared folders for those of tests.
 pub fn offences(root: &Path, metadata: &Metadata, sources: &[Source]) -> Vec<String> {
     let of_package = |package: &Package| {
         let folder = package.folder(root);

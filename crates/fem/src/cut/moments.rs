@@ -1,0 +1,226 @@
+//! Moments of a cell that balls cut.
+
+use super::rays::{Disc, Ray, for_each_plane, for_each_ray};
+use crate::element::{gauss, gauss_cube};
+
+/// Gauss points per direction: their polynomials have degree 4 in each coordinate.
+pub const POINTS: usize = 5;
+/// Points of the rule on the parts of an angle.
+const RULE: usize = 8;
+
+/// A ball in coordinates in which the cell is the unit cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BallInCell<const D: usize> {
+    /// Centre.
+    pub center: [f64; D],
+    /// Radius.
+    pub radius: f64,
+}
+
+/// Integrals of the Lagrange polynomials of a cell's Gauss points over what balls leave of it and over their
+/// surfaces, in units in which the cell is the unit cube. Points are numbered with x fastest.
+///
+/// Balls are taken one by one: where they overlap, the overlap is taken away twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutMoments<const D: usize> {
+    /// Over the part of the cell outside the balls.
+    pub volume: Vec<f64>,
+    /// Over the surface of each ball in the cell.
+    pub surfaces: Vec<SurfaceMoments<D>>,
+}
+
+/// Integrals over the part of a ball's surface in a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceMoments<const D: usize> {
+    /// Integrals of the polynomials times the normal, which points into the ball.
+    pub normal: Vec<[f64; D]>,
+    /// Integrals of the polynomials.
+    pub area: Vec<f64>,
+}
+
+impl<const D: usize> CutMoments<D> {
+    /// The moments of a cell that these balls cut.
+    pub fn new(balls: &[BallInCell<D>]) -> Self {
+        let mut new = Self {
+            volume: gauss_cube::<D>(POINTS).into_iter().map(|point| point.1).collect(),
+            surfaces: Vec::with_capacity(balls.len()),
+        };
+        let rules = Rules::new();
+        for ball in balls {
+            let inside = rules.inside(ball);
+            new.volume.iter_mut().zip(inside.volume).for_each(|(whole, part)| *whole -= part);
+            let normal = inside.normal.into_iter().map(|n| n.map(|n| -n)).collect();
+            new.surfaces.push(SurfaceMoments { normal, area: inside.area });
+        }
+        new
+    }
+
+    /// Share of the cell outside the balls.
+    pub fn fraction(&self) -> f64 {
+        self.volume.iter().sum()
+    }
+}
+
+/// Integrals over the part of a ball in a cell, and over its surface there with the normal out of the ball.
+struct Inside<const D: usize> {
+    volume: Vec<f64>,
+    normal: Vec<[f64; D]>,
+    area: Vec<f64>,
+}
+
+/// The one-dimensional rules that integrals are made of.
+struct Rules {
+    /// On parts of angles.
+    angles: Vec<(f64, f64)>,
+    /// Along chords: exact for the polynomials.
+    chords: Vec<(f64, f64)>,
+    lagrange: Lagrange,
+}
+
+impl Rules {
+    fn new() -> Self {
+        Self { angles: gauss(RULE), chords: gauss(POINTS.div_ceil(2)), lagrange: Lagrange::new() }
+    }
+
+    /// By rays in every direction for the surface; those in the first give the volume too.
+    fn inside<const D: usize>(&self, ball: &BallInCell<D>) -> Inside<D> {
+        let count = POINTS.pow(D as u32);
+        let mut inside =
+            Inside { volume: vec![0.0; count], normal: vec![[0.0; D]; count], area: vec![0.0; count] };
+        for direction in 0..D {
+            self.add_rays(ball, direction, &mut inside);
+        }
+        inside
+    }
+
+    /// Adds what the rays in a direction tell, plane by plane.
+    fn add_rays<const D: usize>(&self, ball: &BallInCell<D>, direction: usize, inside: &mut Inside<D>) {
+        let [across, height] = [1, 2].map(|shift| (direction + shift) % D);
+        let [c, y] = [direction, across].map(|d| ball.center[d]);
+        if D == 2 {
+            let disc = Disc { along: c, across: y, radius: ball.radius };
+            let strides = [direction, across].map(stride);
+            return self.plane(disc, ball.radius).add_to(inside, direction, strides, &[(0, 1.0)]);
+        }
+        for_each_plane([c, y, ball.center[height]], ball.radius, &self.angles, |disc, z, width| {
+            let values = self.lagrange.values(z);
+            let layers: Vec<(usize, f64)> =
+                (0..POINTS).map(|k| (k * stride(height), width * values[k])).collect();
+            let strides = [direction, across].map(stride);
+            self.plane(disc, ball.radius).add_to(inside, direction, strides, &layers);
+        });
+    }
+
+    /// The moments of a plane of rays through a ball of this radius.
+    fn plane(&self, disc: Disc, ball_radius: f64) -> Plane {
+        let mut plane = Plane::default();
+        for_each_ray(disc, &self.angles, |ray| self.add_ray(disc, ball_radius, ray, &mut plane));
+        plane
+    }
+
+    fn add_ray(&self, disc: Disc, ball_radius: f64, ray: Ray, plane: &mut Plane) {
+        let across = self.lagrange.values(ray.at).map(|value| value * ray.weight);
+        let ends = [disc.along - ray.half, disc.along + ray.half];
+        let chord = self.chord([ends[0].max(0.0), ends[1].min(1.0)]);
+        add_product(&chord, &across, 1.0, &mut plane.volume);
+        for (end, normal) in ends.into_iter().zip([-1.0, 1.0]).filter(|end| 0.0 < end.0 && end.0 < 1.0) {
+            let along = self.lagrange.values(end);
+            add_product(&along, &across, normal, &mut plane.normal);
+            add_product(&along, &across, ray.half / ball_radius, &mut plane.area);
+        }
+    }
+
+    /// Integrals of the polynomials over an interval, zero if it is empty.
+    fn chord(&self, [from, to]: [f64; 2]) -> [f64; POINTS] {
+        let mut sum = [0.0; POINTS];
+        let length = (to - from).max(0.0);
+        for &(t, weight) in &self.chords {
+            let values = self.lagrange.values(from + t * length);
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += length * weight * value);
+        }
+        sum
+    }
+}
+
+/// Distance of neighbouring points along an axis.
+fn stride(axis: usize) -> usize {
+    POINTS.pow(axis as u32)
+}
+
+fn add_product(
+    along: &[f64; POINTS],
+    across: &[f64; POINTS],
+    factor: f64,
+    sum: &mut [[f64; POINTS]; POINTS],
+) {
+    for (row, across) in sum.iter_mut().zip(across) {
+        row.iter_mut().zip(along).for_each(|(sum, along)| *sum += factor * across * along);
+    }
+}
+
+/// Moments in a plane: rows across the rays, columns along them.
+#[derive(Default)]
+struct Plane {
+    volume: [[f64; POINTS]; POINTS],
+    normal: [[f64; POINTS]; POINTS],
+    area: [[f64; POINTS]; POINTS],
+}
+
+impl Plane {
+    /// Adds the moments in every layer, given by its first point and its weight. Those of the volume are
+    /// added for the first direction only.
+    fn add_to<const D: usize>(
+        &self,
+        inside: &mut Inside<D>,
+        direction: usize,
+        [along, across]: [usize; 2],
+        layers: &[(usize, f64)],
+    ) {
+        for &(first, weight) in layers {
+            for j in 0..POINTS {
+                for i in 0..POINTS {
+                    let q = first + i * along + j * across;
+                    inside.normal[q][direction] += weight * self.normal[j][i];
+                    inside.area[q] += weight * self.area[j][i];
+                    if direction == 0 {
+                        inside.volume[q] += weight * self.volume[j][i];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Lagrange polynomials of the Gauss points in one dimension.
+struct Lagrange {
+    points: [f64; POINTS],
+    /// Inverse products of the distances to the others.
+    scales: [f64; POINTS],
+}
+
+impl Lagrange {
+    fn new() -> Self {
+        let line = gauss(POINTS);
+        let points: [f64; POINTS] = std::array::from_fn(|i| line[i].0);
+        let others = |i: usize| (0..POINTS).filter(move |&j| j != i);
+        let scales = std::array::from_fn(|i| 1.0 / others(i).map(|j| points[i] - points[j]).product::<f64>());
+        Self { points, scales }
+    }
+
+    /// Values of all of them at `x`, by products from both sides.
+    fn values(&self, x: f64) -> [f64; POINTS] {
+        let mut values = self.scales;
+        let (mut left, mut right) = (1.0, 1.0);
+        for i in 0..POINTS {
+            values[i] *= left;
+            left *= x - self.points[i];
+            let last = POINTS - 1 - i;
+            values[last] *= right;
+            right *= x - self.points[last];
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests;
