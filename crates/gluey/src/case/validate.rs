@@ -1,10 +1,11 @@
 //! What a case must satisfy beyond its types.
 
 use super::Case;
+use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
-use crate::reference::{self, Mismatch, Reference};
+use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,7 @@ fn check_reference(case: &Case, key: Key) -> Check {
         let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
         return fail(key, Problem::UnknownName(problem));
     };
-    match table.mismatch(case) {
+    match mismatch(case, &table) {
         Some(Mismatch { needs, found }) => fail(key, Problem::Unfit { choice: name.clone(), needs, found }),
         None => Ok(()),
     }
@@ -68,7 +69,7 @@ fn check_domain(case: &Case, key: &Key) -> Check {
     }
     match case.flow.hydrodynamics {
         Hydrodynamics::Stokes if case.root_cells().is_none() => {
-            fail(key.name("upper"), Problem::UnevenBox { edges: edges(case) })
+            fail(key.name("upper"), Problem::UnevenBox { edges: case.edges() })
         }
         _ => Ok(()),
     }
@@ -183,11 +184,13 @@ fn check_mesh(case: &Case, key: &Key) -> Check {
         return out_of_range(cells, "of 1 or more", key.name("cells_per_radius"));
     }
     // An analytic model has no mesh to be too fine.
-    let (Some(roots), Some(finest)) = (case.root_cells(), case.finest_level()) else { return Ok(()) };
-    let radius = smallest(case.particles.iter().map(|particle| particle.radius));
-    let root_size = edges(case)[0] / f64::from(roots[0]);
-    let level = (cells * root_size / radius * (1.0 - 1e-9)).log2().ceil().max(0.0);
+    let (Some(root_size), Some(finest), Some(level)) =
+        (case.root_size(), case.finest_level(), case.surface_level())
+    else {
+        return Ok(());
+    };
     if level > f64::from(finest) {
+        let radius = case.smallest_radius();
         let largest = radius / root_size * f64::from(1u32 << finest);
         let problem = Problem::MeshTooFine { cells_per_radius: cells, radius, level, finest, largest };
         return fail(key.name("cells_per_radius"), problem);
@@ -288,12 +291,4 @@ fn out_of_range(found: f64, range: &str, key: Key) -> Check {
 
 fn fail(key: Key, problem: Problem) -> Check {
     Err(Violation { key, problem })
-}
-
-fn edges(case: &Case) -> Vec<f64> {
-    case.lower().iter().zip(case.upper()).map(|(lower, upper)| upper - lower).collect()
-}
-
-fn smallest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(f64::INFINITY, f64::min)
 }
