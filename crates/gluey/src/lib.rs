@@ -34,6 +34,7 @@ pub mod reference;
 mod report;
 mod run;
 mod simulation;
+pub mod table;
 mod trajectory;
 
 pub use case::{Case, CaseError, Formulation, Strategy};

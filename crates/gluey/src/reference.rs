@@ -1,11 +1,12 @@
 //! Reference solutions compiled into the program, so that it compares from any folder.
 //!
-//! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came
-//! from.
+//! All are for the unit box at shear rate 1 and radius 0.05. The files in `data` of this package are copies of
+//! those in `data/reference` of the workspace, whose README says where each came from; a test compares them.
 
 use gluey_geom::Vector;
 
 use crate::interpolate::cubic;
+use crate::table::Table;
 use crate::trajectory::PairHistory;
 
 /// Names a case may give as its `reference`.
@@ -42,30 +43,19 @@ impl Reference {
     /// The reference of that name.
     pub fn named(name: &str) -> Option<Self> {
         let (dimension, is_in_box, text) = match name {
-            "pair2d_trajectory" => (2, true, include_str!("../../../data/reference/pair2d_trajectory.csv")),
-            "trio2d_trajectory" => (2, true, include_str!("../../../data/reference/trio2d_trajectory.csv")),
-            "pair3d_trajectory_box" => {
-                (3, true, include_str!("../../../data/reference/pair3d_trajectory_box.csv"))
-            }
+            "pair2d_trajectory" => (2, true, include_str!("../data/pair2d_trajectory.csv")),
+            "trio2d_trajectory" => (2, true, include_str!("../data/trio2d_trajectory.csv")),
+            "pair3d_trajectory_box" => (3, true, include_str!("../data/pair3d_trajectory_box.csv")),
             "pair3d_trajectory_unbounded" => {
-                (3, false, include_str!("../../../data/reference/pair3d_trajectory_unbounded.csv"))
+                (3, false, include_str!("../data/pair3d_trajectory_unbounded.csv"))
             }
             _ => return None,
         };
-        Self::parse(dimension, is_in_box, text)
+        Self::new(dimension, is_in_box, &Table::parse(text).ok()?)
     }
 
-    /// Reads a table with `#` comments and a header; columns are found by name.
-    fn parse(dimension: usize, is_in_box: bool, text: &str) -> Option<Self> {
-        let mut lines = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
-        let header: Vec<&str> = lines.next()?.split(',').map(str::trim).collect();
-        let rows: Vec<Vec<f64>> = lines
-            .map(|line| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<_>>())
-            .collect::<Option<_>>()?;
-        let column = |name: &str| -> Option<Vec<f64>> {
-            let index = header.iter().position(|title| *title == name)?;
-            rows.iter().map(|row| row.get(index).copied()).collect()
-        };
+    fn new(dimension: usize, is_in_box: bool, table: &Table) -> Option<Self> {
+        let column = |name: &str| table.find(name).map(<[f64]>::to_vec);
         let centers =
             (1..).map_while(|n| Some([column(&format!("x{n}"))?, column(&format!("y{n}"))?])).collect();
         let gap = column("D_over_a").or_else(|| column("gap12_over_a"))?;
