@@ -273,6 +273,23 @@ impl Default for PaperSpec {
     }
 }
 
+impl PaperSpec {
+    /// The same for the solver.
+    pub fn params(&self) -> PaperParams {
+        PaperParams {
+            viscosity_ratio: self.viscosity_ratio,
+            ramp: self.ramp,
+            rho: self.rho,
+            uzawa_steps: self.uzawa_steps,
+            particle_velocity: match self.velocity {
+                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
+                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
+            },
+            ..PaperParams::default()
+        }
+    }
+}
+
 impl Default for RigidDofsSpec {
     fn default() -> Self {
         Self { offset: None, gap_fraction: 1.0, gap_levels: None }

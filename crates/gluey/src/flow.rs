@@ -14,13 +14,13 @@ use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, PhaseTimes, Refinement, SolverKind, StokesError,
+    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, StokesError,
     WarmStartError, WeakPressures,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::case::{Case, Formulation, ParticleVelocity, Solver};
+use crate::case::{Case, Formulation, Solver};
 
 pub use estimate::MeshEstimate;
 
@@ -253,17 +253,7 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
             offset: case.rigid_offset(),
             weak_pressures: WeakPressures::Aggregate,
         },
-        Formulation::Paper => gluey_stokes::Formulation::Paper(PaperParams {
-            viscosity_ratio: flow.paper.viscosity_ratio,
-            ramp: flow.paper.ramp,
-            rho: flow.paper.rho,
-            uzawa_steps: flow.paper.uzawa_steps,
-            particle_velocity: match flow.paper.velocity {
-                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
-                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
-            },
-            ..PaperParams::default()
-        }),
+        Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
     };
     let solver = match flow.solver {
         Solver::Direct => SolverKind::Direct,

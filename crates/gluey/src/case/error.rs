@@ -1,4 +1,4 @@
-//! What can be wrong with a case, with the numbers needed to mend it.
+//! What can be wrong with a case, with the numbers needed to fix it.
 
 use std::fmt;
 use std::io;
@@ -174,6 +174,14 @@ pub enum Problem {
         /// The range, in words: `greater than 0`.
         range: String,
     },
+    /// A parameter that the solver refuses.
+    #[error("{found} is out of range")]
+    Parameter {
+        /// The value.
+        found: f64,
+        /// The range, in words: `must be larger than 1`.
+        wanted: &'static str,
+    },
     /// A vector with another number of coordinates than the dimension.
     #[error("{found} coordinates in {dimension}D")]
     CoordinateCount {
@@ -312,6 +320,7 @@ impl Problem {
             Self::Dimension { .. } => "dimension is 2 or 3".into(),
             Self::NotFinite { .. } => "expected a finite number".into(),
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
+            Self::Parameter { wanted, .. } => format!("it {wanted}"),
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
             Self::UnevenBox { .. } => format!(

@@ -1,5 +1,7 @@
 //! What a case must satisfy beyond its types.
 
+use gluey_stokes::StokesError;
+
 use super::Case;
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
@@ -48,8 +50,9 @@ fn check_name(name: &str, key: Key) -> Check {
 fn check_reference(case: &Case, key: Key) -> Check {
     let Some(name) = &case.reference else { return Ok(()) };
     let Some(table) = Reference::named(name) else {
-        let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
-        return fail(key, Problem::UnknownName(problem));
+        let known = reference::NAMES.iter().map(|&name| name.to_owned()).collect();
+        let unknown = UnknownName { what: "reference".to_owned(), found: name.clone(), known };
+        return fail(key, Problem::UnknownName(unknown));
     };
     match mismatch(case, &table) {
         Some(Mismatch { needs, found }) => fail(key, Problem::Unfit { choice: name.clone(), needs, found }),
@@ -220,23 +223,15 @@ fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
     }
 }
 
+/// The solver knows the ranges of its parameters, which have the names of the keys.
 fn check_paper(case: &Case, key: &Key) -> Check {
-    let paper = &case.flow.paper;
-    if !(paper.viscosity_ratio > 1.0 && paper.viscosity_ratio <= 1e12) {
-        return out_of_range(
-            paper.viscosity_ratio,
-            "greater than 1, up to 1e12",
-            key.name("viscosity_ratio"),
-        );
+    match case.flow.paper.params().check() {
+        Err(StokesError::Parameter { name, value: found, wanted }) => {
+            finite(found, key.name(name))?;
+            fail(key.name(name), Problem::Parameter { found, wanted })
+        }
+        _ => Ok(()),
     }
-    if !(1..=10_000).contains(&paper.uzawa_steps) {
-        return out_of_range(paper.uzawa_steps as f64, "from 1 to 10000", key.name("uzawa_steps"));
-    }
-    between(paper.rho, 0.0, 4.0, key.name("rho"))?;
-    if !(paper.ramp > 0.0 && paper.ramp <= 100.0) {
-        return out_of_range(paper.ramp, "greater than 0, up to 100", key.name("ramp"));
-    }
-    Ok(())
 }
 
 /// The analytic model knows two equal spheres in unbounded shear.
