@@ -252,7 +252,7 @@ fn names_that_are_not_known() {
     refused(&memory, &["case.toml:18:", "contact.memory", "one of \"paper\", \"consistent\""]);
     let contact = with_line(17, "[contact]\nsolver = \"gauss\"");
     let all = "one of \"auto\", \"uzawa\", \"accelerated\", \"active-set\"";
-    refused(&contact, &["case.toml:18:", "contact.solver", "`gauss` is not a known contact solver", all]);
+    refused(&contact, &["case.toml:18:", "contact.solver", "`gauss` is not a known solver", all]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs;
 
 use gluey::case::ParticleSpec;
 use gluey::flow::{MeshEstimate, stokes_flow};
-use gluey::{Case, CaseError, Formulation, RunError, RunOptions, Silent, run};
+use gluey::{Case, Formulation, RunError, RunOptions, Silent, run};
 use gluey_geom::{Dim, Particle, Space, Vector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -98,7 +98,7 @@ fn meshes_that_do_not_fit_are_refused_before_they_are_built() {
         let folder = tempfile::TempDir::new().expect("a folder");
         let csv = folder.path().join("out.csv");
         let error = run(&case, &RunOptions::csv(&csv), &Silent).expect_err("too large");
-        let RunError::Case(CaseError::TooLarge(too_large)) = &error else { panic!("{error}") };
+        let RunError::TooLarge(too_large) = &error else { panic!("{error}") };
         assert!(too_large.estimate.cell_count > 1e8, "{error}");
         let message = error.to_string();
         for part in ["the mesh would have about", "cells", "unknowns", "GB of memory"] {

@@ -16,16 +16,19 @@
 //! # Ok::<(), gluey::CaseError>(())
 //! ```
 
+mod comparable;
 mod error;
 mod load;
+mod mesh;
 mod names;
 pub(crate) mod neighbours;
 mod suggest;
 mod validate;
 
-pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem, TooLarge};
+pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
+pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
 
 use gluey_contact::{ContactParams, Domain, Wall};
@@ -33,15 +36,8 @@ use gluey_geom::Vector;
 use gluey_stokes::PaperParams;
 use serde::{Deserialize, Serialize};
 
-/// Largest number of root cells along the shortest edge of the box.
-const MOST_ROOTS: u32 = 16;
-
 /// The axis across the shear: the box has walls there.
 const WALLED_AXIS: usize = 1;
-
-/// A mesh has at most `2^18` cells along an axis: the tree numbers 21 bits a coordinate, and keeps some for
-/// nodes.
-const FINEST_LEVEL: u32 = 18;
 
 /// A complete, checked description of one run.
 ///
@@ -182,7 +178,7 @@ pub struct FlowSpec {
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSpec {
     /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when
-    /// absent, what [`crate::flow::default_cells_per_radius`] gives.
+    /// absent, what [`default_cells_per_radius`] gives.
     pub cells_per_radius: Option<f64>,
     /// Cells are at least `2^-coarsest_level` of the box.
     pub coarsest_level: u32,
@@ -214,13 +210,13 @@ pub struct PaperSpec {
 #[serde(deny_unknown_fields, default)]
 pub struct RigidDofsSpec {
     /// A node is rigid where the signed distance (positive inside) is at least this many cells; when absent,
-    /// what [`crate::flow::default_offset`] gives.
+    /// what [`gluey_stokes::default_offset`] gives.
     pub offset: Option<f64>,
     /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves
     /// gaps alone.
     pub gap_fraction: f64,
     /// Levels beyond that of the surfaces that gaps may use; when absent, what
-    /// [`crate::flow::default_gap_levels`] gives.
+    /// [`default_gap_levels`] gives.
     pub gap_levels: Option<u32>,
 }
 
@@ -277,6 +273,23 @@ impl Default for PaperSpec {
     }
 }
 
+impl PaperSpec {
+    /// The same for the solver.
+    pub fn params(&self) -> PaperParams {
+        PaperParams {
+            viscosity_ratio: self.viscosity_ratio,
+            ramp: self.ramp,
+            rho: self.rho,
+            uzawa_steps: self.uzawa_steps,
+            particle_velocity: match self.velocity {
+                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
+                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
+            },
+            ..PaperParams::default()
+        }
+    }
+}
+
 impl Default for RigidDofsSpec {
     fn default() -> Self {
         Self { offset: None, gap_fraction: 1.0, gap_levels: None }
@@ -295,18 +308,6 @@ impl Case {
         self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64
     }
 
-    /// Cells a radius at the surfaces, as stated or by default.
-    pub fn cells_per_radius(&self) -> f64 {
-        let default = crate::flow::default_cells_per_radius(self.dimension, self.flow.formulation);
-        self.flow.mesh.cells_per_radius.unwrap_or(default)
-    }
-
-    /// The finest level of the tree over this box; `None` for a box that is not made of cubes.
-    pub(crate) fn finest_level(&self) -> Option<u32> {
-        let most = self.root_cells()?.into_iter().max()?;
-        FINEST_LEVEL.checked_sub(most.checked_next_power_of_two()?.ilog2())
-    }
-
     /// Lower corner of the box, one coordinate a dimension.
     pub fn lower(&self) -> Vec<f64> {
         self.domain.lower.clone().unwrap_or_else(|| vec![0.0; self.dimension])
@@ -315,6 +316,11 @@ impl Case {
     /// Upper corner of the box, one coordinate a dimension.
     pub fn upper(&self) -> Vec<f64> {
         self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
+    }
+
+    /// Edge lengths of the box.
+    pub(crate) fn edges(&self) -> Vec<f64> {
+        self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect()
     }
 
     /// Length of the box along an axis in which the particles see images of each other.
@@ -337,22 +343,6 @@ impl Case {
             walls: vec![Wall::new(&below, &inwards), Wall::new(&above, &-inwards)],
             periods: std::array::from_fn(|axis| self.period(axis)),
         }
-    }
-
-    /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the
-    /// mesh. `None` if it takes more than 16 of them along the shortest edge, or more than a tree can number
-    /// along the longest.
-    pub fn root_cells(&self) -> Option<Vec<u32>> {
-        let edges: Vec<f64> =
-            self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect();
-        let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);
-        let counts = |along_shortest: u32| -> Option<Vec<u32>> {
-            let exact = edges.iter().map(|edge| edge / shortest * f64::from(along_shortest));
-            let most = f64::from(1u32 << FINEST_LEVEL);
-            let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count && count <= most;
-            exact.map(|count| whole(count).then(|| count.round() as u32)).collect()
-        };
-        (1..=MOST_ROOTS).find_map(counts)
     }
 
     /// Name of the output files of this case: case and strategy, and the formulation where it is not the

@@ -17,10 +17,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Case;
+use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::csv::CsvMarks;
 use crate::output::{OutputError, write_atomically};
 use crate::phases::PhaseTable;
-use crate::run::HydrodynamicsError;
 use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";

@@ -65,7 +65,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
                 .into()
         }
         RunError::Case(CaseError::Invalid(issue)) => issue.problem.hint(),
-        RunError::Case(CaseError::TooLarge(_)) => {
+        RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
         RunError::Case(CaseError::Read { .. }) => "give the path of a case file".into(),

@@ -13,15 +13,14 @@ use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
-pub use gluey_stokes::default_offset;
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, PhaseTimes, Refinement, SolverKind, StokesError,
+    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, StokesError,
     WarmStartError, WeakPressures,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::case::{Case, Formulation, ParticleVelocity, Solver};
+use crate::case::{Case, Formulation, Solver};
 
 pub use estimate::MeshEstimate;
 
@@ -116,13 +115,13 @@ where
 {
     let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
     let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
-    let roots = root_cells(case, &domain)?;
+    let (roots, level) = tree(case, &domain)?;
     let radii: Vec<f64> = case.particles.iter().map(|p| p.radius).collect();
     let params = flow_params::<D>(case);
     Ok(StokesFlow {
         solver: FlowSolver::new(params)?,
         params,
-        refinement: refinement(case, domain.extent()[0] / f64::from(roots[0]), &radii),
+        refinement: refinement(case, level),
         domain,
         roots,
         periods: std::array::from_fn(|axis| case.period(axis)),
@@ -225,64 +224,36 @@ where
     }
 }
 
-/// The root cells along each axis of a box.
-fn root_cells<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<[u32; D], FlowError> {
+/// The root cells along each axis of a box, and the level of the surfaces.
+fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
     let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
-    roots.ok_or_else(|| FlowError::Box { extent: domain.extent().iter().copied().collect() })
+    let uneven = || FlowError::Box { extent: domain.extent().iter().copied().collect() };
+    roots.zip(case.surface_level()).ok_or_else(uneven)
 }
 
-/// Level at which `cells` cells fit into the smallest radius, and what else the mesh follows.
-fn refinement(case: &Case, root_size: f64, radii: &[f64]) -> Refinement {
-    let flow = &case.flow;
-    let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
-    let cells = case.cells_per_radius();
-    let surface = (cells * root_size / smallest * (1.0 - 1e-9)).log2().ceil().max(0.0) as u8;
-    let rigid = flow.formulation == Formulation::RigidDofs;
+/// What the mesh of a checked case follows, whose surfaces are at `level`.
+fn refinement(case: &Case, level: f64) -> Refinement {
+    let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
+    let surface = level as u8;
+    let rigid = case.flow.formulation == Formulation::RigidDofs;
     let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
-    let gap_levels =
-        flow.rigid_dofs.gap_levels.unwrap_or(default_gap_levels(case.dimension)).min(levels_left);
     Refinement {
-        coarsest: flow.mesh.coarsest_level.min(u32::from(surface)) as u8,
+        coarsest: mesh.coarsest_level.min(u32::from(surface)) as u8,
         surface,
-        band: flow.mesh.band,
-        gap_fraction: if rigid { flow.rigid_dofs.gap_fraction } else { 0.0 },
-        gap_levels: gap_levels as u8,
+        band: mesh.band,
+        gap_fraction: if rigid { rigid_dofs.gap_fraction } else { 0.0 },
+        gap_levels: case.gap_levels().min(levels_left) as u8,
     }
-}
-
-/// Cells a radius where a case does not state them.
-pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f64 {
-    match (dimension, formulation) {
-        (2, Formulation::RigidDofs) => 12.8,
-        (2, Formulation::Paper) => 6.4,
-        _ => 3.2,
-    }
-}
-
-/// Levels that gaps may use beyond that of the surfaces where a case does not state them: enough for any film
-/// in 2D, none in 3D, where they spoil the convergence of the solver.
-pub fn default_gap_levels(dimension: usize) -> u32 {
-    if dimension == 2 { 9 } else { 0 }
 }
 
 fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let flow = &case.flow;
     let formulation = match flow.formulation {
         Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
-            offset: flow.rigid_dofs.offset.unwrap_or(default_offset(D)),
+            offset: case.rigid_offset(),
             weak_pressures: WeakPressures::Aggregate,
         },
-        Formulation::Paper => gluey_stokes::Formulation::Paper(PaperParams {
-            viscosity_ratio: flow.paper.viscosity_ratio,
-            ramp: flow.paper.ramp,
-            rho: flow.paper.rho,
-            uzawa_steps: flow.paper.uzawa_steps,
-            particle_velocity: match flow.paper.velocity {
-                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
-                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
-            },
-            ..PaperParams::default()
-        }),
+        Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
     };
     let solver = match flow.solver {
         Solver::Direct => SolverKind::Direct,

@@ -22,6 +22,7 @@
 pub mod case;
 mod checkpoint;
 pub mod flow;
+mod hydrodynamics;
 mod interpolate;
 mod measures;
 pub mod memory;
@@ -33,16 +34,19 @@ pub mod reference;
 mod report;
 mod run;
 mod simulation;
+pub mod table;
 mod trajectory;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
 pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError};
 pub use flow::FlowError;
+pub use hydrodynamics::HydrodynamicsError;
+pub use memory::TooLarge;
 pub use near_pairs::{NearPairs, PairGap};
 pub use output::{ClaimError, OutputError, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
-pub use run::{HydrodynamicsError, RunError, RunOptions, VtkOptions, run};
+pub use run::{RunError, RunOptions, VtkOptions, run};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
 pub use trajectory::Row;

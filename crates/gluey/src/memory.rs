@@ -3,20 +3,40 @@
 use std::fs;
 use std::path::Path;
 
-use crate::case::{Case, CaseError, TooLarge};
+use thiserror::Error;
+
+use crate::case::Case;
 use crate::flow::MeshEstimate;
 
 /// Nodes and cells are numbered in 32 bits.
 const MOST_UNKNOWNS: f64 = u32::MAX as f64;
 
+/// A case that needs more memory than there is.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error(
+    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {:.1} GB of memory; {}",
+    .estimate.cell_count, .estimate.unknown_count, .estimate.bytes / 1e9, there(*.available)
+)]
+pub struct TooLarge {
+    /// What it would need.
+    pub estimate: MeshEstimate,
+    /// Bytes there are, if that is known.
+    pub available: Option<u64>,
+}
+
+fn there(available: Option<u64>) -> String {
+    match available {
+        Some(bytes) => format!("{:.1} GB are there", bytes as f64 / 1e9),
+        None => "at most 2^32 - 1 can be numbered".into(),
+    }
+}
+
 /// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how
 /// much there is, only the first is checked.
-pub(crate) fn check(case: &Case) -> Result<(), CaseError> {
+pub(crate) fn check(case: &Case) -> Result<(), TooLarge> {
     let available = available();
     match MeshEstimate::of(case) {
-        Some(estimate) if !fits(&estimate, available) => {
-            Err(CaseError::TooLarge(TooLarge { estimate, available }))
-        }
+        Some(estimate) if !fits(&estimate, available) => Err(TooLarge { estimate, available }),
         _ => Ok(()),
     }
 }

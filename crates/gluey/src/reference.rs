@@ -1,12 +1,12 @@
 //! Reference solutions compiled into the program, so that it compares from any folder.
 //!
-//! All are for the unit box at shear rate 1 and radius 0.05; `data/reference/README.md` says where each came
-//! from.
+//! All are for the unit box at shear rate 1 and radius 0.05. The files in `data` of this package are copies of
+//! those in `data/reference` of the workspace, whose README says where each came from; a test compares them.
 
 use gluey_geom::Vector;
 
-use crate::case::{Boundary, Case, Hydrodynamics};
 use crate::interpolate::cubic;
+use crate::table::Table;
 use crate::trajectory::PairHistory;
 
 /// Names a case may give as its `reference`.
@@ -14,40 +14,20 @@ pub const NAMES: &[&str] =
     &["pair2d_trajectory", "trio2d_trajectory", "pair3d_trajectory_box", "pair3d_trajectory_unbounded"];
 
 /// Radius of the particles in every reference.
-const RADIUS: f64 = 0.05;
+pub(crate) const RADIUS: f64 = 0.05;
 /// Height at which the shear is at rest, and coordinate z of all centres.
-const MIDDLE: f64 = 0.5;
-/// How far from the reference's a particle may start, in radii.
-const START_TOLERANCE: f64 = 1e-6;
-
+pub(crate) const MIDDLE: f64 = 0.5;
 /// Trajectories of particles, to compare a run with.
 #[derive(Clone, Debug)]
 pub struct Reference {
     dimension: usize,
-    /// Of a flow in the unit box with Couette velocity on its boundary, or without a box.
-    hydrodynamics: Hydrodynamics,
+    /// Whether the flow is in the unit box with Couette velocity on its boundary, or without a box.
+    is_in_box: bool,
     times: Vec<f64>,
     /// Columns of x and y of each particle.
     centers: Vec<[Vec<f64>; 2]>,
     /// Gap of particles 1 and 2 over the radius.
     gap: Vec<f64>,
-}
-
-/// What a comparison needs, and what a case has in its place.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Mismatch {
-    pub needs: String,
-    pub found: String,
-}
-
-/// A mismatch unless `is_so`.
-fn unless(is_so: bool, needs: impl Into<String>, found: impl FnOnce() -> String) -> Option<Mismatch> {
-    (!is_so).then(|| Mismatch { needs: needs.into(), found: found() })
-}
-
-/// Equal but for rounding.
-fn is_near(x: f64, wanted: f64) -> bool {
-    (x - wanted).abs() <= 1e-12
 }
 
 /// How far a run is from a [`Reference`], over the time they have in common.
@@ -62,101 +42,44 @@ pub struct Deviation {
 impl Reference {
     /// The reference of that name.
     pub fn named(name: &str) -> Option<Self> {
-        let (dimension, hydrodynamics, text) = match name {
-            "pair2d_trajectory" => {
-                (2, Hydrodynamics::Stokes, include_str!("../../../data/reference/pair2d_trajectory.csv"))
+        let (dimension, is_in_box, text) = match name {
+            "pair2d_trajectory" => (2, true, include_str!("../data/pair2d_trajectory.csv")),
+            "trio2d_trajectory" => (2, true, include_str!("../data/trio2d_trajectory.csv")),
+            "pair3d_trajectory_box" => (3, true, include_str!("../data/pair3d_trajectory_box.csv")),
+            "pair3d_trajectory_unbounded" => {
+                (3, false, include_str!("../data/pair3d_trajectory_unbounded.csv"))
             }
-            "trio2d_trajectory" => {
-                (2, Hydrodynamics::Stokes, include_str!("../../../data/reference/trio2d_trajectory.csv"))
-            }
-            "pair3d_trajectory_box" => {
-                (3, Hydrodynamics::Stokes, include_str!("../../../data/reference/pair3d_trajectory_box.csv"))
-            }
-            "pair3d_trajectory_unbounded" => (
-                3,
-                Hydrodynamics::PairMobility,
-                include_str!("../../../data/reference/pair3d_trajectory_unbounded.csv"),
-            ),
             _ => return None,
         };
-        Self::parse(dimension, hydrodynamics, text)
+        Self::new(dimension, is_in_box, &Table::parse(text).ok()?)
     }
 
-    /// Reads a table with `#` comments and a header; columns are found by name.
-    fn parse(dimension: usize, hydrodynamics: Hydrodynamics, text: &str) -> Option<Self> {
-        let mut lines = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
-        let header: Vec<&str> = lines.next()?.split(',').map(str::trim).collect();
-        let rows: Vec<Vec<f64>> = lines
-            .map(|line| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<_>>())
-            .collect::<Option<_>>()?;
-        let column = |name: &str| -> Option<Vec<f64>> {
-            let index = header.iter().position(|title| *title == name)?;
-            rows.iter().map(|row| row.get(index).copied()).collect()
-        };
+    fn new(dimension: usize, is_in_box: bool, table: &Table) -> Option<Self> {
+        let column = |name: &str| table.find(name).map(<[f64]>::to_vec);
         let centers =
             (1..).map_while(|n| Some([column(&format!("x{n}"))?, column(&format!("y{n}"))?])).collect();
         let gap = column("D_over_a").or_else(|| column("gap12_over_a"))?;
-        Some(Self { dimension, hydrodynamics, times: column("t")?, centers, gap })
+        Some(Self { dimension, is_in_box, times: column("t")?, centers, gap })
     }
 
-    /// What in `case` keeps it from being compared.
-    pub(crate) fn mismatch(&self, case: &Case) -> Option<Mismatch> {
-        self.other_flow(case).or_else(|| self.other_box(case)).or_else(|| self.first_stranger(case))
+    /// Dimension of space.
+    pub(crate) fn dimension(&self) -> usize {
+        self.dimension
     }
 
-    fn other_flow(&self, case: &Case) -> Option<Mismatch> {
-        let (dimension, count, hydrodynamics) = (self.dimension, self.centers.len(), self.hydrodynamics);
-        let found = case.flow.hydrodynamics;
-        let reversal = case.time.reverse_at;
-        unless(case.dimension == dimension, format!("dimension {dimension}"), || {
-            format!("dimension {}", case.dimension)
-        })
-        .or_else(|| {
-            let found = || format!("{} particles", case.particles.len());
-            unless(case.particles.len() == count, format!("{count} particles"), found)
-        })
-        .or_else(|| {
-            let needs = format!("flow.hydrodynamics = \"{hydrodynamics}\"");
-            unless(found == hydrodynamics, needs, || format!("\"{found}\""))
-        })
-        .or_else(|| unless(case.shear_rate == 1.0, "shear_rate = 1", || format!("{}", case.shear_rate)))
-        .or_else(|| {
-            unless(reversal.is_none(), "a shear that is not reversed", || "time.reverse_at".to_owned())
-        })
+    /// Whether the flow is in the unit box with Couette velocity on its boundary, or without a box.
+    pub(crate) fn is_in_box(&self) -> bool {
+        self.is_in_box
     }
 
-    /// Flow in a box needs that box and its boundary; without walls the height at which the shear is at rest
-    /// counts.
-    fn other_box(&self, case: &Case) -> Option<Mismatch> {
-        let (lower, upper, boundary) = (case.lower(), case.upper(), case.domain.boundary);
-        if self.hydrodynamics == Hydrodynamics::PairMobility {
-            let middle = 0.5 * (lower[1] + upper[1]);
-            let needs = format!("a box whose middle is at y = {MIDDLE}");
-            return unless(is_near(middle, MIDDLE), needs, || format!("its middle at y = {middle}"));
-        }
-        let is_unit = lower.iter().all(|&x| is_near(x, 0.0)) && upper.iter().all(|&x| is_near(x, 1.0));
-        unless(is_unit, "the unit box, from 0 to 1", || format!("a box from {lower:?} to {upper:?}")).or_else(
-            || {
-                let needs = format!("domain.boundary = \"{}\"", Boundary::Couette);
-                unless(boundary == Boundary::Couette, needs, || format!("\"{boundary}\""))
-            },
-        )
+    /// Number of particles.
+    pub(crate) fn particle_count(&self) -> usize {
+        self.centers.len()
     }
 
-    /// The first particle that is not one of the reference's at its start.
-    fn first_stranger(&self, case: &Case) -> Option<Mismatch> {
-        let mut particles = case.particles.iter().zip(&self.centers).enumerate();
-        particles.find_map(|(index, (particle, [x, y]))| {
-            // All references lie in the middle plane.
-            let start = [x[0], y[0], MIDDLE];
-            let start = &start[..self.dimension];
-            let moves = particle.position.iter().zip(start).map(|(found, wanted)| found - wanted);
-            let is_there = moves.fold(0.0, f64::hypot) <= START_TOLERANCE * RADIUS;
-            let needs = format!("particle {} of radius {RADIUS} at {start:?}", index + 1);
-            unless(is_there && particle.radius == RADIUS, needs, || {
-                format!("radius {} at {:?}", particle.radius, particle.position)
-            })
-        })
+    /// Centres of the particles at the start; all references lie in the middle plane.
+    pub(crate) fn starts(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.centers.iter().map(|[x, y]| [x[0], y[0], MIDDLE])
     }
 
     /// Largest distance of a centre from its reference at `time`, in radii.

@@ -11,14 +11,13 @@ use std::time::Instant;
 
 use gluey_contact::{ContactModel, PairContact};
 use gluey_geom::{Dim, Particle, Space, Vector};
-use gluey_motion::{LinearFlow, PairMobility};
 
-pub use error::{HydrodynamicsError, RunError};
+pub use error::RunError;
 pub use options::{RunOptions, VtkOptions};
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::flow::{StokesFlow, stokes_flow};
+use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
 use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
@@ -56,21 +55,6 @@ fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<
     }
 }
 
-/// The finite-element flow of `case`.
-fn stokes<const D: usize>(case: &Case) -> Result<StokesFlow<D>, HydrodynamicsError>
-where
-    Dim<D>: Space<D>,
-{
-    Ok(stokes_flow(case)?)
-}
-
-/// Two spheres in the shear of `case`, unbounded.
-fn pair_mobility(case: &Case) -> PairMobility {
-    let middle = 0.5 * (case.lower()[1] + case.upper()[1]);
-    let shear = LinearFlow::shear(case.shear_rate, middle);
-    PairMobility::new(shear).with_gap_offset(case.flow.pair_mobility.gap_offset)
-}
-
 /// Makes sure before the first step that files can be written, and that no other run writes them.
 fn claim_outputs(options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
     let vtk = options.vtk.as_ref().map(|vtk| vtk.folder.as_path());
@@ -82,7 +66,7 @@ fn claim_outputs(options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Cl
     Ok(claims)
 }
 
-/// A run on its way.
+/// A run in progress.
 struct Run<'a, const D: usize, H>
 where
     Dim<D>: Space<D>,

@@ -1,5 +1,8 @@
-//! The reference data of `data/reference`, read by the names in their headers. Where they come from and how
-//! exact they are is written in `data/reference/README.md`.
+//! The velocities of `data/reference`, read by the names in their headers. Where they come from and how exact
+//! they are is written in `data/reference/README.md`.
+//!
+//! `gluey` reads trajectories by a table of its own: it lies above the crates whose tests take their data
+//! from here, and what is for tests only is not part of a program.
 
 use std::collections::BTreeMap;
 
@@ -46,14 +49,6 @@ pub enum TableError {
         /// The name asked for.
         name: String,
     },
-    /// The abscissa lies outside the table, or the table has fewer than four rows.
-    #[error("{at} lies outside column {name}")]
-    OutOfRange {
-        /// Name of the abscissa.
-        name: String,
-        /// The value asked for, as text.
-        at: String,
-    },
 }
 
 impl Table {
@@ -89,19 +84,6 @@ impl Table {
             .map(Vec::as_slice)
             .ok_or_else(|| TableError::NoColumn { name: name.to_owned() })
     }
-
-    /// The value of column `of` where column `over`, which must rise, has the value `at`: the cubic through
-    /// the four nearest rows.
-    pub fn interpolate(&self, over: &str, of: &str, at: f64) -> Result<f64, TableError> {
-        let (x, y) = (self.column(over)?, self.column(of)?);
-        let inside = x.len() >= 4 && at >= x[0] && at <= x[x.len() - 1];
-        if !inside {
-            return Err(TableError::OutOfRange { name: over.to_owned(), at: at.to_string() });
-        }
-        let above = x.partition_point(|&x| x <= at);
-        let first = above.saturating_sub(2).min(x.len() - 4);
-        Ok(lagrange(&x[first..first + 4], &y[first..first + 4], at))
-    }
 }
 
 fn append_row(values: &mut [Vec<f64>], line: usize, text: &str) -> Result<(), TableError> {
@@ -114,12 +96,6 @@ fn append_row(values: &mut [Vec<f64>], line: usize, text: &str) -> Result<(), Ta
         column.push(number);
     }
     Ok(())
-}
-
-fn lagrange(x: &[f64], y: &[f64], at: f64) -> f64 {
-    let weight =
-        |i: usize| -> f64 { (0..x.len()).filter(|&j| j != i).map(|j| (at - x[j]) / (x[i] - x[j])).product() };
-    (0..x.len()).map(|i| weight(i) * y[i]).sum()
 }
 
 macro_rules! reference_table {
@@ -141,32 +117,6 @@ reference_table!(
     pair_2d_velocities,
     "pair2d_velocities.csv"
 );
-reference_table!(
-    /// The doublet of Verdon et al. 2010, figures 5 and 6: `t, D_over_a, theta, x1, y1, x2, y2`.
-    pair_2d_trajectory,
-    "pair2d_trajectory.csv"
-);
-reference_table!(
-    /// Three discs: `t, x1, y1, ..., gap12_over_a, ..., omega1, ...`.
-    trio_2d_trajectory,
-    "trio2d_trajectory.csv"
-);
-reference_table!(
-    /// Mobility of two equal spheres (Batchelor and Green 1972):
-    /// `r_over_a, xi, A, B, one_minus_A, one_minus_B, C_rot`.
-    sphere_pair_mobility,
-    "sphere_pair_mobility_unbounded.csv"
-);
-reference_table!(
-    /// Two spheres in unbounded shear: `t, D_over_a, theta, x1, y1, x2, y2, omega_z`.
-    pair_3d_trajectory_unbounded,
-    "pair3d_trajectory_unbounded.csv"
-);
-reference_table!(
-    /// Two spheres in the unit box: `t, D_over_a, theta, x1, y1, x2, y2`.
-    pair_3d_trajectory_box,
-    "pair3d_trajectory_box.csv"
-);
 
 #[cfg(test)]
 mod tests {
@@ -174,16 +124,7 @@ mod tests {
 
     #[test]
     fn every_file_is_read_and_has_what_is_promised() {
-        let tables = [
-            (single_2d_velocities(), "omega"),
-            (pair_2d_velocities(), "vn"),
-            (pair_2d_trajectory(), "theta"),
-            (trio_2d_trajectory(), "gap23_over_a"),
-            (sphere_pair_mobility(), "C_rot"),
-            (pair_3d_trajectory_unbounded(), "omega_z"),
-            (pair_3d_trajectory_box(), "D_over_a"),
-        ];
-        for (table, column) in tables {
+        for (table, column) in [(single_2d_velocities(), "omega"), (pair_2d_velocities(), "vn")] {
             let table = table.expect("readable");
             let values = table.column(column).expect("present");
             assert!(values.len() >= 2 && values.len() == table.row_count());
@@ -193,30 +134,9 @@ mod tests {
 
     #[test]
     fn known_facts_are_found_in_the_data() {
-        let pair = pair_2d_trajectory().expect("readable");
-        let turned = pair.interpolate("t", "theta", 7.769129988).expect("inside");
-        assert!((turned - (-0.201_317_108_4 - std::f64::consts::PI)).abs() < 1e-6, "half a turn: {turned}");
         let disc = single_2d_velocities().expect("readable");
-        assert_eq!(
-            (disc.column("Ux").expect("present")[1], disc.column("y").expect("present")[1]),
-            (0.20220057, 0.7)
-        );
-        let closest = pair_3d_trajectory_unbounded().expect("readable");
-        let gap = closest.interpolate("t", "D_over_a", 7.894071).expect("inside");
-        assert!((gap - 7.370378e-3).abs() < 1e-6, "{gap}");
-    }
-
-    #[test]
-    fn interpolation_is_exact_on_cubics_up_to_both_ends() {
-        let rows: String = (0..6).map(|k| format!("{},{}\n", k * k, (k * k) * (k * k) * (k * k))).collect();
-        let table = Table::parse(&format!("# a comment\nx, cube\n\n{rows}")).expect("valid");
-        for at in [0.0, 0.5, 1.0, 7.3, 24.0, 25.0] {
-            let value = table.interpolate("x", "cube", at).expect("inside");
-            assert!((value - at.powi(3)).abs() < 1e-9, "{at}: {value}");
-        }
-        for at in [-0.1, 25.1, f64::NAN] {
-            assert!(matches!(table.interpolate("x", "cube", at), Err(TableError::OutOfRange { .. })));
-        }
+        let at = |column: &str| disc.column(column).expect("present")[1];
+        assert_eq!([at("Ux"), at("y")], [0.20220057, 0.7]);
     }
 
     #[test]
@@ -230,6 +150,5 @@ mod tests {
         assert_eq!(Table::parse("a,a\n1,2\n"), Err(TableError::DuplicateColumn { name: "a".to_owned() }));
         let table = Table::parse("a\n1\n").expect("valid");
         assert_eq!(table.column("b"), Err(TableError::NoColumn { name: "b".to_owned() }));
-        assert!(table.interpolate("a", "a", 1.0).is_err());
     }
 }

@@ -72,7 +72,7 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
         version: env!("CARGO_PKG_VERSION"),
         quick: options.quick,
         wall_s: start.elapsed().as_secs_f64(),
-        figures: options.figures.iter().map(FigureName::to_string).collect(),
+        figures: options.figures.clone(),
         rows,
         runs: runs(reports, &data.settings),
         failures,
@@ -118,7 +118,7 @@ fn make_runs(
     for (key, result) in keys.into_iter().zip(results) {
         match result {
             Ok(report) => drop(reports.insert(key, report)),
-            Err(error) => failures.push(Failure { what: format!("run {key}"), error }),
+            Err(error) => failures.push(Failure { what: format!("run {key}"), error: runner::chain(&error) }),
         }
     }
     reports

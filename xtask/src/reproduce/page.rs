@@ -96,7 +96,7 @@ fn write_counts(out: &mut String, rows: &[Row]) -> std::fmt::Result {
         if !missed.is_empty() {
             writeln!(out, "<ul>")?;
             for row in missed {
-                let (figure, statement, run) = (&row.figure, escape(row.statement), escape(row.run));
+                let (figure, statement, run) = (row.figure, escape(row.statement), escape(row.run));
                 let measure = escape(row.measure);
                 let value = number(row.value);
                 writeln!(
@@ -150,11 +150,8 @@ fn write_section(out: &mut String, summary: &Summary, section: &Section) -> std:
         section.drawing.inline_svg()
     )?;
     for group in GROUPS {
-        let rows: Vec<&Row> = summary
-            .rows
-            .iter()
-            .filter(|row| row.figure == figure.as_str() && row.kind == group.kind)
-            .collect();
+        let rows: Vec<&Row> =
+            summary.rows.iter().filter(|row| row.figure == figure && row.kind == group.kind).collect();
         write_group(out, group, &rows)?;
     }
     if let Some(table) = &section.table {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use gluey::case::{Memory, ParticleVelocity};
-use gluey::{Case, CaseError, Formulation, RunOptions, RunReport, Strategy};
+use gluey::{Case, CaseError, Formulation, RunError, RunOptions, RunReport, Strategy};
 
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
 use super::progress::{Board, duration};
@@ -50,12 +50,18 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
 
 /// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.partial-1` holds what a failed
 /// run wrote.
-pub fn run(root: &Path, folder: &Path, key: RunKey, quick: bool, board: &Board) -> Result<RunReport, String> {
+pub fn run(
+    root: &Path,
+    folder: &Path,
+    key: RunKey,
+    quick: bool,
+    board: &Board,
+) -> Result<RunReport, RunError> {
     let line = board.start(key);
     let result = run_to_files(root, folder, key, quick, &line);
     match &result {
         Ok(report) => line.finish(&format!("done in {}", duration(report.wall_s))),
-        Err(error) => line.finish(&format!("failed: {error}")),
+        Err(error) => line.finish(&format!("failed: {}", chain(error))),
     }
     result
 }
@@ -66,10 +72,9 @@ fn run_to_files(
     key: RunKey,
     quick: bool,
     line: &dyn gluey::Progress,
-) -> Result<RunReport, String> {
+) -> Result<RunReport, RunError> {
     let csv = folder.join(format!("{key}.csv"));
-    let case = case(root, key, quick).map_err(|error| chain(&error))?;
-    gluey::run(&case, &RunOptions::csv(csv), line).map_err(|error| chain(&error))
+    gluey::run(&case(root, key, quick)?, &RunOptions::csv(csv), line)
 }
 
 /// An error with its causes.

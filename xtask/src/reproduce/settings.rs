@@ -54,7 +54,7 @@ fn flow(case: &Case) -> String {
     let flow = &case.flow;
     match flow.formulation {
         Formulation::RigidDofs => {
-            let offset = flow.rigid_dofs.offset.unwrap_or(gluey::flow::default_offset(case.dimension));
+            let offset = case.rigid_offset();
             format!("rigid-dofs, offset {offset} h")
         }
         Formulation::Paper => {

@@ -3,6 +3,7 @@
 use gluey::RunReport;
 use serde::Serialize;
 
+use super::plan::FigureName;
 use super::settings::Settings;
 use super::verdict::Row;
 
@@ -16,7 +17,7 @@ pub struct Summary {
     /// Wall time of everything, seconds.
     pub wall_s: f64,
     /// The figures drawn.
-    pub figures: Vec<String>,
+    pub figures: Vec<FigureName>,
     /// The runs that succeeded.
     pub runs: Vec<Run>,
     /// What did not work.

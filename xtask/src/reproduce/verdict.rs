@@ -101,7 +101,7 @@ impl Claim {
         };
         Row {
             id: self.id,
-            figure: figure.to_string(),
+            figure,
             kind: self.kind,
             statement: self.statement,
             run: self.run,
@@ -120,7 +120,7 @@ pub struct Row {
     /// Names the row for good.
     pub id: &'static str,
     /// The figure under which it is shown.
-    pub figure: String,
+    pub figure: FigureName,
     /// Why it is there.
     pub kind: Kind,
     /// The statement.

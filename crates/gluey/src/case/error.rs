@@ -1,4 +1,4 @@
-//! What can be wrong with a case, with the numbers needed to mend it.
+//! What can be wrong with a case, with the numbers needed to fix it.
 
 use std::fmt;
 use std::io;
@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
-use crate::flow::MeshEstimate;
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -24,29 +24,6 @@ pub enum CaseError {
     /// The file was read, but something in it is wrong.
     #[error(transparent)]
     Invalid(Box<CaseIssue>),
-    /// Nothing in it is wrong, but its mesh does not fit into this machine.
-    #[error(transparent)]
-    TooLarge(TooLarge),
-}
-
-/// A case that needs more memory than there is.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error(
-    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {:.1} GB of memory; {}",
-    .estimate.cell_count, .estimate.unknown_count, .estimate.bytes / 1e9, there(*.available)
-)]
-pub struct TooLarge {
-    /// What it would need.
-    pub estimate: MeshEstimate,
-    /// Bytes there are, if that is known.
-    pub available: Option<u64>,
-}
-
-fn there(available: Option<u64>) -> String {
-    match available {
-        Some(bytes) => format!("{:.1} GB are there", bytes as f64 / 1e9),
-        None => "at most 2^32 - 1 can be numbered".into(),
-    }
 }
 
 /// One thing that is wrong in a case file, and where.
@@ -197,6 +174,14 @@ pub enum Problem {
         /// The range, in words: `greater than 0`.
         range: String,
     },
+    /// A parameter that the solver refuses.
+    #[error("{found} is out of range")]
+    Parameter {
+        /// The value.
+        found: f64,
+        /// The range, in words: `must be larger than 1`.
+        wanted: &'static str,
+    },
     /// A vector with another number of coordinates than the dimension.
     #[error("{found} coordinates in {dimension}D")]
     CoordinateCount {
@@ -335,11 +320,13 @@ impl Problem {
             Self::Dimension { .. } => "dimension is 2 or 3".into(),
             Self::NotFinite { .. } => "expected a finite number".into(),
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
+            Self::Parameter { wanted, .. } => format!("it {wanted}"),
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
-            Self::UnevenBox { .. } => {
-                "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than 2^18".into()
-            }
+            Self::UnevenBox { .. } => format!(
+                "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than \
+                 2^{FINEST_LEVEL}"
+            ),
             Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
             Self::PeriodTooShort { period, axis, .. } => {
                 format!("the radius must be at most {}, or the box longer along {axis}", 0.25 * period)

@@ -6,17 +6,10 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{CaseError, CaseIssue, Key, Problem};
+use super::error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 use super::suggest::closest;
 use super::validate::{Violation, check};
-use super::{
-    Boundary, Case, ContactSolver, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName,
-};
-
-/// Names of choices that other crates own, in their order.
-const STRATEGIES: &[&str] = &["none", "velocity-correction", "inelastic", "gluey"];
-const MEMORIES: &[&str] = &["paper", "consistent"];
-const SCHEMES: &[&str] = &["euler", "adams-bashforth-2"];
+use super::{Case, UnknownName};
 
 impl Case {
     /// Reads and checks a case file.
@@ -56,11 +49,12 @@ impl Source<'_> {
     }
 
     fn type_issue(&self, tree: &Spanned<DeTable<'_>>, error: &toml::de::Error) -> CaseError {
-        let problem = classify(error.message());
         let span = error.span().unwrap_or(0..0);
+        let key = key_at(tree, &span);
+        let problem = classify(error.message(), &key);
         let key = match &problem {
             Problem::MissingKey { name, .. } => table_at(tree, &span).name(name),
-            _ => key_at(tree, &span),
+            _ => key,
         };
         let span = match &problem {
             Problem::MissingKey { .. } => first_line(self.text, &span),
@@ -111,8 +105,8 @@ impl Source<'_> {
     }
 }
 
-/// Sorts serde's message into a [`Problem`].
-fn classify(message: &str) -> Problem {
+/// Sorts serde's message about the value of `key` into a [`Problem`].
+fn classify(message: &str, key: &Key) -> Problem {
     let quoted: Vec<String> = message.split('`').skip(1).step_by(2).map(str::to_owned).collect();
     let first = quoted.first().cloned().unwrap_or_default();
     if message.starts_with("missing field") {
@@ -122,8 +116,12 @@ fn classify(message: &str) -> Problem {
         let suggestion = closest(&first, known.iter().map(String::as_str)).map(str::to_owned);
         Problem::UnknownKey { name: first, suggestion, known }
     } else if message.starts_with("unknown variant") {
-        unknown_name(first, &quoted[1..])
-            .unwrap_or_else(|| Problem::Malformed { message: message.to_owned() })
+        let what = key.0.iter().rev().find_map(|part| match part {
+            KeyPart::Name(name) => Some(name.clone()),
+            KeyPart::Index(_) => None,
+        });
+        let what = what.unwrap_or_else(|| "name".to_owned());
+        Problem::UnknownName(UnknownName { what, found: first, known: quoted[1..].to_vec() })
     } else if message.starts_with("wanted string") {
         Problem::WrongType { found: "something without quotes".into(), expected: "a name in quotes".into() }
     } else if let Some((found, expected)) = wrong_type(message) {
@@ -152,23 +150,6 @@ fn in_words(expected: &str) -> String {
             None => other.to_owned(),
         },
     }
-}
-
-/// The list of names that serde offers, matched with the choice it belongs to.
-fn unknown_name(found: String, known: &[String]) -> Option<Problem> {
-    let lists: [(&'static str, &'static [&'static str]); 9] = [
-        ("strategy", STRATEGIES),
-        ("memory", MEMORIES),
-        ("contact solver", &ContactSolver::NAMES),
-        ("formulation", Formulation::NAMES),
-        ("hydrodynamics", Hydrodynamics::NAMES),
-        ("solver", Solver::NAMES),
-        ("velocity", ParticleVelocity::NAMES),
-        ("time scheme", SCHEMES),
-        ("boundary", Boundary::NAMES),
-    ];
-    let (what, known) = lists.into_iter().find(|(_, names)| names.iter().eq(known.iter()))?;
-    Some(Problem::UnknownName(UnknownName { what, found, known }))
 }
 
 /// A line that would supply a missing key.

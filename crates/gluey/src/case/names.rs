@@ -13,18 +13,18 @@ use super::suggest::closest;
 #[error("`{found}` is not a known {what}")]
 pub struct UnknownName {
     /// What was to be named: `strategy`, `formulation`, ...
-    pub what: &'static str,
+    pub what: String,
     /// The name as given.
     pub found: String,
     /// All names that would be right.
-    pub known: &'static [&'static str],
+    pub known: Vec<String>,
 }
 
 impl UnknownName {
     /// What would be right, with the nearest name first.
     pub fn hint(&self) -> String {
         let choices = self.known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
-        match closest(&self.found, self.known.iter().copied()) {
+        match closest(&self.found, self.known.iter().map(String::as_str)) {
             Some(near) => format!("did you mean \"{near}\"? One of {choices}"),
             None => format!("one of {choices}"),
         }
@@ -65,9 +65,9 @@ macro_rules! named {
 
             fn from_str(found: &str) -> Result<Self, UnknownName> {
                 Self::ALL.iter().copied().find(|choice| choice.name() == found).ok_or_else(|| UnknownName {
-                    what: $what,
+                    what: $what.to_owned(),
                     found: found.to_owned(),
-                    known: Self::NAMES,
+                    known: Self::NAMES.iter().map(|&name| name.to_owned()).collect(),
                 })
             }
         }

@@ -1,10 +1,13 @@
 //! What a case must satisfy beyond its types.
 
+use gluey_stokes::StokesError;
+
 use super::Case;
+use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::names::{Hydrodynamics, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
-use crate::reference::{self, Mismatch, Reference};
+use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,10 +50,11 @@ fn check_name(name: &str, key: Key) -> Check {
 fn check_reference(case: &Case, key: Key) -> Check {
     let Some(name) = &case.reference else { return Ok(()) };
     let Some(table) = Reference::named(name) else {
-        let problem = UnknownName { what: "reference", found: name.clone(), known: reference::NAMES };
-        return fail(key, Problem::UnknownName(problem));
+        let known = reference::NAMES.iter().map(|&name| name.to_owned()).collect();
+        let unknown = UnknownName { what: "reference".to_owned(), found: name.clone(), known };
+        return fail(key, Problem::UnknownName(unknown));
     };
-    match table.mismatch(case) {
+    match mismatch(case, &table) {
         Some(Mismatch { needs, found }) => fail(key, Problem::Unfit { choice: name.clone(), needs, found }),
         None => Ok(()),
     }
@@ -68,7 +72,7 @@ fn check_domain(case: &Case, key: &Key) -> Check {
     }
     match case.flow.hydrodynamics {
         Hydrodynamics::Stokes if case.root_cells().is_none() => {
-            fail(key.name("upper"), Problem::UnevenBox { edges: edges(case) })
+            fail(key.name("upper"), Problem::UnevenBox { edges: case.edges() })
         }
         _ => Ok(()),
     }
@@ -183,11 +187,13 @@ fn check_mesh(case: &Case, key: &Key) -> Check {
         return out_of_range(cells, "of 1 or more", key.name("cells_per_radius"));
     }
     // An analytic model has no mesh to be too fine.
-    let (Some(roots), Some(finest)) = (case.root_cells(), case.finest_level()) else { return Ok(()) };
-    let radius = smallest(case.particles.iter().map(|particle| particle.radius));
-    let root_size = edges(case)[0] / f64::from(roots[0]);
-    let level = (cells * root_size / radius * (1.0 - 1e-9)).log2().ceil().max(0.0);
+    let (Some(root_size), Some(finest), Some(level)) =
+        (case.root_size(), case.finest_level(), case.surface_level())
+    else {
+        return Ok(());
+    };
     if level > f64::from(finest) {
+        let radius = case.smallest_radius();
         let largest = radius / root_size * f64::from(1u32 << finest);
         let problem = Problem::MeshTooFine { cells_per_radius: cells, radius, level, finest, largest };
         return fail(key.name("cells_per_radius"), problem);
@@ -217,23 +223,15 @@ fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
     }
 }
 
+/// The solver knows the ranges of its parameters, which have the names of the keys.
 fn check_paper(case: &Case, key: &Key) -> Check {
-    let paper = &case.flow.paper;
-    if !(paper.viscosity_ratio > 1.0 && paper.viscosity_ratio <= 1e12) {
-        return out_of_range(
-            paper.viscosity_ratio,
-            "greater than 1, up to 1e12",
-            key.name("viscosity_ratio"),
-        );
+    match case.flow.paper.params().check() {
+        Err(StokesError::Parameter { name, value: found, wanted }) => {
+            finite(found, key.name(name))?;
+            fail(key.name(name), Problem::Parameter { found, wanted })
+        }
+        _ => Ok(()),
     }
-    if !(1..=10_000).contains(&paper.uzawa_steps) {
-        return out_of_range(paper.uzawa_steps as f64, "from 1 to 10000", key.name("uzawa_steps"));
-    }
-    between(paper.rho, 0.0, 4.0, key.name("rho"))?;
-    if !(paper.ramp > 0.0 && paper.ramp <= 100.0) {
-        return out_of_range(paper.ramp, "greater than 0, up to 100", key.name("ramp"));
-    }
-    Ok(())
 }
 
 /// The analytic model knows two equal spheres in unbounded shear.
@@ -288,12 +286,4 @@ fn out_of_range(found: f64, range: &str, key: Key) -> Check {
 
 fn fail(key: Key, problem: Problem) -> Check {
     Err(Violation { key, problem })
-}
-
-fn edges(case: &Case) -> Vec<f64> {
-    case.lower().iter().zip(case.upper()).map(|(lower, upper)| upper - lower).collect()
-}
-
-fn smallest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(f64::INFINITY, f64::min)
 }

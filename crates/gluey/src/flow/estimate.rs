@@ -73,13 +73,11 @@ struct Tree {
 impl Tree {
     fn of(case: &Case) -> Option<Self> {
         let roots = case.root_cells()?;
-        let root_size = (case.upper()[0] - case.lower()[0]) / f64::from(roots[0]);
-        let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
         Some(Self {
             dimension: case.dimension as i32,
             root_count: roots.iter().map(|&count| f64::from(count)).product(),
-            root_size,
-            refinement: refinement(case, root_size, &radii),
+            root_size: case.root_size()?,
+            refinement: refinement(case, case.surface_level()?),
         })
     }
 

@@ -1,47 +1,25 @@
-//! Why a run came to nothing.
+//! Why a run failed.
 
 use std::path::PathBuf;
 
-use gluey_motion::PairMobilityError;
 use thiserror::Error;
 
-use crate::case::{Case, CaseError, Hydrodynamics};
+use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
-use crate::flow::FlowError;
+use crate::hydrodynamics::HydrodynamicsError;
+use crate::memory::TooLarge;
 use crate::output::{ClaimError, OutputError, RowsError};
 use crate::simulation::StepError;
 
-/// The flow could not be computed.
-#[derive(Debug, Error)]
-pub enum HydrodynamicsError {
-    /// By the analytic model of two spheres.
-    #[error(transparent)]
-    PairMobility(#[from] PairMobilityError),
-    /// By the finite-element solver.
-    #[error(transparent)]
-    Flow(#[from] FlowError),
-    /// The model does not exist in this dimension.
-    #[error("there is no {hydrodynamics} hydrodynamics in {dimension}D")]
-    Unfit {
-        /// The model.
-        hydrodynamics: Hydrodynamics,
-        /// The dimension.
-        dimension: usize,
-    },
-}
-
-impl HydrodynamicsError {
-    pub(super) fn unfit(case: &Case) -> Self {
-        Self::Unfit { hydrodynamics: case.flow.hydrodynamics, dimension: case.dimension }
-    }
-}
-
-/// A run came to nothing.
+/// Why a run failed.
 #[derive(Debug, Error)]
 pub enum RunError {
     /// The case makes no sense.
     #[error(transparent)]
     Case(#[from] CaseError),
+    /// Nothing in the case is wrong, but its mesh does not fit into this machine.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
     /// Something could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),

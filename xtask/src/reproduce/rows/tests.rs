@@ -83,7 +83,7 @@ fn every_figure_with_runs_has_statements_and_every_row_its_own_name() {
     let (data, reports) = (Data::default(), BTreeMap::new());
     let rows = all(&FigureName::ALL, &Evidence { data: &data, reports: &reports });
     for figure in FigureName::ALL.into_iter().filter(|figure| !figure.approaches().is_empty()) {
-        let statements = rows.iter().filter(|row| row.figure == figure.as_str() && row.kind == Kind::Paper);
+        let statements = rows.iter().filter(|row| row.figure == figure && row.kind == Kind::Paper);
         assert!(statements.count() >= 2, "{figure}");
     }
     let mut names: Vec<&str> = rows.iter().map(|row| row.id).collect();
