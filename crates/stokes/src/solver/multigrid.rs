@@ -7,7 +7,7 @@
 //! mesh cut at depth `l`. On every level the solid nodes of that level are eliminated; a coarse correction
 //! enters as the rigid motion that fits it best. In the `paper` formulation the finest level moves every node
 //! the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and left to a
-//! correction, [`crate::precondition::solid::SolidBlock`].
+//! correction, [`crate::precondition::solid::PenalisedCorrection`].
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::CellOperator;
