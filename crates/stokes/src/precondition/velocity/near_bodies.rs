@@ -13,7 +13,7 @@
 //! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, LinOp, SpectralInterval};
+use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp};
 
 use super::SAFETY;
 use crate::operator::{BlockDiagonal, Restricted, acting, add_at};
@@ -23,11 +23,8 @@ use crate::space::{ActiveCell, VelocitySpace, nodes_of_cells_with};
 const MOST_DIMENSIONS: usize = 2;
 /// Cells between a body and the farthest relaxed nodes.
 const RINGS: usize = 3;
-/// Applications of the diagonal in a sweep.
-const DEGREE: usize = 6;
-/// Largest over smallest eigenvalue that a sweep damps: more than that of a level, since no coarser mesh
-/// helps.
-const RATIO: f64 = 20.0;
+/// A sweep, which damps more of the spectrum than that of a level, since no coarser mesh helps.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 6, ratio: 20.0, safety: SAFETY, lanczos_steps: 0 };
 
 /// The sweep around the bodies of one level.
 #[derive(Clone, Debug)]
@@ -72,9 +69,8 @@ where
         positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
         let acting = acting(discretisation, cells, &near);
         let operator = Restricted::new(space, &acting, cells.len(), positions, None);
-        let interval = SpectralInterval::upper_part(lambda_max, RATIO, SAFETY);
         let dim = operator.dim();
-        let chebyshev = Chebyshev::new(dim, DEGREE, interval);
+        let chebyshev = Chebyshev::below(lambda_max, dim, &SWEEP);
         Some(Self { operator, diagonal, chebyshev, r: vec![0.0; dim], e: vec![0.0; dim] })
     }
 
