@@ -18,6 +18,8 @@ use super::discretisation::Discretisation;
 pub type SolidNodes = Vec<Option<u32>>;
 
 const NO_BODY: u32 = u32::MAX;
+/// Numbers of a rigid motion in any dimension, at most.
+const MOST_RIGID: usize = 6;
 
 /// A node that moves with a body, with its arm in units of the body's radius.
 #[derive(Clone, Debug)]
@@ -124,9 +126,11 @@ where
     /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these
     /// are.
     pub fn add_rigid_motions<S: Scalar, T: Scalar>(&self, x: &[S], u: &mut [T]) {
-        let twists: Vec<T> = x[self.full_dim()..].iter().map(|x| T::from_f64(x.to_f64())).collect();
+        let twists = &x[self.full_dim()..];
         for r in &self.rigid {
-            let twist = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let entries = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let twist: [T; MOST_RIGID] =
+                std::array::from_fn(|k| T::from_f64(entries.get(k).map_or(0.0, |entry| entry.to_f64())));
             for (c, value) in u[r.node as usize * D..][..D].iter_mut().enumerate() {
                 *value += twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
             }
@@ -216,7 +220,7 @@ where
     fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {
         let n = Dim::<D>::RIGID;
         for (load, inverse) in loads.chunks_exact_mut(n).zip(&self.fit) {
-            let old: [f64; 6] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
+            let old: [f64; MOST_RIGID] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
             for (i, value) in load.iter_mut().enumerate() {
                 let row = |m: &Vec<f64>| (0..n).map(|j| m[i * n + j] * old[j]).sum::<f64>();
                 *value = T::from_f64(inverse.as_ref().map_or(0.0, row));
