@@ -11,9 +11,9 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
 use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
-use crate::space::Discretisation;
+use crate::space::{Discretisation, WeakPressures};
 use warm_start::WarmStart;
 
 pub use refinement::Refinement;
@@ -40,6 +40,20 @@ pub struct FlowParams {
     /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed
     /// flow.
     pub tolerance: f64,
+}
+
+impl FlowParams {
+    /// The usual choice in 2D or 3D: a fluid of viscosity one, rigid nodes, the direct solver in 2D and
+    /// multigrid in 3D, to 1e-6.
+    pub fn for_dimension(dimension: usize) -> Self {
+        let offset = default_offset(dimension);
+        Self {
+            viscosity: 1.0,
+            formulation: Formulation::RigidDofs { offset, weak_pressures: WeakPressures::Aggregate },
+            solver: if dimension == 2 { SolverKind::Direct } else { SolverKind::Multigrid },
+            tolerance: 1e-6,
+        }
+    }
 }
 
 /// A computed flow.

@@ -1,5 +1,5 @@
-//! How rigidity is imposed: [`Formulation`] names the ways, [`Method`] and [`problem::Rigidity`] say what
-//! each provides.
+//! How rigidity is imposed: [`Formulation`] names the ways, each of which implements [`Method`] and
+//! [`problem::Rigidity`].
 //!
 //! Another formulation is a file or folder of this room and an arm of [`Formulation::method`].
 
@@ -40,7 +40,7 @@ impl Formulation {
     ///
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
-    pub fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError>
+    pub(crate) fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError>
     where
         Dim<D>: Space<D>,
     {
@@ -55,7 +55,7 @@ impl Formulation {
 
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
-    pub fn check(&self) -> Result<(), StokesError> {
+    pub(crate) fn check(&self) -> Result<(), StokesError> {
         match self {
             Self::RigidDofs { offset, .. } => rigid_dofs::check(*offset),
             Self::Paper(params) => params.check(),

@@ -110,7 +110,7 @@ where
     /// The rigid bodies.
     pub bodies: Vec<Ball<D>>,
     /// How they are rigid.
-    pub rigidity: Arc<dyn Rigidity<D>>,
+    pub(crate) rigidity: Arc<dyn Rigidity<D>>,
 }
 
 impl<const D: usize> Problem<D>
@@ -123,7 +123,7 @@ where
     /// # Errors
     /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller
     /// than a cell.
-    pub fn on(
+    pub(crate) fn on(
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         viscosity: f64,

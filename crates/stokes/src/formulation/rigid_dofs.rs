@@ -54,7 +54,7 @@ where
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, bodies, self.offset);
         let space = VelocitySpace::new(discretisation, bodies, &solid);
         check_resolved(discretisation, bodies, |body| space.is_active(body))?;
-        Ok((StokesSystem::new(space, viscosity, self.weak_pressures, None), Arc::new(*self)))
+        Ok((StokesSystem::new(space, viscosity, self.weak_pressures), Arc::new(*self)))
     }
 }
 

@@ -20,9 +20,9 @@ pub struct StokesSystem<const D: usize> {
     /// Reduced pressures.
     pub pressure: PressureSpace<D>,
     /// Cells that are not rigid, with the scales of their matrices.
-    pub cells: Vec<ActiveCell>,
-    /// The penalised solid, in that formulation.
-    pub penalty: Option<Penalty<D>>,
+    pub(crate) cells: Vec<ActiveCell>,
+    /// The penalised solid, in the `paper` formulation.
+    pub(crate) penalty: Option<Penalty<D>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
 }
@@ -32,7 +32,16 @@ where
     Dim<D>: Space<D>,
 {
     /// The system with fluid viscosity `viscosity` on the velocities of `space`.
-    pub fn new(
+    pub fn new(space: VelocitySpace<D>, viscosity: f64, weak: WeakPressures) -> Self {
+        Self::with_penalty(space, viscosity, weak, None)
+    }
+
+    /// The system with a penalised solid beside the fluid.
+    pub(crate) fn penalised(space: VelocitySpace<D>, viscosity: f64, penalty: Penalty<D>) -> Self {
+        Self::with_penalty(space, viscosity, WeakPressures::Keep, Some(penalty))
+    }
+
+    fn with_penalty(
         space: VelocitySpace<D>,
         viscosity: f64,
         weak: WeakPressures,
@@ -206,7 +215,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, weak, None);
+        let system = StokesSystem::new(space, 1.5, weak);
         let mut x = vec![0.0f64; system.dim()];
         for q in (0..system.pressure.dim()).filter(|&q| system.pressure.is_free(q)) {
             x[system.velocity_dim() + q] = 1.0;

@@ -17,7 +17,7 @@ where
 {
     let nowhere = vec![None; flow.discretisation.velocity.node_count()];
     let space = VelocitySpace::new::<Ball<D>>(&flow.discretisation, &[], &nowhere);
-    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
+    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep);
     let mut b = vec![0.0; system.dim()];
     system.residual(&flow.velocity, &flow.pressure, &mut b);
     b

@@ -102,7 +102,7 @@ where
     let bodies: [Ball<D>; 0] = [];
     let solid = vec![None; discretisation.velocity.node_count()];
     let space = VelocitySpace::new(discretisation, &bodies, &solid);
-    StokesSystem::new(space, viscosity, WeakPressures::Keep, None)
+    StokesSystem::new(space, viscosity, WeakPressures::Keep)
 }
 
 /// The nodes whose velocity is that of the boundary or of a body.
@@ -282,7 +282,7 @@ mod tests {
         assert!(!discretisation.pressure.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], 0.0);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
-        let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
+        let system = StokesSystem::new(space, 1.0, WeakPressures::Keep);
         let weights = weights_in(&system, 1.0);
         let mut least = 1.0f64;
         for (q, &weight) in weights.iter().enumerate() {

@@ -21,7 +21,7 @@ impl CoarseSolver {
     where
         Dim<D>: Space<D>,
     {
-        let system = StokesSystem::new(space, viscosity, WeakPressures::Keep, None);
+        let system = StokesSystem::new(space, viscosity, WeakPressures::Keep);
         let assembled = assemble_viscous(&system)?;
         let factor = factorised(&assembled.matrix, Ordering::Amd)?;
         let count = assembled.unknowns.len();
