@@ -15,8 +15,8 @@ use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 pub use gluey_stokes::default_offset;
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, NodalFields, PaperParams, PhaseTimes, Refinement, SolverKind, StokesError,
-    WarmStartError, WeakPressures,
+    CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PaperParams, PhaseTimes, Refinement,
+    SolverKind, StokesError, WarmStartError,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -270,7 +270,7 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let formulation = match flow.formulation {
         Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
             offset: flow.rigid_dofs.offset.unwrap_or(default_offset(D)),
-            weak_pressures: WeakPressures::Aggregate,
+            cut_cell_pressures: CutCellPressures::Aggregate,
         },
         Formulation::Paper => gluey_stokes::Formulation::Paper(PaperParams {
             viscosity_ratio: flow.paper.viscosity_ratio,

@@ -17,8 +17,8 @@
 //! # Ok::<(), gluey_stokes::StokesError>(())
 //! ```
 //!
-//! A program that only wants flows needs [`FlowSolver`], [`FlowParams`] and [`Refinement`]. One that calls the
-//! linear solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
+//! A program that only wants flows needs [`FlowSolver`], [`FlowParams`] and [`Refinement`]. One that calls
+//! the linear solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
 //!
 //! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, the penalised
 //! solid, operators, preconditioners, formulations of rigidity, solvers, flows.
@@ -40,7 +40,7 @@ pub use flow::{
 };
 // How rigidity is imposed.
 pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
-pub use space::WeakPressures;
+pub use space::CutCellPressures;
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.

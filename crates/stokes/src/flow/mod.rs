@@ -13,7 +13,7 @@ use gluey_levelset::Ball;
 use crate::error::StokesError;
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
 use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
-use crate::space::{Discretisation, WeakPressures};
+use crate::space::{CutCellPressures, Discretisation};
 use warm_start::WarmStart;
 
 pub use refinement::Refinement;
@@ -49,7 +49,7 @@ impl FlowParams {
         let offset = default_offset(dimension);
         Self {
             viscosity: 1.0,
-            formulation: Formulation::RigidDofs { offset, weak_pressures: WeakPressures::Aggregate },
+            formulation: Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate },
             solver: if dimension == 2 { SolverKind::Direct } else { SolverKind::Multigrid },
             tolerance: 1e-6,
         }
@@ -106,7 +106,7 @@ where
     warm_start: Option<WarmStart<D>>,
 }
 
-/// What the solves of one prediction took.
+/// Effort of the solves of one prediction.
 #[derive(Default)]
 struct Effort {
     solve_count: usize,
@@ -151,7 +151,7 @@ where
         self.solve_forced(mesh, bodies, boundary, None)
     }
 
-    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike:
+    /// The flow under a force `f(x)` per unit of volume, on fluid and bodies alike:
     /// `-div(2 eta eps(u)) + grad p = f`.
     pub fn solve_forced(
         &mut self,
@@ -238,7 +238,7 @@ where
         Ok(())
     }
 
-    /// What the solve starts from, and the last flow on its mesh; zero and nothing at the first step.
+    /// The initial guess, and the last flow on its mesh; zero and nothing at the first step.
     fn initial_guess(&self, problem: &Problem<D>) -> (Vec<f64>, Option<NodalFields>) {
         match &self.warm_start {
             Some(warm) if self.params.solver == SolverKind::Multigrid => {

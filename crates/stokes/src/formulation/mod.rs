@@ -15,7 +15,7 @@ use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::space::{Discretisation, WeakPressures};
+use crate::space::{CutCellPressures, Discretisation};
 
 pub use paper::{PaperParams, ParticleVelocity};
 pub use problem::{Data, Method, Problem, check_viscosity};
@@ -29,14 +29,14 @@ pub enum Formulation {
         /// Nodes with `alpha >= offset h` are rigid; slightly negative is best, see `docs/theory`.
         offset: f64,
         /// Treatment of the pressures in cut cells.
-        weak_pressures: WeakPressures,
+        cut_cell_pressures: CutCellPressures,
     },
     /// Penalty and Uzawa multiplier of the paper.
     Paper(PaperParams),
 }
 
 impl Formulation {
-    /// What the formulation keeps from mesh to mesh.
+    /// The formulation with all it keeps from mesh to mesh.
     ///
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
@@ -46,8 +46,8 @@ impl Formulation {
     {
         self.check()?;
         Ok(match *self {
-            Self::RigidDofs { offset, weak_pressures } => {
-                Arc::new(rigid_dofs::RigidDofs { offset, weak_pressures })
+            Self::RigidDofs { offset, cut_cell_pressures } => {
+                Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
         })

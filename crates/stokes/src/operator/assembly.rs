@@ -209,11 +209,11 @@ impl CellForms {
 struct Reduction {
     /// Place of each unknown among those of the cell at hand.
     place: Vec<u32>,
-    /// Number of these.
+    /// Number of unknowns of the cell.
     count: usize,
     /// `K`.
     element: Vec<f64>,
-    /// Its number of rows.
+    /// Number of rows of `K`.
     size: usize,
     /// A row of `K C`.
     row: Vec<f64>,
@@ -259,7 +259,7 @@ impl Reduction {
 mod tests {
     use super::*;
     use crate::operator::system::SystemOperator;
-    use crate::space::{Discretisation, WeakPressures, solid_nodes};
+    use crate::space::{CutCellPressures, Discretisation, solid_nodes};
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
@@ -278,7 +278,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, WeakPressures::Aggregate);
+        let system = StokesSystem::new(space, 1.5, CutCellPressures::Aggregate);
         let assembled = assemble_stokes(&system).unwrap();
         let unknowns = &assembled.unknowns;
         let x: Vec<f64> = (0..unknowns.len()).map(|i| (0.37 * i as f64).sin()).collect();

@@ -1,9 +1,9 @@
 //! Velocities that are rigid inside bodies, zero on the boundary and continuous across hanging nodes.
 //!
 //! A reduced vector holds the nodal velocities (`D` interleaved components; entries of hanging, boundary and
-//! rigid nodes are zero) and, after them, `RIGID` numbers a body: the velocity `U` of its reference point and
-//! its spin times its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`; a
-//! rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
+//! rigid nodes are zero) and, after them, `RIGID` numbers per body: the velocity `U` of its reference point
+//! and its spin times its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`;
+//! a rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
 //! it turns nodal loads into loads on free nodes, forces and (scaled) torques.
 
 use gluey_fem::NodeMap;
@@ -202,7 +202,7 @@ where
     }
 
     /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of
-    /// `RIGID` coefficients a component.
+    /// `RIGID` coefficients per component.
     pub fn rigid_rows(&self) -> impl Iterator<Item = (u32, u32, Vec<f64>)> + '_ {
         self.rigid.iter().map(|r| (r.node, r.body, rigid_matrix(&r.arm)))
     }
