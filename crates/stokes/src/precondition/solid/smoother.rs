@@ -212,8 +212,9 @@ impl<const D: usize> Preconditioner<f32> for DiagonalAndPatches<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::DiagonalError;
     use crate::formulation::{Formulation, PaperParams, Problem};
-    use crate::solid::{PointMatrices, SolidRegion};
+    use crate::solid::{Penalty, PointMatrices, SolidRegion};
     use crate::space::{VelocitySpace, around_films};
     use gluey_fem::{ReferenceMatrices, TreeMesh};
     use gluey_geom::{Aabb, Vector};
@@ -246,8 +247,8 @@ mod tests {
         (problem, touched)
     }
 
-    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` adds its answer to
-    /// the error's load.
+    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` corrects
+    /// it from its load.
     fn energies(problem: &Problem<3>, marked: &[bool], sweep: impl FnOnce(&[f64], &mut [f64])) -> [f64; 2] {
         let system = &problem.system;
         let (cells, penalty) = (&system.cells, system.penalty.as_ref());
@@ -287,6 +288,38 @@ mod tests {
             assert!(smoother.take_applications() == (SWEEP.degree - 1) as f64);
             assert!(after > 0.0 && after < 0.01 * before, "{viscosity_ratio:e}: {before:e} -> {after:e}");
         }
+    }
+
+    /// The smoother of a mesh where everything is solid, for viscosities of any sign.
+    fn smoother_of(viscosity: f64, factor: f64) -> Result<PenalisedSmoother<3>, StokesError> {
+        let (problem, _) = problem(2, 1e2, &[Ball::new(Vector::repeat(0.47), 0.3)]);
+        let Penalty { stress, .. } = problem.system.penalty.clone().unwrap();
+        let space = problem.system.space.clone();
+        let system = StokesSystem::penalised(space, viscosity, Penalty { factor, stress });
+        let elements = Elements::new(&system, ReferenceMatrices::<3>::VELOCITY);
+        let solid = NumberedNodes::new(system.discretisation(), |n| system.space.is_free(n));
+        let matrix = assemble_on_nodes(&solid, &elements).unwrap();
+        let all = vec![true; solid.nodes.whole()];
+        PenalisedSmoother::new(&system, &all, &solid, &matrix)
+    }
+
+    #[test]
+    fn a_fluid_or_solid_of_negative_viscosity_is_named() {
+        let refused = smoother_of(-1.0, 0.99).err().unwrap();
+        assert!(matches!(refused, StokesError::AroundSolid(DiagonalError::Node { .. })), "{refused:?}");
+        let text = refused.to_string();
+        assert!(
+            text.starts_with("the fluid around the solid cannot be smoothed: the diagonal entry"),
+            "{text}"
+        );
+        let refused = smoother_of(1.0, -10.0).err().unwrap();
+        assert!(matches!(refused, StokesError::SolidPatch(_)), "{refused:?}");
+        let text = refused.to_string();
+        assert!(
+            text.starts_with("the solid cannot be smoothed cell by cell:") && text.contains("pivot"),
+            "{text}"
+        );
+        assert!(smoother_of(1.0, 0.99).is_ok());
     }
 
     /// Two balls of radius 0.15 with this gap.
