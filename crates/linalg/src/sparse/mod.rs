@@ -1,5 +1,5 @@
-//! Sparse matrices: compressed rows, blocks of unknowns that are coupled alike, symmetric blocks with Galerkin
-//! products, slices for products.
+//! Sparse matrices: compressed rows, blocks of unknowns that are coupled alike, symmetric blocks with
+//! Galerkin products, slices for products.
 
 mod block_pattern;
 mod matrix;

@@ -1,9 +1,9 @@
 //! The Schur complement of the box, from its coarsest mesh.
 //!
 //! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow
-//! that would answer them does not fit between its walls. A mesh of a few cells knows them. With the Schur
-//! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that stands for it (see
-//! [`crate::schur`]), and the interpolation `P` from its pressures,
+//! that they would drive does not fit between its walls. A mesh of a few cells resolves them. With the Schur
+//! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that approximates it
+//! (see [`super`]), and the interpolation `P` from its pressures,
 //!
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!
@@ -25,7 +25,7 @@ use crate::space::Discretisation;
 
 /// Largest dense matrix.
 const MOST_PRESSURES: usize = 1000;
-/// Share of the mass that is added to `S_0`, for meshes so coarse that no velocity sees some pressure.
+/// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
 const SHARE_OF_MASS: f64 = 1e-3;
 
 /// `P (S_0^-1 - T_0^-1) P^T`.
@@ -154,7 +154,7 @@ where
     let count = unknowns.len();
     let mass = DMatrix::from_fn(count, count, |i, j| mass.get(unknowns[i] as usize, unknowns[j] as usize));
     let mut schur = dense_schur(system, unknowns)? + SHARE_OF_MASS * &mass;
-    // Constants, which no velocity sees, get a stiffness like that of the rest.
+    // Constants, which act on no velocity, get a stiffness like that of the rest.
     schur.add_scalar_mut(schur.trace() / (count * count) as f64);
     let schur = schur.cholesky().ok_or_else(|| failed(SmallMatrix::Schur))?;
     let mass = mass.cholesky().ok_or_else(|| failed(SmallMatrix::Mass))?;

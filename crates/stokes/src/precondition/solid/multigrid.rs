@@ -3,8 +3,8 @@
 //! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D,
 //! where factors are small, the operator on these nodes is factorised. In 3D a multigrid cycle on coarser
 //! meshes approximates its inverse, with the Galerkin products `P^T A P` on those of their nodes that lie
-//! among the solid's, so a cell that is cut stays cut as it is. [`SchwarzPatches`] on the cells smooth all but
-//! the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
+//! among the solid's, so a cell that is cut stays cut as it is. [`SchwarzPatches`] on the cells smooth all
+//! but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
@@ -51,8 +51,8 @@ where
         Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
     }
 
-    /// The cycle below the nodes of `solid`, on which the operator is `matrix`, on the `meshes` of the coarser
-    /// levels, fine to coarse.
+    /// The cycle below the nodes of `solid`, on which the operator is `matrix`, on the `meshes` of the
+    /// coarser levels, fine to coarse.
     pub fn below<'a>(
         solid: &NumberedNodes<'a, D>,
         matrix: &SymmetricBlockMatrix<D>,

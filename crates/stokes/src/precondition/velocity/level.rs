@@ -143,8 +143,8 @@ where
         }
     }
 
-    /// Restricts what is to be corrected to the right-hand side of the coarser level: the residual of a sweep
-    /// from zero, or the right-hand side of this level.
+    /// Restricts to the right-hand side of the coarser level: the residual of a sweep from zero, or the
+    /// right-hand side of this level.
     pub fn restrict(
         &mut self,
         transfer: &mut Interpolation<D>,
@@ -189,15 +189,15 @@ fn restrict_load<const D: usize>(
 {
     let nodal = space.full_dim();
     twist_loads.copy_from_slice(&b[nodal..]);
-    // What this leaves at rigid nodes no smoother looks at.
+    // Smoothers ignore the entries that this leaves at rigid nodes.
     space.spread(b);
     restrict(b);
     b[nodal..].copy_from_slice(twist_loads);
 }
 
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
-/// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 %
-/// (3D) too large.
+/// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is a few percent
+/// too large.
 fn cell_lambda_max<const D: usize>() -> f64 {
     let n = ReferenceMatrices::<D>::VELOCITY;
     let viscous = ReferenceMatrices::<D>::new().viscous;

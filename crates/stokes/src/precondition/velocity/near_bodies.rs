@@ -2,12 +2,10 @@
 //!
 //! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it
 //! cannot correct: errors that reach over two or three cells from a body, too smooth for the sweep of a
-//! level. With two touching discs (N = 256) the eigenvalues of the V-cycle times the operator that are
-//! farthest below one, 0.79 to 0.83, are of this kind, with three quarters of their energy within two cells
-//! of a surface; those of the fluid begin at 0.89. As Brandt (1984) advises for boundaries, some more
+//! level. Of all errors the V-cycle reduces these the least
+//! (`docs/decisions/0014-relaxation-near-bodies.md`). As Brandt (1984) advises for boundaries, some more
 //! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
-//! are most of the cells of the finest mesh: one or two iterations fewer cost a sixth to a third more time,
-//! so there is none.
+//! are most of the cells of the finest mesh, and the iterations saved do not pay for it.
 //!
 //! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists
 //! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
