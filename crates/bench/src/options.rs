@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use gluey_stokes::{Formulation, PaperParams, WeakPressures};
+use gluey_stokes::{CutCellPressures, Formulation, PaperParams};
 use serde::Serialize;
 
 use crate::cases::Case;
@@ -61,7 +61,7 @@ impl Options {
         match self.formulation {
             FormulationName::RigidDofs => Formulation::RigidDofs {
                 offset: gluey_stokes::default_offset(dimension),
-                weak_pressures: WeakPressures::Aggregate,
+                cut_cell_pressures: CutCellPressures::Aggregate,
             },
             FormulationName::Paper => Formulation::Paper(PaperParams {
                 viscosity_ratio: self.contrast,

@@ -9,7 +9,9 @@ use gluey_contact::{ContactModel, ContactParams, PairContact, StepGeometry};
 use gluey_geom::{Aabb, Particle, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Integrator, Scheme};
-use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, WeakPressures};
+use gluey_stokes::{
+    CutCellPressures, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind,
+};
 
 /// Radius of the discs; the box is the unit square.
 const RADIUS: f64 = 0.05;
@@ -34,7 +36,7 @@ pub fn methods() -> [Method; 3] {
     let coarse = Refinement { coarsest: 3, surface: 7, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
     let resolved = Refinement { surface: 8, gap_fraction: 1.0, gap_levels: 9, ..coarse };
     let paper = Formulation::Paper(PaperParams::default());
-    let rigid = Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
+    let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
     let method =
         |name, formulation, refinement, has_contact| Method { name, formulation, refinement, has_contact };
     [

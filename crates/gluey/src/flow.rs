@@ -14,8 +14,8 @@ use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, StokesError,
-    WarmStartError, WeakPressures,
+    CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind,
+    StokesError, WarmStartError,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -251,7 +251,7 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let formulation = match flow.formulation {
         Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
             offset: case.rigid_offset(),
-            weak_pressures: WeakPressures::Aggregate,
+            cut_cell_pressures: CutCellPressures::Aggregate,
         },
         Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
     };

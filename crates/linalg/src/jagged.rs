@@ -71,6 +71,12 @@ impl<T> Jagged<T> {
         self.starts.push(u32::try_from(self.items.len()).expect("at most 2^32 items, as documented"));
     }
 
+    /// Drops all lists and keeps their memory.
+    pub fn clear(&mut self) {
+        self.starts.truncate(1);
+        self.items.clear();
+    }
+
     /// Number of lists.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
@@ -95,6 +101,11 @@ impl<T> Jagged<T> {
     /// The items of all lists.
     pub fn items(&self) -> &[T] {
         &self.items
+    }
+
+    /// The items of all lists, to be changed in place.
+    pub fn items_mut(&mut self) -> &mut [T] {
+        &mut self.items
     }
 
     /// First item of each list, and the number of items.
@@ -156,6 +167,13 @@ mod tests {
         assert_eq!((&jagged[1], jagged.range(2)), (&[][..], 2..3));
         assert_eq!((jagged.items(), jagged.starts()), (&[3, 1, 7][..], &[0, 2, 2, 3][..]));
         assert_eq!(jagged, Jagged::from_starts(vec![0, 2, 2, 3], vec![3, 1, 7]));
+
+        let mut again = jagged;
+        again.items_mut().iter_mut().for_each(|item| *item += 1);
+        assert_eq!((&again[0], &again[2]), (&[4, 2][..], &[8][..]));
+        again.clear();
+        again.push([5]);
+        assert!(again.iter().eq([&[5][..]]));
     }
 
     #[test]

@@ -45,8 +45,11 @@ pub use jagged::Jagged;
 pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
-pub use smoother::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
-pub use sparse::{BlockGroups, BlockPattern, Pattern, SellMatrix, SparseError, SparseMatrix};
+pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval};
+pub use sparse::{
+    BlockGroups, BlockPattern, LocalTerm, Pattern, Prolongation, SellMatrix, SparseError, SparseMatrix,
+    SymmetricBlockMatrix,
+};
 pub use subset::Subset;
 
 #[cfg(doctest)]

@@ -18,7 +18,7 @@ pub enum StokesError {
     Unresolved {
         /// Index of the body, from 0; messages count from 1.
         body: usize,
-        /// Its radius.
+        /// Radius of the body.
         radius: f64,
         /// Size of the finest cells.
         cell_size: f64,
@@ -33,7 +33,7 @@ pub enum StokesError {
     NoSolid {
         /// Index of the body, from 0; messages count from 1.
         body: usize,
-        /// Its radius.
+        /// Radius of the body.
         radius: f64,
         /// Size of the finest cells.
         cell_size: f64,
@@ -43,9 +43,9 @@ pub enum StokesError {
     Parameter {
         /// Name of the parameter.
         name: &'static str,
-        /// Its value.
+        /// Value of the parameter.
         value: f64,
-        /// What would be right.
+        /// Range of right values.
         wanted: &'static str,
     },
     /// A matrix could not be assembled.
@@ -65,7 +65,7 @@ pub enum StokesError {
     Smoother {
         /// Level, 0 is the coarsest.
         level: usize,
-        /// What is wrong.
+        /// Cause.
         source: DiagonalError,
     },
     /// The fluid around a penalised solid cannot be smoothed.
@@ -74,26 +74,26 @@ pub enum StokesError {
     /// The penalised operator on the nodes of a cell is not positive definite.
     #[error("the solid cannot be smoothed cell by cell: {0}")]
     SolidPatch(#[source] BlockError),
-    /// The matrix that stands for the Schur complement has a bad diagonal.
+    /// The matrix that approximates the Schur complement has a bad diagonal.
     #[error("the mass of the pressures: {0}")]
     PressureMass(#[source] BadDiagonal),
-    /// The pressures as large as the box cannot be answered.
+    /// The Schur complement of the pressures as large as the box cannot be inverted.
     #[error("the {matrix} of the {pressures} pressures of a mesh of {cells} cells is not positive definite")]
     BoxPressures {
-        /// What is not positive definite.
+        /// The matrix that is not positive definite.
         matrix: SmallMatrix,
-        /// Its size.
+        /// Number of rows.
         pressures: usize,
         /// Cells of the coarsest mesh.
         cells: usize,
     },
-    /// The pressures of a gap cannot be answered.
+    /// The Schur complement of the pressures of a gap cannot be inverted.
     #[error(
         "the {matrix} of the gap at {place:?}, with {pressures} pressures and {velocities} velocities, is not positive \
          definite"
     )]
     GapPressures {
-        /// What is not positive definite.
+        /// The matrix that is not positive definite.
         matrix: SmallMatrix,
         /// A node of the gap.
         place: Vec<f64>,
@@ -107,7 +107,7 @@ pub enum StokesError {
     NotPrepared,
 }
 
-/// What has no inverse in the diagonal of an operator.
+/// A part of the diagonal of an operator that has no inverse.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DiagonalError {
     /// An entry is not positive.
@@ -123,7 +123,7 @@ pub enum DiagonalError {
     Body {
         /// Index of the body, from 0; messages count from 1.
         body: usize,
-        /// What is wrong.
+        /// Cause.
         source: BlockError,
     },
 }
@@ -135,7 +135,7 @@ pub enum SmallMatrix {
     Stiffness,
     /// Schur complement.
     Schur,
-    /// What stands for the Schur complement elsewhere.
+    /// Approximation of the Schur complement that is used elsewhere.
     Mass,
 }
 
@@ -152,6 +152,19 @@ impl std::fmt::Display for SmallMatrix {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The errors of other crates say all themselves; a box says what of it is wrong.
+    #[test]
+    fn messages_pass_on_causes() {
+        let pivot = BlockError::NotPositiveDefinite { pivot: 4, value: -1e-3 };
+        assert_eq!(StokesError::Cell(pivot).to_string(), pivot.to_string());
+        let entry = SparseError::TooLarge { entry_count: 7 };
+        assert_eq!(StokesError::from(entry).to_string(), entry.to_string());
+        let error = StokesError::BoxPressures { matrix: SmallMatrix::Schur, pressures: 25, cells: 16 };
+        let text = error.to_string();
+        assert!(text.contains("Schur complement of the 25 pressures of a mesh of 16 cells"), "{text}");
+        assert!(StokesError::NotPrepared.to_string().contains("not prepared"));
+    }
 
     /// People count bodies from one, and think of radii in cells.
     #[test]

@@ -1,23 +1,27 @@
-//! Stokes flow around rigid bodies by a fictitious-domain Q2-Q1 finite-element method.
+//! Stokes flow around rigid bodies by an unfitted Q2-Q1 finite-element method.
 //!
-//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body
-//! and no force or torque on any. [`Formulation`] names the two ways to impose rigidity.
+//! `-div(2 eta eps(u)) + grad p = f`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body
+//! and no force or torque on any but those of `f`. [`Formulation`] names the two ways to impose rigidity.
 //!
 //! ```
-//! use gluey_geom::{Aabb, Vector};
-//! use gluey_levelset::Ball;
-//! use gluey_stokes::{FlowParams, FlowSolver, Formulation, Refinement, SolverKind, WeakPressures};
+//! use gluey_stokes::geom::{Aabb, Vector};
+//! use gluey_stokes::levelset::Ball;
+//! use gluey_stokes::{FlowParams, FlowSolver, Refinement};
 //!
 //! let disc = Ball::new(Vector::<2>::new(0.5, 0.7), 0.05);
-//! let refinement = Refinement { coarsest: 3, surface: 6, band: 2.0, gap_fraction: 1.0, gap_levels: 9 };
+//! let refinement = Refinement { gap_fraction: 1.0, gap_levels: 9, ..Refinement::to_level(6) };
 //! let mesh = refinement.mesh(Aabb::unit(), [1, 1], [false; 2], &[disc])?;
-//! let formulation = Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
-//! let params = FlowParams { viscosity: 1.0, formulation, solver: SolverKind::Direct, tolerance: 1e-8 };
-//! let mut solver = FlowSolver::<2>::new(params)?;
+//! let mut solver = FlowSolver::<2>::new(FlowParams { tolerance: 1e-8, ..FlowParams::for_dimension(2) })?;
 //! let flow = solver.solve(mesh, &[disc], &|x| Vector::<2>::new(x[1] - 0.5, 0.0))?;
 //! assert!((flow.twists[0].velocity[0] - 0.2022).abs() < 1e-3);
 //! # Ok::<(), gluey_stokes::StokesError>(())
 //! ```
+//!
+//! A program that only wants flows needs [`FlowSolver`], [`FlowParams`] and [`Refinement`]. One that calls
+//! the linear solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
+//!
+//! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, the penalised
+//! solid, operators, preconditioners, formulations of rigidity, solvers, flows.
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
@@ -30,16 +34,25 @@ mod solid;
 mod solver;
 mod space;
 
-pub use error::{DiagonalError, SmallMatrix, StokesError};
+// A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{
     Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, WarmStartError,
 };
-pub use formulation::{Formulation, PaperParams, ParticleVelocity, Problem, default_offset};
-pub use gluey_fem::Evaluator;
+// How rigidity is imposed.
+pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
+pub use space::CutCellPressures;
+// Why there is no flow.
+pub use error::{DiagonalError, SmallMatrix, StokesError};
+// The linear system and its solvers.
+pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
-pub use solid::{Penalty, PointMatrices, SolidRegion, SolidStress};
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
-pub use space::{
-    ActiveCell, CellKind, Discretisation, PressureSpace, SolidNodes, VelocitySpace, WeakPressures, cell_kind,
-    solid_nodes,
-};
+// The parts of the system: unknowns, and where the penalised solid is.
+pub use solid::{PointMatrices, SolidRegion};
+pub use space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
+// The crates whose types appear in this one.
+pub use {gluey_fem as fem, gluey_geom as geom, gluey_levelset as levelset, gluey_linalg as linalg};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

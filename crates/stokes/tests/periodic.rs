@@ -3,7 +3,9 @@
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, WeakPressures};
+use gluey_stokes::{
+    CutCellPressures, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind,
+};
 
 const REFINEMENT: Refinement =
     Refinement { coarsest: 3, surface: 5, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
@@ -45,7 +47,7 @@ where
 
 #[test]
 fn a_ball_across_the_border_moves_like_one_inside() {
-    let rigid = Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
+    let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
     let paper = Formulation::Paper(PaperParams { uzawa_steps: 2, ..PaperParams::default() });
     for formulation in [rigid, paper] {
         crossing_the_border_changes_nothing::<2>(formulation, SolverKind::Direct);

@@ -1,5 +1,7 @@
 //! Smoothers: they damp the part of an error that a coarser mesh does not see.
 
 mod chebyshev;
+mod schwarz;
 
 pub use chebyshev::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
+pub use schwarz::SchwarzPatches;

@@ -11,9 +11,9 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
 use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
-use crate::space::Discretisation;
+use crate::space::{CutCellPressures, Discretisation};
 use warm_start::WarmStart;
 
 pub use refinement::Refinement;
@@ -40,6 +40,20 @@ pub struct FlowParams {
     /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed
     /// flow.
     pub tolerance: f64,
+}
+
+impl FlowParams {
+    /// The usual choice in 2D or 3D: a fluid of viscosity one, rigid nodes, the direct solver in 2D and
+    /// multigrid in 3D, to 1e-6.
+    pub fn for_dimension(dimension: usize) -> Self {
+        let offset = default_offset(dimension);
+        Self {
+            viscosity: 1.0,
+            formulation: Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate },
+            solver: if dimension == 2 { SolverKind::Direct } else { SolverKind::Multigrid },
+            tolerance: 1e-6,
+        }
+    }
 }
 
 /// A computed flow.
@@ -92,7 +106,7 @@ where
     warm_start: Option<WarmStart<D>>,
 }
 
-/// What the solves of one prediction took.
+/// Effort of the solves of one prediction.
 #[derive(Default)]
 struct Effort {
     solve_count: usize,
@@ -137,7 +151,7 @@ where
         self.solve_forced(mesh, bodies, boundary, None)
     }
 
-    /// The flow under a force `f(x)` a unit of volume, on fluid and bodies alike:
+    /// The flow under a force `f(x)` per unit of volume, on fluid and bodies alike:
     /// `-div(2 eta eps(u)) + grad p = f`.
     pub fn solve_forced(
         &mut self,
@@ -224,7 +238,7 @@ where
         Ok(())
     }
 
-    /// What the solve starts from, and the last flow on its mesh; zero and nothing at the first step.
+    /// The initial guess, and the last flow on its mesh; zero and nothing at the first step.
     fn initial_guess(&self, problem: &Problem<D>) -> (Vec<f64>, Option<NodalFields>) {
         match &self.warm_start {
             Some(warm) if self.params.solver == SolverKind::Multigrid => {

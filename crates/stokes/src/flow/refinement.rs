@@ -25,6 +25,11 @@ pub struct Refinement {
 }
 
 impl Refinement {
+    /// Cells of this level in bodies and two cell sizes around them, none finer in gaps.
+    pub fn to_level(surface: u8) -> Self {
+        Self { coarsest: surface.min(3), surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
+    }
+
     /// The mesh of `domain` around `bodies`.
     ///
     /// # Errors

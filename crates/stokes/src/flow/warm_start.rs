@@ -1,13 +1,12 @@
-//! What an iterative solve starts from: the last two flows, extrapolated in time.
+//! Initial guesses of iterative solves: the last two flows, extrapolated in time.
 //!
 //! The deviation `d` from the undisturbed flow at the next step is guessed as `2 d^n - d^(n-1)`, both moved
 //! to the new mesh. `d^(n-1)` was already moved to the mesh of `d^n` one step before, so both live on one
 //! mesh. The extrapolation assumes equal steps; others only make it a worse guess.
 //!
 //! In `rigid-dofs` the guess is `d^n`: nodes enter and leave the bodies one by one, and extrapolation doubles
-//! the jumps this makes. Iterations a step of the two spheres of the paper's figure 7 from zero / `d^n` /
-//! `2 d^n - d^(n-1)` / `d^n + c (d^n - d^(n-1))` with the smallest residual: `paper` 23 / 17 / 12 / 14,
-//! `rigid-dofs` 19 / 13 / 14 / 14.
+//! the jumps this makes. Iterations from these and from other guesses are in
+//! `docs/experiments/0010-krylov-vectors.md`.
 
 use gluey_fem::Evaluator;
 use gluey_fem::{NodeMap, TreeMesh};
@@ -90,7 +89,7 @@ where
         (&self.last, self.before.as_ref())
     }
 
-    /// The same two on another mesh.
+    /// Both flows on another mesh.
     pub fn moved(&self, to: &Discretisation<D>) -> Self {
         let from = &self.discretisation;
         if from.mesh == to.mesh {

@@ -1,5 +1,5 @@
-//! How rigidity is imposed: [`Formulation`] names the ways, [`Method`] and [`problem::Rigidity`] say what
-//! each provides.
+//! How rigidity is imposed: [`Formulation`] names the ways, each of which implements [`Method`] and
+//! [`problem::Rigidity`].
 //!
 //! Another formulation is a file or folder of this room and an arm of [`Formulation::method`].
 
@@ -15,7 +15,7 @@ use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::space::{Discretisation, WeakPressures};
+use crate::space::{CutCellPressures, Discretisation};
 
 pub use paper::{PaperParams, ParticleVelocity};
 pub use problem::{Data, Method, Problem, check_viscosity};
@@ -29,25 +29,25 @@ pub enum Formulation {
         /// Nodes with `alpha >= offset h` are rigid; slightly negative is best, see `docs/theory`.
         offset: f64,
         /// Treatment of the pressures in cut cells.
-        weak_pressures: WeakPressures,
+        cut_cell_pressures: CutCellPressures,
     },
     /// Penalty and Uzawa multiplier of the paper.
     Paper(PaperParams),
 }
 
 impl Formulation {
-    /// What the formulation keeps from mesh to mesh.
+    /// The formulation with all it keeps from mesh to mesh.
     ///
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
-    pub fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError>
+    pub(crate) fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError>
     where
         Dim<D>: Space<D>,
     {
         self.check()?;
         Ok(match *self {
-            Self::RigidDofs { offset, weak_pressures } => {
-                Arc::new(rigid_dofs::RigidDofs { offset, weak_pressures })
+            Self::RigidDofs { offset, cut_cell_pressures } => {
+                Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
         })
@@ -55,7 +55,7 @@ impl Formulation {
 
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
-    pub fn check(&self) -> Result<(), StokesError> {
+    pub(crate) fn check(&self) -> Result<(), StokesError> {
         match self {
             Self::RigidDofs { offset, .. } => rigid_dofs::check(*offset),
             Self::Paper(params) => params.check(),

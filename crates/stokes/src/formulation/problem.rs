@@ -1,5 +1,5 @@
 //! The linear system of a flow around rigid bodies, for those who call the linear solvers themselves, and
-//! what a formulation of rigidity provides for it: [`Method`], [`Rigidity`].
+//! the traits that a formulation of rigidity implements: [`Method`], [`Rigidity`].
 //!
 //! The velocity is `lift + T x`: the lift carries the boundary values, and `x` solves
 //! `[A, -B^T; -B, 0] x = b` with the residual `b` of the lift.
@@ -35,7 +35,7 @@ where
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError>;
 }
 
-/// What a formulation provides for a flow on one mesh, beside its system.
+/// A formulation on one mesh, beside its system.
 pub trait Rigidity<const D: usize>: Debug + Send + Sync
 where
     Dim<D>: Space<D>,
@@ -49,7 +49,7 @@ where
     /// Predicts the flow from the residual `b` of the `lift` and the guess `x`, by one solve or several.
     ///
     /// # Errors
-    /// Those of the solves.
+    /// The errors of the solves.
     fn solve(
         &self,
         problem: &Problem<D>,
@@ -71,7 +71,7 @@ where
     /// How a level of the velocity cycle smooths; `None` if it only joins the coarser ones to what follows.
     fn smoothing(&self, levels: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing>;
 
-    /// What the levels cannot see: a correction around the velocity cycle.
+    /// A correction around the velocity cycle, for the errors that its levels do not reduce.
     ///
     /// # Errors
     /// If it cannot be set up.
@@ -83,12 +83,12 @@ where
     ) -> Result<Option<Box<dyn Correction>>, StokesError>;
 }
 
-/// What a prediction is made from.
+/// Data of a prediction.
 #[derive(Clone, Copy, Debug)]
 pub struct Data<'a> {
     /// The field that carries the boundary values.
     pub lift: &'a [f64],
-    /// Its residual, with the loads of forces.
+    /// Residual of that field, with the loads of forces.
     pub b: &'a [f64],
 }
 
@@ -110,7 +110,7 @@ where
     /// The rigid bodies.
     pub bodies: Vec<Ball<D>>,
     /// How they are rigid.
-    pub rigidity: Arc<dyn Rigidity<D>>,
+    pub(crate) rigidity: Arc<dyn Rigidity<D>>,
 }
 
 impl<const D: usize> Problem<D>
@@ -123,7 +123,7 @@ where
     /// # Errors
     /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller
     /// than a cell.
-    pub fn on(
+    pub(crate) fn on(
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
@@ -158,7 +158,7 @@ where
         lift
     }
 
-    /// The load of the force `f(x)` per unit of volume, less what the lift makes of it.
+    /// The load of the force `f(x)` per unit of volume, less that of the lift.
     pub fn right_hand_side(&self, lift: &[f64], force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
         let mut b = vec![0.0; self.system.dim()];
         if let Some(force) = force {

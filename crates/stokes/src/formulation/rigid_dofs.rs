@@ -11,7 +11,7 @@ use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
-use crate::space::{Discretisation, VelocitySpace, WeakPressures, solid_nodes};
+use crate::space::{CutCellPressures, Discretisation, VelocitySpace, solid_nodes};
 
 /// Offset of the rigid nodes in cells that suits a dimension. In 3D, where films are not resolved, a larger
 /// one makes up for the resistance of the film.
@@ -38,7 +38,7 @@ pub struct RigidDofs {
     /// Nodes with `alpha >= offset h` are rigid.
     pub offset: f64,
     /// Treatment of the pressures in cut cells.
-    pub weak_pressures: WeakPressures,
+    pub cut_cell_pressures: CutCellPressures,
 }
 
 impl<const D: usize> Method<D> for RigidDofs
@@ -54,7 +54,7 @@ where
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, bodies, self.offset);
         let space = VelocitySpace::new(discretisation, bodies, &solid);
         check_resolved(discretisation, bodies, |body| space.is_active(body))?;
-        Ok((StokesSystem::new(space, viscosity, self.weak_pressures, None), Arc::new(*self)))
+        Ok((StokesSystem::new(space, viscosity, self.cut_cell_pressures), Arc::new(*self)))
     }
 }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    AffineConstraints, BlockGroups, BlockPattern, DirectSpd, Ordering, RefinementParams, SparseError,
+    AffineConstraints, BlockGroups, BlockPattern, DirectSpd, Jagged, Ordering, RefinementParams, SparseError,
     SparseMatrix, Subset, Symbolic,
 };
 
@@ -25,16 +25,6 @@ pub fn factorised(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Result<Direc
     let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
     factor.factorise(matrix.values())?;
     Ok(factor)
-}
-
-/// The forms in the numbers of the kept unknowns, where those of `forms` are positions less `shift`.
-fn renumbered(forms: &AffineConstraints, shift: usize, unknowns: &Subset) -> AffineConstraints {
-    let mut new = AffineConstraints::zeros(forms.row_count(), unknowns.len());
-    for row in 0..forms.row_count() {
-        let terms = forms.terms(row).iter();
-        new.set(row, terms.filter_map(|&(k, w)| Some((unknowns.number(k as usize + shift)? as u32, w))));
-    }
-    new
 }
 
 /// A sparse matrix in the kept unknowns.
@@ -61,8 +51,8 @@ where
         Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
         None => keeps_velocity(&system.space, k),
     });
-    let velocity = renumbered(&velocity_expansion(&system.space), 0, &unknowns);
-    let pressure = renumbered(&pressure_expansion(&system.pressure), split, &unknowns);
+    let velocity = velocity_expansion(&system.space).restricted_to(&unknowns, 0);
+    let pressure = pressure_expansion(&system.pressure).restricted_to(&unknowns, split);
     let forms = |cell: usize, local: &mut CellForms| {
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
         discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.terms(q as usize)));
@@ -95,7 +85,7 @@ where
     let unknowns = Subset::new(system.velocity_dim(), |k| {
         keeps_velocity(&system.space, k) && (k >= nodal || keep(k / D))
     });
-    let velocity = renumbered(&velocity_expansion(&system.space), 0, &unknowns);
+    let velocity = velocity_expansion(&system.space).restricted_to(&unknowns, 0);
     let forms = |cell: usize, local: &mut CellForms| {
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
     };
@@ -127,8 +117,8 @@ where
     let mut cells = Vec::with_capacity(system.cells.len());
     for (index, cell) in system.cells.iter().enumerate() {
         forms(cell.cell as usize, &mut local);
-        if !local.terms.is_empty() {
-            groups.push(local.terms.iter().map(|term| numbering.of[term.0 as usize] as usize));
+        if !local.terms().is_empty() {
+            groups.push(local.terms().iter().map(|term| numbering.of[term.0 as usize] as usize));
             cells.push((index, cell));
         }
     }
@@ -183,8 +173,7 @@ impl Blocks {
 /// The linear forms of a cell's local unknowns, in a row.
 #[derive(Default)]
 struct CellForms {
-    ends: Vec<u32>,
-    terms: Vec<(u32, f64)>,
+    forms: Jagged<(u32, f64)>,
     /// The local unknown that each term belongs to.
     locals: Vec<u32>,
 }
@@ -192,8 +181,7 @@ struct CellForms {
 impl CellForms {
     /// The forms of the velocities at `nodes`, and no others.
     fn set_velocity(&mut self, velocity: &AffineConstraints, nodes: &[u32], component_count: usize) {
-        self.ends.clear();
-        self.terms.clear();
+        self.forms.clear();
         self.locals.clear();
         for &node in nodes {
             let first = node as usize * component_count;
@@ -202,20 +190,18 @@ impl CellForms {
     }
 
     fn push(&mut self, form: &[(u32, f64)]) {
-        self.terms.extend_from_slice(form);
-        self.locals.resize(self.terms.len(), self.ends.len() as u32);
-        self.ends.push(self.terms.len() as u32);
+        self.locals.resize(self.locals.len() + form.len(), self.forms.len() as u32);
+        self.forms.push(form.iter().copied());
+    }
+
+    /// Unknown and weight of all terms.
+    fn terms(&self) -> &[(u32, f64)] {
+        self.forms.items()
     }
 
     /// Whether each form is the unknown in its place.
     fn is_identity(&self) -> bool {
-        let own = |(term, k): (&(u32, f64), u32)| *term == (k, 1.0);
-        self.ends.iter().zip(1..).all(|(&end, k)| end == k) && self.terms.iter().zip(0..).all(own)
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &[(u32, f64)]> {
-        let starts = std::iter::once(&0).chain(&self.ends);
-        starts.zip(&self.ends).map(|(&start, &end)| &self.terms[start as usize..end as usize])
+        self.forms.iter().zip(0..).all(|(form, k)| *form == [(k, 1.0)])
     }
 }
 
@@ -223,11 +209,11 @@ impl CellForms {
 struct Reduction {
     /// Place of each unknown among those of the cell at hand.
     place: Vec<u32>,
-    /// Number of these.
+    /// Number of unknowns of the cell.
     count: usize,
     /// `K`.
     element: Vec<f64>,
-    /// Its number of rows.
+    /// Number of rows of `K`.
     size: usize,
     /// A row of `K C`.
     row: Vec<f64>,
@@ -245,7 +231,7 @@ impl Reduction {
             self.place[unknown] = self.count as u32;
             self.count += 1;
         }
-        for term in &mut forms.terms {
+        for term in forms.forms.items_mut() {
             term.0 = self.place[term.0 as usize];
         }
     }
@@ -253,12 +239,12 @@ impl Reduction {
     /// Adds `C^T K C` to `target`.
     fn multiply(&mut self, forms: &CellForms, target: &mut [f64]) {
         self.row.resize(self.count, 0.0);
-        for (rows, values) in forms.iter().zip(self.element.chunks_exact(self.size)) {
+        for (rows, values) in forms.forms.iter().zip(self.element.chunks_exact(self.size)) {
             if rows.is_empty() {
                 continue;
             }
             self.row.fill(0.0);
-            for (&(column, weight), &local) in forms.terms.iter().zip(&forms.locals) {
+            for (&(column, weight), &local) in forms.terms().iter().zip(&forms.locals) {
                 self.row[column as usize] += weight * values[local as usize];
             }
             for &(r, weight) in rows {
@@ -273,7 +259,7 @@ impl Reduction {
 mod tests {
     use super::*;
     use crate::operator::system::SystemOperator;
-    use crate::space::{Discretisation, WeakPressures, solid_nodes};
+    use crate::space::{CutCellPressures, Discretisation, solid_nodes};
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
@@ -292,7 +278,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, WeakPressures::Aggregate, None);
+        let system = StokesSystem::new(space, 1.5, CutCellPressures::Aggregate);
         let assembled = assemble_stokes(&system).unwrap();
         let unknowns = &assembled.unknowns;
         let x: Vec<f64> = (0..unknowns.len()).map(|i| (0.37 * i as f64).sin()).collect();

@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Space};
 use super::system::StokesSystem;
 use crate::space::ActiveCell;
 
-/// The fluid of the factorised matrix is so compressible, relative to its viscosity: enough to make pressures
-/// that no velocity sees harmless. The solve corrects it.
+/// Relative artificial compressibility added to the factorised matrix: enough to make pressures that act on
+/// no velocity harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
 /// The matrices of the active cells.

@@ -10,7 +10,9 @@ use gluey_linalg::{LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
 use crate::solid::Penalty;
-use crate::space::{ActiveCell, Discretisation, PressureSpace, VelocitySpace, WeakPressures, active_cells};
+use crate::space::{
+    ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells,
+};
 
 /// Operator of the Stokes problem on a mesh, matrix-free.
 #[derive(Clone, Debug)]
@@ -20,9 +22,9 @@ pub struct StokesSystem<const D: usize> {
     /// Reduced pressures.
     pub pressure: PressureSpace<D>,
     /// Cells that are not rigid, with the scales of their matrices.
-    pub cells: Vec<ActiveCell>,
-    /// The penalised solid, in that formulation.
-    pub penalty: Option<Penalty<D>>,
+    pub(crate) cells: Vec<ActiveCell>,
+    /// The penalised solid, in the `paper` formulation.
+    pub(crate) penalty: Option<Penalty<D>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
 }
@@ -32,15 +34,24 @@ where
     Dim<D>: Space<D>,
 {
     /// The system with fluid viscosity `viscosity` on the velocities of `space`.
-    pub fn new(
+    pub fn new(space: VelocitySpace<D>, viscosity: f64, cut: CutCellPressures) -> Self {
+        Self::with_penalty(space, viscosity, cut, None)
+    }
+
+    /// The system with a penalised solid beside the fluid.
+    pub(crate) fn penalised(space: VelocitySpace<D>, viscosity: f64, penalty: Penalty<D>) -> Self {
+        Self::with_penalty(space, viscosity, CutCellPressures::Keep, Some(penalty))
+    }
+
+    fn with_penalty(
         space: VelocitySpace<D>,
         viscosity: f64,
-        weak: WeakPressures,
+        cut: CutCellPressures,
         penalty: Option<Penalty<D>>,
     ) -> Self {
         let cells = active_cells(&space, viscosity);
         Self {
-            pressure: PressureSpace::new(&space, &cells, weak),
+            pressure: PressureSpace::new(&space, &cells, cut),
             operator: cell_operator(&space, &cells, penalty.as_ref()),
             space,
             cells,
@@ -101,8 +112,8 @@ where
 
 /// The matrix of a [`StokesSystem`] with the workspace to apply it, to vectors in either precision.
 ///
-/// What a cell does is always computed in double precision. A stress is a small difference of velocities: in
-/// single precision a box of fluid at N = 256 takes 20 iterations in place of 17.
+/// Stresses of cells are always computed in double precision: they are small differences of velocities, and
+/// their rounding errors cost iterations (`docs/experiments/0010-krylov-vectors.md`).
 #[derive(Debug)]
 pub struct SystemOperator<'a, const D: usize>
 where
@@ -114,7 +125,7 @@ where
     applications: usize,
 }
 
-/// What it takes to apply the operator to vectors of `X`.
+/// Workspace of the operator for vectors of `X`.
 #[derive(Debug)]
 struct Work<X> {
     /// Pressures at all nodes.
@@ -194,7 +205,7 @@ mod tests {
     use gluey_levelset::Ball;
 
     /// Constant pressures do no work on any admissible velocity.
-    fn constants_are_in_the_kernel<const D: usize>(weak: WeakPressures)
+    fn constants_are_in_the_kernel<const D: usize>(cut: CutCellPressures)
     where
         Dim<D>: Space<D>,
     {
@@ -206,7 +217,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, weak, None);
+        let system = StokesSystem::new(space, 1.5, cut);
         let mut x = vec![0.0f64; system.dim()];
         for q in (0..system.pressure.dim()).filter(|&q| system.pressure.is_free(q)) {
             x[system.velocity_dim() + q] = 1.0;
@@ -219,9 +230,9 @@ mod tests {
 
     #[test]
     fn constant_pressures_do_no_work() {
-        for weak in [WeakPressures::Keep, WeakPressures::Aggregate] {
-            constants_are_in_the_kernel::<2>(weak);
-            constants_are_in_the_kernel::<3>(weak);
+        for cut in [CutCellPressures::Keep, CutCellPressures::Aggregate] {
+            constants_are_in_the_kernel::<2>(cut);
+            constants_are_in_the_kernel::<3>(cut);
         }
     }
 }

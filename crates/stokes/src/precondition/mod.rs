@@ -1,4 +1,4 @@
-//! The preconditioner: a V-cycle on the velocities, what the penalised solid needs beside it, and the Schur
+//! The preconditioner: a V-cycle on the velocities, a correction for the penalised solid, and the Schur
 //! complement.
 
 mod block_triangular;
@@ -10,7 +10,7 @@ use crate::space::Discretisation;
 
 pub use block_triangular::BlockTriangular;
 
-/// Cells in the radius of the largest body on a mesh on which what is in it is factorised in 3D, at most.
+/// In 3D the operator in the bodies is factorised on meshes with at most this many cells per largest radius.
 const FACTORISED_CELLS: f64 = 2.0;
 
 /// The meshes of a velocity cycle and the bodies in them.
@@ -35,7 +35,7 @@ impl<const D: usize> CycleLevels<'_, D> {
     }
 }
 
-/// A correction around the velocity cycle, for what its levels cannot see.
+/// A correction around the velocity cycle, for the errors that its levels do not reduce.
 pub trait Correction: Send {
     /// `z = M^-1 r` for reduced velocities, where `levels(f, u)` turns the nodal load `f` into the reduced
     /// velocities `u` of the finest level.

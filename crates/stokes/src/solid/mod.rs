@@ -7,4 +7,4 @@ mod stress;
 
 pub use quadrature::PointMatrices;
 pub use region::SolidRegion;
-pub use stress::{Penalty, SolidStress};
+pub use stress::{Penalty, SolidOperator, SolidStress};

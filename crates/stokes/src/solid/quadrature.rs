@@ -16,7 +16,7 @@ const PAIRS: usize = LINE * LINE;
 /// The velocity shape functions at the quadrature points of a cell.
 #[derive(Clone, Debug)]
 pub struct PointMatrices<const D: usize> {
-    /// Points a direction.
+    /// Points per direction.
     line: usize,
     points: Vec<([f64; D], f64)>,
     /// Values at each point.
@@ -32,7 +32,7 @@ pub struct PointMatrices<const D: usize> {
 type Slopes = (bool, bool);
 
 impl<const D: usize> PointMatrices<D> {
-    /// Prepares the tensor-product Gauss rule with `points` points a direction.
+    /// Prepares the tensor-product Gauss rule with `line` points per direction.
     pub fn new(line: usize) -> Self {
         let points = gauss_cube::<D>(line);
         let nodes = ReferenceMatrices::<D>::VELOCITY / D;
@@ -54,7 +54,7 @@ impl<const D: usize> PointMatrices<D> {
         }
     }
 
-    /// Points a direction.
+    /// Points per direction.
     pub fn line(&self) -> usize {
         self.line
     }

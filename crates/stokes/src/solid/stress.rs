@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, Workspace};
 use gluey_fem::{Chunks, NodeMap};
+use gluey_linalg::Jagged;
 
 use super::quadrature::PointMatrices;
 use super::region::{SolidCell, SolidRegion};
@@ -40,51 +41,43 @@ pub struct SolidStress<const D: usize> {
     matrices: Arc<PointMatrices<D>>,
 }
 
-/// What the solid adds to the viscosities of cells.
+/// The viscosities that the solid adds to those of the cells of a mesh, times `h^(D-2)`.
 pub struct SolidViscosities {
+    /// One value per cell.
     uniform: Vec<f64>,
-    /// Where the viscosities at the points of a cell start; `u32::MAX` for none.
-    start: Vec<u32>,
-    points: Vec<f64>,
-    point_count: usize,
+    /// Values at the quadrature points of each cell in which they vary.
+    points: Jagged<f64>,
 }
 
 impl SolidViscosities {
     /// The viscosity times `h^(D-2)` that the solid adds in all of a cell, and at its quadrature points if it
     /// varies.
     pub fn of(&self, cell: usize) -> (f64, &[f64]) {
-        let points = match self.start[cell] {
-            u32::MAX => &[],
-            start => &self.points[start as usize..][..self.point_count],
-        };
-        (self.uniform[cell], points)
+        (self.uniform[cell], &self.points[cell])
     }
 }
 
 impl<const D: usize> SolidStress<D> {
-    /// Gauss points a direction.
+    /// Gauss points per direction.
     pub fn quadrature(&self) -> usize {
         self.matrices.line()
     }
 
     /// `factor I eta_s h^(D-2)` in the cells of a mesh.
     pub fn viscosities(&self, factor: f64, cell_count: usize) -> SolidViscosities {
-        let mut new = SolidViscosities {
-            uniform: vec![0.0; cell_count],
-            start: vec![u32::MAX; cell_count],
-            points: Vec::new(),
-            point_count: self.matrices.points().len(),
-        };
-        for (solid, scale) in self.cells.iter().zip(self.scales.iter()) {
-            let scale = factor * scale;
-            if solid.fraction.is_empty() {
-                new.uniform[solid.cell as usize] = scale;
-            } else {
-                new.start[solid.cell as usize] = new.points.len() as u32;
-                new.points.extend(solid.fraction.iter().map(|f| scale * f));
+        let mut uniform = vec![0.0; cell_count];
+        let mut solid = self.cells.iter().zip(self.scales.iter()).peekable();
+        let points = uniform.iter_mut().enumerate().map(|(cell, uniform)| {
+            let here = solid.next_if(|(solid, _)| solid.cell as usize == cell);
+            let (fraction, scale) =
+                here.map_or((&[][..], 0.0), |(solid, scale)| (solid.fraction.as_slice(), factor * scale));
+            if fraction.is_empty() {
+                *uniform = scale;
             }
-        }
-        new
+            fraction.iter().map(move |f| scale * f)
+        });
+        let points = points.collect();
+        SolidViscosities { uniform, points }
     }
 
     /// Takes `K(I eta_s)` for `eta_s = solid_viscosity`.
@@ -120,17 +113,28 @@ impl<const D: usize> SolidStress<D> {
         }
     }
 
-    /// `y += K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes
-    /// moved to their masters.
-    pub fn apply(&self, nodes: &NodeMap<D>, x: &[f64], y: &mut [f64]) {
+    /// The operator, ready to be applied.
+    pub fn operator(&self, nodes: &NodeMap<D>) -> SolidOperator<D> {
         let viscosities = self.viscosities(1.0, nodes.cell_count());
         let data = self.cells.iter().map(|solid| {
             let (viscous, points) = viscosities.of(solid.cell as usize);
             CellData { cell: solid.cell as usize, viscous, divergence: 0.0, points }
         });
-        let operator = CellOperator::<f64, D>::new(&self.chunks, nodes, data, self.quadrature(), &[], 0);
-        let mut load = vec![0.0; operator.velocity_dim()];
-        operator.viscous_of_field(x, &mut load, &mut Workspace::default());
-        gluey_linalg::vector::axpy(1.0, &load, &mut y[..load.len()]);
+        let operator = CellOperator::new(&self.chunks, nodes, data, self.quadrature(), &[], 0);
+        SolidOperator { operator, work: Workspace::default() }
+    }
+}
+
+/// `K(I eta_s)` with the workspace to apply it.
+pub struct SolidOperator<const D: usize> {
+    operator: CellOperator<f64, D>,
+    work: Workspace<f64>,
+}
+
+impl<const D: usize> SolidOperator<D> {
+    /// `y = K(I eta_s) x` for nodal velocities that fulfil the constraints, with the loads on hanging nodes
+    /// moved to their masters.
+    pub fn apply(&mut self, x: &[f64], y: &mut [f64]) {
+        self.operator.viscous_of_field(x, y, &mut self.work);
     }
 }

@@ -1,4 +1,4 @@
-//! The trait behind which the linear solvers stand.
+//! The linear solvers behind one trait.
 
 mod direct;
 mod multigrid;
@@ -12,7 +12,7 @@ use crate::operator::StokesSystem;
 pub use direct::DirectSolver;
 pub use multigrid::MultigridSolver;
 
-/// What a linear solve took.
+/// Effort and residuals of a linear solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveReport {
     /// Krylov iterations, or corrections by a direct solver.

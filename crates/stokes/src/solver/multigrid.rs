@@ -1,4 +1,4 @@
-//! Krylov solution of the Stokes system with a multigrid preconditioner.
+//! GCR on the Stokes system with a block triangular preconditioner, whose velocity block is multigrid.
 //!
 //! Generalised conjugate residuals ([`Gcr`]) on `[A, -B^T; -B, 0]` with the block triangular preconditioner
 //! `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`: `S` is close to the Schur complement (see [`SchurInverse`]),
@@ -7,7 +7,7 @@
 //! mesh cut at depth `l`. On every level the solid nodes of that level are eliminated; a coarse correction
 //! enters as the rigid motion that fits it best. In the `paper` formulation the finest level moves every node
 //! the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and left to a
-//! correction, [`crate::precondition::solid::SolidBlock`].
+//! correction, [`crate::precondition::solid::PenalisedCorrection`].
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::CellOperator;
@@ -24,11 +24,12 @@ use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::solid::Penalty;
 use crate::space::{VelocitySpace, solid_nodes};
 
-/// Largest [`rounding_noise`] with which steps are taken in single precision. Two spheres in a penalised
-/// solid take the same iterations in either precision up to 2; where it is 5 (N = 64, contrast 1e4) they take
-/// 99 in place of 22.
+/// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
+/// iterations, see `docs/experiments/0010-krylov-vectors.md`.
 const MOST_NOISE: f64 = 1.0;
-/// Generalised conjugate residuals with a multigrid preconditioner.
+
+/// Generalised conjugate residuals (GCR) with a block triangular preconditioner: one V-cycle of multigrid on
+/// the velocities, an approximate Schur complement on the pressures.
 pub struct MultigridSolver<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -156,8 +157,8 @@ fn run<S: Scalar>(
     Ok(krylov.residual_history().to_vec())
 }
 
-/// What rounding a velocity to single precision changes in its viscous force, over the force of a velocity as
-/// smooth as the box: a difference of neighbours, times the viscosity of the solid.
+/// Change of the viscous force when a velocity is rounded to single precision, over the force of a velocity
+/// as smooth as the box: a difference of neighbours, times the viscosity of the solid.
 fn rounding_noise<const D: usize>(system: &StokesSystem<D>) -> f64
 where
     Dim<D>: Space<D>,

@@ -1,4 +1,4 @@
-//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures with weak ones
+//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, poorly supported pressures
 //! aggregated; the marking of nodes and cells.
 
 mod cells;
@@ -14,5 +14,5 @@ pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{
     CellKind, around_films, around_finest_cells, cell_kind, cells_touching, nodes_of_cells_with, solid_nodes,
 };
-pub use pressure::{PressureSpace, WeakPressures};
+pub use pressure::{CutCellPressures, PressureSpace};
 pub use velocity::{SolidNodes, VelocitySpace};

@@ -1,11 +1,13 @@
 //! Pressures that are continuous across hanging nodes and well supported near bodies.
 //!
-//! A pressure node that touches no cell with a free velocity node sees nothing and is dropped. One that lies
-//! inside a body but touches such a cell is *weak*: few free velocities see it, and left alone it makes the
-//! Schur complement nearly singular. With [`WeakPressures::Aggregate`] it takes the mean of the pressures at
-//! the nodes outside the bodies that share a cell with it; the divergence it would have tested is then tested
-//! by those, so nothing leaks. In a gap narrower than a cell, where no such node exists, weak nodes stay
-//! unknowns of their own: the lubrication pressure lives there.
+//! A pressure node that touches no cell with a free velocity node acts on nothing and is dropped. One that
+//! lies inside a body but touches such a cell is *poorly supported*: it acts on few free velocities, and left
+//! alone it makes the Schur complement nearly singular. With [`CutCellPressures::Aggregate`] it takes the
+//! mean of the pressures at the nodes outside the bodies that share a cell with it, in the manner of the
+//! aggregated finite element method (AgFEM: Badia, Verdugo and Martin 2018, Comput. Methods Appl. Mech. Eng.
+//! 336, 533); the divergence it would have tested is then tested by those, so nothing leaks. In a gap
+//! narrower than a cell, where no such node exists, poorly supported nodes stay unknowns of their own: the
+//! lubrication pressure is there.
 
 use std::sync::Arc;
 
@@ -17,24 +19,24 @@ use super::cells::ActiveCell;
 use super::discretisation::Discretisation;
 use super::velocity::VelocitySpace;
 
-/// What happens to the pressure nodes inside bodies that touch the fluid.
+/// Treatment of the poorly supported pressures: those of nodes inside bodies that touch the fluid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WeakPressures {
-    /// They stay unknowns.
+pub enum CutCellPressures {
+    /// Poorly supported pressures stay unknowns.
     Keep,
-    /// They take the mean of their outer neighbours.
+    /// Poorly supported pressures take the mean of their outer neighbours, an aggregation as in AgFEM.
     Aggregate,
 }
 
-/// The reduced pressure space of one mesh. Vectors have an entry a node; those of nodes that are not free are
-/// zero.
+/// The reduced pressure space of one mesh. Vectors have one entry per node, zero at nodes that are not
+/// free.
 #[derive(Clone, Debug)]
 pub struct PressureSpace<const D: usize> {
     nodes: Arc<NodeMap<D>>,
     free: Vec<bool>,
     free_count: usize,
     constraints: Vec<Constraint>,
-    weak: Vec<u32>,
+    poorly_supported: Vec<u32>,
 }
 
 impl<const D: usize> PressureSpace<D>
@@ -42,7 +44,7 @@ where
     Dim<D>: Space<D>,
 {
     /// The pressures seen by the free velocities of `space` on the active `cells`.
-    pub fn new(space: &VelocitySpace<D>, cells: &[ActiveCell], weak: WeakPressures) -> Self {
+    pub fn new(space: &VelocitySpace<D>, cells: &[ActiveCell], cut: CutCellPressures) -> Self {
         let discretisation = space.discretisation();
         let nodes = discretisation.pressure.clone();
         let fluid: Vec<usize> = cells
@@ -53,15 +55,16 @@ where
         let mut free = seen(&nodes, &fluid);
         // Aggregates first: hanging nodes may hang on them.
         let inside = inside(space, &fluid, &free);
-        let mut constraints = match weak {
-            WeakPressures::Keep => Vec::new(),
-            WeakPressures::Aggregate => aggregates(discretisation, &fluid, &free, &inside),
+        let mut constraints = match cut {
+            CutCellPressures::Keep => Vec::new(),
+            CutCellPressures::Aggregate => aggregates(discretisation, &fluid, &free, &inside),
         };
         constraints.iter().for_each(|c| free[c.node as usize] = false);
         constraints.extend_from_slice(nodes.constraints());
         let free_count = free.iter().filter(|&&f| f).count();
-        let weak = (0..free.len() as u32).filter(|&q| free[q as usize] && inside[q as usize]).collect();
-        Self { nodes, free, free_count, constraints, weak }
+        let left = |&q: &u32| free[q as usize] && inside[q as usize];
+        let poorly_supported = (0..free.len() as u32).filter(left).collect();
+        Self { nodes, free, free_count, constraints, poorly_supported }
     }
 
     /// The nodes.
@@ -79,9 +82,9 @@ where
         self.free[node]
     }
 
-    /// The unknowns inside bodies.
-    pub fn weak(&self) -> &[u32] {
-        &self.weak
+    /// The poorly supported pressures that are unknowns.
+    pub fn poorly_supported(&self) -> &[u32] {
+        &self.poorly_supported
     }
 
     /// The nodes whose pressure follows from others, in an order in which each can be resolved from those
@@ -118,7 +121,7 @@ where
         }
     }
 
-    /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and what is left of the
+    /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and the rest of the
     /// divergence is spread evenly.
     pub fn remove_mean<T: Scalar>(&self, q: &mut [T]) {
         let sum: f64 = q.iter().zip(&self.free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum();
@@ -162,7 +165,7 @@ where
     inside
 }
 
-/// Constraints of the weak nodes that have outer nodes in a common fluid cell.
+/// Constraints of the poorly supported nodes that have outer nodes in a common fluid cell.
 fn aggregates<const D: usize>(
     discretisation: &Discretisation<D>,
     fluid: &[usize],
@@ -173,9 +176,9 @@ fn aggregates<const D: usize>(
     let mut outer: Vec<Vec<u32>> = vec![Vec::new(); free.len()];
     for &cell in fluid {
         let nodes = discretisation.pressure.cell(cell);
-        for &weak in nodes.iter().take(corners).filter(|&&q| inside[q as usize]) {
-            let strong = nodes.iter().filter(|&&q| free[q as usize] && !inside[q as usize]);
-            outer[weak as usize].extend(strong);
+        for &node in nodes.iter().take(corners).filter(|&&q| inside[q as usize]) {
+            let supported = nodes.iter().filter(|&&q| free[q as usize] && !inside[q as usize]);
+            outer[node as usize].extend(supported);
         }
     }
     let constraint = |(node, mut masters): (usize, Vec<u32>)| {

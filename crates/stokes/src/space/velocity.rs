@@ -1,9 +1,9 @@
 //! Velocities that are rigid inside bodies, zero on the boundary and continuous across hanging nodes.
 //!
 //! A reduced vector holds the nodal velocities (`D` interleaved components; entries of hanging, boundary and
-//! rigid nodes are zero) and, after them, `RIGID` numbers a body: the velocity `U` of its reference point and
-//! its spin times its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`; a
-//! rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
+//! rigid nodes are zero) and, after them, `RIGID` numbers per body: the velocity `U` of its reference point
+//! and its spin times its radius, `s w`. [`VelocitySpace::expand`] is the map `T` of `u = T (u_fluid, U, w)`;
+//! a rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
 //! it turns nodal loads into loads on free nodes, forces and (scaled) torques.
 
 use gluey_fem::NodeMap;
@@ -18,6 +18,8 @@ use super::discretisation::Discretisation;
 pub type SolidNodes = Vec<Option<u32>>;
 
 const NO_BODY: u32 = u32::MAX;
+/// Numbers of a rigid motion in any dimension, at most.
+const MOST_RIGID: usize = 6;
 
 /// A node that moves with a body, with its arm in units of the body's radius.
 #[derive(Clone, Debug)]
@@ -124,9 +126,11 @@ where
     /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these
     /// are.
     pub fn add_rigid_motions<S: Scalar, T: Scalar>(&self, x: &[S], u: &mut [T]) {
-        let twists: Vec<T> = x[self.full_dim()..].iter().map(|x| T::from_f64(x.to_f64())).collect();
+        let twists = &x[self.full_dim()..];
         for r in &self.rigid {
-            let twist = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let entries = &twists[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+            let twist: [T; MOST_RIGID] =
+                std::array::from_fn(|k| T::from_f64(entries.get(k).map_or(0.0, |entry| entry.to_f64())));
             for (c, value) in u[r.node as usize * D..][..D].iter_mut().enumerate() {
                 *value += twist[c] + rotation_entry(&r.arm, c, &twist[D..]);
             }
@@ -198,7 +202,7 @@ where
     }
 
     /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of
-    /// `RIGID` coefficients a component.
+    /// `RIGID` coefficients per component.
     pub fn rigid_rows(&self) -> impl Iterator<Item = (u32, u32, Vec<f64>)> + '_ {
         self.rigid.iter().map(|r| (r.node, r.body, rigid_matrix(&r.arm)))
     }
@@ -216,7 +220,7 @@ where
     fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {
         let n = Dim::<D>::RIGID;
         for (load, inverse) in loads.chunks_exact_mut(n).zip(&self.fit) {
-            let old: [f64; 6] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
+            let old: [f64; MOST_RIGID] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
             for (i, value) in load.iter_mut().enumerate() {
                 let row = |m: &Vec<f64>| (0..n).map(|j| m[i * n + j] * old[j]).sum::<f64>();
                 *value = T::from_f64(inverse.as_ref().map_or(0.0, row));

@@ -5,7 +5,7 @@ use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::KrylovError;
 use gluey_stokes::{
-    FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError, WeakPressures,
+    CutCellPressures, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError,
 };
 
 use crate::support::{
@@ -68,7 +68,7 @@ fn a_body_that_another_hides_is_refused() {
 fn parameters_out_of_range_are_named() {
     let good = params(RIGID, SolverKind::Direct, 1e-8);
     let rigid = |offset| FlowParams {
-        formulation: Formulation::RigidDofs { offset, weak_pressures: WeakPressures::Keep },
+        formulation: Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Keep },
         ..good
     };
     let soft = |p: PaperParams| FlowParams { formulation: Formulation::Paper(p), ..good };
@@ -123,6 +123,16 @@ fn without_convergence_the_residuals_are_handed_back() {
         // The direct solver stops at rounding error and says no more than that is possible.
         assert_eq!(run(SolverKind::Direct), None);
     }
+}
+
+/// A mass over such a viscosity is zero in single precision.
+#[test]
+fn a_viscosity_beyond_single_precision_is_noticed() {
+    let disc = one_disc();
+    let thick = FlowParams { viscosity: 1e45, ..params(RIGID, SolverKind::Multigrid, 1e-8) };
+    let refused = try_solve(thick, mesh(&bands(5), &disc), &disc, &couette).err().unwrap();
+    assert!(matches!(refused, StokesError::PressureMass(_)), "{refused:?}");
+    assert!(refused.to_string().starts_with("the mass of the pressures: diagonal entry"), "{refused}");
 }
 
 #[test]

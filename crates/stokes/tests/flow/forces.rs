@@ -3,8 +3,8 @@
 use gluey_geom::{Dim, Space, Spin, Vector};
 use gluey_levelset::{Ball, Body, Ramp};
 use gluey_stokes::{
-    Flow, Formulation, PointMatrices, SolidNodes, SolidRegion, SolverKind, StokesSystem, VelocitySpace,
-    WeakPressures, solid_nodes,
+    CutCellPressures, Flow, Formulation, PointMatrices, SolidNodes, SolidRegion, SolverKind, StokesSystem,
+    VelocitySpace, solid_nodes,
 };
 
 use crate::support::{RIGID, SOLVERS, bands, couette, mesh, pair_at, paper, params, solve};
@@ -17,7 +17,7 @@ where
 {
     let nowhere = vec![None; flow.discretisation.velocity.node_count()];
     let space = VelocitySpace::new::<Ball<D>>(&flow.discretisation, &[], &nowhere);
-    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
+    let system = StokesSystem::new(space, 1.0, CutCellPressures::Keep);
     let mut b = vec![0.0; system.dim()];
     system.residual(&flow.velocity, &flow.pressure, &mut b);
     b

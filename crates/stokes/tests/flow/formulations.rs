@@ -3,8 +3,8 @@
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_stokes::{
-    DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices, SaddleSolver, SolidRegion,
-    SolverKind, StokesSystem, VelocitySpace, WeakPressures,
+    CutCellPressures, DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices,
+    SaddleSolver, SolidRegion, SolverKind, StokesSystem, VelocitySpace,
 };
 
 use crate::support::{
@@ -57,7 +57,7 @@ where
     let region = SolidRegion::new(&discretisation, balls, Ramp::new(STEP), &PointMatrices::new(1));
     let solid = region.touched_nodes(&discretisation.velocity, balls);
     let space = VelocitySpace::new(&discretisation, balls, &solid);
-    let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
+    let system = StokesSystem::new(space, 1.0, CutCellPressures::Keep);
     let nodes = &discretisation.velocity;
     let mut lift: Vec<f64> =
         (0..nodes.node_count()).flat_map(|n| couette(&nodes.point(n)).data.0[0]).collect();

@@ -5,6 +5,7 @@
 
 mod errors;
 mod exactness;
+mod examples;
 mod forces;
 mod formulations;
 mod operators;

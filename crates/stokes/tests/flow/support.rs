@@ -5,8 +5,8 @@ use gluey_fem::element::{gauss_cube, value};
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::{
-    Flow, FlowParams, FlowSolver, Formulation, PaperParams, ParticleVelocity, Refinement, SolverKind,
-    StokesError, WeakPressures,
+    CutCellPressures, Flow, FlowParams, FlowSolver, Formulation, PaperParams, ParticleVelocity, Refinement,
+    SolverKind, StokesError,
 };
 use gluey_testkit::exact::StokesSolution;
 
@@ -17,7 +17,7 @@ pub const SOLVERS: [SolverKind; 2] = [SolverKind::Direct, SolverKind::Multigrid]
 /// `rigid-dofs` with the offset that cases have by default in 2D. In 3D the default is -0.2, chosen on one
 /// encounter of two spheres; `tests/accuracy.rs` at the root measures what cases get there.
 pub const RIGID: Formulation =
-    Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
+    Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
 
 /// The paper's formulation with a viscosity ratio and a number of Uzawa steps.
 pub fn paper(viscosity_ratio: f64, uzawa_steps: usize) -> Formulation {

@@ -13,11 +13,11 @@ use gluey_levelset::{Ball, Ramp};
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
-use crate::precondition::solid::SolidBlock;
+use crate::precondition::solid::PenalisedCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::solid::{Penalty, PointMatrices, SolidRegion, SolidStress};
-use crate::space::{Discretisation, SolidNodes, VelocitySpace, WeakPressures};
+use crate::space::{Discretisation, SolidNodes, VelocitySpace};
 
 pub use params::{PaperParams, ParticleVelocity};
 
@@ -54,7 +54,7 @@ where
         let nowhere = vec![None; discretisation.velocity.node_count()];
         let space = VelocitySpace::new::<Ball<D>>(discretisation, &[], &nowhere);
         let penalty = Penalty { factor: 1.0 - 1.0 / params.viscosity_ratio, stress };
-        let system = StokesSystem::new(space, viscosity, WeakPressures::Keep, Some(penalty));
+        let system = StokesSystem::penalised(space, viscosity, penalty);
         let solid = PenalisedSolid { params: *params, region, touched, matrices: matrices.clone() };
         Ok((system, Arc::new(solid)))
     }
@@ -126,6 +126,6 @@ where
         finest: &VelocitySpace<D>,
         levels: CycleLevels<'_, D>,
     ) -> Result<Option<Box<dyn Correction>>, StokesError> {
-        Ok(Some(Box::new(SolidBlock::new(elements, &self.touched, finest, levels)?)))
+        Ok(Some(Box::new(PenalisedCorrection::new(elements, &self.touched, finest, levels)?)))
     }
 }

@@ -19,7 +19,7 @@ pub struct PaperParams {
     /// Number of solves per prediction, each followed by an update of the multiplier. With one the
     /// multiplier, which starts from zero, is never used: the formulation is then a penalty method.
     pub uzawa_steps: usize,
-    /// Gauss points a direction in cells near a surface.
+    /// Gauss points per direction in cells near a surface.
     pub quadrature: usize,
     /// How the motion of a particle is taken from the field.
     pub particle_velocity: ParticleVelocity,

@@ -16,6 +16,7 @@ use super::params::PaperParams;
 use crate::error::StokesError;
 use crate::formulation::problem::{Data, LinearSolve, Multiplier, Problem};
 use crate::operator::StokesSystem;
+use crate::solid::SolidOperator;
 
 /// The steps of a prediction; `x` holds the last velocity and pressure afterwards.
 pub fn solve<const D: usize>(
@@ -28,12 +29,14 @@ pub fn solve<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let reference = vector::norm(data.b);
-    let mut multiplier = vec![0.0; problem.system.space.full_dim()];
+    let (system, reference) = (&problem.system, vector::norm(data.b));
+    let mut multiplier = vec![0.0; system.space.full_dim()];
+    let penalty = system.penalty.as_ref().filter(|_| params.uzawa_steps > 1);
+    let mut stress = penalty.map(|penalty| penalty.stress.operator(system.space.nodes()));
     for step in 0..params.uzawa_steps {
         let mut b = data.b.to_vec();
-        if step > 0 {
-            subtract_multiplier(&problem.system, &multiplier, &mut b);
+        if let Some(stress) = stress.as_mut().filter(|_| step > 0) {
+            subtract_multiplier(system, stress, &multiplier, &mut b);
         }
         let scale = reference / vector::norm(&b).max(f64::MIN_POSITIVE);
         solve(&b, x, scale.min(1.0))?;
@@ -44,14 +47,16 @@ where
 
 /// The right-hand side of eq. 9: `b -= int I eta_s eps(lambda):eps(v)`, half of `K(I eta_s) lambda`, which
 /// carries `2 eta_s`.
-fn subtract_multiplier<const D: usize>(system: &StokesSystem<D>, multiplier: &[f64], b: &mut [f64])
-where
+fn subtract_multiplier<const D: usize>(
+    system: &StokesSystem<D>,
+    stress: &mut SolidOperator<D>,
+    multiplier: &[f64],
+    b: &mut [f64],
+) where
     Dim<D>: Space<D>,
 {
-    if let Some(penalty) = &system.penalty {
-        let mut load = vec![0.0; system.velocity_dim()];
-        penalty.stress.apply(system.space.nodes(), multiplier, &mut load);
-        system.space.reduce(&mut load);
-        vector::axpy(-0.5, &load, &mut b[..system.velocity_dim()]);
-    }
+    let mut load = vec![0.0; system.velocity_dim()];
+    stress.apply(multiplier, &mut load);
+    system.space.reduce(&mut load);
+    vector::axpy(-0.5, &load, &mut b[..system.velocity_dim()]);
 }

@@ -21,17 +21,16 @@ use crate::space::ActiveCell;
 
 /// Matrices on the pressures of the active cells whose sum is close to twice the Schur complement.
 pub struct PressureMatrices {
-    /// That of the unit cube at viscosity one.
+    /// Matrix of the unit cube at viscosity one.
     unit: Vec<f64>,
-    /// The multiple of it that each cell has.
+    /// Factor of that matrix in each cell.
     scales: Vec<f64>,
-    /// Those of cut cells.
+    /// Matrices of cut cells.
     own: Vec<Option<Vec<f64>>>,
 }
 
 impl PressureMatrices {
-    /// Mass matrices over the viscosity, or, where a solid cuts a cell, what its Schur complement makes of
-    /// them.
+    /// Mass matrices over the viscosity, or, where a solid cuts a cell, matrices from its Schur complement.
     ///
     /// # Errors
     /// [`BlockError`] if the viscosity of a cut cell is not positive.
@@ -93,7 +92,7 @@ struct CellSchur<const D: usize> {
     rigid: Vec<f64>,
     /// The Schur complement of the unit cube at viscosity one.
     unit: Vec<f64>,
-    /// `[A_c, B_c^T; B_c, 0]`, and what elimination makes of it.
+    /// `[A_c, B_c^T; B_c, 0]` before and after elimination.
     saddle: DenseSymmetric,
 }
 
@@ -108,7 +107,8 @@ where
         Ok(new)
     }
 
-    /// That of a cell with the matrices `A_c = viscous K + own` and `B_c = divergence B`, row by row.
+    /// The Schur complement of a cell with the matrices `A_c = viscous K + own` and `B_c = divergence B`, row
+    /// by row.
     fn of(&mut self, viscous: f64, divergence: f64, own: &[f64]) -> Result<Vec<f64>, BlockError> {
         let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         // The load of a pressure does no work on rigid motions: what is added on these changes nothing else.

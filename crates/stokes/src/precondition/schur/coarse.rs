@@ -1,9 +1,9 @@
 //! The Schur complement of the box, from its coarsest mesh.
 //!
 //! Of the pressures whose Schur complement is far below their mass some are as large as the box: the flow
-//! that would answer them does not fit between its walls. A mesh of a few cells knows them. With the Schur
-//! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that stands for it (see
-//! [`crate::precondition::schur`]), and the interpolation `P` from its pressures,
+//! that they would drive does not fit between its walls. A mesh of a few cells resolves them. With the Schur
+//! complement `S_0` of such a mesh, which is dense and small, the weighted mass `T_0` that approximates it
+//! (see [`super`]), and the interpolation `P` from its pressures,
 //!
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Ordering, Preconditioner};
+use gluey_linalg::{LinOp, Ordering, Preconditioner, Subset, vector};
 use nalgebra::{DMatrix, DVector};
 
 use super::mass::pressure_matrix;
@@ -25,7 +25,7 @@ use crate::space::Discretisation;
 
 /// Largest dense matrix.
 const MOST_PRESSURES: usize = 1000;
-/// Share of the mass that is added to `S_0`, for meshes so coarse that no velocity sees some pressure.
+/// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
 const SHARE_OF_MASS: f64 = 1e-3;
 
 /// `P (S_0^-1 - T_0^-1) P^T`.
@@ -39,7 +39,10 @@ where
     system: StokesSystem<D>,
     /// `S_0^-1 - T_0^-1` for the unknown pressures in `unknowns`.
     correction: DMatrix<f32>,
-    unknowns: Vec<u32>,
+    unknowns: Subset,
+    /// Load and correction at the unknown pressures.
+    load: DVector<f32>,
+    corrected: DVector<f32>,
     /// `transfers[l]` joins the pressures of mesh `l` to those of mesh `l + 1`.
     transfers: Vec<Interpolation<D>>,
     /// Pressures on each mesh.
@@ -71,16 +74,26 @@ where
         }
         let coarsest = &meshes[0];
         let system = without_bodies(coarsest, viscosity);
-        let free = |q: &u32| system.pressure.is_free(*q as usize);
-        let unknowns: Vec<u32> = (0..system.pressure.dim() as u32).filter(free).collect();
-        let correction = correction(&system, viscosity, &unknowns)?;
-        Ok(Some(Self { viscosity, correction, unknowns, transfers, pressures, system, meshes }))
+        let unknowns = Subset::new(system.pressure.dim(), |q| system.pressure.is_free(q));
+        let correction = correction(&system, viscosity, unknowns.positions())?;
+        let [load, corrected] = [(); 2].map(|()| DVector::zeros(unknowns.len()));
+        Ok(Some(Self {
+            meshes,
+            viscosity,
+            system,
+            correction,
+            unknowns,
+            load,
+            corrected,
+            transfers,
+            pressures,
+        }))
     }
 
     /// `z += P (S_0^-1 - T_0^-1) P^T r` on all pressure nodes of the finest mesh. `r` is zero but at
     /// unknowns, where its sum vanishes.
     pub fn add(&mut self, r: &[f32], z: &mut [f32]) {
-        let Self { meshes, system, correction, unknowns, transfers, pressures, .. } = self;
+        let Self { meshes, system, correction, unknowns, load, corrected, transfers, pressures, .. } = self;
         let top = meshes.len() - 1;
         pressures[top].copy_from_slice(r);
         for level in (0..top).rev() {
@@ -89,15 +102,15 @@ where
             transfers[level].restrict::<1>(&above[0], &mut below[level]);
         }
         system.pressure.reduce(&mut pressures[0]);
-        let load = DVector::from_iterator(unknowns.len(), unknowns.iter().map(|&q| pressures[0][q as usize]));
-        let answer = &*correction * load;
-        unknowns.iter().zip(answer.iter()).for_each(|(&q, &value)| pressures[0][q as usize] = value);
+        unknowns.gather(&pressures[0], load.as_mut_slice());
+        correction.mul_to(load, corrected);
+        unknowns.scatter(corrected.as_slice(), &mut pressures[0]);
         for level in 0..top {
             let (below, above) = pressures.split_at_mut(level + 1);
             meshes[level].pressure.distribute(1, |w| w as f32, &mut below[level]);
             transfers[level].prolong::<1>(&below[level], &mut above[0]);
         }
-        gluey_linalg::vector::axpy(1.0, &pressures[top], z);
+        vector::axpy(1.0, &pressures[top], z);
     }
 }
 
@@ -141,7 +154,7 @@ where
     let count = unknowns.len();
     let mass = DMatrix::from_fn(count, count, |i, j| mass.get(unknowns[i] as usize, unknowns[j] as usize));
     let mut schur = dense_schur(system, unknowns)? + SHARE_OF_MASS * &mass;
-    // Constants, which no velocity sees, get a stiffness like that of the rest.
+    // Constants, which act on no velocity, get a stiffness like that of the rest.
     schur.add_scalar_mut(schur.trace() / (count * count) as f64);
     let schur = schur.cholesky().ok_or_else(|| failed(SmallMatrix::Schur))?;
     let mass = mass.cholesky().ok_or_else(|| failed(SmallMatrix::Mass))?;
@@ -184,7 +197,6 @@ mod tests {
     use super::*;
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
-    use gluey_linalg::vector;
 
     /// Meshes of a long box, from level 2 on, the finest with hanging nodes.
     fn long_box(roots: u32) -> Vec<Discretisation<2>> {

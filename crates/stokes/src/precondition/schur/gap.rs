@@ -1,6 +1,6 @@
 //! Schur complements of the pressures in gaps narrower than a cell.
 //!
-//! A pressure inside a body that has no outer neighbour to follow (see [`crate::WeakPressures`]) is seen by a
+//! A pressure inside a body that has no outer neighbour to follow (see [`crate::PressureSpace`]) is seen by a
 //! few free velocities and by the approach of two bodies, and its Schur complement is up to a thousand times
 //! less than its mass. Such pressures come in small clusters. For the pressures `P` of the cells around a
 //! cluster and the unknown velocities `V` of all cells that those pressures act on,
@@ -20,7 +20,7 @@ use crate::space::{ActiveCell, pressure_expansion, velocity_expansion};
 /// Larger clusters are left to the mass matrix: their dense matrices would cost more than the iterations they
 /// save.
 const MOST_VELOCITIES: usize = 1000;
-/// Share of the mass that is added to `S_P`, for pressures that no velocity sees.
+/// Share of the mass that is added to `S_P`, for pressures that act on no velocity.
 const SHARE_OF_MASS: f64 = 1e-3;
 
 /// The inverses of `S_P` for all gaps.
@@ -41,7 +41,7 @@ impl GapInverse {
     where
         Dim<D>: Space<D>,
     {
-        if system.pressure.weak().is_empty() {
+        if system.pressure.poorly_supported().is_empty() {
             return Ok(Self { blocks: Vec::new() });
         }
         let forms = Forms {
@@ -101,14 +101,15 @@ where
         clusters.into_iter().map(gap).filter(|gap| gap.velocities.len() <= MOST_VELOCITIES).collect()
     }
 
-    /// The pressures of the cells with a weak one; cells that share any are in one cluster.
+    /// The pressures of the cells with a poorly supported one; cells that share any are in one cluster.
     fn clusters(&self) -> Vec<Vec<u32>> {
-        let weak = marked(self.system.pressure.dim(), self.system.pressure.weak().iter().copied());
-        let mut parents: Vec<u32> = (0..weak.len() as u32).collect();
+        let poor =
+            marked(self.system.pressure.dim(), self.system.pressure.poorly_supported().iter().copied());
+        let mut parents: Vec<u32> = (0..poor.len() as u32).collect();
         let mut members = Vec::new();
         for cell in self.system.cells.iter().filter(|cell| self.is_fluid(cell)) {
             let pressures = sorted(self.pressures_of(cell));
-            if pressures.iter().any(|&q| weak[q as usize]) {
+            if pressures.iter().any(|&q| poor[q as usize]) {
                 pressures.windows(2).for_each(|pair| join(&mut parents, pair[0], pair[1]));
                 members.extend(pressures);
             }
@@ -249,5 +250,43 @@ fn add(matrix: &mut DMatrix<f64>, rows: &[(usize, f64)], columns: &[(usize, f64)
         for &(j, w) in columns {
             matrix[(i, j)] += v * w * value;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::{CutCellPressures, Discretisation, VelocitySpace, solid_nodes};
+    use gluey_fem::TreeMesh;
+    use gluey_geom::{Aabb, Vector};
+    use gluey_levelset::Ball;
+
+    /// A disc whose poorly supported pressures are all kept, in a fluid of viscosity of any sign.
+    fn disc(viscosity: f64) -> StokesSystem<2> {
+        let disc = Ball::new(Vector::<2>::repeat(0.47), 0.2);
+        let mesh = TreeMesh::uniform(Aabb::unit(), [1; 2], [false; 2], 3).unwrap();
+        let discretisation = Discretisation::new(mesh);
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[disc], -0.1);
+        let space = VelocitySpace::new(&discretisation, &[disc], &solid);
+        StokesSystem::new(space, viscosity, CutCellPressures::Keep)
+    }
+
+    #[test]
+    fn a_gap_whose_matrix_is_not_positive_is_named() {
+        let no_mass = |system: &StokesSystem<2>| {
+            SparseMatrix::from_triplets(system.pressure.dim(), system.pressure.dim(), &[]).unwrap()
+        };
+        let good = disc(1.0);
+        assert!(!good.pressure.poorly_supported().is_empty());
+        assert!(GapInverse::new(&good, &no_mass(&good)).is_ok());
+        let bad = disc(-1.0);
+        let refused = GapInverse::new(&bad, &no_mass(&bad)).err().unwrap();
+        let stiffness = SmallMatrix::Stiffness;
+        assert!(matches!(&refused, StokesError::GapPressures { matrix, .. } if *matrix == stiffness));
+        let text = refused.to_string();
+        assert!(
+            text.starts_with("the stiffness of the gap at [0.") && text.contains("pressures and"),
+            "{text}"
+        );
     }
 }

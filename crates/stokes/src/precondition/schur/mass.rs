@@ -1,4 +1,4 @@
-//! The matrix `T` that stands for the Schur complement: the mass of the pressures over the viscosity, with
+//! The matrix `T` that approximates the Schur complement: the mass of the pressures over the viscosity, with
 //! their weights.
 
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::space::{ActiveCell, pressure_expansion};
 
-/// `T`: the pressure mass matrix over twice the viscosity, or what takes its place, scaled by the weights of
-/// the pressures.
+/// `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in its place, scaled by
+/// the weights of the pressures.
 pub fn pressure_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     viscosity: f64,

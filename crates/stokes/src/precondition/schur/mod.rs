@@ -3,10 +3,10 @@
 //! For velocities that vanish on the boundary `int 2 eta eps(u):eps(u) >= 2 eta int (div u)^2`, so
 //! `S <= M / (2 eta)` with the pressure mass matrix `M`, and most pressures come close to equality. Hence `S`
 //! is taken to be `T = W^1/2 M W^1/2 / (2 eta)`: the eigenvalues then gather at one, where those of the
-//! velocity block are. The weights `W` are one but for pressures next to walls and bodies, which fewer
-//! velocities see ([`weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
+//! velocity block are. The weights `W` are one but for pressures next to walls and bodies, which act on
+//! fewer velocities ([`weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
 //! diagonal (Wathen and Rees 2009), in `f32`. Two kinds of pressures are still far from `T`: those as large
-//! as the box, for which a small mesh has the answer ([`coarse`]), and those in gaps narrower
+//! as the box, which are corrected on a small mesh ([`coarse`]), and those in gaps narrower
 //! than a cell, where the inverses of small exact Schur complements are added ([`gap`]).
 
 mod cells;
@@ -87,7 +87,7 @@ where
 
 /// The smallest even number of Chebyshev steps whose error is small enough, or [`MOST_STEPS`]. An odd number
 /// would take too much of the smooth pressures, at the upper end of the spectrum, where an even one takes too
-/// little: 27 spheres take 33 iterations with three steps, 27 with two and 22 with four.
+/// little (`docs/decisions/0014-relaxation-near-bodies.md`).
 fn steps(interval: SpectralInterval) -> usize {
     let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
     (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)
@@ -160,9 +160,10 @@ mod tests {
         assert!(e.iter().all(|e| e[0] < 0.01 && e[1] > 0.15), "{e:?}");
     }
 
-    /// Loads as large as the box, with hanging nodes. Four cells a side do not know these pressures better.
+    /// Loads as large as the box, with hanging nodes. Four cells per side do not resolve these pressures
+    /// better.
     #[test]
-    fn pressures_as_large_as_the_box_are_answered() {
+    fn pressures_as_large_as_the_box_are_corrected() {
         let smooth = |x: f64| (std::f64::consts::PI * x).cos();
         let e = [errors::<2>(4, smooth), errors::<3>(3, smooth)];
         assert!(e.iter().all(|e| e[0] < 0.28 && e[1] > 1.4 * e[0]), "{e:?}");

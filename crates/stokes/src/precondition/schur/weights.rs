@@ -1,16 +1,15 @@
 //! How much of its mass a pressure keeps next to walls and bodies.
 //!
-//! Where velocities are fixed fewer of them see a pressure, and oscillations of the size of a cell have a
+//! Where velocities are fixed fewer of them feel a pressure, and oscillations of the size of a cell have a
 //! Schur complement far below their mass: a third in the edges of a box, a fifth in its corners, on any mesh.
-//! What the diagonal of `A` makes of it is cheap and tells most: with
+//! The Schur complement with the diagonal of `A` in place of `A` is cheap and tells most: with
 //!
 //! `s_q = (B diag(A)^-1 B^T)_qq`, `m_q = M_qq / eta`,
 //!
 //! the *weight* of a pressure is the ratio `s_q / m_q` over the same ratio away from all walls, where the
-//! mesh is uniform. It is 0.78 and 0.55 on the sides and in the corners of a square, 0.69, 0.46 and 0.29 on
-//! the faces, edges and in the corners of a cube. Symmetric scaling of the mass matrix by the weights takes
-//! the smallest eigenvalues of `M^-1 S` from 0.19 to 0.34 (cube, 8 cells a side) and leaves the largest at
-//! 1.2. Smooth pressures hardly notice: what they have next to walls is of the order of a cell.
+//! mesh is uniform. Symmetric scaling of the mass matrix by the weights raises the smallest eigenvalues of
+//! `M^-1 S` and leaves the largest (`docs/decisions/0015-weights-of-pressures.md`). Smooth pressures hardly
+//! change: the part of them next to walls is of the order of a cell.
 //!
 //! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements
 //! ([`super::cells`]). These leave out that the solid in one cell holds the nodes of the next and are
@@ -24,9 +23,9 @@ use gluey_linalg::SparseMatrix;
 
 use super::cells::PressureMatrices;
 use crate::operator::{Elements, StokesSystem, viscous_diagonal};
-use crate::space::{Discretisation, VelocitySpace, WeakPressures, pressure_expansion};
+use crate::space::{CutCellPressures, Discretisation, VelocitySpace, pressure_expansion};
 
-/// The least weight, for pressures that hardly any velocity sees.
+/// The least weight, for pressures that act on hardly any velocity.
 const LEAST: f64 = 0.05;
 /// The least and the largest weight in cut cells.
 const OF_CUT_CELLS: [f64; 2] = [0.25, 2.0];
@@ -102,7 +101,7 @@ where
     let bodies: [Ball<D>; 0] = [];
     let solid = vec![None; discretisation.velocity.node_count()];
     let space = VelocitySpace::new(discretisation, &bodies, &solid);
-    StokesSystem::new(space, viscosity, WeakPressures::Keep, None)
+    StokesSystem::new(space, viscosity, CutCellPressures::Keep)
 }
 
 /// The nodes whose velocity is that of the boundary or of a body.
@@ -282,7 +281,7 @@ mod tests {
         assert!(!discretisation.pressure.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], 0.0);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
-        let system = StokesSystem::new(space, 1.0, WeakPressures::Keep, None);
+        let system = StokesSystem::new(space, 1.0, CutCellPressures::Keep);
         let weights = weights_in(&system, 1.0);
         let mut least = 1.0f64;
         for (q, &weight) in weights.iter().enumerate() {

@@ -1,11 +1,9 @@
-//! What the penalised solid needs beside the rigid levels.
+//! The preconditioner of the penalised solid, beside the rigid levels.
 
-mod block;
-mod cycle;
-mod node_matrix;
+mod assembly;
+mod correction;
+mod multigrid;
 mod numbered;
-mod patches;
-mod prolongation;
 mod smoother;
 
-pub use block::SolidBlock;
+pub use correction::PenalisedCorrection;

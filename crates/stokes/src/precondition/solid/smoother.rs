@@ -1,7 +1,8 @@
 //! The smoother of the finest mesh where the solid is penalised.
 //!
 //! One sweep of Chebyshev's method on the whole operator, after all corrections: in the fluid by its
-//! diagonal, in the solid by [`Patches`]. In single precision: what it is given are residuals, and what it
+//! diagonal, in the solid by [`SchwarzPatches`] on its
+//! cells. In single precision: what it is given are residuals, and what it
 //! adds holds no rigid motion of a body, whose rounding the solid's viscosity would multiply.
 //!
 //! Where the cells of two bodies meet, coarser meshes have fluid between them and are softer, and the forces
@@ -9,24 +10,19 @@
 //! corrections ([`FilmSmoother`]).
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, LinOp, Preconditioner, SpectralInterval, estimate_lambda_max, vector};
+use gluey_linalg::{
+    Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, SchwarzPatches, SymmetricBlockMatrix, vector,
+};
 
-use super::node_matrix::NodeMatrix;
-use super::numbered::Numbered;
-use super::patches::Patches;
+use super::assembly::assemble_on_nodes;
+use super::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::{
     CountedOperator, Elements, Restricted, StokesSystem, acting, add_at, block_diagonal, gather,
 };
 
-/// Applications of diagonal and patches in a sweep.
-const DEGREE: usize = 4;
-/// Largest over smallest eigenvalue that a sweep damps.
-const RATIO: f64 = 5.0;
-/// Lanczos steps for the largest eigenvalue.
-const LANCZOS_STEPS: usize = 8;
-/// Factor by which that estimate is raised.
-const SAFETY: f64 = 1.1;
+/// A sweep with diagonal and patches as preconditioner.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.1, lanczos_steps: 8 };
 
 /// The smoother of all nodes around the finest cells.
 pub struct PenalisedSmoother<const D: usize> {
@@ -42,8 +38,8 @@ where
     pub fn new(
         system: &StokesSystem<D>,
         smoothed: &[bool],
-        solid: &Numbered<'_, D>,
-        matrix: &NodeMatrix<D>,
+        solid: &NumberedNodes<'_, D>,
+        matrix: &SymmetricBlockMatrix<D>,
     ) -> Result<Self, StokesError> {
         let discretisation = system.discretisation();
         let acting = acting(discretisation, &system.cells, smoothed);
@@ -51,8 +47,8 @@ where
         let diagonal = fluid.map_err(StokesError::AroundSolid)?.into_nodal();
         let cell_count = system.cells.len();
         let operator = CountedOperator::new(&system.space, &acting, cell_count, system.penalty.as_ref());
-        let parts = Parts::new(diagonal, solid, solid.positions(), matrix)?;
-        let mut sweep = Sweep::new(operator, parts)?;
+        let preconditioner = DiagonalAndPatches::new(diagonal, solid, solid.positions(), matrix)?;
+        let mut sweep = Sweep::new(operator, preconditioner)?;
         sweep.operator.take_applications();
         Ok(Self { sweep })
     }
@@ -94,20 +90,21 @@ where
         let discretisation = system.discretisation();
         let (space, penalty) = (&system.space, system.penalty.as_ref());
         let is_free = |node: usize| film[node] && space.is_free(node);
-        let positions = Numbered::new(discretisation, is_free).positions();
-        let solid = Numbered::new(discretisation, |node| is_free(node) && touched[node]);
-        let matrix = NodeMatrix::assembled(&solid, elements)?;
+        let positions = NumberedNodes::new(discretisation, is_free).positions();
+        let solid = NumberedNodes::new(discretisation, |node| is_free(node) && touched[node]);
+        let matrix = assemble_on_nodes(&solid, elements)?;
         let acting = acting(discretisation, &system.cells, film);
         let fluid = block_diagonal(space, &acting, film).map_err(StokesError::AroundSolid)?;
         let mut diagonal = vec![0.0; positions.len()];
         gather(&positions, &fluid.into_nodal(), &mut diagonal);
         let place = |k: &u32| positions.binary_search(k).expect("the film has its solid") as u32;
-        let parts = Parts::new(diagonal, &solid, solid.positions().iter().map(place).collect(), &matrix)?;
+        let places = solid.positions().iter().map(place).collect();
+        let preconditioner = DiagonalAndPatches::new(diagonal, &solid, places, &matrix)?;
         let [r, x] = [(); 2].map(|()| vec![0.0; positions.len()]);
         let cell_count = system.cells.len();
         let operator = CountedOperator::new(space, &acting, cell_count, penalty);
         let restricted = Restricted::new(space, &acting, cell_count, positions, penalty);
-        let mut sweep = Sweep::new(restricted, parts)?;
+        let mut sweep = Sweep::new(restricted, preconditioner)?;
         sweep.operator.take_applications();
         Ok(Self { sweep, operator, r, x })
     }
@@ -137,10 +134,10 @@ where
     }
 }
 
-/// Chebyshev's method from zero: the operator, its parts, load and velocity.
+/// Chebyshev's method from zero: the operator, its preconditioner, load and velocity.
 struct Sweep<A, const D: usize> {
     operator: A,
-    parts: Parts<D>,
+    preconditioner: DiagonalAndPatches<D>,
     chebyshev: Chebyshev<f32>,
     b: Vec<f32>,
     x: Vec<f32>,
@@ -150,52 +147,53 @@ impl<A: LinOp<f32>, const D: usize> Sweep<A, D>
 where
     Dim<D>: Space<D>,
 {
-    fn new(mut operator: A, mut parts: Parts<D>) -> Result<Self, StokesError> {
-        let largest = estimate_lambda_max(&mut operator, &mut parts, LANCZOS_STEPS)?;
-        let interval = SpectralInterval::upper_part(largest, RATIO, SAFETY);
+    fn new(mut operator: A, mut preconditioner: DiagonalAndPatches<D>) -> Result<Self, StokesError> {
+        let chebyshev = Chebyshev::for_operator(&mut operator, &mut preconditioner, &SWEEP)?;
         let dim = operator.dim();
-        let chebyshev = Chebyshev::new(dim, DEGREE, interval);
-        Ok(Self { operator, parts, chebyshev, b: vec![0.0; dim], x: vec![0.0; dim] })
+        Ok(Self { operator, preconditioner, chebyshev, b: vec![0.0; dim], x: vec![0.0; dim] })
     }
 
     fn run(&mut self) {
-        let Self { operator, parts, chebyshev, b, x } = self;
-        chebyshev.smooth(operator, parts, b, x, Guess::Zero);
+        let Self { operator, preconditioner, chebyshev, b, x } = self;
+        chebyshev.smooth(operator, preconditioner, b, x, Guess::Zero);
     }
 }
 
-/// What the residual is multiplied by.
-struct Parts<const D: usize> {
-    /// In the fluid; zero elsewhere.
+/// The inverse diagonal in the fluid and the patches in the solid.
+struct DiagonalAndPatches<const D: usize> {
+    /// Inverse diagonal in the fluid, zero elsewhere.
     diagonal: Vec<f32>,
-    patches: Patches<f32, D>,
+    patches: SchwarzPatches<f32, D>,
     /// The unknowns of the patches among those of the sweep.
     positions: Vec<u32>,
+    /// Residual and correction at these.
+    r: Vec<f32>,
+    z: Vec<f32>,
 }
 
-impl<const D: usize> Parts<D>
+impl<const D: usize> DiagonalAndPatches<D>
 where
     Dim<D>: Space<D>,
 {
     fn new(
         mut diagonal: Vec<f32>,
-        solid: &Numbered<'_, D>,
+        solid: &NumberedNodes<'_, D>,
         positions: Vec<u32>,
-        matrix: &NodeMatrix<D>,
+        matrix: &SymmetricBlockMatrix<D>,
     ) -> Result<Self, StokesError> {
-        let patches = Patches::new(matrix, solid.cells(), vec![0.0; positions.len()]);
+        let patches = SchwarzPatches::new(matrix, solid.cells(), vec![0.0; positions.len()]);
         positions.iter().for_each(|&k| diagonal[k as usize] = 0.0);
-        Ok(Self { diagonal, patches: patches.map_err(StokesError::SolidPatch)?, positions })
+        let [r, z] = [(); 2].map(|()| vec![0.0; positions.len()]);
+        Ok(Self { diagonal, patches: patches.map_err(StokesError::SolidPatch)?, positions, r, z })
     }
 }
 
-impl<const D: usize> Preconditioner<f32> for Parts<D> {
+impl<const D: usize> Preconditioner<f32> for DiagonalAndPatches<D> {
     fn apply(&mut self, r: &[f32], z: &mut [f32]) {
         vector::multiply(&self.diagonal, r, z);
-        let [mut on_solid, mut answer] = [(); 2].map(|()| vec![0.0; self.positions.len()]);
-        gather(&self.positions, r, &mut on_solid);
-        self.patches.apply(&on_solid, &mut answer);
-        add_at(&self.positions, &answer, z);
+        gather(&self.positions, r, &mut self.r);
+        self.patches.apply(&self.r, &mut self.z);
+        add_at(&self.positions, &self.z, z);
     }
 
     fn diagonal(&self) -> &[f32] {
@@ -214,8 +212,9 @@ impl<const D: usize> Preconditioner<f32> for Parts<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::DiagonalError;
     use crate::formulation::{Formulation, PaperParams, Problem};
-    use crate::solid::{PointMatrices, SolidRegion};
+    use crate::solid::{Penalty, PointMatrices, SolidRegion};
     use crate::space::{VelocitySpace, around_films};
     use gluey_fem::{ReferenceMatrices, TreeMesh};
     use gluey_geom::{Aabb, Vector};
@@ -248,8 +247,8 @@ mod tests {
         (problem, touched)
     }
 
-    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` adds its answer to
-    /// the error's load.
+    /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` corrects
+    /// it from its load.
     fn energies(problem: &Problem<3>, marked: &[bool], sweep: impl FnOnce(&[f64], &mut [f64])) -> [f64; 2] {
         let system = &problem.system;
         let (cells, penalty) = (&system.cells, system.penalty.as_ref());
@@ -276,8 +275,9 @@ mod tests {
             let (problem, touched) = problem(3, viscosity_ratio, &balls);
             let (discretisation, system) = (problem.discretisation(), &problem.system);
             let elements = Elements::new(system, ReferenceMatrices::<3>::VELOCITY);
-            let solid = Numbered::new(discretisation, |n| touched[n].is_some() && system.space.is_free(n));
-            let matrix = NodeMatrix::assembled(&solid, &elements).unwrap();
+            let solid =
+                NumberedNodes::new(discretisation, |n| touched[n].is_some() && system.space.is_free(n));
+            let matrix = assemble_on_nodes(&solid, &elements).unwrap();
             let all = vec![true; touched.len()];
             let mut smoother = PenalisedSmoother::new(system, &all, &solid, &matrix).unwrap();
 
@@ -285,9 +285,41 @@ mod tests {
             assert!(asymmetry < 1e-6, "{viscosity_ratio:e}: {asymmetry:e}");
             smoother.take_applications();
             let [before, after] = energies(&problem, &all, |r, z| smoother.add_to(r, z));
-            assert!(smoother.take_applications() == (DEGREE - 1) as f64);
+            assert!(smoother.take_applications() == (SWEEP.degree - 1) as f64);
             assert!(after > 0.0 && after < 0.01 * before, "{viscosity_ratio:e}: {before:e} -> {after:e}");
         }
+    }
+
+    /// The smoother of a mesh where everything is solid, for viscosities of any sign.
+    fn smoother_of(viscosity: f64, factor: f64) -> Result<PenalisedSmoother<3>, StokesError> {
+        let (problem, _) = problem(2, 1e2, &[Ball::new(Vector::repeat(0.47), 0.3)]);
+        let Penalty { stress, .. } = problem.system.penalty.clone().unwrap();
+        let space = problem.system.space.clone();
+        let system = StokesSystem::penalised(space, viscosity, Penalty { factor, stress });
+        let elements = Elements::new(&system, ReferenceMatrices::<3>::VELOCITY);
+        let solid = NumberedNodes::new(system.discretisation(), |n| system.space.is_free(n));
+        let matrix = assemble_on_nodes(&solid, &elements).unwrap();
+        let all = vec![true; solid.nodes.whole()];
+        PenalisedSmoother::new(&system, &all, &solid, &matrix)
+    }
+
+    #[test]
+    fn a_fluid_or_solid_of_negative_viscosity_is_named() {
+        let refused = smoother_of(-1.0, 0.99).err().unwrap();
+        assert!(matches!(refused, StokesError::AroundSolid(DiagonalError::Node { .. })), "{refused:?}");
+        let text = refused.to_string();
+        assert!(
+            text.starts_with("the fluid around the solid cannot be smoothed: the diagonal entry"),
+            "{text}"
+        );
+        let refused = smoother_of(1.0, -10.0).err().unwrap();
+        assert!(matches!(refused, StokesError::SolidPatch(_)), "{refused:?}");
+        let text = refused.to_string();
+        assert!(
+            text.starts_with("the solid cannot be smoothed cell by cell:") && text.contains("pivot"),
+            "{text}"
+        );
+        assert!(smoother_of(1.0, 0.99).is_ok());
     }
 
     /// Two balls of radius 0.15 with this gap.
@@ -323,7 +355,7 @@ mod tests {
             smoother.add_to(r, z);
             assert!(z.iter().enumerate().all(|(k, &z)| film[k / 3] || z == 0.0));
         });
-        let share = smoother.take_applications() / (DEGREE - 1) as f64;
+        let share = smoother.take_applications() / (SWEEP.degree - 1) as f64;
         assert!(share > 0.0 && share < 1.0, "{share}");
         assert!(after > 0.0 && after < 0.01 * before, "{before:e} -> {after:e}");
     }

@@ -28,9 +28,9 @@ where
     /// Coarsest first.
     pub levels: Vec<Level<D>>,
     coarse: CoarseSolver,
-    /// For what the levels cannot see.
+    /// For the errors that the levels do not reduce.
     correction: Option<Box<dyn Correction>>,
-    /// What it is given and what it answers.
+    /// Load and velocities of the correction.
     wide: [Vec<f64>; 2],
 }
 
@@ -100,8 +100,8 @@ where
         vector::convert(norm, &self.levels[top].x, z);
     }
 
-    /// The reduced velocities `u` with which the finest rigid level answers the nodal load `f`, which it
-    /// reduces.
+    /// The reduced velocities `u` of one cycle on the finest rigid level for the nodal load `f`, which is
+    /// reduced in place.
     fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
         self.levels[self.levels.len() - 1].space.reduce(f);
         self.rigid_cycle(f, u);

@@ -2,7 +2,7 @@
 
 use gluey_fem::{Interpolation, ReferenceMatrices};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, LinOp, SpectralInterval, vector};
+use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp, vector};
 
 use super::SAFETY;
 use super::near_bodies::NearBodies;
@@ -10,12 +10,11 @@ use crate::error::DiagonalError;
 use crate::operator::{BlockDiagonal, CountedOperator, block_diagonal};
 use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells, cells_touching};
 
-/// Chebyshev smoothing: applications of the diagonal in a sweep, and the largest over the smallest eigenvalue
-/// it damps.
+/// How a level smooths.
 #[derive(Clone, Copy, Debug)]
 pub struct Smoothing {
-    degree: usize,
-    ratio: f64,
+    /// A sweep with the block diagonal as preconditioner. Its largest eigenvalue is known.
+    sweep: ChebyshevParams,
     /// Whether a sweep from zero goes before the correction, beside the one after it.
     before: bool,
 }
@@ -24,14 +23,19 @@ impl Smoothing {
     /// In `rigid-dofs`: one sweep after the correction damps more than two of half its degree, at as many
     /// applications, and the restriction needs no residual.
     pub fn of_eliminated(is_finest: bool) -> Self {
-        Self { degree: if is_finest { 4 } else { 5 }, ratio: 5.0, before: false }
+        Self { sweep: sweep(if is_finest { 4 } else { 5 }, 5.0), before: false }
     }
 
-    /// Below a penalised solid, where one sweep after the correction loses robustness: nine discs then take
-    /// 25 iterations at contrast 1e3 and 58 at 1e6.
+    /// Below a penalised solid, where one sweep after the correction loses robustness at high contrast, see
+    /// `docs/decisions/0012-passes-over-memory.md`.
     pub fn of_penalised(is_finest: bool) -> Self {
-        Self { degree: if is_finest { 2 } else { 3 }, ratio: 4.0, before: true }
+        Self { sweep: sweep(if is_finest { 2 } else { 3 }, 4.0), before: true }
     }
+}
+
+/// A sweep that damps eigenvalues down to the largest over `ratio`.
+pub fn sweep(degree: usize, ratio: f64) -> ChebyshevParams {
+    ChebyshevParams { degree, ratio, safety: SAFETY, ..ChebyshevParams::default() }
 }
 
 /// One level of the multigrid.
@@ -87,11 +91,11 @@ where
         if !smooths_twists {
             diagonal.hold_twists();
         }
-        let interval = SpectralInterval::upper_part(cell_lambda_max::<D>(), smoothing.ratio, SAFETY);
+        let lambda_max = cell_lambda_max::<D>();
         Ok(Self {
-            near_bodies: NearBodies::new(space, &cells, &diagonal, cell_lambda_max::<D>()),
+            near_bodies: NearBodies::new(space, &cells, &diagonal, lambda_max),
             operator: CountedOperator::new(space, &cells, cell_count, None),
-            chebyshev: Chebyshev::new(space.dim(), smoothing.degree, interval),
+            chebyshev: Chebyshev::below(lambda_max, space.dim(), &smoothing.sweep),
             before: smoothing.before,
             diagonal,
         })
@@ -139,8 +143,8 @@ where
         }
     }
 
-    /// Restricts what is to be corrected to the right-hand side of the coarser level: the residual of a sweep
-    /// from zero, or the right-hand side of this level.
+    /// Restricts to the right-hand side of the coarser level: the residual of a sweep from zero, or the
+    /// right-hand side of this level.
     pub fn restrict(
         &mut self,
         transfer: &mut Interpolation<D>,
@@ -185,15 +189,15 @@ fn restrict_load<const D: usize>(
 {
     let nodal = space.full_dim();
     twist_loads.copy_from_slice(&b[nodal..]);
-    // What this leaves at rigid nodes no smoother looks at.
+    // Smoothers ignore the entries that this leaves at rigid nodes.
     space.spread(b);
     restrict(b);
     b[nodal..].copy_from_slice(twist_loads);
 }
 
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
-/// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is 1 % (2D) to 8 %
-/// (3D) too large.
+/// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is a few percent
+/// too large.
 fn cell_lambda_max<const D: usize>() -> f64 {
     let n = ReferenceMatrices::<D>::VELOCITY;
     let viscous = ReferenceMatrices::<D>::new().viscous;

@@ -11,5 +11,5 @@ pub use hierarchy::Hierarchy;
 pub use level::Smoothing;
 
 /// Factor by which the bound of the largest eigenvalue is raised for hanging nodes and twists, whose
-/// diagonals are not sums over cells: they add 2 % at most where measured.
+/// diagonals are not sums over cells: they add little.
 const SAFETY: f64 = 1.05;

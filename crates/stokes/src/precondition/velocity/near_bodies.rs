@@ -2,18 +2,16 @@
 //!
 //! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it
 //! cannot correct: errors that reach over two or three cells from a body, too smooth for the sweep of a
-//! level. With two touching discs (N = 256) the eigenvalues of the V-cycle times the operator that are
-//! farthest below one, 0.79 to 0.83, are of this kind, with three quarters of their energy within two cells
-//! of a surface; those of the fluid begin at 0.89. As Brandt (1984) advises for boundaries, some more
+//! level. Of all errors the V-cycle reduces these the least
+//! (`docs/decisions/0014-relaxation-near-bodies.md`). As Brandt (1984) advises for boundaries, some more
 //! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
-//! are most of the cells of the finest mesh: one or two iterations fewer cost a sixth to a third more time,
-//! so there is none.
+//! are most of the cells of the finest mesh, and the iterations saved do not pay for it.
 //!
 //! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists
 //! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, LinOp, SpectralInterval};
+use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp};
 
 use super::SAFETY;
 use crate::operator::{BlockDiagonal, Restricted, acting, add_at};
@@ -23,11 +21,8 @@ use crate::space::{ActiveCell, VelocitySpace, nodes_of_cells_with};
 const MOST_DIMENSIONS: usize = 2;
 /// Cells between a body and the farthest relaxed nodes.
 const RINGS: usize = 3;
-/// Applications of the diagonal in a sweep.
-const DEGREE: usize = 6;
-/// Largest over smallest eigenvalue that a sweep damps: more than that of a level, since no coarser mesh
-/// helps.
-const RATIO: f64 = 20.0;
+/// A sweep, which damps more of the spectrum than that of a level, since no coarser mesh helps.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 6, ratio: 20.0, safety: SAFETY, lanczos_steps: 0 };
 
 /// The sweep around the bodies of one level.
 #[derive(Clone, Debug)]
@@ -72,9 +67,8 @@ where
         positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
         let acting = acting(discretisation, cells, &near);
         let operator = Restricted::new(space, &acting, cells.len(), positions, None);
-        let interval = SpectralInterval::upper_part(lambda_max, RATIO, SAFETY);
         let dim = operator.dim();
-        let chebyshev = Chebyshev::new(dim, DEGREE, interval);
+        let chebyshev = Chebyshev::below(lambda_max, dim, &SWEEP);
         Some(Self { operator, diagonal, chebyshev, r: vec![0.0; dim], e: vec![0.0; dim] })
     }
 

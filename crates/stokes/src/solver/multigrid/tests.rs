@@ -1,4 +1,4 @@
-//! What the levels promise to the Krylov method.
+//! Properties of the levels that the Krylov method relies on.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Vector};
@@ -6,7 +6,7 @@ use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 
 use crate::formulation::{Formulation, PaperParams, Problem};
-use crate::space::WeakPressures;
+use crate::space::CutCellPressures;
 
 use super::MultigridSolver;
 use crate::solver::SaddleSolver;
@@ -57,7 +57,7 @@ where
 
 #[test]
 fn operators_of_all_levels_are_symmetric_to_round_off() {
-    let rigid = Formulation::RigidDofs { offset: -0.1, weak_pressures: WeakPressures::Aggregate };
+    let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
     for formulation in [rigid, Formulation::Paper(PaperParams::default())] {
         level_operators_are_symmetric::<2>(formulation);
         level_operators_are_symmetric::<3>(formulation);

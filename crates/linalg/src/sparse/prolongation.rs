@@ -1,10 +1,11 @@
 //! Interpolation from some nodes to more of them.
 
-use gluey_linalg::Jagged;
+use crate::jagged::Jagged;
 
-/// Values at nodes as weighted sums of those at fewer nodes, the same for every component.
+/// Values at nodes as weighted sums of the values at fewer nodes, the same for every component.
+#[derive(Clone, Debug)]
 pub struct Prolongation {
-    /// Coarse node and weight, a list per node.
+    /// Coarse node and weight, one list per node.
     terms: Jagged<(u32, f64)>,
     coarse_count: usize,
 }
@@ -35,24 +36,24 @@ impl Prolongation {
         Self { terms: Jagged::grouped(self.coarse_count, pairs), coarse_count: self.terms.len() }
     }
 
-    /// `fine += P coarse` for `D` components. Nodes beyond its rows are left alone.
-    pub fn prolong<const D: usize>(&self, coarse: &[f64], fine: &mut [f64]) {
-        let fine = fine.as_chunks_mut::<D>().0;
-        for (node, fine) in fine.iter_mut().enumerate().take(self.terms.len()) {
-            for &(from, weight) in self.of(node) {
-                let from = &coarse[from as usize * D..][..D];
+    /// `fine += P coarse` for `B` components. Nodes beyond its rows are left alone.
+    pub fn prolong<const B: usize>(&self, coarse: &[f64], fine: &mut [f64]) {
+        let fine = fine.as_chunks_mut::<B>().0;
+        for (terms, fine) in self.terms.iter().zip(fine) {
+            for &(from, weight) in terms {
+                let from = &coarse[from as usize * B..][..B];
                 fine.iter_mut().zip(from).for_each(|(fine, value)| *fine += weight * value);
             }
         }
     }
 
     /// `coarse = P^T fine`.
-    pub fn restrict<const D: usize>(&self, fine: &[f64], coarse: &mut [f64]) {
+    pub fn restrict<const B: usize>(&self, fine: &[f64], coarse: &mut [f64]) {
         coarse.fill(0.0);
-        let fine = fine.as_chunks::<D>().0;
-        for (node, fine) in fine.iter().enumerate().take(self.terms.len()) {
-            for &(to, weight) in self.of(node) {
-                let to = &mut coarse[to as usize * D..][..D];
+        let fine = fine.as_chunks::<B>().0;
+        for (terms, fine) in self.terms.iter().zip(fine) {
+            for &(to, weight) in terms {
+                let to = &mut coarse[to as usize * B..][..B];
                 to.iter_mut().zip(fine).for_each(|(to, value)| *to += weight * value);
             }
         }

@@ -1,36 +1,27 @@
-//! What corrects the penalised operator on the nodes of the solid.
+//! Galerkin multigrid for the penalised operator on the nodes of the solid.
 //!
 //! The rigid levels never see the viscosity of the solid; this is where strain inside it is found. In 2D,
-//! where factors are small, the operator on these nodes is factorised. In 3D a multigrid cycle answers for it
-//! on coarser meshes, with the Galerkin products `P^T A P` on those of their nodes that lie among the
-//! solid's, so a cell that is cut stays cut as it is. [`Patches`] smooth on all but the coarsest level, which
-//! is factorised; on the finest the smoother of the whole mesh does.
+//! where factors are small, the operator on these nodes is factorised. In 3D a multigrid cycle on coarser
+//! meshes approximates its inverse, with the Galerkin products `P^T A P` on those of their nodes that lie
+//! among the solid's, so a cell that is cut stays cut as it is. [`SchwarzPatches`] on the cells smooth all
+//! but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, DirectSpd, Guess, LinOp, Ordering, Preconditioner, SparseMatrix, SpectralInterval,
-    estimate_lambda_max, vector,
+    Chebyshev, ChebyshevParams, DirectSpd, Guess, LinOp, Ordering, Preconditioner, Prolongation,
+    SchwarzPatches, SparseMatrix, SymmetricBlockMatrix, vector,
 };
 
-use super::node_matrix::NodeMatrix;
-use super::numbered::Numbered;
-use super::patches::Patches;
-use super::prolongation::Prolongation;
+use super::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::factorised;
 use crate::space::Discretisation;
 
-/// Applications of the patches in a sweep.
-const DEGREE: usize = 2;
-/// Largest over smallest eigenvalue that a sweep damps.
-const RATIO: f64 = 4.0;
-/// Lanczos steps for the largest eigenvalue.
-const LANCZOS_STEPS: usize = 8;
-/// Factor by which that estimate is raised.
-const SAFETY: f64 = 1.1;
+/// A sweep with the patches as preconditioner.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 2, ratio: 4.0, safety: 1.1, lanczos_steps: 8 };
 
-/// The levels.
-pub struct SolidCycle<const D: usize> {
+/// One V-cycle of Galerkin multigrid on the nodes of the solid, or a factorisation.
+pub struct SolidMultigrid<const D: usize> {
     /// From fine to coarse, without the finest; none where that is factorised.
     coarser: Vec<Coarse<D>>,
     direct: DirectSpd,
@@ -40,35 +31,35 @@ pub struct SolidCycle<const D: usize> {
 struct Coarse<const D: usize> {
     prolongation: Prolongation,
     /// Matrix and smoother, but on the coarsest.
-    smoothed: Option<(NodeMatrix<D>, Smoother<D>)>,
+    smoothed: Option<(SymmetricBlockMatrix<D>, Smoother<D>)>,
     b: Vec<f64>,
     x: Vec<f64>,
     r: Vec<f64>,
 }
 
 struct Smoother<const D: usize> {
-    patches: Patches<f64, D>,
+    patches: SchwarzPatches<f64, D>,
     chebyshev: Chebyshev<f64>,
 }
 
-impl<const D: usize> SolidCycle<D>
+impl<const D: usize> SolidMultigrid<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The cycle that is a factorisation.
+    /// The factorisation of a matrix in place of a cycle.
     pub fn factorised(matrix: &SparseMatrix, order: &[usize]) -> Result<Self, StokesError> {
         Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
     }
 
-    /// The cycle below the nodes of `solid`, on which the operator is `matrix`. `meshes` are those of the
+    /// The cycle below the nodes of `solid`, on which the operator is `matrix`, on the `meshes` of the
     /// coarser levels, fine to coarse.
     pub fn below<'a>(
-        solid: &Numbered<'a, D>,
-        matrix: &NodeMatrix<D>,
+        solid: &NumberedNodes<'a, D>,
+        matrix: &SymmetricBlockMatrix<D>,
         meshes: impl Iterator<Item = &'a Discretisation<D>>,
     ) -> Result<Self, StokesError> {
         let mut coarser: Vec<Coarse<D>> = Vec::new();
-        let mut last: Option<(Numbered<'a, D>, NodeMatrix<D>)> = None;
+        let mut last: Option<(NumberedNodes<'a, D>, SymmetricBlockMatrix<D>)> = None;
         for mesh in meshes {
             let (nodes, matrix) = last.as_ref().map_or((solid, matrix), |(nodes, matrix)| (nodes, matrix));
             let (coarse, prolongation) = nodes.coarsened(mesh);
@@ -81,12 +72,12 @@ where
             last = Some((coarse, product));
         }
         let coarsest = last.as_ref().map_or(matrix, |last| &last.1);
-        let (matrix, order) = coarsest.to_sparse()?;
-        Ok(Self { coarser, direct: factorised(&matrix, Ordering::Custom(&order))? })
+        let (matrix, blocks) = coarsest.to_sparse()?;
+        Ok(Self { coarser, direct: factorised(&matrix, Ordering::Custom(&blocks.minimum_degree()?))? })
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for SolidCycle<D>
+impl<const D: usize> Preconditioner<f64> for SolidMultigrid<D>
 where
     Dim<D>: Space<D>,
 {
@@ -110,13 +101,12 @@ impl<const D: usize> Smoother<D>
 where
     Dim<D>: Space<D>,
 {
-    fn new(matrix: &NodeMatrix<D>, nodes: &Numbered<'_, D>) -> Result<Self, StokesError> {
+    fn new(matrix: &SymmetricBlockMatrix<D>, nodes: &NumberedNodes<'_, D>) -> Result<Self, StokesError> {
         let diagonal = matrix.diagonal().iter().map(|d| 1.0 / d).collect();
-        let patches = Patches::new(matrix, nodes.cells(), diagonal);
+        let patches = SchwarzPatches::new(matrix, nodes.cells(), diagonal);
         let mut patches = patches.map_err(StokesError::SolidPatch)?;
-        let largest = estimate_lambda_max(&mut &*matrix, &mut patches, LANCZOS_STEPS)?;
-        let interval = SpectralInterval::upper_part(largest, RATIO, SAFETY);
-        Ok(Self { patches, chebyshev: Chebyshev::new(matrix.dim(), DEGREE, interval) })
+        let chebyshev = Chebyshev::for_operator(&mut &*matrix, &mut patches, &SWEEP)?;
+        Ok(Self { patches, chebyshev })
     }
 
     fn smooth(&mut self, a: &mut impl LinOp<f64>, b: &[f64], x: &mut [f64], guess: Guess) {
@@ -124,7 +114,7 @@ where
     }
 }
 
-/// Adds to `x` what the coarser levels make of the residual `r`.
+/// Adds to `x` the correction of the coarser levels for the residual `r`.
 fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64])
 where
     Dim<D>: Space<D>,

@@ -2,8 +2,9 @@
 //!
 //! Every velocity is a field that is rigid on the nodes the solid touches, plus a field that vanishes away
 //! from them. The first belongs to the hierarchy of rigid levels, which never sees the solid's viscosity. On
-//! the second the penalised operator is a block `A_WW` that holds all of the contrast; [`SolidCycle`] answers
-//! for it with `C`. The two are combined multiplicatively, then the sweep `G` takes what both leave:
+//! the second the penalised operator is a block `A_WW` that holds all of the contrast; [`SolidMultigrid`]
+//! approximates its inverse by `C`. The two are combined multiplicatively, then the sweep `G` smooths the
+//! residual of both:
 //!
 //! `z = E C E^T r`, `z += V (r - A z)`, `z += G (r - A z)`.
 //!
@@ -18,9 +19,9 @@
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
 
-use super::cycle::SolidCycle;
-use super::node_matrix::NodeMatrix;
-use super::numbered::Numbered;
+use super::assembly::assemble_on_nodes;
+use super::multigrid::SolidMultigrid;
+use super::numbered::NumberedNodes;
 use super::smoother::{FilmSmoother, PenalisedSmoother};
 use crate::error::StokesError;
 use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscous_on, gather};
@@ -29,15 +30,17 @@ use crate::space::{
     CellKind, VelocitySpace, around_films, around_finest_cells, cell_kind, nodes_of_cells_with,
 };
 
-/// Where the solid is less stiff a sweep around films saves no iterations: at a ratio of viscosities of 1e2
-/// none, at 1e3 one or two.
+/// Where the solid is less stiff a sweep around films saves no iterations, see
+/// `docs/decisions/0017-pressures-in-cut-cells-and-films.md`.
 const LEAST_CONTRAST_OF_FILMS: f64 = 300.0;
-/// The cycle on the solid, the sweep, and the operators that tell what is left.
-pub struct SolidBlock<const D: usize>
+
+/// The correction of the velocity cycle for the penalised solid: the approximate inverse on its nodes, the
+/// sweeps, and the operators that give the residuals between them.
+pub struct PenalisedCorrection<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    cycle: SolidCycle<D>,
+    cycle: SolidMultigrid<D>,
     /// The cycle's unknowns among the reduced velocities.
     positions: Vec<u32>,
     /// `None` where the cycle, being exact, takes its place.
@@ -57,11 +60,11 @@ where
     velocity: Vec<f32>,
     /// Loads of that velocity.
     rigid_load: Vec<f32>,
-    /// What is left of the right-hand side.
+    /// Residual at all nodes.
     r: Vec<f64>,
 }
 
-impl<const D: usize> SolidBlock<D>
+impl<const D: usize> PenalisedCorrection<D>
 where
     Dim<D>: Space<D>,
 {
@@ -76,15 +79,15 @@ where
         let discretisation = system.discretisation();
         let nodes = &discretisation.velocity;
         let mut block: Vec<bool> = touched.iter().map(Option::is_some).collect();
-        let Solid { cycle, positions, smoother, swept } = if levels.are_factorised() {
+        let SolidInverse { cycle, positions, smoother, swept } = if levels.are_factorised() {
             // A ring of cells around the solid saves a third of the iterations; in 3D that does not pay for
             // its factorisation.
             if D == 2 {
                 block = nodes_of_cells_with(nodes, &block);
             }
-            Solid::factorised(elements, &block)?
+            SolidInverse::factorised(elements, &block)?
         } else {
-            Solid::smoothed(elements, &block, levels)?
+            SolidInverse::smoothed(elements, &block, levels)?
         };
         let is_stiff = system.penalty.as_ref().is_some_and(|p| p.contrast() >= LEAST_CONTRAST_OF_FILMS);
         let films = (smoother.is_some() && is_stiff).then(|| around_films(discretisation, touched)).flatten();
@@ -123,15 +126,15 @@ where
         add_at(&self.positions, &self.x, z);
     }
 
-    /// The same for what is left of the right-hand side.
-    fn correct_solid_by_rest(&mut self, z: &mut [f64]) {
-        let left = std::mem::take(&mut self.r);
-        self.correct_solid(&left, z);
-        self.r = left;
+    /// `z += E C E^T r` for the residual in the workspace.
+    fn correct_solid_by_residual(&mut self, z: &mut [f64]) {
+        let residual = std::mem::take(&mut self.r);
+        self.correct_solid(&residual, z);
+        self.r = residual;
     }
 }
 
-impl<const D: usize> Correction for SolidBlock<D>
+impl<const D: usize> Correction for PenalisedCorrection<D>
 where
     Dim<D>: Space<D>,
 {
@@ -142,7 +145,7 @@ where
                 film.add_to(r, z);
                 film.loads(z, &mut self.r);
                 vector::residual_from_product(r, &mut self.r);
-                self.correct_solid_by_rest(z);
+                self.correct_solid_by_residual(z);
             }
             None => self.correct_solid(r, z),
         }
@@ -160,7 +163,7 @@ where
 
         match &mut self.smoother {
             Some(smoother) => smoother.add_to(&self.r, z),
-            None => self.correct_solid_by_rest(z),
+            None => self.correct_solid_by_residual(z),
         }
     }
 
@@ -171,23 +174,23 @@ where
     }
 }
 
-/// What answers for the solid.
-struct Solid<const D: usize> {
-    cycle: SolidCycle<D>,
+/// The approximate inverse on the nodes of the solid and the sweep that goes with it.
+struct SolidInverse<const D: usize> {
+    cycle: SolidMultigrid<D>,
     positions: Vec<u32>,
     smoother: Option<PenalisedSmoother<D>>,
     /// The nodes whose residuals are looked at after the rigid levels.
     swept: Vec<bool>,
 }
 
-impl<const D: usize> Solid<D>
+impl<const D: usize> SolidInverse<D>
 where
     Dim<D>: Space<D>,
 {
     fn factorised(elements: &Elements<'_, D>, block: &[bool]) -> Result<Self, StokesError> {
         let assembled = assemble_viscous_on(elements, |node| block[node])?;
         Ok(Self {
-            cycle: SolidCycle::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?,
+            cycle: SolidMultigrid::factorised(&assembled.matrix, &assembled.blocks.minimum_degree()?)?,
             positions: assembled.unknowns.positions().to_vec(),
             smoother: None,
             swept: block.to_vec(),
@@ -201,13 +204,13 @@ where
     ) -> Result<Self, StokesError> {
         let system = elements.system();
         let discretisation = system.discretisation();
-        let nodes = Numbered::new(discretisation, |node| system.space.is_free(node) && block[node]);
-        let matrix = NodeMatrix::assembled(&nodes, elements)?;
+        let nodes = NumberedNodes::new(discretisation, |node| system.space.is_free(node) && block[node]);
+        let matrix = assemble_on_nodes(&nodes, elements)?;
         let factorised = (1..levels.meshes.len()).rev().find(|&count| levels.below(count).are_factorised());
         let coarser = &levels.meshes[factorised.map_or(0, |count| count - 1)..levels.meshes.len() - 1];
         let swept = around_finest_cells(discretisation);
         Ok(Self {
-            cycle: SolidCycle::below(&nodes, &matrix, coarser.iter().rev())?,
+            cycle: SolidMultigrid::below(&nodes, &matrix, coarser.iter().rev())?,
             positions: nodes.positions(),
             smoother: Some(PenalisedSmoother::new(system, &swept, &nodes, &matrix)?),
             swept,

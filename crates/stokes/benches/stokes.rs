@@ -11,8 +11,8 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_linalg::{LinOp, Preconditioner};
 use gluey_stokes::{
-    DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver, PaperParams,
-    PointMatrices, Problem, Refinement, SaddleSolver, SolidRegion, SolverKind, SystemOperator, WeakPressures,
+    CutCellPressures, DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver,
+    PaperParams, PointMatrices, Problem, Refinement, SaddleSolver, SolidRegion, SolverKind, SystemOperator,
     solid_nodes,
 };
 use gluey_testkit::packing::Packing;
@@ -23,7 +23,7 @@ const OFFSET: f64 = -0.1;
 const TOLERANCE: f64 = 1e-8;
 const VISCOSITY: f64 = 1.0;
 const RIGID: Formulation =
-    Formulation::RigidDofs { offset: OFFSET, weak_pressures: WeakPressures::Aggregate };
+    Formulation::RigidDofs { offset: OFFSET, cut_cell_pressures: CutCellPressures::Aggregate };
 
 fn pair_2d() -> Vec<Ball<2>> {
     [(0.451, 0.51), (0.549, 0.49)].map(|(x, y)| Ball::new(Vector::<2>::new(x, y), 0.05)).to_vec()
