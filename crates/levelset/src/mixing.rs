@@ -35,9 +35,14 @@ impl ViscosityLaw {
         self.fluid * (fraction * self.ratio + (1.0 - fraction))
     }
 
-    /// The part `I eta_s` of [`ViscosityLaw::mix`]: the weight of the multiplier in the Uzawa method (eq. 9).
-    pub fn solid_part(&self, fraction: f64) -> f64 {
-        self.fluid * self.ratio * fraction
+    /// Viscosity of the solid, `eta_s`; `I eta_s` is the weight of the multiplier in the Uzawa method (eq. 9).
+    pub fn solid(&self) -> f64 {
+        self.fluid * self.ratio
+    }
+
+    /// The factor `1 - 1/r` with which the solid adds to the fluid: `eta = eta_f + (1 - 1/r) I eta_s`.
+    pub fn excess(&self) -> f64 {
+        1.0 - 1.0 / self.ratio
     }
 }
 
@@ -51,6 +56,7 @@ mod tests {
         assert_eq!([-0.2, 0.0, 0.05, 0.1, 0.3].map(|a| ramp.fraction(a)), [0.0, 0.0, 0.5, 1.0, 1.0]);
         let law = ViscosityLaw { fluid: 2.0, ratio: 1e3 };
         assert_eq!([0.0, 1.0].map(|i| law.mix(i)), [2.0, 2000.0]);
-        assert_eq!(law.mix(0.3), law.solid_part(0.3) + 2.0 * 0.7);
+        assert_eq!(law.mix(0.3), 0.3 * law.solid() + 2.0 * 0.7);
+        assert!((law.mix(0.3) - (2.0 + law.excess() * 0.3 * law.solid())).abs() < 1e-12 * law.mix(0.3));
     }
 }

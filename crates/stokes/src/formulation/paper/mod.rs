@@ -8,7 +8,7 @@ use gluey_fem::Evaluator;
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space, Twist};
-use gluey_levelset::{Ball, Ramp};
+use gluey_levelset::{Ball, Ramp, ViscosityLaw};
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
@@ -45,15 +45,16 @@ where
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
         let Self { params, matrices } = self;
+        let law = ViscosityLaw { fluid: viscosity, ratio: params.viscosity_ratio };
         let ramp = Ramp::new(params.ramp * discretisation.finest_cell_size());
         let region = SolidRegion::new(discretisation, bodies, ramp, matrices);
         let held = region.held(bodies.len());
         check_resolved(discretisation, bodies, |body| held[body])?;
-        let stress = SolidStress::new(discretisation, &region, matrices, viscosity * params.viscosity_ratio);
+        let stress = SolidStress::new(discretisation, &region, matrices, law.solid());
         let touched = region.touched_nodes(&discretisation.velocity, bodies);
         let nowhere = vec![None; discretisation.velocity.node_count()];
         let space = VelocitySpace::new::<Ball<D>>(discretisation, &[], &nowhere);
-        let penalty = Penalty { factor: 1.0 - 1.0 / params.viscosity_ratio, stress };
+        let penalty = Penalty { factor: law.excess(), stress };
         let system = StokesSystem::penalised(space, viscosity, penalty);
         let solid = PenalisedSolid { params: *params, region, touched, matrices: matrices.clone() };
         Ok((system, Arc::new(solid)))
