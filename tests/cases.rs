@@ -20,6 +20,17 @@ fn case_files() -> Vec<PathBuf> {
     files
 }
 
+/// The package carries copies of the trajectories, for it cannot reach outside its folder.
+#[test]
+fn the_packaged_references_are_those_of_the_workspace() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    for name in gluey::reference::NAMES {
+        let [packaged, original] = ["crates/gluey/data", "data/reference"]
+            .map(|folder| fs::read_to_string(format!("{root}/{folder}/{name}.csv")).expect("a table"));
+        assert!(packaged == original, "{name}");
+    }
+}
+
 #[test]
 fn the_papers_cases_are_there() {
     let names: Vec<String> =

@@ -146,7 +146,8 @@ fn half_turn(instants: &[Instant]) -> Option<f64> {
     Some(before.time + DT * (target - before.angle) / (after.angle - before.angle))
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+/// Prints the three encounters.
+pub fn main() -> Result<(), Box<dyn Error>> {
     let end = std::env::args().nth(1).map_or(Ok(8.0), |end| end.parse::<f64>())?;
     for method in methods() {
         let instants = encounter(&method, end)?;
@@ -155,11 +156,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         for Instant { time, angle, gap, gamma } in instants.iter().step_by(40) {
             println!("{time:6.1} {angle:6.1} {gap:10.2e} {gamma:10.2e}");
         }
-        let smallest = instants.iter().map(|instant| instant.gap).fold(f64::INFINITY, f64::min);
-        println!(
-            "smallest gap/a {smallest:.2e}, half a turn at t = {:.3}\n",
-            half_turn(&instants).unwrap_or(f64::NAN)
-        );
+        let gaps = instants.iter().map(|instant| instant.gap);
+        let (smallest, largest) = gaps
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(smallest, largest), gap| {
+                (smallest.min(gap), largest.max(gap))
+            });
+        let half_turn = half_turn(&instants).unwrap_or(f64::NAN);
+        println!("gap/a from {smallest:.2e} to {largest:.2e}, half a turn at t = {half_turn:.3}\n");
     }
     Ok(())
 }

@@ -50,3 +50,8 @@ pub use report::RunReport;
 pub use run::{RunError, RunOptions, VtkOptions, run};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
 pub use trajectory::Row;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
