@@ -86,7 +86,7 @@ pub struct DomainSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParticleSpec {
-    /// Centre, one coordinate a dimension.
+    /// Centre, one coordinate per dimension.
     pub position: Vec<f64>,
     /// Radius `a > 0`.
     pub radius: f64,
@@ -112,7 +112,7 @@ pub struct TimeSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// What keeps particles from overlapping.
+    /// The contact law, which keeps particles from overlapping.
     pub strategy: Strategy,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     pub exact_gap: bool,
@@ -134,7 +134,7 @@ pub struct ContactSpec {
 }
 
 impl ContactSpec {
-    /// The same for the contact model.
+    /// These parameters as the contact model takes them.
     pub fn params(&self) -> ContactParams {
         ContactParams {
             law: self.strategy,
@@ -274,7 +274,7 @@ impl Default for PaperSpec {
 }
 
 impl PaperSpec {
-    /// The same for the solver.
+    /// These parameters as the solver takes them.
     pub fn params(&self) -> PaperParams {
         PaperParams {
             viscosity_ratio: self.viscosity_ratio,
@@ -308,12 +308,12 @@ impl Case {
         self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64
     }
 
-    /// Lower corner of the box, one coordinate a dimension.
+    /// Lower corner of the box, one coordinate per dimension.
     pub fn lower(&self) -> Vec<f64> {
         self.domain.lower.clone().unwrap_or_else(|| vec![0.0; self.dimension])
     }
 
-    /// Upper corner of the box, one coordinate a dimension.
+    /// Upper corner of the box, one coordinate per dimension.
     pub fn upper(&self) -> Vec<f64> {
         self.domain.upper.clone().unwrap_or_else(|| vec![1.0; self.dimension])
     }
@@ -330,7 +330,7 @@ impl Case {
         is_periodic.then(|| self.upper()[axis] - self.lower()[axis])
     }
 
-    /// What surrounds the particles: walls below and above (y), which move along themselves, and the periods.
+    /// Surroundings of the particles: walls below and above (y), which move along themselves, and the periods.
     /// Nothing without a finite-element flow.
     pub(crate) fn surroundings<const D: usize>(&self) -> Domain<D> {
         if self.flow.hydrodynamics != Hydrodynamics::Stokes {

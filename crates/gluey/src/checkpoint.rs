@@ -115,7 +115,7 @@ pub struct CaseDifference {
     pub given: String,
 }
 
-/// What stands in the file: the case as text, then the run, decoded only if the case is the right one.
+/// Content of the file: the case as text, then the run, decoded only if the case is the right one.
 #[derive(Serialize, Deserialize)]
 struct Payload {
     case: String,
@@ -179,7 +179,7 @@ where
     }
 }
 
-/// What was compressed; `None` if it was not.
+/// Bytes before compression; `None` if `body` is not compressed.
 fn inflated(body: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     ZlibDecoder::new(body).read_to_end(&mut bytes).ok()?;

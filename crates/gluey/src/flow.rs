@@ -60,7 +60,7 @@ impl From<MeshError> for FlowError {
     }
 }
 
-/// What the next prediction starts from, for checkpoints.
+/// Flows that the next prediction starts from, for checkpoints.
 #[derive(Serialize, Deserialize)]
 struct WarmStart<const D: usize> {
     centers: Vec<Vector<D>>,
@@ -231,7 +231,7 @@ fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64)
     roots.zip(case.surface_level()).ok_or_else(uneven)
 }
 
-/// What the mesh of a checked case follows, whose surfaces are at `level`.
+/// Refinement of the mesh of a checked case, whose surfaces are at `level`.
 fn refinement(case: &Case, level: f64) -> Refinement {
     let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
     let surface = level as u8;

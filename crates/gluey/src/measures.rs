@@ -1,4 +1,4 @@
-//! What a run is measured by, row by row as it goes on: the rows themselves are on disk only.
+//! Measures of a run, updated row by row: the rows themselves are on disk only.
 
 use gluey_geom::Vector;
 
@@ -6,7 +6,7 @@ use crate::case::Case;
 use crate::reference::{Comparison, Deviation, Reference};
 use crate::trajectory::PairHistory;
 
-/// What the measures need of a row; a resumed run reads it from its file.
+/// Part of a row that enters the measures; a resumed run reads it from its file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Instant<const D: usize> {
     /// Time.

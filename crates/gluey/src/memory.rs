@@ -18,7 +18,7 @@ const MOST_UNKNOWNS: f64 = u32::MAX as f64;
     .estimate.cell_count, .estimate.unknown_count, .estimate.bytes / 1e9, there(*.available)
 )]
 pub struct TooLarge {
-    /// What it would need.
+    /// Size of its mesh.
     pub estimate: MeshEstimate,
     /// Bytes there are, if that is known.
     pub available: Option<u64>,

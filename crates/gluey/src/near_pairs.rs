@@ -73,7 +73,7 @@ where
         found
     }
 
-    /// One ball a particle, as large as to meet those within `reach`, and the images that could meet one.
+    /// One ball per particle, as large as to meet those within `reach`, and the images that could meet one.
     fn place_balls(&mut self, row: &Row<'_, D>, reach: f64) {
         let periods = &row.domain.periods;
         let longest = periods.iter().flatten().copied().fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! What a run leaves on disk. Nothing appears under its final name before it is complete, nothing is deleted
+//! Files of a run on disk. Nothing appears under its final name before it is complete, nothing is deleted
 //! that the run did not make, and what another run is writing is not touched.
 
 mod claim;
@@ -24,7 +24,7 @@ pub use draft::{Mark, RowsError};
 pub struct OutputError {
     /// The file or folder.
     pub path: PathBuf,
-    /// What was tried.
+    /// The action that failed.
     pub action: &'static str,
     /// Why it failed.
     #[source]

@@ -12,7 +12,7 @@ pub struct ProgressState<'a> {
     pub steps: usize,
     /// Time reached in the simulation.
     pub time: f64,
-    /// What is being done: `flow`, `contact`, `motion` or `output`.
+    /// The work being done: `flow`, `contact`, `motion` or `output`.
     pub phase: &'a str,
     /// Wall time since the run started, in seconds.
     pub wall_s: f64,

@@ -1,4 +1,4 @@
-//! What a run comes to.
+//! Summary of a run.
 
 use std::fmt;
 

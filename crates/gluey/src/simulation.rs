@@ -284,7 +284,7 @@ where
         &mut self.phases
     }
 
-    /// What [`Simulation::restore`] needs; taken between steps.
+    /// The state that [`Simulation::restore`] needs; taken between steps.
     ///
     /// # Errors
     /// If the flow cannot store what it starts from.

@@ -57,7 +57,7 @@ fn separation<const D: usize>(one: &Vector<D>, other: &Vector<D>, periods: &[Opt
     Vector::from_fn(|axis, _| nearest_image(direct[axis], periods[axis]))
 }
 
-/// What the report needs of particles 1 and 2, at every instant: three numbers a row.
+/// History of particles 1 and 2 for the report: three numbers per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PairHistory {
     times: Vec<f64>,

@@ -15,14 +15,14 @@ use crate::reproduce::trajectory::Trajectory;
 use canvas::Canvas;
 use chart::{Curve, Stroke};
 
-/// What figures are drawn from.
+/// Data from which figures are drawn.
 #[derive(Debug, Default)]
 pub struct Data {
     /// Trajectories of the runs that succeeded.
     pub runs: BTreeMap<RunKey, Trajectory>,
     /// Exact solutions.
     pub exact: BTreeMap<CaseName, Trajectory>,
-    /// What the runs were computed with.
+    /// Settings of the runs.
     pub settings: BTreeMap<RunKey, Settings>,
     /// The runs are those of `--quick`; the figures say so.
     pub quick: bool,
@@ -47,7 +47,7 @@ impl Data {
         figure.approaches().into_iter().filter_map(|approach| Some((approach, run(approach)?))).collect()
     }
 
-    /// What a reader of the figure must know: missing runs, reduced settings.
+    /// Notes for the reader of the figure: missing runs, reduced settings.
     fn notes(&self, figure: FigureName) -> Vec<String> {
         let mut notes = Vec::new();
         if self.quick {

@@ -55,7 +55,7 @@ enum Piece {
     Plain,
 }
 
-/// What comes first in `rest`, and how many bytes it takes.
+/// First item of `rest`, and how many bytes it takes.
 fn next_piece(rest: &str) -> (Piece, usize) {
     if rest.starts_with('*') {
         return (Piece::Star, 1);

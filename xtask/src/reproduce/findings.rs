@@ -54,7 +54,7 @@ pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<Table> {
     Some(Table { columns: measures.iter().map(|(name, _)| (*name).to_owned()).collect(), rows })
 }
 
-/// What a column of a table is computed from.
+/// Data from which a column of a table is computed.
 struct View<'a> {
     run: &'a Trajectory,
     exact: Option<&'a Trajectory>,

@@ -34,7 +34,7 @@ use trajectory::Trajectory;
 /// Times shown by figures of the 2D pair end here; its exact orbit is continued to this time.
 const LATEST_END: f64 = 30.0;
 
-/// What to reproduce, and where to put it.
+/// Figures to reproduce, and where to put them.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Coarse and fast.

@@ -53,7 +53,7 @@ pub enum Approach {
 }
 
 impl Approach {
-    /// What stands after the case in a run's name.
+    /// Part of a run's name after the case.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -69,9 +69,9 @@ impl Approach {
 /// One run: a case and the way it is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunKey {
-    /// What is computed.
+    /// The case.
     pub case: CaseName,
-    /// How.
+    /// The way it is computed.
     pub approach: Approach,
 }
 
@@ -229,7 +229,7 @@ pub fn runs_for(figures: &[FigureName], quick: bool) -> Vec<RunKey> {
 /// says nothing about smaller ones.
 const ONLY_IN_FULL: RunKey = RunKey { case: CaseName::Pair3d, approach: Approach::GlueyAsPrintedLargeStep };
 
-/// What `--quick` changes of a case: the only place for these numbers.
+/// Changes of a case by `--quick`: the only place for these numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuickSettings {
     /// Finest cells per radius, `a / h`.

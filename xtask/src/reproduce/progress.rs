@@ -1,4 +1,4 @@
-//! What the runs are doing: a bar each on a terminal, a line now and then elsewhere.
+//! Progress of the runs: a bar each on a terminal, a line now and then elsewhere.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;

@@ -31,7 +31,7 @@ pub enum JobError<E: Error + 'static> {
     NeverStarted,
 }
 
-/// What became of a job; empty while it is not done.
+/// Outcome of a job; empty while it is not done.
 type Slot<T, E> = Mutex<Option<Result<T, JobError<E>>>>;
 
 /// Does every job, at most `workers` at a time and in the order given; the results stand in the order of the

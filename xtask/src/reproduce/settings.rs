@@ -1,4 +1,4 @@
-//! What a run was computed with, in words: nobody should have to open a case file to learn it.
+//! Settings of a run in words: nobody should have to open a case file to learn it.
 
 use gluey::case::{Boundary, Memory, ParticleVelocity};
 use gluey::{Case, Formulation, Strategy};
@@ -37,7 +37,7 @@ impl Settings {
         }
     }
 
-    /// What the notes of a figure say, one string per line.
+    /// Notes under a figure, one string per line.
     pub fn figure_notes(&self) -> [String; 2] {
         let Self { flow, cells_per_radius, time_step, .. } = self;
         [format!("{flow};"), format!("*a*/*h* = {cells_per_radius}, time step {time_step}.")]

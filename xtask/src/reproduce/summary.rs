@@ -20,9 +20,9 @@ pub struct Summary {
     pub figures: Vec<FigureName>,
     /// The runs that succeeded.
     pub runs: Vec<Run>,
-    /// What did not work.
+    /// Runs, figures and files that failed.
     pub failures: Vec<Failure>,
-    /// What the runs show.
+    /// Rows under the figures.
     pub rows: Vec<Row>,
 }
 
@@ -31,7 +31,7 @@ pub struct Summary {
 pub struct Run {
     /// Its name, that of its CSV file.
     pub name: String,
-    /// What it was computed with.
+    /// Its settings.
     pub settings: Settings,
     /// Its result in numbers.
     pub report: RunReport,

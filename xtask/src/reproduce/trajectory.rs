@@ -32,7 +32,7 @@ pub enum TrajectoryError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// It is no table of a trajectory.
@@ -40,7 +40,7 @@ pub enum TrajectoryError {
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the table.
         source: TableError,
     },
 }

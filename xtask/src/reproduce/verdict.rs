@@ -75,11 +75,11 @@ pub struct Claim {
     pub statement: &'static str,
     /// The run or runs it is about.
     pub run: &'static str,
-    /// What is measured.
+    /// The measure.
     pub measure: &'static str,
     /// The number; `None` if it could not be measured.
     pub value: Option<f64>,
-    /// What it should be.
+    /// Its wanted interval.
     pub wanted: Wanted,
     /// It needs the full computation: runs of `--quick` end earlier and take larger steps.
     pub full_only: bool,
@@ -127,11 +127,11 @@ pub struct Row {
     pub statement: &'static str,
     /// The run or runs it is about.
     pub run: &'static str,
-    /// What is measured.
+    /// The measure.
     pub measure: &'static str,
     /// The number; `None` if it could not be measured.
     pub value: Option<f64>,
-    /// What it should be.
+    /// Its wanted interval.
     pub wanted: String,
     /// Whether it is.
     pub outcome: Outcome,

@@ -12,7 +12,7 @@ use super::law::Law;
 /// The crate that tests, and only tests, may use everywhere.
 const TEST_CRATE: &str = "gluey-testkit";
 
-/// What is needed of `cargo metadata`.
+/// Part of `cargo metadata` that is needed.
 #[derive(Debug, Deserialize)]
 pub struct Metadata {
     /// The members of the workspace.

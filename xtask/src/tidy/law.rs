@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::TidyError;
 
-/// What ARCHITECTURE.md allows.
+/// Rules of ARCHITECTURE.md.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Law {
     /// For each crate of the workspace, those it may depend on.

@@ -20,7 +20,7 @@ pub enum TidyError {
     Read {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// A block of the law is missing or a line of it makes no sense.
@@ -31,7 +31,7 @@ pub enum TidyError {
     Syntax {
         /// The file or the folder it lies in.
         path: String,
-        /// What the parser said.
+        /// Error of the parser.
         error: syn::Error,
     },
     /// `cargo metadata` did not answer.

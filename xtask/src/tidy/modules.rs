@@ -51,7 +51,7 @@ struct Reference {
     line: usize,
 }
 
-/// What a file says about names.
+/// Names in a file.
 #[derive(Debug)]
 struct Module {
     file: String,

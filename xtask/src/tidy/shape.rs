@@ -62,7 +62,7 @@ impl Functions<'_> {
     }
 }
 
-/// What an argument counts for: a tuple for as many as it has parts.
+/// Weight of an argument: a tuple for as many as it has parts.
 fn parameters(argument: &syn::FnArg) -> usize {
     match argument {
         syn::FnArg::Typed(argument) => parts(&argument.pat),

@@ -6,14 +6,14 @@ use crate::reference::{MIDDLE, RADIUS, Reference};
 /// How far from the reference's a particle may start, in radii.
 const START_TOLERANCE: f64 = 1e-6;
 
-/// What a comparison needs, and what a case has in its place.
+/// Requirement of a comparison, and the case's value in its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Mismatch {
     pub needs: String,
     pub found: String,
 }
 
-/// What in `case` keeps it from being compared with `reference`.
+/// First mismatch that keeps `case` from being compared with `reference`.
 pub(super) fn mismatch(case: &Case, reference: &Reference) -> Option<Mismatch> {
     other_flow(case, reference)
         .or_else(|| other_box(case, reference))

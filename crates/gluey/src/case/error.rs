@@ -1,4 +1,4 @@
-//! What can be wrong with a case, with the numbers needed to fix it.
+//! Errors in a case, with the numbers needed to fix them.
 
 use std::fmt;
 use std::io;
@@ -43,7 +43,7 @@ pub struct CaseIssue {
     pub key: Key,
     /// The value as written, when there is one.
     pub value: Option<String>,
-    /// What is wrong.
+    /// The error.
     pub problem: Problem,
 }
 
@@ -110,13 +110,13 @@ impl fmt::Display for Key {
     }
 }
 
-/// What is wrong with a value of a case.
+/// An error in a value of a case.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Problem {
     /// Not TOML.
     #[error("not valid TOML: {message}")]
     Syntax {
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
     /// A key that has no default is absent.
@@ -140,9 +140,9 @@ pub enum Problem {
     /// A value of another type.
     #[error("wrong type: found {found}")]
     WrongType {
-        /// What stands there.
+        /// Type of the value.
         found: String,
-        /// What would be right.
+        /// Type that would be right.
         expected: String,
     },
     /// A name that is none of the known ones.
@@ -151,7 +151,7 @@ pub enum Problem {
     /// Something serde has no better word for.
     #[error("{message}")]
     Malformed {
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
     /// Neither 2 nor 3.
@@ -262,7 +262,7 @@ pub enum Problem {
     #[error("no particles")]
     NoParticles,
     /// A mesh finer than the tree can number.
-    #[error("{cells_per_radius} cells a radius of {radius} need level {level} of the tree")]
+    #[error("{cells_per_radius} cells per radius of {radius} need level {level} of the tree")]
     MeshTooFine {
         /// Cells asked for.
         cells_per_radius: f64,
@@ -272,7 +272,7 @@ pub enum Problem {
         level: f64,
         /// Finest level possible.
         finest: u32,
-        /// The largest number of cells a radius at that level.
+        /// The largest number of cells per radius at that level.
         largest: f64,
     },
     /// The coarsest cells would be finer than the finest.
@@ -298,9 +298,9 @@ pub enum Problem {
     Unfit {
         /// The choice.
         choice: String,
-        /// What it needs.
+        /// Its requirement.
         needs: String,
-        /// What the case has.
+        /// The case's value in its place.
         found: String,
     },
     /// A name with characters that do not belong in a file name.
@@ -309,7 +309,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// What would be right.
+    /// Hint at values that would be right.
     pub fn hint(&self) -> String {
         match self {
             Self::Syntax { .. } | Self::Malformed { .. } => "see the case format in the README".into(),
@@ -339,7 +339,7 @@ impl Problem {
             }
             Self::NoParticles => "add a [[particles]] table with `position` and `radius`".into(),
             Self::MeshTooFine { finest, largest, .. } => {
-                format!("the tree has {finest} levels: at most {largest:.3} cells a radius")
+                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
             }
             Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
             Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),

@@ -12,7 +12,7 @@ use super::suggest::closest;
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("`{found}` is not a known {what}")]
 pub struct UnknownName {
-    /// What was to be named: `strategy`, `formulation`, ...
+    /// Kind of the name: `strategy`, `formulation`, ...
     pub what: String,
     /// The name as given.
     pub found: String,
@@ -21,7 +21,7 @@ pub struct UnknownName {
 }
 
 impl UnknownName {
-    /// What would be right, with the nearest name first.
+    /// Hint at the known names, with the nearest one first.
     pub fn hint(&self) -> String {
         let choices = self.known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
         match closest(&self.found, self.known.iter().map(String::as_str)) {

@@ -1,4 +1,4 @@
-//! What a case must satisfy beyond its types.
+//! Checks of a case beyond its types.
 
 use gluey_stokes::StokesError;
 

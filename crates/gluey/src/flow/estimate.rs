@@ -36,7 +36,7 @@ pub struct MeshEstimate {
 
 impl MeshEstimate {
     /// The estimate for a checked case; `None` if its flow has no mesh. Takes as long as looking at each
-    /// particle once a level.
+    /// particle once per level.
     pub fn of(case: &Case) -> Option<Self> {
         if case.flow.hydrodynamics != Hydrodynamics::Stokes {
             return None;
@@ -167,7 +167,7 @@ fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
     let rigid = case.flow.formulation == Formulation::RigidDofs;
     let per_cell = UNKNOWNS_PER_CELL[case.dimension - 2];
     if direct {
-        // What is inside rigid particles is eliminated.
+        // The nodes inside rigid particles are eliminated.
         let inside = if rigid { tree.cells_inside(case) } else { 0.0 };
         let solved = (per_cell * (cell_count - inside)).max(1e3);
         return match case.dimension {

@@ -1,4 +1,4 @@
-//! The trajectory as comma-separated values, one row a step.
+//! The trajectory as comma-separated values, one row per step.
 //!
 //! Columns: `t`, the centres `x1,y1[,z1],x2,...`, gaps in mean radii `a`, the spins `omega1,...` (2D) or
 //! `omega1x,omega1y,omega1z,...` (3D). Numbers have 17 significant digits, so they read back exactly.

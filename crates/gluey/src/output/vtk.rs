@@ -30,7 +30,7 @@ const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
 const HEXAHEDRON_ORDER: [usize; 27] =
     [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
 
-/// What there is to write about one instant.
+/// Particles, contacts and fields at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a, const D: usize>
 where

@@ -74,7 +74,7 @@ pub enum RunError {
         step: usize,
         /// Where the run can go on from.
         checkpoint: PathBuf,
-        /// What failed.
+        /// The error.
         #[source]
         cause: Box<RunError>,
     },

@@ -1,4 +1,4 @@
-//! What a run writes, and where.
+//! Output of a run, and its places.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::atomic::AtomicBool;
 
 use crate::output::vtk::VtkEncoding;
 
-/// What a run writes, and where.
+/// Output of a run, and its places.
 #[derive(Clone, Debug, Default)]
 pub struct RunOptions {
-    /// The trajectory, one row a step; its folder is created when missing.
+    /// The trajectory, one row per step; its folder is created when missing.
     pub csv: PathBuf,
     /// Fields and particles for ParaView.
     pub vtk: Option<VtkOptions>,

@@ -85,7 +85,7 @@ fn claims(figure: FigureName, evidence: &Evidence<'_>) -> Vec<Claim> {
     }
 }
 
-/// What was measured, and the number; `None` if it could not be.
+/// A measure and its number; `None` if it could not be measured.
 struct Measured {
     what: &'static str,
     value: Option<f64>,

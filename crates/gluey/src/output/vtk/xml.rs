@@ -51,7 +51,7 @@ pub enum Precision {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{name}` is not a known precision: expected `f32` or `f64`")]
 pub struct UnknownPrecision {
-    /// What was asked for.
+    /// The name as it was given.
     pub name: String,
 }
 
