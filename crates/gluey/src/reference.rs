@@ -1,7 +1,8 @@
 //! Reference solutions compiled into the program, so that it compares from any folder.
 //!
 //! All are for the unit box at shear rate 1 and radius 0.05. The files in `data` of this package are copies
-//! of those in `data/reference` of the workspace, whose README says where each came from; a test compares them.
+//! of those in `data/reference` of the workspace, whose README says where each came from; a test compares
+//! them.
 
 use gluey_geom::Vector;
 
