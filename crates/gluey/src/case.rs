@@ -330,8 +330,8 @@ impl Case {
         is_periodic.then(|| self.upper()[axis] - self.lower()[axis])
     }
 
-    /// Surroundings of the particles: walls below and above (y), which move along themselves, and the periods.
-    /// Nothing without a finite-element flow.
+    /// Surroundings of the particles: walls below and above (y), which move along themselves, and the
+    /// periods. Nothing without a finite-element flow.
     pub(crate) fn surroundings<const D: usize>(&self) -> Domain<D> {
         if self.flow.hydrodynamics != Hydrodynamics::Stokes {
             return Domain::default();
