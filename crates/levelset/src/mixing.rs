@@ -35,7 +35,8 @@ impl ViscosityLaw {
         self.fluid * (fraction * self.ratio + (1.0 - fraction))
     }
 
-    /// Viscosity of the solid, `eta_s`; `I eta_s` is the weight of the multiplier in the Uzawa method (eq. 9).
+    /// Viscosity of the solid, `eta_s`; `I eta_s` is the weight of the multiplier in the Uzawa method
+    /// (eq. 9).
     pub fn solid(&self) -> f64 {
         self.fluid * self.ratio
     }

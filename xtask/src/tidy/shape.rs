@@ -1,5 +1,6 @@
 //! Functions and comments of a size that is read at one glance.
 
+use proc_macro2::Span;
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
@@ -62,6 +63,10 @@ impl Functions<'_> {
     }
 }
 
+fn last_line(span: Span) -> usize {
+    span.end().line
+}
+
 /// Weight of an argument: a tuple for as many as it has parts.
 fn parameters(argument: &syn::FnArg) -> usize {
     match argument {
@@ -85,17 +90,17 @@ impl<'a> Visit<'a> for Functions<'_> {
     }
 
     fn visit_item_fn(&mut self, function: &'a syn::ItemFn) {
-        self.check(&function.sig, function.block.span().end().line);
+        self.check(&function.sig, last_line(function.block.span()));
         visit::visit_item_fn(self, function);
     }
 
     fn visit_impl_item_fn(&mut self, function: &'a syn::ImplItemFn) {
-        self.check(&function.sig, function.block.span().end().line);
+        self.check(&function.sig, last_line(function.block.span()));
         visit::visit_impl_item_fn(self, function);
     }
 
     fn visit_trait_item_fn(&mut self, function: &'a syn::TraitItemFn) {
-        self.check(&function.sig, function.span().end().line);
+        self.check(&function.sig, last_line(function.span()));
         visit::visit_trait_item_fn(self, function);
     }
 }
