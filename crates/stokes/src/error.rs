@@ -38,6 +38,24 @@ pub enum StokesError {
         /// Size of the finest cells.
         cell_size: f64,
     },
+    /// No cell with enough fluid is near a cell with too little for unknowns of its own.
+    #[error(
+        "a cell at body {} has a share of fluid of {share:.1e} and no cell with more around it: refine the mesh, or \
+         move the bodies that enclose it apart",
+        body + 1
+    )]
+    NoRoot {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// Share of fluid in the cell.
+        share: f64,
+    },
+    /// Cells of different sizes meet at a surface.
+    #[error("the surface of body {} meets cells of different sizes: refine the mesh around it", body + 1)]
+    CoarseSurface {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+    },
     /// A parameter is out of range.
     #[error("{name} = {value}: {wanted}")]
     Parameter {

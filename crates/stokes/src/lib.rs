@@ -33,6 +33,7 @@ mod precondition;
 mod solid;
 mod solver;
 mod space;
+mod surface;
 
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{

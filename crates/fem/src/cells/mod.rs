@@ -10,6 +10,7 @@
 //! current rayon pool; the results have the same bits for any number of threads.
 
 mod buffers;
+mod cut;
 mod kernel;
 mod legendre;
 mod output;
@@ -24,6 +25,7 @@ mod varying;
 
 use std::sync::Arc;
 
+pub use cut::{CutOperator, CutPiece};
 pub use partition::{CHUNK_CELLS, Chunks};
 pub use rigid::RigidNode;
 pub use scalar::CellScalar;

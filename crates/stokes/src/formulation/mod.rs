@@ -7,6 +7,7 @@ mod load;
 mod paper;
 mod problem;
 mod rigid_dofs;
+mod unfitted;
 
 use std::sync::Arc;
 
@@ -33,6 +34,8 @@ pub enum Formulation {
     },
     /// Penalty and Uzawa multiplier of the paper.
     Paper(PaperParams),
+    /// Nitsche's conditions on the true surfaces, with aggregated elements.
+    Unfitted,
 }
 
 impl Formulation {
@@ -50,6 +53,7 @@ impl Formulation {
                 Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
+            Self::Unfitted => Arc::new(unfitted::Unfitted),
         })
     }
 
@@ -59,6 +63,7 @@ impl Formulation {
         match self {
             Self::RigidDofs { offset, .. } => rigid_dofs::check(*offset),
             Self::Paper(params) => params.check(),
+            Self::Unfitted => Ok(()),
         }
     }
 }

@@ -154,6 +154,11 @@ where
         projected.resize(space.dim(), 0.0);
         space.project(&mut projected);
         lift.extend_from_slice(&projected[space.full_dim()..]);
+        if space.is_by_surface() {
+            for (index, body) in self.bodies.iter().enumerate() {
+                space.set_twist(&mut lift, index, &motion_of(flow, body));
+            }
+        }
         space.expand(&mut lift);
         lift
     }
@@ -191,6 +196,23 @@ where
     pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         self.rigidity.twists(self, velocity)
     }
+}
+
+/// The rigid motion of a body that is closest to a flow at the ends of its diameters along the axes.
+fn motion_of<const D: usize>(flow: &dyn Fn(&Vector<D>) -> Vector<D>, body: &Ball<D>) -> Twist<D>
+where
+    Dim<D>: Space<D>,
+{
+    let mut twist = Twist::default();
+    for k in 0..2 * D {
+        let mut arm = Vector::<D>::zeros();
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        arm[k / 2] = side * body.bounding_radius();
+        let velocity = flow(&(body.center() + arm));
+        twist.velocity += velocity / (2 * D) as f64;
+        twist.spin += Dim::<D>::moment(&arm, &velocity) * (0.25 / arm.norm_squared());
+    }
+    twist
 }
 
 /// # Errors

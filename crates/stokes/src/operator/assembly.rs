@@ -18,6 +18,7 @@ use super::element::Elements;
 use super::system::StokesSystem;
 use crate::error::StokesError;
 use crate::space::{VelocitySpace, pressure_expansion, velocity_expansion};
+use crate::surface::SurfaceCoupling;
 
 /// The factor of a symmetric positive definite matrix.
 pub fn factorised(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Result<DirectSpd, StokesError> {
@@ -102,7 +103,8 @@ where
     }
 }
 
-/// Sums up the matrices of the active cells, whose local unknowns are given by `forms`.
+/// Sums up the matrices of the active cells and of the pieces of cut cells, whose local unknowns are given by
+/// `forms`.
 fn assemble<const D: usize>(
     system: &StokesSystem<D>,
     unknowns: Subset,
@@ -114,29 +116,55 @@ where
 {
     let numbering = Blocks::new(system, &unknowns);
     let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
-    let mut cells = Vec::with_capacity(system.cells.len());
-    for (index, cell) in system.cells.iter().enumerate() {
-        forms(cell.cell as usize, &mut local);
+    let set_forms = |source: Source, local: &mut CellForms| match source {
+        Source::Cell { cell, .. } => forms(cell, local),
+        Source::Piece { cell, body, .. } => {
+            forms(cell, local);
+            local.extend_by_twist(system, &unknowns, body);
+        }
+    };
+    let mut sources = Vec::with_capacity(system.cells.len());
+    for source in all_sources(system) {
+        set_forms(source, &mut local);
         if !local.terms().is_empty() {
             groups.push(local.terms().iter().map(|term| numbering.of[term.0 as usize] as usize));
-            cells.push((index, cell));
+            sources.push(source);
         }
     }
     let blocks = BlockPattern::new(numbering.first, groups)?;
-    let mut reduction = Reduction::new(unknowns.len(), elements.size());
-    let mut cells = cells.into_iter();
+    let mut of_cells = Reduction::new(unknowns.len(), elements.size());
+    let mut of_pieces = Reduction::new(unknowns.len(), SurfaceCoupling::<D>::piece_size());
+    let mut sources = sources.into_iter();
     let matrix = blocks.sum(|group, target| {
-        let Some((index, cell)) = cells.next() else { return };
-        forms(cell.cell as usize, &mut local);
+        let Some(source) = sources.next() else { return };
+        set_forms(source, &mut local);
+        let reduction = if matches!(source, Source::Cell { .. }) { &mut of_cells } else { &mut of_pieces };
         reduction.place(&mut local, blocks.unknowns_of(group));
-        if local.is_identity() {
-            elements.fill(index, target);
-        } else {
-            elements.fill(index, &mut reduction.element);
-            reduction.multiply(&local, target);
+        match source {
+            Source::Cell { index, .. } if local.is_identity() => return elements.fill(index, target),
+            Source::Cell { index, .. } => elements.fill(index, &mut reduction.element),
+            Source::Piece { index, .. } => elements.fill_piece(index, &mut reduction.element),
         }
+        reduction.multiply(&local, target);
     });
     Ok(Assembled { unknowns, blocks, matrix })
+}
+
+/// What has a matrix: its place among its kind, its cell in the mesh, and for pieces the body.
+#[derive(Clone, Copy)]
+enum Source {
+    Cell { index: usize, cell: usize },
+    Piece { index: usize, cell: usize, body: usize },
+}
+
+fn all_sources<const D: usize>(system: &StokesSystem<D>) -> impl Iterator<Item = Source> + '_
+where
+    Dim<D>: Space<D>,
+{
+    let cells = system.cells.iter().enumerate();
+    let cells = cells.map(|(index, cell)| Source::Cell { index, cell: cell.cell as usize });
+    let pieces = system.surfaces.iter().flat_map(|surfaces| surfaces.pieces().enumerate());
+    cells.chain(pieces.map(|(index, (cell, body))| Source::Piece { index, cell, body }))
 }
 
 /// Blocks of the kept unknowns.
@@ -186,6 +214,22 @@ impl CellForms {
         for &node in nodes {
             let first = node as usize * component_count;
             (first..first + component_count).for_each(|k| self.push(velocity.terms(k)));
+        }
+    }
+
+    /// Adds the twist of a body to the forms of a cell, whose pressures count as zero if they have none.
+    fn extend_by_twist<const D: usize>(&mut self, system: &StokesSystem<D>, unknowns: &Subset, body: usize)
+    where
+        Dim<D>: Space<D>,
+    {
+        let nodal = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
+        while self.forms.len() < nodal {
+            self.push(&[]);
+        }
+        let first = system.space.full_dim() + body * Dim::<D>::RIGID;
+        for k in first..first + Dim::<D>::RIGID {
+            let number = unknowns.number(k).map(|number| (number as u32, 1.0));
+            self.push(number.as_slice());
         }
     }
 

@@ -5,6 +5,7 @@ use gluey_geom::{Dim, Space};
 
 use super::system::StokesSystem;
 use crate::space::ActiveCell;
+use crate::surface::SurfaceCoupling;
 
 /// Relative artificial compressibility added to the factorised matrix: enough to make pressures that act on
 /// no velocity harmless. The solve corrects it.
@@ -104,6 +105,17 @@ where
         if size > n {
             self.fill_pressure(index, matrix);
         }
+    }
+
+    /// Writes the matrix of a piece of a cut cell, row by row: velocities, pressures, twist.
+    pub fn fill_piece(&self, index: usize, matrix: &mut [f64]) {
+        let Some(surfaces) = &self.system.surfaces else { return };
+        surfaces.matrix(index, matrix);
+        let (n, size) = (ReferenceMatrices::<D>::VELOCITY, SurfaceCoupling::<D>::piece_size());
+        let scale = COMPRESSIBILITY / self.system.viscosity();
+        surfaces.for_each_mass_of_piece(index, |q, r, mass| {
+            matrix[(n + q) * size + n + r] -= scale * mass;
+        });
     }
 
     fn fill_pressure(&self, index: usize, matrix: &mut [f64]) {

@@ -4,6 +4,8 @@
 //! unknowns of [`VelocitySpace`] and the pressure nodes. Cells that move as one body are left out: they have
 //! no strain. Pressure nodes that see no cell with a free node are dropped.
 
+use std::sync::Arc;
+
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Scalar, vector};
@@ -11,8 +13,9 @@ use gluey_linalg::{LinOp, Scalar, vector};
 use super::cells::cell_operator;
 use crate::solid::Penalty;
 use crate::space::{
-    ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells,
+    ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
 };
+use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace};
 
 /// Operator of the Stokes problem on a mesh, matrix-free.
 #[derive(Clone, Debug)]
@@ -25,6 +28,8 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) cells: Vec<ActiveCell>,
     /// The penalised solid, in the `paper` formulation.
     pub(crate) penalty: Option<Penalty<D>>,
+    /// The cells that surfaces cut, where the mesh does not fit the bodies.
+    pub(crate) surfaces: Option<Arc<SurfaceCoupling<D>>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
 }
@@ -43,6 +48,27 @@ where
         Self::with_penalty(space, viscosity, CutCellPressures::Keep, Some(penalty))
     }
 
+    /// The system in `fluid` cells that nothing cuts and in those that `surfaces` cut.
+    pub(crate) fn around_surfaces(
+        space: VelocitySpace<D>,
+        pressure: PressureSpace<D>,
+        viscosity: f64,
+        surfaces: SurfaceCoupling<D>,
+    ) -> Self {
+        let is_fluid = |cell: &ActiveCell| surfaces.cut.states[cell.cell as usize] == CellState::Fluid;
+        let mut cells = all_cells(space.discretisation(), viscosity);
+        cells.retain(is_fluid);
+        Self {
+            pressure,
+            operator: cell_operator(&space, &cells, None),
+            space,
+            cells,
+            penalty: None,
+            surfaces: Some(Arc::new(surfaces)),
+            viscosity,
+        }
+    }
+
     fn with_penalty(
         space: VelocitySpace<D>,
         viscosity: f64,
@@ -56,6 +82,7 @@ where
             space,
             cells,
             penalty,
+            surfaces: None,
             viscosity,
         }
     }
@@ -86,6 +113,9 @@ where
         let mut y = vec![0.0; self.dim()];
         let (yu, yp) = y.split_at_mut(self.velocity_dim());
         self.operator.stokes_of_field(u, p, yu, yp, &mut Workspace::default());
+        if let Some(surfaces) = &self.surfaces {
+            surfaces.add([u, p], [&mut *yu, &mut *yp], &mut SurfaceWorkspace::default());
+        }
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);
     }
@@ -131,6 +161,7 @@ struct Work<X> {
     /// Pressures at all nodes.
     pressure: Vec<X>,
     cells: Workspace<f64, X>,
+    surfaces: SurfaceWorkspace<f64>,
 }
 
 impl<'a, const D: usize> SystemOperator<'a, D>
@@ -150,20 +181,23 @@ where
 
 impl<X: Scalar> Work<X> {
     fn new() -> Self {
-        Self { pressure: Vec::new(), cells: Workspace::default() }
+        Self { pressure: Vec::new(), cells: Workspace::default(), surfaces: SurfaceWorkspace::default() }
     }
 
     fn apply<const D: usize>(&mut self, system: &StokesSystem<D>, x: &[X], y: &mut [X])
     where
         Dim<D>: Space<D>,
     {
-        let Self { pressure, cells } = self;
+        let Self { pressure, cells, surfaces: work } = self;
         let (u, p) = x.split_at(system.velocity_dim());
         let (yu, yp) = y.split_at_mut(system.velocity_dim());
         pressure.resize(p.len(), X::ZERO);
         vector::copy(p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, cells);
+        if let Some(surfaces) = &system.surfaces {
+            surfaces.add([u, pressure], [&mut *yu, &mut *yp], work);
+        }
         system.reduce_pressures(yp);
     }
 }

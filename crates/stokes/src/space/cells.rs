@@ -2,6 +2,7 @@
 
 use gluey_geom::{Dim, Space};
 
+use super::discretisation::Discretisation;
 use super::marking::{CellKind, cell_kind};
 use super::velocity::VelocitySpace;
 
@@ -27,6 +28,13 @@ where
     let kind = |cell: usize| {
         cell_kind(discretisation.velocity.cell(cell).iter().map(|&n| space.body_of(n as usize)))
     };
+    let mut cells = all_cells(discretisation, viscosity);
+    cells.retain(|cell| kind(cell.cell as usize) != CellKind::Rigid);
+    cells
+}
+
+/// All cells of a mesh.
+pub fn all_cells<const D: usize>(discretisation: &Discretisation<D>, viscosity: f64) -> Vec<ActiveCell> {
     let active = |cell: usize| {
         let h = discretisation.cell_size(cell);
         ActiveCell {
@@ -36,5 +44,5 @@ where
             volume: h.powi(D as i32),
         }
     };
-    (0..discretisation.mesh.cell_count()).filter(|&c| kind(c) != CellKind::Rigid).map(active).collect()
+    (0..discretisation.mesh.cell_count()).map(active).collect()
 }

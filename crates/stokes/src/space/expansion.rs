@@ -32,6 +32,12 @@ where
             expansion.set_combination(constraint.node as usize * D + c, masters);
         }
     }
+    for ghost in space.ghosts() {
+        for c in 0..D {
+            let masters = ghost.masters.iter().map(|&(m, w)| (m as usize * D + c, w));
+            expansion.set_combination(ghost.node as usize * D + c, masters);
+        }
+    }
     expansion
 }
 

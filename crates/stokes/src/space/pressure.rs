@@ -67,6 +67,19 @@ where
         Self { nodes, free, free_count, constraints, poorly_supported }
     }
 
+    /// The pressures of the cells in which `seen` holds; `ghosts` take their values from others.
+    pub fn around_surfaces(
+        nodes: &Arc<NodeMap<D>>,
+        seen: impl Fn(usize) -> bool,
+        ghosts: &[Constraint],
+    ) -> Self {
+        let cells: Vec<usize> = (0..nodes.cell_count()).filter(|&cell| seen(cell)).collect();
+        let free = self::seen(nodes, &cells);
+        let constraints = nodes.constraints().iter().chain(ghosts).cloned().collect();
+        let free_count = free.iter().filter(|&&f| f).count();
+        Self { nodes: nodes.clone(), free, free_count, constraints, poorly_supported: Vec::new() }
+    }
+
     /// The nodes.
     pub fn nodes(&self) -> &NodeMap<D> {
         &self.nodes

@@ -6,8 +6,8 @@
 //! a rigid node at `r` from the reference point gets `U + w x r`. [`VelocitySpace::reduce`] is its transpose:
 //! it turns nodal loads into loads on free nodes, forces and (scaled) torques.
 
-use gluey_fem::NodeMap;
 use gluey_fem::cells;
+use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
@@ -41,6 +41,11 @@ pub struct VelocitySpace<const D: usize> {
     /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough
     /// nodes.
     fit: Vec<Option<Vec<f64>>>,
+    /// Nodes that take their values from others near a surface, where the mesh does not fit the bodies.
+    ghosts: Vec<Constraint>,
+    is_ghost: Vec<bool>,
+    /// Whether bodies are coupled to the fluid through their surfaces: then no node has to be rigid.
+    by_surface: bool,
 }
 
 impl<const D: usize> VelocitySpace<D>
@@ -60,13 +65,45 @@ where
             radius: bodies.iter().map(|b| b.bounding_radius()).collect(),
             fit: gram_inverses(bodies.len(), &rigid),
             rigid,
+            ghosts: Vec::new(),
+            is_ghost: vec![false; nodes.node_count()],
+            by_surface: false,
         };
         let fit = &space.fit;
         space.rigid.retain(|r| fit[r.body as usize].is_some());
-        for r in &space.rigid {
-            space.body_of[r.node as usize] = r.body;
-        }
+        space.mark_rigid();
         space
+    }
+
+    /// The space around bodies that are coupled to the fluid through their surfaces: nodes without fluid
+    /// around them, named in `solid`, move with their bodies, and `ghosts` take their values from others.
+    pub fn around_surfaces<B: Body<D>>(
+        discretisation: &Discretisation<D>,
+        bodies: &[B],
+        solid: &[Option<u32>],
+        ghosts: Vec<Constraint>,
+    ) -> Self {
+        let mut space = Self::new(discretisation, bodies, solid);
+        space.rigid = rigid_nodes(space.nodes(), bodies, solid);
+        space.mark_rigid();
+        ghosts.iter().for_each(|ghost| space.is_ghost[ghost.node as usize] = true);
+        Self { ghosts, by_surface: true, ..space }
+    }
+
+    fn mark_rigid(&mut self) {
+        for r in &self.rigid {
+            self.body_of[r.node as usize] = r.body;
+        }
+    }
+
+    /// Nodes that take their values from others near a surface.
+    pub fn ghosts(&self) -> &[Constraint] {
+        &self.ghosts
+    }
+
+    /// Whether bodies are coupled to the fluid through their surfaces.
+    pub fn is_by_surface(&self) -> bool {
+        self.by_surface
     }
 
     /// The nodes.
@@ -86,7 +123,7 @@ where
 
     /// Whether the body has enough nodes on this mesh to be rigid.
     pub fn is_active(&self, body: usize) -> bool {
-        self.fit[body].is_some()
+        self.by_surface || self.fit[body].is_some()
     }
 
     /// Length of a reduced vector.
@@ -106,7 +143,8 @@ where
 
     /// Whether the velocity of a node is an unknown of its own.
     pub fn is_free(&self, node: usize) -> bool {
-        self.body_of[node] == NO_BODY && !self.nodes().is_on_boundary(node) && !self.nodes().is_hanging(node)
+        let follows = self.is_ghost[node] || self.nodes().is_hanging(node);
+        self.body_of[node] == NO_BODY && !self.nodes().is_on_boundary(node) && !follows
     }
 
     /// `u = T x` in place: sets the nodal velocities of rigid and hanging nodes; those of the boundary stay
@@ -121,6 +159,14 @@ where
             }
         }
         self.nodes().distribute(D, T::from_f64, nodal);
+        for ghost in &self.ghosts {
+            let mut sum = [T::ZERO; D];
+            for &(master, weight) in &ghost.masters {
+                let from = &nodal[master as usize * D..][..D];
+                (0..D).for_each(|c| sum[c] += T::from_f64(weight) * from[c]);
+            }
+            nodal[ghost.node as usize * D..][..D].copy_from_slice(&sum);
+        }
     }
 
     /// Adds the rigid motions of a reduced vector to the velocities `u` of the rigid nodes, as exact as these
@@ -142,6 +188,14 @@ where
     pub fn reduce<T: Scalar>(&self, f: &mut [T]) {
         let (nodal, loads) = f.split_at_mut(self.full_dim());
         loads.fill(T::ZERO);
+        for ghost in &self.ghosts {
+            let load: [T; D] =
+                std::array::from_fn(|c| std::mem::replace(&mut nodal[ghost.node as usize * D + c], T::ZERO));
+            for &(master, weight) in &ghost.masters {
+                let to = &mut nodal[master as usize * D..][..D];
+                (0..D).for_each(|c| to[c] += T::from_f64(weight) * load[c]);
+            }
+        }
         self.nodes().condense(D, T::from_f64, nodal);
         for r in &self.rigid {
             let load = &mut loads[r.body as usize * Dim::<D>::RIGID..][..Dim::<D>::RIGID];

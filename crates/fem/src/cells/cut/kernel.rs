@@ -1,0 +1,395 @@
+//! The forms on a vector of pieces, one direction after another.
+//!
+//! Velocities go from nodes to values and derivatives at the points of all directions but the last
+//! ([`Planes`]); then line by line along the last direction to the points, where the forms are taken, and
+//! back.
+
+use gluey_linalg::Scalar;
+
+use super::super::simd::Lanes;
+use crate::cut::POINTS;
+use crate::element::{derivatives_1d, gauss, multi_index, node_count, values_1d};
+
+/// Nodes per direction.
+const NODES: usize = 3;
+/// Lines of points along the last direction, at most.
+const LINES: usize = POINTS * POINTS;
+/// Most dimensions.
+const MOST: usize = 3;
+
+/// Values and derivatives of the one-dimensional shape functions at the Gauss points.
+#[derive(Clone, Debug)]
+pub(super) struct Shapes<T> {
+    /// Of degree 2: value, derivative.
+    velocity: [[[T; NODES]; POINTS]; 2],
+    /// Of degree 1.
+    pressure: [[T; 2]; POINTS],
+    /// The points.
+    points: [T; POINTS],
+}
+
+impl<T: Scalar> Shapes<T> {
+    pub(super) fn new() -> Self {
+        let rule = gauss(POINTS);
+        let at = |shape: fn(usize, f64) -> [f64; 3], q: usize| shape(2, rule[q].0).map(T::from_f64);
+        let both: [fn(usize, f64) -> [f64; 3]; 2] = [values_1d, derivatives_1d];
+        Self {
+            velocity: both.map(|shape| std::array::from_fn(|q| at(shape, q))),
+            pressure: std::array::from_fn(|q| {
+                let [a, b, _] = values_1d(1, rule[q].0);
+                [a, b].map(T::from_f64)
+            }),
+            points: std::array::from_fn(|q| T::from_f64(rule[q].0)),
+        }
+    }
+}
+
+/// Unknowns of a piece: velocities, component by component, pressures, twist.
+pub(super) const fn slots<const D: usize>() -> usize {
+    D * node_count::<D>(2) + node_count::<D>(1) + twist_len::<D>()
+}
+
+/// Unknowns of a rigid motion.
+pub(super) const fn twist_len<const D: usize>() -> usize {
+    D + D * (D - 1) / 2
+}
+
+/// Numbers at a point: volume, normal, penalty.
+pub(super) const fn numbers<const D: usize>() -> usize {
+    D + 2
+}
+
+/// What a vector of pieces is: one number per lane.
+pub(super) struct Pieces<'a, V: Lanes> {
+    /// Moments times `eta h^(D-2)`, point by point, [`numbers`] each, `step` apart.
+    pub moments: &'a [V::Scalar],
+    /// Distance of successive numbers.
+    pub step: usize,
+    /// `h / eta`.
+    pub pressure: V,
+    /// Arm of the lower corner in radii of the ball, and the edge of the cell in radii.
+    pub origin: [V; MOST],
+    /// See `origin`.
+    pub edge: V,
+}
+
+/// Fields at the points of all directions but the last and at the nodes of the last: per component the value
+/// and the derivatives in these directions.
+struct Planes<V: Lanes> {
+    velocity: [[[[V; NODES]; LINES]; MOST]; MOST],
+    pressure: [[V; 2]; LINES],
+}
+
+/// `y = [A, -B^T; -B, 0] x` on a vector of pieces; slots are `step` numbers apart.
+#[inline(always)]
+pub(super) fn apply<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    pieces: &Pieces<'_, V>,
+    x: &[V::Scalar],
+    y: &mut [V::Scalar],
+) {
+    let mut planes = Planes::<V>::zeros();
+    let get = |slot: usize| V::load(&x[slot * pieces.step..]);
+    planes.evaluate::<D>(shapes, get);
+    let twist = std::array::from_fn(|k| if k < twist_len::<D>() { get(first_twist::<D>() + k) } else { zero() });
+    let mut load = [zero(); 2 * MOST];
+    for line in 0..POINTS.pow(D as u32 - 1) {
+        planes.line::<D>(shapes, pieces, line, &twist, &mut load);
+    }
+    let mut put = |slot: usize, value: V| value.store(&mut y[slot * pieces.step..]);
+    for (k, load) in load[..twist_len::<D>()].iter().enumerate() {
+        put(first_twist::<D>() + k, *load);
+    }
+    planes.evaluate_transpose::<D>(shapes, put);
+}
+
+const fn first_twist<const D: usize>() -> usize {
+    slots::<D>() - twist_len::<D>()
+}
+
+#[inline(always)]
+fn zero<V: Lanes>() -> V {
+    V::splat(V::Scalar::ZERO)
+}
+
+impl<V: Lanes> Planes<V> {
+    #[inline(always)]
+    fn zeros() -> Self {
+        Self { velocity: [[[[zero(); NODES]; LINES]; MOST]; MOST], pressure: [[zero(); 2]; LINES] }
+    }
+
+    /// From nodes to planes.
+    #[inline(always)]
+    fn evaluate<const D: usize>(&mut self, shapes: &Shapes<V::Scalar>, get: impl Fn(usize) -> V) {
+        let n = node_count::<D>(2);
+        for c in 0..D {
+            for last in 0..NODES {
+                let mut rows = [[[zero(); POINTS]; NODES]; 2];
+                for j in 0..NODES.pow(D as u32 - 2) {
+                    let start = c * n + NODES * j + NODES.pow(D as u32 - 1) * last;
+                    let line = [get(start), get(start + 1), get(start + 2)];
+                    for kind in 0..2 {
+                        for q in 0..POINTS {
+                            rows[kind][j][q] = dot(&shapes.velocity[kind][q], &line);
+                        }
+                    }
+                }
+                self.set_plane::<D>(shapes, [c, last], &rows);
+            }
+        }
+        for last in 0..2 {
+            let corner = |k: usize| get(D * n + 2usize.pow(D as u32 - 1) * last + k);
+            for line in 0..POINTS.pow(D as u32 - 1) {
+                let [a, b] = [line % POINTS, line / POINTS].map(|q| &shapes.pressure[q]);
+                let mut sum = dot(a, &[corner(0), corner(1)]);
+                if D == 3 {
+                    sum = dot(b, &[sum, dot(a, &[corner(2), corner(3)])]);
+                }
+                self.pressure[line][last] = sum;
+            }
+        }
+    }
+
+    /// The second direction of a component in a plane of nodes, from values and derivatives in the first.
+    #[inline(always)]
+    fn set_plane<const D: usize>(
+        &mut self,
+        shapes: &Shapes<V::Scalar>,
+        [c, last]: [usize; 2],
+        rows: &[[[V; POINTS]; NODES]; 2],
+    ) {
+        let target = &mut self.velocity[c];
+        for q in 0..POINTS {
+            if D == 2 {
+                target[0][q][last] = rows[0][0][q];
+                target[1][q][last] = rows[1][0][q];
+                continue;
+            }
+            let [values, slopes] = [0, 1].map(|kind| [rows[kind][0][q], rows[kind][1][q], rows[kind][2][q]]);
+            for r in 0..POINTS {
+                let line = q + POINTS * r;
+                target[0][line][last] = dot(&shapes.velocity[0][r], &values);
+                target[1][line][last] = dot(&shapes.velocity[0][r], &slopes);
+                target[2][line][last] = dot(&shapes.velocity[1][r], &values);
+            }
+        }
+    }
+
+    /// The transpose of [`Planes::evaluate`].
+    #[inline(always)]
+    fn evaluate_transpose<const D: usize>(
+        &self,
+        shapes: &Shapes<V::Scalar>,
+        mut put: impl FnMut(usize, V),
+    ) {
+        let n = node_count::<D>(2);
+        for c in 0..D {
+            for last in 0..NODES {
+                let rows = self.plane_loads::<D>(shapes, [c, last]);
+                for j in 0..NODES.pow(D as u32 - 2) {
+                    let start = c * n + NODES * j + NODES.pow(D as u32 - 1) * last;
+                    for i in 0..NODES {
+                        let mut sum = zero::<V>();
+                        for kind in 0..2 {
+                            for q in 0..POINTS {
+                                sum = rows[kind][j][q].mul_add(V::splat(shapes.velocity[kind][q][i]), sum);
+                            }
+                        }
+                        put(start + i, sum);
+                    }
+                }
+            }
+        }
+        for corner in 0..node_count::<D>(1) {
+            let index = multi_index::<D>(corner, 2);
+            let mut sum = zero::<V>();
+            for line in 0..POINTS.pow(D as u32 - 1) {
+                let mut weight = shapes.pressure[line % POINTS][index[0]];
+                if D == 3 {
+                    weight *= shapes.pressure[line / POINTS][index[1]];
+                }
+                sum = self.pressure[line][index[D - 1]].mul_add(V::splat(weight), sum);
+            }
+            put(D * n + corner, sum);
+        }
+    }
+
+    /// The transpose of [`Planes::set_plane`].
+    #[inline(always)]
+    fn plane_loads<const D: usize>(
+        &self,
+        shapes: &Shapes<V::Scalar>,
+        [c, last]: [usize; 2],
+    ) -> [[[V; POINTS]; NODES]; 2] {
+        let mut rows = [[[zero(); POINTS]; NODES]; 2];
+        let from = &self.velocity[c];
+        for q in 0..POINTS {
+            if D == 2 {
+                rows[0][0][q] = from[0][q][last];
+                rows[1][0][q] = from[1][q][last];
+                continue;
+            }
+            for r in 0..POINTS {
+                let line = q + POINTS * r;
+                let [value, first, second] = [from[0][line][last], from[1][line][last], from[2][line][last]];
+                for j in 0..NODES {
+                    let [shape, slope] = [0, 1].map(|kind| V::splat(shapes.velocity[kind][r][j]));
+                    rows[0][j][q] = second.mul_add(slope, value.mul_add(shape, rows[0][j][q]));
+                    rows[1][j][q] = first.mul_add(shape, rows[1][j][q]);
+                }
+            }
+        }
+        rows
+    }
+
+    /// The forms at the points of a line, which takes the place of what it held.
+    #[inline(always)]
+    fn line<const D: usize>(
+        &mut self,
+        shapes: &Shapes<V::Scalar>,
+        pieces: &Pieces<'_, V>,
+        line: usize,
+        twist: &[V; 2 * MOST],
+        load: &mut [V; 2 * MOST],
+    ) {
+        let mut sums = [[[zero::<V>(); NODES]; MOST]; MOST];
+        let mut pressure_sum = [zero::<V>(); 2];
+        for q in 0..POINTS {
+            let [shape, slope] = [0, 1].map(|kind| &shapes.velocity[kind][q]);
+            let mut point = Point::<V> { value: [zero(); MOST], gradient: [[zero(); MOST]; MOST], p: zero() };
+            for c in 0..D {
+                let field = &self.velocity[c];
+                point.value[c] = dot(shape, &field[0][line]);
+                for d in 0..D - 1 {
+                    point.gradient[c][d] = dot(shape, &field[1 + d][line]);
+                }
+                point.gradient[c][D - 1] = dot(slope, &field[0][line]);
+            }
+            point.p = dot(&shapes.pressure[q], &self.pressure[line]).mul(pieces.pressure);
+            let arm = pieces.arm::<D>(shapes, line, q);
+            let moments = pieces.at::<D>(line + POINTS.pow(D as u32 - 1) * q);
+            let tested = point.tested::<D>(&moments, &arm, twist);
+            for c in 0..D {
+                for l in 0..NODES {
+                    let [shape, slope] = [shape[l], slope[l]].map(V::splat);
+                    let own = tested.value[c].mul_add(shape, sums[c][0][l]);
+                    sums[c][0][l] = tested.gradient[c][D - 1].mul_add(slope, own);
+                    for d in 0..D - 1 {
+                        sums[c][1 + d][l] = tested.gradient[c][d].mul_add(shape, sums[c][1 + d][l]);
+                    }
+                }
+            }
+            let divergence = tested.p.mul(pieces.pressure);
+            for l in 0..2 {
+                pressure_sum[l] = divergence.mul_add(V::splat(shapes.pressure[q][l]), pressure_sum[l]);
+            }
+            add_twist_load::<V, D>(&tested.value, &arm, load);
+        }
+        for c in 0..D {
+            for kind in 0..D {
+                self.velocity[c][kind][line] = sums[c][kind];
+            }
+        }
+        self.pressure[line] = pressure_sum;
+    }
+}
+
+impl<V: Lanes> Pieces<'_, V> {
+    /// Arm of a point from the centre of the ball, in its radii.
+    #[inline(always)]
+    fn arm<const D: usize>(&self, shapes: &Shapes<V::Scalar>, line: usize, last: usize) -> [V; MOST] {
+        let index = [line % POINTS, line / POINTS, last];
+        let mut arm = [zero(); MOST];
+        for d in 0..D {
+            let at = if d == D - 1 { last } else { index[d] };
+            arm[d] = self.edge.mul_add(V::splat(shapes.points[at]), self.origin[d]);
+        }
+        arm
+    }
+
+    /// Volume, normal and penalty at a point.
+    #[inline(always)]
+    fn at<const D: usize>(&self, point: usize) -> [V; MOST + 2] {
+        let count = numbers::<D>();
+        std::array::from_fn(|k| match k < count {
+            true => V::load(&self.moments[(point * count + k) * self.step..]),
+            false => zero(),
+        })
+    }
+}
+
+/// Values at a point, or what tests values and gradients there.
+struct Point<V> {
+    value: [V; MOST],
+    /// `gradient[c][d] = d u_c / d x_d`.
+    gradient: [[V; MOST]; MOST],
+    p: V,
+}
+
+impl<V: Lanes> Point<V> {
+    /// What the values, gradients and pressures of test functions are multiplied by.
+    #[inline(always)]
+    fn tested<const D: usize>(&self, moments: &[V; MOST + 2], arm: &[V; MOST], twist: &[V; 2 * MOST]) -> Self {
+        let (volume, penalty) = (moments[0], moments[D + 1]);
+        let normal = |d: usize| moments[1 + d];
+        let motion = rigid_motion::<V, D>(twist, arm);
+        let mut tested = Self { value: [zero(); MOST], gradient: [[zero(); MOST]; MOST], p: zero() };
+        let mut jump = [zero::<V>(); MOST];
+        for c in 0..D {
+            jump[c] = self.value[c].sub(motion[c]);
+        }
+        let pressure = volume.mul(self.p);
+        for c in 0..D {
+            let mut value = penalty.mul_add(jump[c], normal(c).mul(self.p));
+            for d in 0..D {
+                // Twice the strain.
+                let strain = self.gradient[c][d].add(self.gradient[d][c]);
+                value = value.sub(strain.mul(normal(d)));
+                let flux = jump[d].mul_add(normal(c), jump[c].mul(normal(d)));
+                tested.gradient[c][d] = strain.mul(volume).sub(flux);
+            }
+            tested.value[c] = value;
+            tested.gradient[c][c] = tested.gradient[c][c].sub(pressure);
+            tested.p = jump[c].mul_add(normal(c), tested.p.sub(volume.mul(self.gradient[c][c])));
+        }
+        tested
+    }
+}
+
+/// `U + w x r`.
+#[inline(always)]
+fn rigid_motion<V: Lanes, const D: usize>(twist: &[V; 2 * MOST], arm: &[V; MOST]) -> [V; MOST] {
+    if D == 2 {
+        let w = twist[2];
+        return [twist[0].sub(w.mul(arm[1])), w.mul_add(arm[0], twist[1]), zero()];
+    }
+    std::array::from_fn(|c| {
+        let (i, j) = ((c + 1) % 3, (c + 2) % 3);
+        twist[3 + i].mul_add(arm[j], twist[c]).sub(twist[3 + j].mul(arm[i]))
+    })
+}
+
+/// Takes force and torque of a load on the fluid from the load on the ball.
+#[inline(always)]
+fn add_twist_load<V: Lanes, const D: usize>(force: &[V; MOST], arm: &[V; MOST], load: &mut [V; 2 * MOST]) {
+    for c in 0..D {
+        load[c] = load[c].sub(force[c]);
+    }
+    if D == 2 {
+        load[2] = arm[1].mul_add(force[0], load[2]).sub(arm[0].mul(force[1]));
+        return;
+    }
+    for k in 0..3 {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        load[3 + k] = arm[j].mul_add(force[i], load[3 + k]).sub(arm[i].mul(force[j]));
+    }
+}
+
+#[inline(always)]
+fn dot<V: Lanes, const N: usize>(weights: &[V::Scalar; N], values: &[V; N]) -> V {
+    let mut sum = values[0].mul(V::splat(weights[0]));
+    for k in 1..N {
+        sum = values[k].mul_add(V::splat(weights[k]), sum);
+    }
+    sum
+}

@@ -1,0 +1,179 @@
+use gluey_linalg::vector::fill_pseudo_random;
+
+use super::super::simd::Portable;
+use super::kernel::{slots, twist_len};
+use super::*;
+use crate::cut::{BallInCell, CutMoments, POINTS};
+use crate::element::{gauss_cube, gradient, node_count, value};
+
+/// Arms, edge, viscosity and `h / eta` of the piece below.
+const EDGE: f64 = 0.31;
+const VISCOUS: f64 = 1.7;
+const PRESSURE: f64 = 0.4;
+
+fn origin<const D: usize>() -> [f64; D] {
+    std::array::from_fn(|d| -0.9 + 0.2 * d as f64)
+}
+
+/// The moments of the unit cube and a ball that matches origin and edge, with a penalty of 20.
+fn moments<const D: usize>() -> (CutMoments<D>, Vec<f64>) {
+    let ball = BallInCell { center: origin::<D>().map(|x| -x / EDGE), radius: 1.0 / EDGE };
+    let moments = CutMoments::new(&[ball]);
+    let penalty = moments.surfaces[0].area.iter().map(|area| 20.0 * area).collect();
+    (moments, penalty)
+}
+
+/// An operator with `count` equal pieces on nodes of their own.
+fn operator<T: crate::cells::CellScalar, const D: usize>(count: usize) -> CutOperator<T, D> {
+    let (n, m) = (node_count::<D>(2), node_count::<D>(1));
+    let nodes: Vec<u32> = (0..(count * n) as u32).collect();
+    let (moments, penalty) = moments::<D>();
+    let piece = |k: usize| CutPiece {
+        nodes: &nodes[k * n..][..n],
+        pressures: &nodes[k * m..][..m],
+        body: k as u32,
+        origin: origin(),
+        edge: EDGE,
+        viscous: VISCOUS,
+        pressure: PRESSURE,
+        volume: &moments.volume,
+        normal: &moments.surfaces[0].normal,
+        penalty: &penalty,
+    };
+    let pieces: Vec<CutPiece<'_, D>> = (0..count).map(piece).collect();
+    CutOperator::new(pieces.into_iter(), [count * n, count * m, count])
+}
+
+/// The velocity, twice the strain, the motion of the ball and the pressure at a point.
+struct Fields<const D: usize> {
+    jump: [f64; D],
+    strain: [[f64; D]; D],
+    p: f64,
+}
+
+fn fields<const D: usize>(x: &[f64], at: &[f64; D]) -> Fields<D> {
+    let (n, m) = (node_count::<D>(2), node_count::<D>(1));
+    let mut fields = Fields { jump: [0.0; D], strain: [[0.0; D]; D], p: 0.0 };
+    for i in 0..n {
+        let (shape, slope) = (value::<D>(2, i, at), gradient::<D>(2, i, at));
+        for c in 0..D {
+            fields.jump[c] += shape * x[i * D + c];
+            for d in 0..D {
+                fields.strain[c][d] += slope[d] * x[i * D + c];
+                fields.strain[d][c] += slope[d] * x[i * D + c];
+            }
+        }
+    }
+    let r: [f64; D] = std::array::from_fn(|d| origin::<D>()[d] + EDGE * at[d]);
+    let twist = &x[n * D + m..];
+    for c in 0..D {
+        let (i, j) = ((c + 1) % 3, (c + 2) % 3);
+        let rotation = match D {
+            2 => [-twist[2] * r[1], twist[2] * r[0]][c],
+            _ => twist[D + i] * r[j] - twist[D + j] * r[i],
+        };
+        fields.jump[c] -= twist[c] + rotation;
+    }
+    fields.p = (0..m).map(|i| value::<D>(1, i, at) * x[n * D + i]).sum();
+    fields
+}
+
+/// `(v, q)^T K (u, p)` by the forms as they are written.
+fn form<const D: usize>(u: &[f64], v: &[f64]) -> f64 {
+    let (moments, penalty) = moments::<D>();
+    let mut sum = 0.0;
+    for (q, (at, _)) in gauss_cube::<D>(POINTS).iter().enumerate() {
+        let (u, v) = (fields::<D>(u, at), fields::<D>(v, at));
+        let (volume, normal) = (moments.volume[q], moments.surfaces[0].normal[q]);
+        let [mut viscous, mut coupling] = [0.0; 2];
+        for c in 0..D {
+            viscous += penalty[q] * u.jump[c] * v.jump[c];
+            coupling += normal[c] * (u.p * v.jump[c] + v.p * u.jump[c]);
+            coupling -= 0.5 * volume * (u.p * v.strain[c][c] + v.p * u.strain[c][c]);
+            for d in 0..D {
+                viscous += 0.5 * volume * u.strain[c][d] * v.strain[c][d];
+                viscous -= normal[d] * (u.strain[c][d] * v.jump[c] + v.strain[c][d] * u.jump[c]);
+            }
+        }
+        sum += VISCOUS * (viscous + PRESSURE * coupling);
+    }
+    sum
+}
+
+fn random(len: usize, seed: u64) -> Vec<f64> {
+    let mut x = vec![0.0; len];
+    fill_pseudo_random(seed, &mut x);
+    x
+}
+
+fn matrix<const D: usize>(operator: &CutOperator<f64, D>, piece: usize) -> Vec<f64> {
+    let mut matrix = vec![f64::NAN; slots::<D>().pow(2)];
+    operator.matrix(piece, &mut matrix);
+    matrix
+}
+
+fn the_kernel_takes_the_forms<const D: usize>() {
+    let size = slots::<D>();
+    let matrix = matrix(&operator::<f64, D>(3), 2);
+    let asymmetry = (0..size * size).map(|k| (matrix[k] - matrix[k % size * size + k / size]).abs());
+    assert!(asymmetry.fold(0.0, f64::max) < 1e-12);
+    for seed in 0..4 {
+        let (u, v) = (random(size, seed), random(size, 10 + seed));
+        let product = |row: usize| (0..size).map(|k| matrix[row * size + k] * u[k]).sum::<f64>();
+        let found: f64 = (0..size).map(|row| v[row] * product(row)).sum();
+        let expected = form::<D>(&u, &v);
+        assert!((found - expected).abs() < 1e-11 * expected.abs().max(1.0), "{found} {expected}");
+    }
+}
+
+#[test]
+fn the_kernel_takes_the_forms_as_they_are_written() {
+    the_kernel_takes_the_forms::<2>();
+    the_kernel_takes_the_forms::<3>();
+}
+
+/// The sweep over more pieces than lanes is the matrix of each.
+fn pieces_are_independent<const D: usize>() {
+    let (count, n, m, w) = (19, node_count::<D>(2) * D, node_count::<D>(1), twist_len::<D>());
+    let operator = operator::<f64, D>(count);
+    let (x, p) = (random(count * (n + w), 1), random(count * m, 2));
+    let (mut y, mut q) = (vec![1.0; x.len()], vec![1.0; p.len()]);
+    operator.add([&x, &p], [&mut y, &mut q], &mut Vec::new());
+    for piece in [0, 15, 16, 18] {
+        let matrix = matrix(&operator, piece);
+        let of = |x: &[f64], p: &[f64]| -> Vec<f64> {
+            let parts = [&x[piece * n..][..n], &p[piece * m..][..m], &x[count * n + piece * w..][..w]];
+            parts.concat()
+        };
+        let (from, to) = (of(&x, &p), of(&y, &q));
+        for (row, to) in matrix.chunks_exact(from.len()).zip(to) {
+            let expected = 1.0 + row.iter().zip(&from).map(|(a, x)| a * x).sum::<f64>();
+            assert!((to - expected).abs() < 1e-11, "{to} {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_sweep_adds_what_the_matrices_give() {
+    pieces_are_independent::<2>();
+    pieces_are_independent::<3>();
+}
+
+fn kernels_agree<T: crate::cells::CellScalar, const D: usize>(tolerance: f64) {
+    let operator = operator::<T, D>(16);
+    let x: Vec<T> = random(slots::<D>() * 16, 3).into_iter().map(T::from_f64).collect();
+    let (mut portable, mut chosen) = (x.clone(), x.clone());
+    operator.run::<Portable<T>>(0, &x, &mut portable);
+    operator.dispatch(0, &x, &mut chosen);
+    for (a, b) in portable.iter().zip(&chosen) {
+        assert!((a.to_f64() - b.to_f64()).abs() < tolerance, "{a} {b}");
+    }
+}
+
+#[test]
+fn vector_and_portable_kernels_agree() {
+    kernels_agree::<f64, 2>(1e-12);
+    kernels_agree::<f64, 3>(1e-12);
+    kernels_agree::<f32, 2>(1e-3);
+    kernels_agree::<f32, 3>(1e-3);
+}

@@ -1,0 +1,113 @@
+//! `unfitted`: the fluid ends at the true surfaces of the bodies, wherever these cut the mesh.
+//!
+//! Aggregated unfitted elements with Nitsche's symmetric conditions on the surfaces and the rigid motions as
+//! unknowns: Badia, Verdugo and Martin 2018 (Comput. Methods Appl. Mech. Eng. 336, 533), Nitsche 1971. Force
+//! and torque on a free body vanish because they are the residual of its own unknowns. No parameter is left
+//! to choose.
+
+use std::sync::Arc;
+
+use gluey_geom::{Dim, Space, Twist};
+use gluey_levelset::Ball;
+
+use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
+use crate::error::StokesError;
+use crate::operator::{Elements, StokesSystem};
+use crate::precondition::velocity::Smoothing;
+use crate::precondition::{Correction, CycleLevels};
+use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
+use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling};
+
+/// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
+const OFFSET: f64 = 0.0;
+
+/// The formulation, which has no parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Unfitted;
+
+impl<const D: usize> Method<D> for Unfitted
+where
+    Dim<D>: Space<D>,
+{
+    fn discretised(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+    ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
+        check_resolved(discretisation, bodies, |_| true)?;
+        let cut = CutCells::new(discretisation, bodies);
+        let aggregates = Aggregates::new(discretisation, &cut)?;
+        let solid = without_fluid(discretisation, &cut);
+        let ghosts = aggregates.velocity.clone();
+        let space = VelocitySpace::around_surfaces(discretisation, bodies, &solid, ghosts);
+        let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
+        let pressure =
+            PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
+        let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates);
+        Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces), Arc::new(*self)))
+    }
+}
+
+/// The nodes with no fluid in the cells around them, each with the body of one of these.
+fn without_fluid<const D: usize>(discretisation: &Discretisation<D>, cut: &CutCells<D>) -> SolidNodes {
+    let nodes = &discretisation.velocity;
+    let mut solid = vec![None; nodes.node_count()];
+    for &(cell, body) in &cut.solid_body {
+        nodes.cell(cell as usize).iter().for_each(|&node| solid[node as usize] = Some(body));
+    }
+    for cell in (0..nodes.cell_count()).filter(|&cell| cut.states[cell] != CellState::Solid) {
+        nodes.cell(cell).iter().for_each(|&node| solid[node as usize] = None);
+    }
+    solid
+}
+
+impl<const D: usize> Rigidity<D> for Unfitted
+where
+    Dim<D>: Space<D>,
+{
+    fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
+        let space = &problem.system.space;
+        Ok((0..space.body_count()).map(|body| space.twist(velocity, body)).collect())
+    }
+
+    fn solve(
+        &self,
+        _problem: &Problem<D>,
+        data: &Data<'_>,
+        x: &mut [f64],
+        solve: &mut LinearSolve<'_>,
+    ) -> Result<Multiplier, StokesError> {
+        solve(data.b, x, 1.0)?;
+        Ok(Multiplier::new())
+    }
+
+    /// Aggregates change from step to step, but what they change is small.
+    fn is_smooth_in_time(&self) -> bool {
+        true
+    }
+
+    fn coarse_offset(&self) -> f64 {
+        OFFSET
+    }
+
+    fn finest_level(&self, problem: &Problem<D>) -> VelocitySpace<D> {
+        let discretisation = problem.discretisation();
+        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &problem.bodies, OFFSET);
+        VelocitySpace::new(discretisation, &problem.bodies, &solid)
+    }
+
+    /// The smoother of the finest mesh is that of the surfaces.
+    fn smoothing(&self, _: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing> {
+        (!is_finest).then(|| Smoothing::of_eliminated(is_finest))
+    }
+
+    fn correction(
+        &self,
+        _elements: &Elements<'_, D>,
+        _finest: &VelocitySpace<D>,
+        _: CycleLevels<'_, D>,
+    ) -> Result<Option<Box<dyn Correction>>, StokesError> {
+        Ok(None)
+    }
+}

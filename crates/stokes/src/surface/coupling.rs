@@ -1,0 +1,262 @@
+//! The operator of cut cells on reduced vectors: fluid, surfaces and the motions of bodies.
+
+use gluey_fem::cells::{CellScalar, CutOperator, CutPiece};
+use gluey_fem::cut::POINTS;
+use gluey_fem::element::{gauss_cube, node_count, value};
+use gluey_geom::{Dim, Space};
+use gluey_levelset::{Ball, Body};
+use gluey_linalg::{AffineConstraints, Scalar, Subset};
+
+use super::aggregates::Aggregates;
+use super::cut_cells::CutCells;
+use super::penalty::penalties;
+use crate::space::{Discretisation, VelocitySpace};
+
+/// `[A, -B^T; -B, 0]` of the cut cells.
+#[derive(Clone, Debug)]
+pub struct SurfaceCoupling<const D: usize> {
+    /// The cut cells.
+    pub cut: CutCells<D>,
+    discretisation: Discretisation<D>,
+    /// Cut cell and body of each piece.
+    pieces: Vec<(u32, u32)>,
+    /// The velocity nodes of cut cells in the nodes of the mesh: themselves, or what they take their values
+    /// from.
+    velocity: AffineConstraints,
+    /// Nodes among these with given values.
+    boundary: Vec<u32>,
+    /// The velocity nodes and the pressure nodes of cut cells.
+    nodes: Subset,
+    pressures: Subset,
+    wide: CutOperator<f64, D>,
+    narrow: CutOperator<f32, D>,
+}
+
+/// Workspace of a [`SurfaceCoupling`] that computes in `T`.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceWorkspace<T> {
+    velocity: Vec<T>,
+    pressure: Vec<T>,
+    velocity_load: Vec<T>,
+    pressure_load: Vec<T>,
+    pieces: Vec<T>,
+}
+
+impl<const D: usize> SurfaceCoupling<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The operator around `bodies` in a fluid of this viscosity.
+    pub fn new(
+        space: &VelocitySpace<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        cut: CutCells<D>,
+        aggregates: &Aggregates,
+    ) -> Self {
+        let discretisation = space.discretisation();
+        let (velocity, pressure) = (&discretisation.velocity, &discretisation.pressure);
+        let touched = |nodes: &gluey_fem::NodeMap<D>| {
+            let mut touched = vec![false; nodes.node_count()];
+            let all = cut.cells.iter().flat_map(|cell| nodes.cell(cell.cell as usize));
+            all.for_each(|&node| touched[node as usize] = true);
+            Subset::new(touched.len(), |node| touched[node])
+        };
+        let (nodes, pressures) = (touched(velocity), touched(pressure));
+        let mut forms = AffineConstraints::identity(velocity.node_count());
+        for ghost in &aggregates.velocity {
+            forms.set(ghost.node as usize, ghost.masters.iter().copied());
+        }
+        let mut of_cut = AffineConstraints::zeros(nodes.len(), velocity.node_count());
+        for (row, &node) in nodes.positions().iter().enumerate() {
+            of_cut.set(row, forms.terms(node as usize).iter().copied());
+        }
+        let masters = (0..nodes.len()).flat_map(|row| of_cut.terms(row)).map(|term| term.0);
+        let mut boundary: Vec<u32> = masters.filter(|&node| velocity.is_on_boundary(node as usize)).collect();
+        boundary.sort_unstable();
+        boundary.dedup();
+        let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
+        let data = PieceData::new(discretisation, bodies, viscosity, &cut, aggregates, [&nodes, &pressures]);
+        let counts = [nodes.len(), pressures.len(), bodies.len()];
+        let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
+        let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
+        drop(data);
+        let discretisation = discretisation.clone();
+        Self { discretisation, wide, narrow, pieces, velocity: of_cut, boundary, nodes, pressures, cut }
+    }
+
+    /// Cell and body of each piece.
+    pub fn pieces(&self) -> impl ExactSizeIterator<Item = (usize, usize)> + '_ {
+        self.pieces.iter().map(|&(k, s)| {
+            let cell = &self.cut.cells[k as usize];
+            (cell.cell as usize, cell.bodies[s as usize] as usize)
+        })
+    }
+
+    /// Rows of the matrix of a piece.
+    pub fn piece_size() -> usize {
+        gluey_fem::ReferenceMatrices::<D>::VELOCITY
+            + gluey_fem::ReferenceMatrices::<D>::PRESSURE
+            + Dim::<D>::RIGID
+    }
+
+    /// The matrix of a piece, row by row: velocities node by node, pressures, twist.
+    pub fn matrix(&self, piece: usize, matrix: &mut [f64]) {
+        self.wide.matrix(piece, matrix);
+    }
+
+    /// Calls `visit(q, r, int p_q p_r)` for the pressures of a piece, whose fluid it is.
+    pub fn for_each_mass_of_piece(&self, piece: usize, visit: impl FnMut(usize, usize, f64)) {
+        let (place, surface) = self.pieces[piece];
+        if surface == 0 {
+            self.for_each_mass(place as usize, visit);
+        }
+    }
+
+    /// Calls `visit(q, r, int p_q p_r)` for the pressures of a cut cell, the integral over its fluid.
+    pub fn for_each_mass(&self, place: usize, mut visit: impl FnMut(usize, usize, f64)) {
+        let cell = &self.cut.cells[place];
+        let volume = self.discretisation.cell_size(cell.cell as usize).powi(D as i32);
+        let rule = gauss_cube::<D>(POINTS);
+        let corners = node_count::<D>(1);
+        let shapes: Vec<Vec<f64>> =
+            rule.iter().map(|(x, _)| (0..corners).map(|q| value::<D>(1, q, x)).collect()).collect();
+        for q in 0..corners {
+            for r in 0..corners {
+                let terms = shapes.iter().zip(&cell.moments.volume);
+                visit(q, r, volume * terms.map(|(shapes, w)| w * shapes[q] * shapes[r]).sum::<f64>());
+            }
+        }
+    }
+
+    /// `(y, q) += (A x - B^T p, -B x)` in double precision, for the pressures at all nodes; without pressures
+    /// where `q` is empty. Loads on nodes with given values are cleared.
+    pub fn add<X: Scalar>(
+        &self,
+        x: [&[X]; 2],
+        y: [&mut [X]; 2],
+        work: &mut SurfaceWorkspace<f64>,
+    ) {
+        self.add_by(&self.wide, x, y, work);
+    }
+
+    /// The same in single precision.
+    pub fn add_narrow(&self, x: [&[f32]; 2], y: [&mut [f32]; 2], work: &mut SurfaceWorkspace<f32>) {
+        self.add_by(&self.narrow, x, y, work);
+    }
+
+    fn add_by<T: CellScalar, X: Scalar>(
+        &self,
+        operator: &CutOperator<T, D>,
+        [x, p]: [&[X]; 2],
+        [y, q]: [&mut [X]; 2],
+        work: &mut SurfaceWorkspace<T>,
+    ) {
+        let SurfaceWorkspace { velocity, pressure, velocity_load, pressure_load, pieces } = work;
+        let nodal = self.velocity.unknown_count() * D;
+        let convert = |value: &X| T::from_f64(value.to_f64());
+        velocity.clear();
+        for row in 0..self.nodes.len() {
+            let mut sum = [T::ZERO; D];
+            for &(node, weight) in self.velocity.terms(row).iter().filter(|_| !x.is_empty()) {
+                let from = &x[node as usize * D..][..D];
+                (0..D).for_each(|c| sum[c] += T::from_f64(weight) * convert(&from[c]));
+            }
+            velocity.extend(sum);
+        }
+        match x.get(nodal..) {
+            Some(twists) => velocity.extend(twists.iter().map(convert)),
+            None => velocity.resize(velocity.len() + y.len() - nodal, T::ZERO),
+        }
+        pressure.clear();
+        if !p.is_empty() {
+            pressure.extend(self.pressures.positions().iter().map(|&node| convert(&p[node as usize])));
+        }
+        velocity_load.clear();
+        velocity_load.resize(velocity.len(), T::ZERO);
+        pressure_load.clear();
+        pressure_load.resize(if q.is_empty() { 0 } else { self.pressures.len() }, T::ZERO);
+        operator.add([&*velocity, &*pressure], [&mut *velocity_load, &mut *pressure_load], pieces);
+        let back = |value: T| X::from_f64(value.to_f64());
+        for (row, load) in velocity_load[..self.nodes.len() * D].chunks_exact(D).enumerate() {
+            for &(node, weight) in self.velocity.terms(row) {
+                let to = &mut y[node as usize * D..][..D];
+                (0..D).for_each(|c| to[c] += back(T::from_f64(weight) * load[c]));
+            }
+        }
+        for (to, &load) in y[nodal..].iter_mut().zip(&velocity_load[self.nodes.len() * D..]) {
+            *to += back(load);
+        }
+        for &node in &self.boundary {
+            y[node as usize * D..][..D].fill(X::ZERO);
+        }
+        for (&node, &load) in self.pressures.positions().iter().zip(pressure_load.iter()) {
+            q[node as usize] += back(load);
+        }
+    }
+}
+
+/// What pieces are made of.
+struct PieceData<'a, const D: usize> {
+    discretisation: &'a Discretisation<D>,
+    bodies: &'a [Ball<D>],
+    viscosity: f64,
+    cut: &'a CutCells<D>,
+    /// Integrals of the penalty over each surface of each cut cell.
+    penalties: Vec<Vec<Vec<f64>>>,
+    /// Numbered nodes of each cut cell.
+    nodes: Vec<Vec<u32>>,
+    pressures: Vec<Vec<u32>>,
+}
+
+impl<'a, const D: usize> PieceData<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(
+        discretisation: &'a Discretisation<D>,
+        bodies: &'a [Ball<D>],
+        viscosity: f64,
+        cut: &'a CutCells<D>,
+        aggregates: &Aggregates,
+        [nodes, pressures]: [&Subset; 2],
+    ) -> Self {
+        let beta = penalties(discretisation, cut, aggregates);
+        let of_cell = |(cell, beta): (&super::cut_cells::CutCell<D>, f64)| {
+            let surfaces = cell.moments.surfaces.iter();
+            surfaces.map(|surface| surface.area.iter().map(|area| beta * area).collect()).collect()
+        };
+        let number = |numbers: &Subset, nodes: &[u32]| {
+            nodes.iter().filter_map(|&n| numbers.number(n as usize)).map(|n| n as u32).collect()
+        };
+        let cells = || cut.cells.iter().map(|cell| cell.cell as usize);
+        Self {
+            penalties: cut.cells.iter().zip(beta).map(of_cell).collect(),
+            nodes: cells().map(|c| number(nodes, discretisation.velocity.cell(c))).collect(),
+            pressures: cells().map(|c| number(pressures, discretisation.pressure.cell(c))).collect(),
+            discretisation,
+            bodies,
+            viscosity,
+            cut,
+        }
+    }
+
+    fn piece(&self, (place, surface): (u32, u32)) -> CutPiece<'_, D> {
+        let (place, surface) = (place as usize, surface as usize);
+        let cell = &self.cut.cells[place];
+        let h = self.discretisation.cell_size(cell.cell as usize);
+        let (body, ball) = (cell.bodies[surface], &cell.balls[surface]);
+        CutPiece {
+            nodes: &self.nodes[place],
+            pressures: &self.pressures[place],
+            body,
+            origin: ball.center.map(|x| -x / ball.radius),
+            edge: h / self.bodies[body as usize].bounding_radius(),
+            viscous: self.viscosity * h.powi(D as i32 - 2),
+            pressure: h / self.viscosity,
+            volume: if surface == 0 { &cell.moments.volume } else { &[] },
+            normal: &cell.moments.surfaces[surface].normal,
+            penalty: &self.penalties[place][surface],
+        }
+    }
+}

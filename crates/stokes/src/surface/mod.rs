@@ -1,0 +1,11 @@
+//! The true surfaces of bodies in a mesh that does not fit them: cut cells, aggregates, Nitsche's penalty and
+//! the operator of all that.
+
+mod aggregates;
+mod coupling;
+mod cut_cells;
+mod penalty;
+
+pub use aggregates::Aggregates;
+pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
+pub use cut_cells::{CellState, CutCells};
