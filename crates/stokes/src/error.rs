@@ -89,6 +89,12 @@ pub enum StokesError {
     /// The fluid around a penalised solid cannot be smoothed.
     #[error("the fluid around the solid cannot be smoothed: {0}")]
     AroundSolid(#[source] DiagonalError),
+    /// The mesh around a surface has an unknown without stiffness.
+    #[error("the mesh around the surfaces cannot be smoothed: {0}")]
+    AtSurface(#[source] DiagonalError),
+    /// The operator on the nodes of a cell at a surface is not positive definite.
+    #[error("the mesh around the surfaces cannot be smoothed cell by cell: {0}")]
+    SurfaceBlock(#[source] BlockError),
     /// The penalised operator on the nodes of a cell is not positive definite.
     #[error("the solid cannot be smoothed cell by cell: {0}")]
     SolidPatch(#[source] BlockError),

@@ -19,13 +19,24 @@ use crate::vector;
 pub struct SchwarzPatches<T, const B: usize> {
     /// Nodes of each patch.
     patches: Jagged<u32>,
-    /// Lower triangles of the inverses, weights included, row by row.
+    /// Lower triangles of the inverses, symmetric weights included, row by row.
     inverses: Vec<f32>,
+    /// Weights of the corrections of each node of each patch.
+    weights: Vec<T>,
     /// Inverse diagonal on nodes of no patch, zero elsewhere.
     diagonal: Vec<T>,
     /// Residual and correction on a patch.
     r: Vec<f32>,
     z: Vec<f32>,
+}
+
+/// Where the weights of a node stand.
+#[derive(Clone, Copy, PartialEq)]
+enum Weights {
+    /// Their roots before and after the inverses.
+    Symmetric,
+    /// After the inverses.
+    Restricted,
 }
 
 impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
@@ -37,7 +48,29 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
     pub fn new(
         matrix: &SymmetricBlockMatrix<B>,
         patches: impl Iterator<Item = Vec<u32>>,
+        diagonal: Vec<T>,
+    ) -> Result<Self, BlockError> {
+        Self::weighted(matrix, patches, diagonal, Weights::Symmetric)
+    }
+
+    /// Restricted additive Schwarz (Cai and Sarkis 1999): `z = W sum R_c^T A_c^-1 R_c r`, which is not
+    /// symmetric and needs no damping.
+    ///
+    /// # Errors
+    /// If a block is not positive definite.
+    pub fn restricted(
+        matrix: &SymmetricBlockMatrix<B>,
+        patches: impl Iterator<Item = Vec<u32>>,
+        diagonal: Vec<T>,
+    ) -> Result<Self, BlockError> {
+        Self::weighted(matrix, patches, diagonal, Weights::Restricted)
+    }
+
+    fn weighted(
+        matrix: &SymmetricBlockMatrix<B>,
+        patches: impl Iterator<Item = Vec<u32>>,
         mut diagonal: Vec<T>,
+        weights_of: Weights,
     ) -> Result<Self, BlockError> {
         let ascending = patches.map(|mut nodes| {
             nodes.sort_unstable();
@@ -46,7 +79,13 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         let patches: Jagged<u32> = ascending.collect();
         let mut count = vec![0u32; matrix.node_count()];
         patches.items().iter().for_each(|&node| count[node as usize] += 1);
-        let weight = |&node: &u32| 1.0 / f64::from(count[node as usize]).sqrt();
+        let share = |node: u32| f64::from(count[node as usize]);
+        let weight = |&node: &u32| if weights_of == Weights::Symmetric { 1.0 / share(node).sqrt() } else { 1.0 };
+        let after = |&node: &u32| match weights_of {
+            Weights::Symmetric => T::ONE,
+            Weights::Restricted => T::from_f64(1.0 / share(node)),
+        };
+        let after = patches.items().iter().map(after).collect();
         let mut inverses = Vec::new();
         inverses.reserve_exact(patches.iter().map(|nodes| triangle_size(nodes.len() * B)).sum());
         let mut place = vec![u32::MAX; matrix.node_count()];
@@ -66,14 +105,14 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         }
         let largest = patches.iter().map(<[u32]>::len).max().unwrap_or(0) * B;
         let [r, z] = [(); 2].map(|()| Vec::with_capacity(largest));
-        Ok(Self { patches, inverses, diagonal, r, z })
+        Ok(Self { patches, inverses, weights: after, diagonal, r, z })
     }
 }
 
 impl<T: Scalar, const B: usize> Preconditioner<T> for SchwarzPatches<T, B> {
     fn apply(&mut self, r: &[T], z: &mut [T]) {
         vector::multiply(&self.diagonal, r, z);
-        let mut inverses = self.inverses.as_slice();
+        let (mut inverses, mut weights) = (self.inverses.as_slice(), self.weights.as_slice());
         for nodes in self.patches.iter() {
             let n = nodes.len() * B;
             let (inverse, rest) = inverses.split_at(triangle_size(n));
@@ -84,11 +123,12 @@ impl<T: Scalar, const B: usize> Preconditioner<T> for SchwarzPatches<T, B> {
             self.z.clear();
             self.z.resize(n, 0.0);
             multiply_triangle(inverse, &self.r, &mut self.z);
-            for (z_local, &node) in self.z.chunks_exact(B).zip(nodes) {
+            let (of_patch, others) = weights.split_at(nodes.len());
+            for ((z_local, &node), &weight) in self.z.chunks_exact(B).zip(nodes).zip(of_patch) {
                 let z = &mut z[node as usize * B..][..B];
-                z.iter_mut().zip(z_local).for_each(|(z, &local)| *z += T::from_f64(f64::from(local)));
+                z.iter_mut().zip(z_local).for_each(|(z, &local)| *z += weight * T::from_f64(f64::from(local)));
             }
-            inverses = rest;
+            (inverses, weights) = (rest, others);
         }
     }
 }

@@ -13,13 +13,14 @@ use gluey_levelset::Ball;
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
+use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
 use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling};
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
-const OFFSET: f64 = 0.0;
+const OFFSET: f64 = -0.1;
 
 /// The formulation, which has no parameters.
 #[derive(Clone, Copy, Debug)]
@@ -104,10 +105,11 @@ where
 
     fn correction(
         &self,
-        _elements: &Elements<'_, D>,
-        _finest: &VelocitySpace<D>,
+        elements: &Elements<'_, D>,
+        finest: &VelocitySpace<D>,
         _: CycleLevels<'_, D>,
     ) -> Result<Option<Box<dyn Correction>>, StokesError> {
-        Ok(None)
+        let Some(surfaces) = &elements.system().surfaces else { return Ok(None) };
+        Ok(Some(Box::new(SurfaceCorrection::new(elements, surfaces, finest)?)))
     }
 }

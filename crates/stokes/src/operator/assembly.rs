@@ -14,7 +14,7 @@ use gluey_linalg::{
     SparseMatrix, Subset, Symbolic,
 };
 
-use super::element::Elements;
+use super::element::{Elements, Source};
 use super::system::StokesSystem;
 use crate::error::StokesError;
 use crate::space::{VelocitySpace, pressure_expansion, velocity_expansion};
@@ -124,7 +124,7 @@ where
         }
     };
     let mut sources = Vec::with_capacity(system.cells.len());
-    for source in all_sources(system) {
+    for source in elements.sources() {
         set_forms(source, &mut local);
         if !local.terms().is_empty() {
             groups.push(local.terms().iter().map(|term| numbering.of[term.0 as usize] as usize));
@@ -138,33 +138,16 @@ where
     let matrix = blocks.sum(|group, target| {
         let Some(source) = sources.next() else { return };
         set_forms(source, &mut local);
-        let reduction = if matches!(source, Source::Cell { .. }) { &mut of_cells } else { &mut of_pieces };
+        let reduction = if source.is_piece() { &mut of_pieces } else { &mut of_cells };
         reduction.place(&mut local, blocks.unknowns_of(group));
-        match source {
-            Source::Cell { index, .. } if local.is_identity() => return elements.fill(index, target),
-            Source::Cell { index, .. } => elements.fill(index, &mut reduction.element),
-            Source::Piece { index, .. } => elements.fill_piece(index, &mut reduction.element),
+        if local.is_identity() && !source.is_piece() {
+            elements.fill_source(source, target);
+        } else {
+            elements.fill_source(source, &mut reduction.element);
+            reduction.multiply(&local, target);
         }
-        reduction.multiply(&local, target);
     });
     Ok(Assembled { unknowns, blocks, matrix })
-}
-
-/// What has a matrix: its place among its kind, its cell in the mesh, and for pieces the body.
-#[derive(Clone, Copy)]
-enum Source {
-    Cell { index: usize, cell: usize },
-    Piece { index: usize, cell: usize, body: usize },
-}
-
-fn all_sources<const D: usize>(system: &StokesSystem<D>) -> impl Iterator<Item = Source> + '_
-where
-    Dim<D>: Space<D>,
-{
-    let cells = system.cells.iter().enumerate();
-    let cells = cells.map(|(index, cell)| Source::Cell { index, cell: cell.cell as usize });
-    let pieces = system.surfaces.iter().flat_map(|surfaces| surfaces.pieces().enumerate());
-    cells.chain(pieces.map(|(index, (cell, body))| Source::Piece { index, cell, body }))
 }
 
 /// Blocks of the kept unknowns.

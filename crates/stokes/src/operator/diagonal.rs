@@ -17,6 +17,11 @@ pub struct BlockDiagonal {
 }
 
 impl BlockDiagonal {
+    /// These inverses of nodal entries, and of blocks of `rigid` rows for the twists.
+    pub fn new(nodal: Vec<f32>, twists: Vec<f32>, rigid: usize) -> Self {
+        Self { nodal, twists, rigid }
+    }
+
     /// Leaves the twists alone.
     pub fn hold_twists(&mut self) {
         self.twists.fill(0.0);
@@ -64,6 +69,20 @@ pub fn block_diagonal<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
+    let nodal = nodal_diagonal(space, cells, smoothed)?;
+    let twists = twist_blocks(space, cells, &ReferenceMatrices::new())?;
+    Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
+}
+
+/// The inverse diagonal of the fluid's operator on the nodes in `smoothed`, zero elsewhere.
+pub fn nodal_diagonal<const D: usize>(
+    space: &VelocitySpace<D>,
+    cells: &[ActiveCell],
+    smoothed: &[bool],
+) -> Result<Vec<f32>, DiagonalError>
+where
+    Dim<D>: Space<D>,
+{
     let discretisation = space.discretisation();
     let mut nodal = viscous_diagonal(discretisation, cells.iter().map(|c| (c, c.viscous, None)));
     // The squares keep the sum positive: weights of hanging nodes may be negative.
@@ -76,8 +95,7 @@ where
             false => 0.0,
         };
     }
-    let twists = twist_blocks(space, cells, &ReferenceMatrices::new())?;
-    Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
+    Ok(nodal)
 }
 
 /// Inverses of `R^T A R` for every body, zero for those that are not active.

@@ -11,6 +11,42 @@ use crate::surface::SurfaceCoupling;
 /// no velocity harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
+/// What has a matrix: its place among its kind, its cell in the mesh, and for the pieces of cut cells the
+/// body.
+#[derive(Clone, Copy, Debug)]
+pub enum Source {
+    /// An active cell that no surface cuts.
+    Cell {
+        /// Place among the active cells.
+        index: usize,
+        /// Index in the mesh.
+        cell: usize,
+    },
+    /// A piece of a cut cell.
+    Piece {
+        /// Place among the pieces.
+        index: usize,
+        /// Index of the cell in the mesh.
+        cell: usize,
+        /// The body whose surface it has.
+        body: usize,
+    },
+}
+
+impl Source {
+    /// Index of the cell in the mesh.
+    pub fn cell(self) -> usize {
+        match self {
+            Self::Cell { cell, .. } | Self::Piece { cell, .. } => cell,
+        }
+    }
+
+    /// Whether it is a piece of a cut cell, whose matrix has velocities, pressures and a twist.
+    pub fn is_piece(self) -> bool {
+        matches!(self, Self::Piece { .. })
+    }
+}
+
 /// The matrices of the active cells.
 pub struct Elements<'a, const D: usize>
 where
@@ -90,6 +126,22 @@ where
         });
     }
 
+    /// All that has a matrix.
+    pub fn sources(&self) -> impl Iterator<Item = Source> + 'a {
+        let cells = self.system.cells.iter().enumerate();
+        let cells = cells.map(|(index, cell)| Source::Cell { index, cell: cell.cell as usize });
+        let pieces = self.system.surfaces.iter().flat_map(|surfaces| surfaces.pieces().enumerate());
+        cells.chain(pieces.map(|(index, (cell, body))| Source::Piece { index, cell, body }))
+    }
+
+    /// Writes the matrix of a cell or a piece, row by row.
+    pub fn fill_source(&self, source: Source, matrix: &mut [f64]) {
+        match source {
+            Source::Cell { index, .. } => self.fill(index, matrix),
+            Source::Piece { index, .. } => self.fill_piece(index, matrix),
+        }
+    }
+
     /// Writes the matrix of an active cell, row by row.
     pub fn fill(&self, index: usize, matrix: &mut [f64]) {
         let (n, size) = (ReferenceMatrices::<D>::VELOCITY, self.size);
@@ -108,7 +160,7 @@ where
     }
 
     /// Writes the matrix of a piece of a cut cell, row by row: velocities, pressures, twist.
-    pub fn fill_piece(&self, index: usize, matrix: &mut [f64]) {
+    fn fill_piece(&self, index: usize, matrix: &mut [f64]) {
         let Some(surfaces) = &self.system.surfaces else { return };
         surfaces.matrix(index, matrix);
         let (n, size) = (ReferenceMatrices::<D>::VELOCITY, SurfaceCoupling::<D>::piece_size());

@@ -6,10 +6,12 @@ mod diagonal;
 mod element;
 mod restricted;
 mod system;
+mod viscous;
 
 pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, factorised};
 pub use cells::viscous_diagonal;
-pub use diagonal::{BlockDiagonal, block_diagonal};
+pub use diagonal::{BlockDiagonal, block_diagonal, nodal_diagonal};
 pub use element::Elements;
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
 pub use system::{StokesSystem, SystemOperator};
+pub use viscous::ViscousOperator;

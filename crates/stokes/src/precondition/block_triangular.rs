@@ -7,6 +7,7 @@ use gluey_linalg::{Preconditioner, Scalar, vector};
 use crate::operator::StokesSystem;
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
+use crate::surface::SurfaceWorkspace;
 
 /// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`.
 pub struct BlockTriangular<'a, const D: usize>
@@ -22,6 +23,7 @@ where
     /// `z_p`.
     answer: Vec<f32>,
     work: Workspace<f32>,
+    surfaces: SurfaceWorkspace<f32>,
 }
 
 impl<'a, const D: usize> BlockTriangular<'a, D>
@@ -35,7 +37,8 @@ where
         schur: &'a mut SchurInverse<D>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];
-        Self { system, fluid, cycle, schur, pressure: zeros(), answer: zeros(), work: Workspace::default() }
+        let (work, surfaces) = (Workspace::default(), SurfaceWorkspace::default());
+        Self { system, fluid, cycle, schur, pressure: zeros(), answer: zeros(), work, surfaces }
     }
 }
 
@@ -44,7 +47,7 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
-        let Self { system, fluid, cycle, schur, pressure, answer, work } = self;
+        let Self { system, fluid, cycle, schur, pressure, answer, work, surfaces } = self;
         let (ru, rp) = r.split_at(system.velocity_dim());
         let (zu, zp) = z.split_at_mut(system.velocity_dim());
         vector::convert(-1.0, rp, pressure);
@@ -54,6 +57,12 @@ where
         vector::convert(1.0, answer, zp);
         vector::copy(answer, pressure);
         system.pressure.expand(pressure);
-        cycle.answer(ru, |load| fluid.gradient(pressure, load, work), zu);
+        let gradient = |load: &mut [f32]| {
+            fluid.gradient(pressure, load, work);
+            if let Some(cut) = &system.surfaces {
+                cut.add_narrow([&[], pressure], [load, &mut []], surfaces);
+            }
+        };
+        cycle.answer(ru, gradient, zu);
     }
 }

@@ -1,9 +1,12 @@
 //! The preconditioner: a V-cycle on the velocities, a correction for the penalised solid, and the Schur
 //! complement.
 
+mod assembly;
 mod block_triangular;
+mod numbered;
 pub mod schur;
 pub mod solid;
+pub mod surface;
 pub mod velocity;
 
 use crate::space::Discretisation;

@@ -18,6 +18,7 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The cut cells.
     pub cut: CutCells<D>,
     discretisation: Discretisation<D>,
+    roots: Vec<u32>,
     /// Cut cell and body of each piece.
     pieces: Vec<(u32, u32)>,
     /// The velocity nodes of cut cells in the nodes of the mesh: themselves, or what they take their values
@@ -82,7 +83,10 @@ where
         let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
         drop(data);
         let discretisation = discretisation.clone();
-        Self { discretisation, wide, narrow, pieces, velocity: of_cut, boundary, nodes, pressures, cut }
+        let mut roots = aggregates.roots.clone();
+        roots.sort_unstable();
+        roots.dedup();
+        Self { discretisation, roots, wide, narrow, pieces, velocity: of_cut, boundary, nodes, pressures, cut }
     }
 
     /// Cell and body of each piece.
@@ -91,6 +95,11 @@ where
             let cell = &self.cut.cells[k as usize];
             (cell.cell as usize, cell.bodies[s as usize] as usize)
         })
+    }
+
+    /// The cells whose nodes are unknowns and that are cut or carry bad cells, ascending; indices in the mesh.
+    pub fn roots(&self) -> &[u32] {
+        &self.roots
     }
 
     /// Rows of the matrix of a piece.

@@ -1,26 +1,34 @@
 //! Nitsche's penalty from local eigenvalues.
 //!
-//! The form is positive if `beta` exceeds the largest eigenvalue `lambda` of `int_G |2 eta eps(u) n|^2 / eta`
-//! against `int_F 2 eta eps(u):eps(u)` over the polynomials of a root, on the root and the bad cells that it
-//! carries; twice that is taken (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem). In
-//! coordinates of the unit cube `lambda h` is a number of the cut alone.
+//! The form is positive if `beta` exceeds the largest ratio `lambda` of `int_G |2 eta eps(u) n|^2 / eta` to
+//! `int_F 2 eta eps(u):eps(u)` over the polynomials of a root, on the root and the bad cells that it carries
+//! (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem); twice that is safe where bad cells
+//! next to each other have different roots. Since `|eps n|^2 <= eps:eps`, the largest ratio `mu` of
+//! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products of
+//! gradients in the volume and on the surface:
+//!
+//! `beta = 2 mu eta`.
+//!
+//! In coordinates of the unit cube `mu h` is a number of the cut alone.
 
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, gradient, node_count};
 use gluey_geom::Vector;
+use gluey_levelset::nearest_image;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
-use super::cut_cells::{CutCell, CutCells};
+use super::cut_cells::CutCells;
 use crate::space::Discretisation;
 
 /// Multiple of the eigenvalue.
 const FACTOR: f64 = 2.0;
-/// Share of the trace that is added to the strain energy: rigid motions have none.
-const SHIFT: f64 = 1e-10;
-/// Steps of the power iteration for the eigenvalue.
-const STEPS: usize = 40;
+/// Share of the mean diagonal that is added to the strain energy: rigid motions have none.
+const SHIFT: f64 = 1e-9;
+/// Steps of the power iteration for the eigenvalue, at most, and the relative change that ends it.
+const MOST_STEPS: usize = 60;
+const CHANGE: f64 = 1e-3;
 
 /// `beta h / eta` of every cut cell.
 pub fn penalties<const D: usize>(
@@ -31,9 +39,26 @@ pub fn penalties<const D: usize>(
     let mut members: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(0..).collect();
     members.sort_unstable();
     let clusters: Vec<&[(u32, u32)]> = members.chunk_by(|a, b| a.0 == b.0).collect();
+    let at_home = Gradients::<D>::new([0.0; D]);
     let of_cluster = |cluster: &&[(u32, u32)]| {
         let root = cluster[0].0 as usize;
-        FACTOR * largest_eigenvalue(discretisation, cut, root, cluster)
+        let mut products = [Products::<D>::zeros(), Products::zeros()];
+        if cut.cut(root).is_none() {
+            let weights: Vec<f64> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.1).collect();
+            products[0].add(&at_home, &weights);
+        }
+        for &(_, k) in *cluster {
+            let cell = &cut.cells[k as usize];
+            let moments = &cell.moments;
+            let elsewhere = (cell.cell as usize != root)
+                .then(|| Gradients::new(offset(discretisation, root, cell.cell as usize)));
+            let gradients = elsewhere.as_ref().unwrap_or(&at_home);
+            products[0].add(gradients, &moments.volume);
+            moments.surfaces.iter().for_each(|surface| products[1].add(gradients, &surface.area));
+        }
+        let [volume, surface] = products.map(|products| products.energy());
+        // int 4 eps:eps on the surface to int 2 eps:eps in the volume.
+        FACTOR * 2.0 * largest_ratio(&surface, volume)
     };
     let values: Vec<f64> = clusters.par_iter().map(of_cluster).collect();
     let mut penalties = vec![0.0; cut.cells.len()];
@@ -43,31 +68,6 @@ pub fn penalties<const D: usize>(
     penalties
 }
 
-/// Sums over points of products of strains, in the polynomials of a root.
-struct Forms<const D: usize> {
-    energy: DMatrix<f64>,
-    traction: DMatrix<f64>,
-}
-
-fn largest_eigenvalue<const D: usize>(
-    discretisation: &Discretisation<D>,
-    cut: &CutCells<D>,
-    root: usize,
-    cluster: &[(u32, u32)],
-) -> f64 {
-    let n = D * node_count::<D>(2);
-    let mut forms = Forms::<D> { energy: DMatrix::zeros(n, n), traction: DMatrix::zeros(n, n) };
-    if cut.cut(root).is_none() {
-        let weights: Vec<f64> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.1).collect();
-        forms.add([0.0; D], &weights, None);
-    }
-    for &(_, k) in cluster {
-        let cell = &cut.cells[k as usize];
-        forms.add(offset(discretisation, root, cell.cell as usize), &cell.moments.volume, Some(cell));
-    }
-    forms.largest_eigenvalue()
-}
-
 /// Place of a cell relative to the root, in cells.
 fn offset<const D: usize>(discretisation: &Discretisation<D>, root: usize, cell: usize) -> [f64; D] {
     let mesh = &discretisation.mesh;
@@ -75,67 +75,89 @@ fn offset<const D: usize>(discretisation: &Discretisation<D>, root: usize, cell:
     let arm: Vector<D> = lower(cell) - lower(root);
     std::array::from_fn(|d| {
         let period = mesh.periodic()[d].then_some(mesh.domain().extent()[d]);
-        gluey_levelset::nearest_image(arm[d], period) / discretisation.cell_size(root)
+        (nearest_image(arm[d], period) / discretisation.cell_size(root)).round()
     })
 }
 
-impl<const D: usize> Forms<D> {
-    /// Adds the integrals over a cell and the surfaces in it.
-    fn add(&mut self, offset: [f64; D], volume: &[f64], cell: Option<&CutCell<D>>) {
-        let (nodes, n) = (node_count::<D>(2), D * node_count::<D>(2));
-        // Twice the strain of each unknown, row by row.
-        let mut strains = DMatrix::zeros(n, D * D);
-        for (q, (at, _)) in gauss_cube::<D>(POINTS).iter().enumerate() {
-            let x = std::array::from_fn(|d| offset[d] + at[d]);
-            for i in 0..nodes {
-                let slope = gradient::<D>(2, i, &x);
-                for c in 0..D {
-                    strains.row_mut(i * D + c).fill(0.0);
-                    for d in 0..D {
-                        strains[(i * D + c, c * D + d)] += slope[d];
-                        strains[(i * D + c, d * D + c)] += slope[d];
-                    }
-                }
-            }
-            // int 2 eps:eps is half the product of twice the strains.
-            self.energy.gemm(0.5 * volume[q], &strains, &strains.transpose(), 1.0);
-            let Some(cell) = cell else { continue };
-            let squares = normal_squares(cell, q, at);
-            let tested = &strains * DMatrix::identity(D, D).kronecker(&squares);
-            self.traction.gemm(1.0, &tested, &strains.transpose(), 1.0);
-        }
-    }
+/// Derivatives of the shape functions of a root at the points of a cell: a row for each function, a column
+/// for each point.
+struct Gradients<const D: usize>([DMatrix<f64>; D]);
 
-    fn largest_eigenvalue(self) -> f64 {
-        let n = self.energy.nrows();
-        let shift = SHIFT * self.energy.trace();
-        let shifted = self.energy + DMatrix::identity(n, n) * shift;
-        let Some(factor) = Cholesky::new(shifted) else { return f64::NAN };
-        let mut x = DVector::from_fn(n, |k, _| (1.0 + k as f64).sin());
-        let mut value = 0.0;
-        for _ in 0..STEPS {
-            let load = &self.traction * &x;
-            let y = factor.solve(&load);
-            value = load.dot(&y) / x.dot(&load);
-            x = y.normalize();
+impl<const D: usize> Gradients<D> {
+    fn new(offset: [f64; D]) -> Self {
+        let rule = gauss_cube::<D>(POINTS);
+        let mut all = std::array::from_fn(|_| DMatrix::zeros(node_count::<D>(2), rule.len()));
+        for (q, (at, _)) in rule.iter().enumerate() {
+            let x = std::array::from_fn(|d| offset[d] + at[d]);
+            for i in 0..node_count::<D>(2) {
+                let slope = gradient::<D>(2, i, &x);
+                (0..D).for_each(|d| all[d][(i, q)] = slope[d]);
+            }
         }
-        value
+        Self(all)
     }
 }
 
-/// Integrals of `n_k n_l` at a point, over all surfaces of a cell: that of `n_k` times the normal there, which
-/// is linear.
-fn normal_squares<const D: usize>(cell: &CutCell<D>, point: usize, at: &[f64; D]) -> DMatrix<f64> {
-    let mut squares = DMatrix::zeros(D, D);
-    for (ball, surface) in cell.balls.iter().zip(&cell.moments.surfaces) {
-        for k in 0..D {
-            for l in 0..D {
-                let normal = (ball.center[l] - at[l]) / ball.radius;
-                let both = 0.5 * surface.normal[point][k] * normal;
-                squares[(k, l)] += both;
-                squares[(l, k)] += both;
+/// Integrals of products of derivatives, `int d_a phi_i d_b phi_j` for `b <= a`.
+struct Products<const D: usize>([[DMatrix<f64>; D]; D]);
+
+impl<const D: usize> Products<D> {
+    fn zeros() -> Self {
+        let n = node_count::<D>(2);
+        Self(std::array::from_fn(|_| std::array::from_fn(|_| DMatrix::zeros(n, n))))
+    }
+
+    fn add(&mut self, Gradients(gradients): &Gradients<D>, weights: &[f64]) {
+        for a in 0..D {
+            let mut weighted = gradients[a].clone();
+            for (mut column, &weight) in weighted.column_iter_mut().zip(weights) {
+                column *= weight;
+            }
+            for b in 0..=a {
+                self.0[a][b].gemm(1.0, &weighted, &gradients[b].transpose(), 1.0);
             }
         }
     }
-    squares
+
+    /// `int 2 eps(u):eps(v)` of the components, component by component.
+    fn energy(&self) -> DMatrix<f64> {
+        let n = node_count::<D>(2);
+        let mut energy = DMatrix::zeros(D * n, D * n);
+        let product = |a: usize, b: usize, i: usize, j: usize| match b <= a {
+            true => self.0[a][b][(i, j)],
+            false => self.0[b][a][(j, i)],
+        };
+        for c in 0..D {
+            for d in 0..D {
+                for i in 0..n {
+                    for j in 0..n {
+                        let laplacian: f64 =
+                            if c == d { (0..D).map(|a| product(a, a, i, j)).sum() } else { 0.0 };
+                        // 2 eps:eps = grad u : (grad v + grad v^T).
+                        energy[(c * n + i, d * n + j)] = laplacian + product(d, c, i, j);
+                    }
+                }
+            }
+        }
+        energy
+    }
+}
+
+/// The largest eigenvalue of `above` against `below`, NaN if that is not positive but for rigid motions.
+fn largest_ratio(above: &DMatrix<f64>, below: DMatrix<f64>) -> f64 {
+    let n = below.nrows();
+    let shift = SHIFT * below.trace() / n as f64;
+    let Some(factor) = Cholesky::new(below + DMatrix::identity(n, n) * shift) else { return f64::NAN };
+    let mut load = above * DVector::from_fn(n, |k, _| (1.0 + k as f64).sin());
+    let mut ratio = 0.0f64;
+    for _ in 0..MOST_STEPS {
+        let x = factor.solve(&load);
+        let next = above * &x;
+        let before = std::mem::replace(&mut ratio, x.dot(&next) / x.dot(&load));
+        load = next / x.norm();
+        if (ratio - before).abs() <= CHANGE * ratio {
+            break;
+        }
+    }
+    ratio
 }

@@ -11,7 +11,7 @@ use super::cells::PressureMatrices;
 use super::weights::scale_by_weights;
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
-use crate::space::{ActiveCell, pressure_expansion};
+use crate::space::pressure_expansion;
 
 /// `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in its place, scaled by
 /// the weights of the pressures.
@@ -40,11 +40,13 @@ where
     let discretisation = system.discretisation();
     let m = ReferenceMatrices::<D>::PRESSURE;
     let expansion = pressure_expansion(&system.pressure);
-    let unknowns = |c: &ActiveCell| {
-        let nodes = discretisation.pressure.cell(c.cell as usize).iter();
+    let unknowns = |cell: u32| {
+        let nodes = discretisation.pressure.cell(cell as usize).iter();
         nodes.flat_map(|&q| expansion.terms(q as usize)).map(|term| term.0 as usize).collect::<Vec<_>>()
     };
-    let groups: Vec<Vec<usize>> = system.cells.iter().map(unknowns).collect();
+    let cut = || system.surfaces.iter().flat_map(|surfaces| surfaces.cut.cells.iter());
+    let mesh_cells = system.cells.iter().map(|c| c.cell).chain(cut().map(|c| c.cell));
+    let groups: Vec<Vec<usize>> = mesh_cells.map(unknowns).collect();
     let mut mass = SparseMatrix::zeros(Arc::new(Pattern::from_groups(system.pressure.dim(), &groups)?));
     drop(groups);
     for (index, c) in system.cells.iter().enumerate() {
@@ -60,6 +62,20 @@ where
                 }
             }
         }
+    }
+    for (place, cell) in cut().enumerate() {
+        let nodes = discretisation.pressure.cell(cell.cell as usize);
+        let Some(surfaces) = &system.surfaces else { continue };
+        let mut added = Ok(());
+        surfaces.for_each_mass(place, |i, j, value| {
+            let value = value / system.viscosity();
+            for &(r, wr) in expansion.terms(nodes[i] as usize) {
+                for &(c, wc) in expansion.terms(nodes[j] as usize) {
+                    added = added.clone().and(mass.add(r as usize, c as usize, wr * wc * value));
+                }
+            }
+        });
+        added?;
     }
     for q in (0..system.pressure.dim()).filter(|&q| !system.pressure.is_free(q)) {
         mass.add(q, q, 1.0)?;

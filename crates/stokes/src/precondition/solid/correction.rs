@@ -19,9 +19,9 @@
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
 
-use super::assembly::assemble_on_nodes;
+use crate::precondition::assembly::assemble_on_nodes;
 use super::multigrid::SolidMultigrid;
-use super::numbered::NumberedNodes;
+use crate::precondition::numbered::NumberedNodes;
 use super::smoother::{FilmSmoother, PenalisedSmoother};
 use crate::error::StokesError;
 use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscous_on, gather};

@@ -12,7 +12,7 @@ use gluey_linalg::{
     SchwarzPatches, SparseMatrix, SymmetricBlockMatrix, vector,
 };
 
-use super::numbered::NumberedNodes;
+use crate::precondition::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::factorised;
 use crate::space::Discretisation;

@@ -14,8 +14,8 @@ use gluey_linalg::{
     Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, SchwarzPatches, SymmetricBlockMatrix, vector,
 };
 
-use super::assembly::assemble_on_nodes;
-use super::numbered::NumberedNodes;
+use crate::precondition::assembly::assemble_on_nodes;
+use crate::precondition::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::{
     CountedOperator, Elements, Restricted, StokesSystem, acting, add_at, block_diagonal, gather,

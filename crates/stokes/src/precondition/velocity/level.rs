@@ -198,7 +198,7 @@ fn restrict_load<const D: usize>(
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
 /// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is a few percent
 /// too large.
-fn cell_lambda_max<const D: usize>() -> f64 {
+pub fn cell_lambda_max<const D: usize>() -> f64 {
     let n = ReferenceMatrices::<D>::VELOCITY;
     let viscous = ReferenceMatrices::<D>::new().viscous;
     let scale = |i: usize| viscous[i * (n + 1)].sqrt();

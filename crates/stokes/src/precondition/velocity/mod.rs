@@ -8,7 +8,7 @@ mod near_bodies;
 
 pub use cycle::{LevelPlan, VCycle};
 pub use hierarchy::Hierarchy;
-pub use level::Smoothing;
+pub use level::{Smoothing, cell_lambda_max};
 
 /// Factor by which the bound of the largest eigenvalue is raised for hanging nodes and twists, whose
 /// diagonals are not sums over cells: they add little.

@@ -1,10 +1,12 @@
-//! The viscous matrix of the penalised operator on numbered nodes.
+//! The viscous matrix on numbered nodes.
 
+use gluey_fem::Constraint;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockGroups, LocalTerm, Pattern, SparseError, SymmetricBlockMatrix};
 
 use super::numbered::NumberedNodes;
 use crate::operator::Elements;
+use crate::surface::SurfaceCoupling;
 
 /// Stands for the constraint of a node that has none.
 const NONE: u32 = u32::MAX;
@@ -17,22 +19,24 @@ pub fn assemble_on_nodes<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let (forms, mut terms) = (NodeForms::new(nodes), Vec::new());
-    let (mut cells, mut groups) = (Vec::new(), BlockGroups::default());
-    for (index, cell) in elements.cells().iter().enumerate() {
-        forms.of_cell(cell.cell as usize, &mut terms);
+    let (forms, mut terms) = (NodeForms::new(nodes, elements.system().space.ghosts()), Vec::new());
+    let (mut sources, mut groups) = (Vec::new(), BlockGroups::default());
+    for source in elements.sources() {
+        forms.of_cell(source.cell(), &mut terms);
         if !terms.is_empty() {
             groups.push(terms.iter().map(|term| term.row as usize));
-            cells.push(index);
+            sources.push(source);
         }
     }
     let groups: Vec<&[usize]> = groups.iter().collect();
     let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(nodes.nodes.len(), &groups)?);
     let mut element = vec![0.0; elements.size().pow(2)];
-    for index in cells {
-        forms.of_cell(elements.cells()[index].cell as usize, &mut terms);
-        elements.fill(index, &mut element);
-        matrix.add_local(&terms, &element);
+    let mut piece = vec![0.0; SurfaceCoupling::<D>::piece_size().pow(2)];
+    for source in sources {
+        forms.of_cell(source.cell(), &mut terms);
+        let dense = if source.is_piece() { &mut piece } else { &mut element };
+        elements.fill_source(source, dense);
+        matrix.add_local(&terms, dense);
     }
     Ok(matrix)
 }
@@ -40,17 +44,20 @@ where
 /// The numbered nodes that nodes stand for: themselves, or the masters they hang on.
 struct NodeForms<'a, const D: usize> {
     nodes: &'a NumberedNodes<'a, D>,
+    /// Hanging nodes and ghosts.
+    constraints: Vec<&'a Constraint>,
     /// Index of the constraint of each node, or [`NONE`].
     constraint: Vec<u32>,
 }
 
 impl<'a, const D: usize> NodeForms<'a, D> {
-    fn new(nodes: &'a NumberedNodes<'a, D>) -> Self {
+    fn new(nodes: &'a NumberedNodes<'a, D>, ghosts: &'a [Constraint]) -> Self {
+        let constraints: Vec<&Constraint> = nodes.mesh.velocity.constraints().iter().chain(ghosts).collect();
         let mut constraint = vec![NONE; nodes.nodes.whole()];
-        for (k, hanging) in nodes.mesh.velocity.constraints().iter().enumerate() {
-            constraint[hanging.node as usize] = k as u32;
+        for (k, of) in constraints.iter().enumerate() {
+            constraint[of.node as usize] = k as u32;
         }
-        Self { nodes, constraint }
+        Self { nodes, constraints, constraint }
     }
 
     /// The terms of a cell, sorted by their rows.
@@ -62,9 +69,9 @@ impl<'a, const D: usize> NodeForms<'a, D> {
                 let row = self.nodes.nodes.number(node as usize);
                 terms.extend(row.map(|row| LocalTerm { row: row as u32, local, weight }));
             };
-            match nodes.constraints().get(self.constraint[node as usize] as usize) {
+            match self.constraints.get(self.constraint[node as usize] as usize) {
                 None => push(node, 1.0),
-                Some(hanging) => hanging.masters.iter().for_each(|&(master, weight)| push(master, weight)),
+                Some(of) => of.masters.iter().for_each(|&(master, weight)| push(master, weight)),
             }
         }
         terms.sort_unstable_by_key(|term| (term.row, term.local));

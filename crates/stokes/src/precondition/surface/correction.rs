@@ -1,0 +1,109 @@
+//! The cycle of a mesh that surfaces cut, on the levels with eliminated bodies.
+//!
+//! The finest of these levels holds the field with which coarser ones correct: it is taken at the free nodes
+//! of the mesh, inside the bodies too, and the motions of the bodies are copied. With the blocks `G` of the
+//! smoother, the levels `V` and Chebyshev's sweep `C`:
+//!
+//! `z = G r`, `z += V (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`.
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::vector;
+
+use super::smoother::SurfaceSmoother;
+use crate::error::StokesError;
+use crate::operator::Elements;
+use crate::precondition::Correction;
+use crate::space::VelocitySpace;
+use crate::surface::SurfaceCoupling;
+
+/// The smoothers of the finest mesh around the rigid levels.
+pub struct SurfaceCorrection<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    smoother: SurfaceSmoother<D>,
+    /// The velocities of the finest rigid level.
+    rigid: VelocitySpace<D>,
+    /// Whether a node is free.
+    is_free: Vec<bool>,
+    /// On the reduced velocities.
+    b: Vec<f32>,
+    x: Vec<f32>,
+    r: Vec<f32>,
+    /// Load and velocity on the finest rigid level.
+    load: Vec<f64>,
+    spread: Vec<f64>,
+    velocity: Vec<f32>,
+}
+
+impl<const D: usize> SurfaceCorrection<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// For the system of `elements`, on levels of which the finest has the velocities `rigid`.
+    pub fn new(
+        elements: &Elements<'_, D>,
+        surfaces: &SurfaceCoupling<D>,
+        rigid: &VelocitySpace<D>,
+    ) -> Result<Self, StokesError> {
+        let space = &elements.system().space;
+        let dim = space.dim();
+        let [b, x, r, velocity] = [(); 4].map(|()| vec![0.0; dim]);
+        Ok(Self {
+            smoother: SurfaceSmoother::new(elements, surfaces)?,
+            rigid: rigid.clone(),
+            is_free: (0..space.nodes().node_count()).map(|node| space.is_free(node)).collect(),
+            b,
+            x,
+            r,
+            load: vec![0.0; dim],
+            spread: vec![0.0; dim],
+            velocity,
+        })
+    }
+
+    /// `x += V r` for the residual in the workspace.
+    fn correct(&mut self, levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
+        let nodal = self.rigid.full_dim();
+        vector::convert(1.0, &self.r, &mut self.load);
+        // The loads on the bodies, as nodal loads of the rigid level.
+        self.spread.fill(0.0);
+        self.spread[nodal..].copy_from_slice(&self.load[nodal..]);
+        self.rigid.spread(&mut self.spread);
+        for (load, spread) in self.load[..nodal].iter_mut().zip(&self.spread) {
+            *load += spread;
+        }
+        levels(&mut self.load, &mut self.velocity);
+        vector::axpy(1.0, &self.velocity[nodal..], &mut self.x[nodal..]);
+        self.rigid.expand(&mut self.velocity);
+        let fields = self.x.chunks_exact_mut(D).zip(self.velocity.chunks_exact(D));
+        for ((x, u), _) in fields.zip(&self.is_free).filter(|(_, is_free)| **is_free) {
+            x.iter_mut().zip(u).for_each(|(x, u)| *x += u);
+        }
+    }
+}
+
+impl<const D: usize> Correction for SurfaceCorrection<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
+        let norm = vector::norm(r);
+        if norm == 0.0 {
+            return z.fill(0.0);
+        }
+        vector::convert(1.0 / norm, r, &mut self.b);
+        self.x.fill(0.0);
+        self.smoother.add_blocks(&self.b, &mut self.x);
+        self.smoother.residual(&self.b, &self.x, &mut self.r);
+        self.correct(levels);
+        self.smoother.residual(&self.b, &self.x, &mut self.r);
+        self.smoother.add_blocks(&self.r, &mut self.x);
+        self.smoother.sweep(&self.b, &mut self.x);
+        vector::convert(norm, &self.x, z);
+    }
+
+    fn take_applications(&mut self) -> f64 {
+        self.smoother.operator.take_applications()
+    }
+}

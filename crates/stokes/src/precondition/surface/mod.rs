@@ -1,0 +1,6 @@
+//! The preconditioner of cut cells, around the levels with eliminated bodies.
+
+mod correction;
+mod smoother;
+
+pub use correction::SurfaceCorrection;

@@ -1,0 +1,166 @@
+//! The smoothers of a mesh that surfaces cut.
+//!
+//! Where aggregates extrapolate and penalties act, motions of every stiffness meet in one cell: the operator's
+//! block on the free nodes of every root tells them apart. A sweep of restricted additive Schwarz over these
+//! (Cai and Sarkis 1999), `z = sum R_c^T W_c A_c^-1 R_c r` with `W` the inverse number of blocks a node
+//! belongs to, needs no damping. Elsewhere Chebyshev's method with the diagonal is enough.
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{
+    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, SymmetricBlockMatrix,
+    estimate_lambda_max, invert_spd, vector,
+};
+
+use crate::error::{DiagonalError, StokesError};
+use crate::operator::{BlockDiagonal, Elements, ViscousOperator, add_at, gather, nodal_diagonal};
+use crate::precondition::assembly::assemble_on_nodes;
+use crate::precondition::numbered::NumberedNodes;
+use crate::precondition::velocity::cell_lambda_max;
+use crate::space::around_finest_cells;
+use crate::surface::SurfaceCoupling;
+
+/// Steps of the sweep with the diagonal.
+const DEGREE: usize = 3;
+/// The sweep damps eigenvalues down to the largest in the fluid over this.
+const RATIO: f64 = 5.0;
+/// Lanczos steps for the largest eigenvalue, which depends on the cuts, and the factor on what they find.
+const LANCZOS_STEPS: usize = 8;
+const SAFETY: f64 = 1.1;
+
+/// The smoothers of the finest mesh.
+pub struct SurfaceSmoother<const D: usize> {
+    /// The viscous operator.
+    pub operator: ViscousOperator<D>,
+    diagonal: BlockDiagonal,
+    /// The sweep with the diagonal.
+    pub chebyshev: Chebyshev<f32>,
+    blocks: Blocks<D>,
+}
+
+/// Restricted additive Schwarz on the free nodes of the roots.
+struct Blocks<const D: usize> {
+    patches: SchwarzPatches<f32, D>,
+    /// The components of the nodes among the reduced velocities.
+    positions: Vec<u32>,
+    r: Vec<f32>,
+    z: Vec<f32>,
+}
+
+impl<const D: usize> SurfaceSmoother<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The smoothers of a system with cut cells.
+    pub fn new(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Result<Self, StokesError> {
+        let system = elements.system();
+        let near = near_surfaces(elements, surfaces);
+        let nodes = NumberedNodes::new(system.discretisation(), |n| near[n] && system.space.is_free(n));
+        let matrix = assemble_on_nodes(&nodes, elements)?;
+        let blocks = Blocks::new(&nodes, &matrix, surfaces)?;
+        let mut diagonal = diagonal(elements, surfaces, &blocks.positions, &matrix)?;
+        let mut operator = ViscousOperator::new(system);
+        let largest = SAFETY * estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
+        let in_fluid = cell_lambda_max::<D>();
+        let interval = SpectralInterval { lower: in_fluid / RATIO, upper: largest.max(in_fluid) };
+        let chebyshev = Chebyshev::new(operator.dim(), DEGREE, interval);
+        operator.take_applications();
+        Ok(Self { operator, diagonal, chebyshev, blocks })
+    }
+
+    /// `z += G r` by the blocks.
+    pub fn add_blocks(&mut self, r: &[f32], z: &mut [f32]) {
+        let Blocks { patches, positions, r: local, z: correction } = &mut self.blocks;
+        gather(positions, r, local);
+        patches.apply(local, correction);
+        add_at(positions, correction, z);
+    }
+
+    /// Chebyshev's sweep on `A x = b` from the present `x`.
+    pub fn sweep(&mut self, b: &[f32], x: &mut [f32]) {
+        let Self { operator, diagonal, chebyshev, .. } = self;
+        chebyshev.smooth(operator, diagonal, b, x, Guess::Given);
+    }
+
+    /// `r = b - A x`.
+    pub fn residual(&mut self, b: &[f32], x: &[f32], r: &mut [f32]) {
+        self.operator.apply(x, r);
+        vector::residual_from_product(b, r);
+    }
+}
+
+/// The nodes of cut cells and of roots.
+fn near_surfaces<const D: usize>(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Vec<bool>
+where
+    Dim<D>: Space<D>,
+{
+    let nodes = &elements.system().discretisation().velocity;
+    let mut near = vec![false; nodes.node_count()];
+    let cut = surfaces.cut.cells.iter().map(|cell| cell.cell);
+    for cell in cut.chain(surfaces.roots().iter().copied()) {
+        nodes.cell(cell as usize).iter().for_each(|&node| near[node as usize] = true);
+    }
+    near
+}
+
+impl<const D: usize> Blocks<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(
+        nodes: &NumberedNodes<'_, D>,
+        matrix: &SymmetricBlockMatrix<D>,
+        surfaces: &SurfaceCoupling<D>,
+    ) -> Result<Self, StokesError> {
+        let number = |&node: &u32| nodes.nodes.number(node as usize).map(|number| number as u32);
+        let block = |&root: &u32| -> Vec<u32> {
+            nodes.mesh.velocity.cell(root as usize).iter().filter_map(number).collect()
+        };
+        let blocks = surfaces.roots().iter().map(block);
+        let zeros = vec![0.0; matrix.node_count() * D];
+        let patches =
+            SchwarzPatches::restricted(matrix, blocks, zeros.clone()).map_err(StokesError::SurfaceBlock)?;
+        Ok(Self { patches, positions: nodes.positions(), r: zeros.clone(), z: zeros })
+    }
+}
+
+/// The inverse diagonal, with blocks for the twists.
+fn diagonal<const D: usize>(
+    elements: &Elements<'_, D>,
+    surfaces: &SurfaceCoupling<D>,
+    positions: &[u32],
+    matrix: &SymmetricBlockMatrix<D>,
+) -> Result<BlockDiagonal, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let system = elements.system();
+    let smoothed = around_finest_cells(system.discretisation());
+    let mut smoothed_in_fluid = smoothed;
+    positions.iter().for_each(|&k| smoothed_in_fluid[k as usize / D] = false);
+    let fluid = nodal_diagonal(&system.space, &system.cells, &smoothed_in_fluid);
+    let mut nodal = fluid.map_err(StokesError::AtSurface)?;
+    for (&k, value) in positions.iter().zip(matrix.diagonal()) {
+        if value <= 0.0 || value.is_nan() {
+            let source = DiagonalError::Node { node: k as usize / D, value };
+            return Err(StokesError::AtSurface(source));
+        }
+        nodal[k as usize] = (1.0 / value) as f32;
+    }
+    let (size, rigid) = (SurfaceCoupling::<D>::piece_size(), Dim::<D>::RIGID);
+    let mut blocks = vec![0.0; system.space.body_count() * rigid * rigid];
+    let mut dense = vec![0.0; size * size];
+    for (piece, (_, body)) in surfaces.pieces().enumerate() {
+        surfaces.matrix(piece, &mut dense);
+        let first = size - rigid;
+        for i in 0..rigid {
+            for j in 0..rigid {
+                blocks[(body * rigid + i) * rigid + j] += dense[(first + i) * size + first + j];
+            }
+        }
+    }
+    for (body, block) in blocks.chunks_exact_mut(rigid * rigid).enumerate() {
+        let inverted = invert_spd(rigid, block);
+        inverted.map_err(|source| StokesError::AtSurface(DiagonalError::Body { body, source }))?;
+    }
+    Ok(BlockDiagonal::new(nodal, blocks.into_iter().map(|value| value as f32).collect(), rigid))
+}
