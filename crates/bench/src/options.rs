@@ -41,6 +41,8 @@ pub struct Options {
 pub enum FormulationName {
     /// Elimination of the solid degrees of freedom.
     RigidDofs,
+    /// Nitsche's conditions on the true surfaces.
+    Unfitted,
     /// Penalty with a ramp of one cell, solved once.
     Paper,
 }
@@ -63,6 +65,7 @@ impl Options {
                 offset: gluey_stokes::default_offset(dimension),
                 cut_cell_pressures: CutCellPressures::Aggregate,
             },
+            FormulationName::Unfitted => Formulation::Unfitted,
             FormulationName::Paper => Formulation::Paper(PaperParams {
                 viscosity_ratio: self.contrast,
                 ramp: 1.0,

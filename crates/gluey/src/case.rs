@@ -350,8 +350,8 @@ impl Case {
     pub fn file_stem(&self) -> String {
         let stem = format!("{}-{}", self.name, self.contact.strategy);
         match (self.flow.hydrodynamics, self.flow.formulation) {
-            (Hydrodynamics::Stokes, Formulation::RigidDofs) => format!("{stem}-{}", Formulation::RigidDofs),
-            _ => stem,
+            (Hydrodynamics::Stokes, Formulation::Paper) | (Hydrodynamics::PairMobility, _) => stem,
+            (Hydrodynamics::Stokes, formulation) => format!("{stem}-{formulation}"),
         }
     }
 

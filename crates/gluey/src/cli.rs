@@ -40,7 +40,7 @@ pub struct RunArguments {
     /// inelastic, gluey.
     #[arg(long)]
     strategy: Option<Strategy>,
-    /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs.
+    /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs, unfitted.
     #[arg(long)]
     formulation: Option<Formulation>,
     /// Folder for all output.

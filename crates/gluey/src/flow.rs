@@ -254,6 +254,7 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
             cut_cell_pressures: CutCellPressures::Aggregate,
         },
         Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
+        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted,
     };
     let solver = match flow.solver {
         Solver::Direct => SolverKind::Direct,

@@ -17,7 +17,7 @@ const ROUNDING: f64 = 1e-9;
 pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f64 {
     match (dimension, formulation) {
         (2, Formulation::RigidDofs) => 12.8,
-        (2, Formulation::Paper) => 6.4,
+        (2, Formulation::Paper | Formulation::Unfitted) => 6.4,
         _ => 3.2,
     }
 }

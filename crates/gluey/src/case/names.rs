@@ -82,6 +82,8 @@ named! {
         Paper = "paper",
         /// Velocity nodes inside particles take part in their rigid motion exactly.
         RigidDofs = "rigid-dofs",
+        /// The fluid ends at the true surfaces, wherever these cut the mesh.
+        Unfitted = "unfitted",
     }
 }
 

@@ -164,7 +164,7 @@ fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
         Solver::Multigrid => false,
         Solver::Auto => case.dimension == 2,
     };
-    let rigid = case.flow.formulation == Formulation::RigidDofs;
+    let rigid = case.flow.formulation != Formulation::Paper;
     let per_cell = UNKNOWNS_PER_CELL[case.dimension - 2];
     if direct {
         // The nodes inside rigid particles are eliminated.
@@ -175,10 +175,11 @@ fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
             _ => solved * 450.0 * solved.cbrt(),
         };
     }
-    let per_unknown = match (case.dimension, rigid) {
-        (_, true) => 500.0,
-        (2, false) => 2400.0,
-        (_, false) => 1400.0,
+    let per_unknown = match (case.dimension, case.flow.formulation) {
+        (_, Formulation::RigidDofs) => 500.0,
+        (_, Formulation::Unfitted) => 1400.0,
+        (2, Formulation::Paper) => 2400.0,
+        (_, Formulation::Paper) => 1400.0,
     };
     per_unknown * per_cell * cell_count
 }

@@ -80,7 +80,8 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         let mut count = vec![0u32; matrix.node_count()];
         patches.items().iter().for_each(|&node| count[node as usize] += 1);
         let share = |node: u32| f64::from(count[node as usize]);
-        let weight = |&node: &u32| if weights_of == Weights::Symmetric { 1.0 / share(node).sqrt() } else { 1.0 };
+        let weight =
+            |&node: &u32| if weights_of == Weights::Symmetric { 1.0 / share(node).sqrt() } else { 1.0 };
         let after = |&node: &u32| match weights_of {
             Weights::Symmetric => T::ONE,
             Weights::Restricted => T::from_f64(1.0 / share(node)),
@@ -126,7 +127,9 @@ impl<T: Scalar, const B: usize> Preconditioner<T> for SchwarzPatches<T, B> {
             let (of_patch, others) = weights.split_at(nodes.len());
             for ((z_local, &node), &weight) in self.z.chunks_exact(B).zip(nodes).zip(of_patch) {
                 let z = &mut z[node as usize * B..][..B];
-                z.iter_mut().zip(z_local).for_each(|(z, &local)| *z += weight * T::from_f64(f64::from(local)));
+                z.iter_mut()
+                    .zip(z_local)
+                    .for_each(|(z, &local)| *z += weight * T::from_f64(f64::from(local)));
             }
             (inverses, weights) = (rest, others);
         }

@@ -4,8 +4,8 @@
 //! bad cell, the good cell whose centre is nearest to the centroid of the fluid in it:
 //! `u_g = sum_j phi_j(x_g) u_j` (Badia, Verdugo and Martin 2018, Comput. Methods Appl. Mech. Eng. 336, 533).
 
-use gluey_fem::element::{gauss_cube, node_count, value};
 use gluey_fem::cut::POINTS;
+use gluey_fem::element::{gauss_cube, node_count, value};
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::Vector;
 
@@ -38,10 +38,8 @@ impl Aggregates {
         cut: &CutCells<D>,
     ) -> Result<Self, StokesError> {
         let root = |of: &CutCell<D>| match cut.states[of.cell as usize] {
-            CellState::Bad => root(discretisation, cut, of).ok_or(StokesError::NoRoot {
-                body: of.bodies[0] as usize,
-                share: of.moments.fraction(),
-            }),
+            CellState::Bad => root(discretisation, cut, of)
+                .ok_or(StokesError::NoRoot { body: of.bodies[0] as usize, share: of.moments.fraction() }),
             _ => Ok(of.cell),
         };
         let roots = cut.cells.iter().map(root).collect::<Result<Vec<u32>, _>>()?;
@@ -76,8 +74,7 @@ fn root<const D: usize>(
             let found = mesh.neighbour(cell, &offset).and_then(|neighbour| mesh.find(&neighbour));
             let may = |&found: &usize| cut.states[found].has_unknowns() && is_regular(found);
             let Some(found) = found.filter(may) else { continue };
-            let distance: f64 =
-                (0..D).map(|d| (0.5 + f64::from(offset[d]) - target[d]).powi(2)).sum();
+            let distance: f64 = (0..D).map(|d| (0.5 + f64::from(offset[d]) - target[d]).powi(2)).sum();
             if best.is_none_or(|best| distance < best.0 - 1e-12) {
                 best = Some((distance, found as u32));
             }

@@ -86,7 +86,18 @@ where
         let mut roots = aggregates.roots.clone();
         roots.sort_unstable();
         roots.dedup();
-        Self { discretisation, roots, wide, narrow, pieces, velocity: of_cut, boundary, nodes, pressures, cut }
+        Self {
+            discretisation,
+            roots,
+            wide,
+            narrow,
+            pieces,
+            velocity: of_cut,
+            boundary,
+            nodes,
+            pressures,
+            cut,
+        }
     }
 
     /// Cell and body of each piece.
@@ -140,12 +151,7 @@ where
 
     /// `(y, q) += (A x - B^T p, -B x)` in double precision, for the pressures at all nodes; without pressures
     /// where `q` is empty. Loads on nodes with given values are cleared.
-    pub fn add<X: Scalar>(
-        &self,
-        x: [&[X]; 2],
-        y: [&mut [X]; 2],
-        work: &mut SurfaceWorkspace<f64>,
-    ) {
+    pub fn add<X: Scalar>(&self, x: [&[X]; 2], y: [&mut [X]; 2], work: &mut SurfaceWorkspace<f64>) {
         self.add_by(&self.wide, x, y, work);
     }
 

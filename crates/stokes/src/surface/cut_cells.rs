@@ -71,8 +71,11 @@ impl<const D: usize> CutCells<D> {
     pub fn new(discretisation: &Discretisation<D>, bodies: &[Ball<D>]) -> Self {
         let tree = BallTree::new(bodies);
         let count = discretisation.mesh.cell_count();
-        let examined: Vec<(CellState, Option<u32>, Option<CutCell<D>>)> =
-            (0..count).into_par_iter().with_min_len(64).map(|cell| examine(discretisation, &tree, cell)).collect();
+        let examined: Vec<(CellState, Option<u32>, Option<CutCell<D>>)> = (0..count)
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|cell| examine(discretisation, &tree, cell))
+            .collect();
         let mut new = Self {
             states: Vec::with_capacity(count),
             solid_body: Vec::new(),

@@ -16,7 +16,7 @@ fn couette_flow_is_found<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    for formulation in [RIGID, paper(1e3, 1)] {
+    for formulation in [RIGID, paper(1e3, 1), Formulation::Unfitted] {
         for solver in SOLVERS {
             let mesh = graded::<D>(3 - (D as u8 - 2));
             let start = |x: &Vector<D>| couette(x) + bump(x) * DETOUR;

@@ -39,6 +39,8 @@ where
             let region = SolidRegion::new(discretisation, balls, Ramp::new(paper.ramp * cell), &matrices);
             region.touched_nodes(&discretisation.velocity, balls)
         }
+        // No node is held there: bodies feel the stress on their surfaces.
+        Formulation::Unfitted => Vec::new(),
     }
 }
 

@@ -15,3 +15,4 @@ mod penalised;
 mod single;
 mod solvers;
 mod support;
+mod unfitted;

@@ -91,7 +91,8 @@ pub(super) fn apply<V: Lanes, const D: usize>(
     let mut planes = Planes::<V>::zeros();
     let get = |slot: usize| V::load(&x[slot * pieces.step..]);
     planes.evaluate::<D>(shapes, get);
-    let twist = std::array::from_fn(|k| if k < twist_len::<D>() { get(first_twist::<D>() + k) } else { zero() });
+    let twist =
+        std::array::from_fn(|k| if k < twist_len::<D>() { get(first_twist::<D>() + k) } else { zero() });
     let mut load = [zero(); 2 * MOST];
     for line in 0..POINTS.pow(D as u32 - 1) {
         planes.line::<D>(shapes, pieces, line, &twist, &mut load);
@@ -177,11 +178,7 @@ impl<V: Lanes> Planes<V> {
 
     /// The transpose of [`Planes::evaluate`].
     #[inline(always)]
-    fn evaluate_transpose<const D: usize>(
-        &self,
-        shapes: &Shapes<V::Scalar>,
-        mut put: impl FnMut(usize, V),
-    ) {
+    fn evaluate_transpose<const D: usize>(&self, shapes: &Shapes<V::Scalar>, mut put: impl FnMut(usize, V)) {
         let n = node_count::<D>(2);
         for c in 0..D {
             for last in 0..NODES {
@@ -329,7 +326,12 @@ struct Point<V> {
 impl<V: Lanes> Point<V> {
     /// What the values, gradients and pressures of test functions are multiplied by.
     #[inline(always)]
-    fn tested<const D: usize>(&self, moments: &[V; MOST + 2], arm: &[V; MOST], twist: &[V; 2 * MOST]) -> Self {
+    fn tested<const D: usize>(
+        &self,
+        moments: &[V; MOST + 2],
+        arm: &[V; MOST],
+        twist: &[V; 2 * MOST],
+    ) -> Self {
         let (volume, penalty) = (moments[0], moments[D + 1]);
         let normal = |d: usize| moments[1 + d];
         let motion = rigid_motion::<V, D>(twist, arm);

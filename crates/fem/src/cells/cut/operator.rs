@@ -128,9 +128,8 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
             _ => Self::SLOTS - Self::TWIST,
         };
         let groups = self.places.len() / (GROUP * Self::PLACES);
-        let pairs = (0..groups).flat_map(|group| {
-            range.clone().flat_map(move |k| (0..GROUP).map(move |lane| (group, k, lane)))
-        });
+        let pairs = (0..groups)
+            .flat_map(|group| range.clone().flat_map(move |k| (0..GROUP).map(move |lane| (group, k, lane))));
         let pairs = pairs.filter_map(|(group, k, lane)| {
             let place = self.places[(group * Self::PLACES + k) * GROUP + lane];
             (place != NONE)
@@ -275,12 +274,7 @@ fn sum_terms<T: Scalar, const N: usize>(terms: &Jagged<u32>, loads: &[T], stride
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn run_avx2<T: CellScalar, const D: usize>(
-    operator: &CutOperator<T, D>,
-    group: usize,
-    x: &[T],
-    y: &mut [T],
-) {
+fn run_avx2<T: CellScalar, const D: usize>(operator: &CutOperator<T, D>, group: usize, x: &[T], y: &mut [T]) {
     operator.run::<T::Avx2>(group, x, y);
 }
 

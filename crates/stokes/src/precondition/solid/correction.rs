@@ -19,12 +19,12 @@
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
 
-use crate::precondition::assembly::assemble_on_nodes;
 use super::multigrid::SolidMultigrid;
-use crate::precondition::numbered::NumberedNodes;
 use super::smoother::{FilmSmoother, PenalisedSmoother};
 use crate::error::StokesError;
 use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscous_on, gather};
+use crate::precondition::assembly::assemble_on_nodes;
+use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{
     CellKind, VelocitySpace, around_films, around_finest_cells, cell_kind, nodes_of_cells_with,

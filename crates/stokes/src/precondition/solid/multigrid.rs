@@ -12,9 +12,9 @@ use gluey_linalg::{
     SchwarzPatches, SparseMatrix, SymmetricBlockMatrix, vector,
 };
 
-use crate::precondition::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::factorised;
+use crate::precondition::numbered::NumberedNodes;
 use crate::space::Discretisation;
 
 /// A sweep with the patches as preconditioner.

@@ -14,12 +14,12 @@ use gluey_linalg::{
     Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, SchwarzPatches, SymmetricBlockMatrix, vector,
 };
 
-use crate::precondition::assembly::assemble_on_nodes;
-use crate::precondition::numbered::NumberedNodes;
 use crate::error::StokesError;
 use crate::operator::{
     CountedOperator, Elements, Restricted, StokesSystem, acting, add_at, block_diagonal, gather,
 };
+use crate::precondition::assembly::assemble_on_nodes;
+use crate::precondition::numbered::NumberedNodes;
 
 /// A sweep with diagonal and patches as preconditioner.
 const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.1, lanczos_steps: 8 };

@@ -1,0 +1,186 @@
+//! The unfitted formulation against the reference data, at walls, across periodic borders, at contact.
+
+use gluey_fem::TreeMesh;
+use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_levelset::Ball;
+use gluey_linalg::{LinOp, vector};
+use gluey_stokes::{Flow, Formulation, Problem, Refinement, SolverKind, StokesError, SystemOperator};
+use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
+
+use crate::support::{
+    RADIUS, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, try_solve, twist_distance,
+};
+
+fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>
+where
+    Dim<D>: Space<D>,
+{
+    let refinement = Refinement { band: 3.0, ..bands(level) };
+    solve(params(Formulation::Unfitted, solver, 1e-9), mesh(&refinement, balls), balls, &couette)
+}
+
+/// Shifts of the bodies by parts of a cell, no two of which are reflections of each other.
+fn shifts(level: u8) -> impl Iterator<Item = Vector<2>> {
+    let h = 0.5f64.powi(level.into());
+    (0..8).map(move |k| {
+        Vector::<2>::new(0.125 * f64::from(k) - 0.4375, 0.125 * f64::from(3 * k % 8) - 0.46875) * h
+    })
+}
+
+/// Mean and standard deviation.
+fn statistics(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    (mean, square.sqrt())
+}
+
+#[test]
+fn a_disc_does_not_feel_the_lattice() {
+    let table = single_2d_velocities().unwrap();
+    let at = |column: &str| table.column(column).unwrap()[1];
+    let errors = shifts(6).map(|shift| {
+        let twist =
+            flow(&balls(&[Vector::<2>::new(at("x") + shift[0], at("y"))]), 6, SolverKind::Direct).twists[0];
+        (twist.velocity[0] - at("Ux"), twist.spin[0] - at("omega"))
+    });
+    let (speeds, spins): (Vec<f64>, Vec<f64>) = errors.unzip();
+    let ((speed, scatter), (spin, spin_scatter)) = (statistics(&speeds), statistics(&spins));
+    assert!(speed.abs() < 6e-6 && scatter < 2e-6, "{speed:e} +- {scatter:e}");
+    assert!(spin.abs() < 4e-5 && spin_scatter < 2e-5, "{spin:e} +- {spin_scatter:e}");
+}
+
+/// Error of the normal speed at 135 degrees over the shifts: mean and standard deviation.
+fn normal_speed(gap: f64, level: u8) -> (f64, f64) {
+    let table = pair_2d_velocities().unwrap();
+    let column = |name: &str| table.column(name).unwrap();
+    let row = (0..table.row_count())
+        .find(|&r| column("xi")[r] == gap && column("theta_deg")[r] == 45.0)
+        .expect("the reference has this gap");
+    let errors: Vec<f64> = shifts(level)
+        .map(|shift| {
+            let pair = pair_at(Vector::<2>::repeat(0.5) + shift, gap, 45.0);
+            let found = pair_motion(&pair, &flow(&pair, level, SolverKind::Direct).twists);
+            found.normal_speed / column("vn")[row] - 1.0
+        })
+        .collect();
+    statistics(&errors)
+}
+
+#[test]
+fn pairs_approach_as_the_reference_says() {
+    for (level, gap, bias, scatter) in
+        [(6, 1.0, 2.5e-3, 2e-4), (6, 0.2, 0.12, 0.06), (7, 1.0, 1.5e-4, 3e-5), (7, 0.2, 0.011, 4e-4)]
+    {
+        let (mean, deviation) = normal_speed(gap, level);
+        assert!(mean.abs() < bias && deviation < scatter, "{level} {gap}: {mean:e} +- {deviation:e}");
+    }
+}
+
+/// Two bodies that share cells.
+fn the_operator_is_symmetric<const D: usize>(level: u32)
+where
+    Dim<D>: Space<D>,
+{
+    let pair =
+        [0.3, 0.58].map(|x| Ball::new(Vector::<D>::from_fn(|d, _| if d == 0 { x } else { 0.4 }), 0.13));
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level as u8).unwrap();
+    let problem = Problem::new(mesh, &pair, 1.3, Formulation::Unfitted).unwrap();
+    let system = &problem.system;
+    let mut operator = SystemOperator::new(system);
+    let [x, y] = [1, 2].map(|seed| {
+        let mut x = vec![0.0; system.dim()];
+        vector::fill_pseudo_random(seed, &mut x);
+        system.reduce(&mut x);
+        x
+    });
+    let (mut ax, mut ay) = (x.clone(), y.clone());
+    operator.apply(&x, &mut ax);
+    operator.apply(&y, &mut ay);
+    let difference = (vector::dot(&x, &ay) - vector::dot(&y, &ax)).abs();
+    let scale = vector::norm(&x) * vector::norm(&ay);
+    assert!(difference < 1e-14 * scale, "{D}D: {difference:e} of {scale:e}");
+}
+
+#[test]
+fn the_operator_is_symmetric_to_round_off() {
+    the_operator_is_symmetric::<2>(5);
+    the_operator_is_symmetric::<3>(4);
+}
+
+/// Both solvers, on meshes of every kind and bodies in every place.
+fn solvers_agree<const D: usize>(balls: &[Ball<D>], mesh: &dyn Fn() -> TreeMesh<D>, tolerance: f64)
+where
+    Dim<D>: Space<D>,
+{
+    let twists = |solver| solve(params(Formulation::Unfitted, solver, 1e-9), mesh(), balls, &couette).twists;
+    let [direct, multigrid]: [Vec<Twist<D>>; 2] = [SolverKind::Direct, SolverKind::Multigrid].map(twists);
+    let distance = twist_distance(&direct, &multigrid);
+    assert!(distance < tolerance, "{distance:e}");
+}
+
+#[test]
+fn both_solvers_give_the_same_motion() {
+    let pair = pair_at(Vector::<2>::new(0.5, 0.51), 0.05, 30.0);
+    solvers_agree(&pair, &|| mesh(&bands(6), &pair), 3e-7);
+    let sphere = [Ball::new(Vector::<3>::new(0.47, 0.55, 0.5), 0.2)];
+    let coarse = Refinement { coarsest: 2, ..bands(3) };
+    solvers_agree(&sphere, &|| mesh(&coarse, &sphere), 3e-7);
+}
+
+/// A body across a periodic border moves as one in the middle does.
+fn the_border_is_not_felt<const D: usize>(level: u8, solver: SolverKind)
+where
+    Dim<D>: Space<D>,
+{
+    let mut periodic = [true; D];
+    periodic[1] = false;
+    let period = periodic.map(|is_periodic| is_periodic.then_some(1.0));
+    let motion = |x: f64| {
+        let center = Vector::<D>::from_fn(|d, _| if d == 1 { 0.4 } else { x });
+        let ball = [Ball::periodic(center, 0.2, period)];
+        let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], periodic, level.into()).unwrap();
+        solve(params(Formulation::Unfitted, solver, 1e-9), mesh, &ball, &couette).twists
+    };
+    let distance = twist_distance(&motion(0.5), &motion(0.0));
+    assert!(distance < 1e-7, "{distance:e}");
+}
+
+#[test]
+fn periodic_borders_are_not_felt() {
+    the_border_is_not_felt::<2>(5, SolverKind::Direct);
+    the_border_is_not_felt::<3>(3, SolverKind::Multigrid);
+}
+
+/// Bodies that touch, overlap by rounding, or lean on a wall have a flow, and move with it. The mesh does not
+/// see the film between them: they approach at a few thousandths of a radius whatever the gap.
+#[test]
+fn bodies_may_touch_each_other_and_walls() {
+    for gap in [1e-9, 0.0, -1e-12] {
+        let pair = pair_at(Vector::<2>::new(0.5, 0.5), gap, 45.0);
+        let motion = pair_motion(&pair, &flow(&pair, 6, SolverKind::Direct).twists);
+        assert!(motion.normal_speed.abs() < 0.015 * RADIUS, "{gap:e}: {motion:?}");
+        assert!(motion.line_rotation < -0.3 && motion.line_rotation > -0.7, "{gap:e}: {motion:?}");
+    }
+    for gap in [1e-3, 1e-9, 0.0] {
+        let disc = balls(&[Vector::<2>::new(0.5, (1.0 + gap) * RADIUS)]);
+        let twist = flow(&disc, 6, SolverKind::Direct).twists[0];
+        // The wall moves at -1/2.
+        assert!(twist.velocity[0] < -0.45 && twist.velocity[1].abs() < 8e-5, "{gap:e}: {twist:?}");
+    }
+    let spheres: Vec<Ball<3>> =
+        [-1.0, 1.0].iter().map(|s| Ball::new(Vector::<3>::new(0.5 + s * 0.15, 0.5, 0.5), 0.15)).collect();
+    let twists = flow(&spheres, 4, SolverKind::Multigrid).twists;
+    assert!((twists[0].velocity - twists[1].velocity)[0].abs() < 1e-3, "{twists:?}");
+}
+
+#[test]
+fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
+    let disc = balls(&[Vector::<2>::new(0.5, 0.5)]);
+    let mesh =
+        TreeMesh::refine(Aabb::unit(), [1; 2], [false; 2], 7, |lower, _, level| level < 6 || lower[0] > 0.5)
+            .unwrap();
+    let refused = try_solve(params(Formulation::Unfitted, SolverKind::Direct, 1e-6), mesh, &disc, &couette);
+    let error = refused.unwrap_err();
+    assert!(matches!(error, StokesError::CoarseSurface { body: 0 }), "{error:?}");
+    assert!(error.to_string().contains("the surface of body 1 meets cells of different sizes"));
+}
