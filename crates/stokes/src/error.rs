@@ -38,6 +38,22 @@ pub enum StokesError {
         /// Size of the finest cells.
         cell_size: f64,
     },
+    /// Bodies need one entry each.
+    #[error("{found} {what} for {bodies} bodies: give one for each")]
+    Count {
+        /// What was given.
+        what: &'static str,
+        /// How many.
+        found: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
+    /// The formulation of rigidity cannot answer this.
+    #[error("{what} are not available in this formulation of rigidity; `rigid-dofs` has them")]
+    Unsupported {
+        /// What was asked for.
+        what: &'static str,
+    },
     /// A parameter is out of range.
     #[error("{name} = {value}: {wanted}")]
     Parameter {

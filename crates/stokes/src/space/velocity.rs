@@ -8,7 +8,7 @@
 
 use gluey_fem::NodeMap;
 use gluey_fem::cells;
-use gluey_geom::{Dim, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
 
@@ -199,6 +199,28 @@ where
         for k in 0..Dim::<D>::ROT {
             entries[D + k] = T::from_f64(twist.spin[k] * self.radius[body]);
         }
+    }
+
+    /// Adds force and torque on a body to a reduced load. What does the work on `s w` is the torque over `s`.
+    pub fn add_wrench(&self, load: &mut [f64], body: usize, wrench: &Wrench<D>) {
+        let rows = &mut load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        for c in 0..D {
+            rows[c] += wrench.force[c];
+        }
+        for k in 0..Dim::<D>::ROT {
+            rows[D + k] += wrench.torque[k] / self.radius[body];
+        }
+    }
+
+    /// Force and torque on a body in a reduced load.
+    pub fn wrench(&self, load: &[f64], body: usize) -> Wrench<D> {
+        let rows = &load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        let mut wrench = Wrench::default();
+        wrench.force.copy_from_slice(&rows[..D]);
+        for k in 0..Dim::<D>::ROT {
+            wrench.torque[k] = rows[D + k] * self.radius[body];
+        }
+        wrench
     }
 
     /// The velocity of a rigid node as a linear form of its body's entries: `(body, rows)`, one row of
@@ -402,5 +424,34 @@ mod tests {
         let arm = space.nodes().point(rim) - Vector::<3>::repeat(0.7);
         let want = twist.velocity_at(&arm);
         assert!((0..3).all(|c| (x[rim * 3 + c] - want[c]).abs() < 1e-14));
+    }
+
+    /// The load of a wrench does the work of the wrench.
+    fn wrenches_work<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let space = space::<D>();
+        let (mut twist, mut wrench) = (Twist::default(), Wrench::default());
+        twist.velocity = Vector::<D>::from_fn(|d, _| 0.3 - d as f64);
+        wrench.force = Vector::<D>::from_fn(|d, _| 1.0 + d as f64);
+        for k in 0..Dim::<D>::ROT {
+            (twist.spin[k], wrench.torque[k]) = (0.7 + k as f64, -0.4 * k as f64 + 2.0);
+        }
+        let (mut x, mut load) = (vec![0.0; space.dim()], vec![0.0; space.dim()]);
+        space.set_twist(&mut x, 1, &twist);
+        space.add_wrench(&mut load, 1, &wrench);
+        let work: f64 = x.iter().zip(&load).map(|(x, f)| x * f).sum();
+        assert!((work - wrench.power(&twist)).abs() < 1e-14);
+        let back = space.wrench(&load, 1) - wrench;
+        assert!(
+            back.force.amax() < 1e-15 && Dim::<D>::spin_slice(&back.torque).iter().all(|t| t.abs() < 1e-15)
+        );
+    }
+
+    #[test]
+    fn loads_of_wrenches_do_their_work() {
+        wrenches_work::<2>();
+        wrenches_work::<3>();
     }
 }
