@@ -36,7 +36,8 @@ mod space;
 
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{
-    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, WarmStartError,
+    Conditions, Field, Flow, FlowParams, FlowSolver, Given, NodalFields, PhaseTimes, Prepared, Refinement,
+    SolverKind, WarmStartError,
 };
 // How rigidity is imposed.
 pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};

@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist};
-use gluey_levelset::Ball;
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_levelset::{Ball, Body};
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
@@ -78,6 +78,26 @@ where
         Ok(Multiplier::new())
     }
 
+    /// By virtual work: the forces of the fluid on the rigid nodes, `S = sum_n f_n r_n`.
+    fn stresslets(
+        &self,
+        problem: &Problem<D>,
+        velocity: &[f64],
+        pressure: &[f64],
+    ) -> Result<Vec<Matrix<D>>, StokesError> {
+        let Problem { system, bodies, .. } = problem;
+        let (space, nodes) = (&system.space, system.space.nodes());
+        let forces = system.nodal_forces(velocity, pressure);
+        let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
+        for (node, force) in forces.chunks_exact(D).enumerate() {
+            if let Some(body) = space.body_of(node).map(|body| body as usize) {
+                let arm = bodies[body].arm(&nodes.point(node));
+                moments[body] += Vector::<D>::from_column_slice(force) * arm.transpose();
+            }
+        }
+        Ok(moments.iter().map(symmetric_and_traceless).collect())
+    }
+
     /// Nodes change sides from step to step.
     fn is_smooth_in_time(&self) -> bool {
         false
@@ -103,4 +123,9 @@ where
     ) -> Result<Option<Box<dyn Correction>>, StokesError> {
         Ok(None)
     }
+}
+
+fn symmetric_and_traceless<const D: usize>(moment: &Matrix<D>) -> Matrix<D> {
+    let symmetric = (moment + moment.transpose()) * 0.5;
+    symmetric - Matrix::identity() * (symmetric.trace() / D as f64)
 }

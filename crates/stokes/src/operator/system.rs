@@ -6,6 +6,7 @@
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
+use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
@@ -27,6 +28,8 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) penalty: Option<Penalty<D>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
+    /// See [`StokesSystem::hold_twists`].
+    holds_twists: bool,
 }
 
 impl<const D: usize> StokesSystem<D>
@@ -57,6 +60,7 @@ where
             cells,
             penalty,
             viscosity,
+            holds_twists: false,
         }
     }
 
@@ -68,6 +72,25 @@ where
     /// Viscosity of the fluid.
     pub fn viscosity(&self) -> f64 {
         self.viscosity
+    }
+
+    /// Makes the twists of the bodies data (`true`) or unknowns again (`false`, as at first). Where they are
+    /// data, the operator is the block without their rows and columns; vectors keep their length, and
+    /// solvers that were prepared before stay prepared.
+    pub fn hold_twists(&mut self, hold: bool) {
+        self.holds_twists = hold;
+    }
+
+    /// Whether the twists of the bodies are data.
+    pub fn holds_twists(&self) -> bool {
+        self.holds_twists
+    }
+
+    /// Clears the entries of twists that are data in the velocity part of a vector.
+    pub(crate) fn clear_held<T: Scalar>(&self, x: &mut [T]) {
+        if self.holds_twists {
+            x[self.space.full_dim()..self.space.dim()].fill(T::ZERO);
+        }
     }
 
     /// Length of a vector: reduced velocities, then all pressure nodes.
@@ -88,6 +111,18 @@ where
         self.operator.stokes_of_field(u, p, yu, yp, &mut Workspace::default());
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);
+    }
+
+    /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal velocities
+    /// and pressures, with the forces on hanging nodes moved to their masters.
+    pub(crate) fn nodal_forces(&self, u: &[f64], p: &[f64]) -> Vec<f64> {
+        let nowhere = vec![None; self.space.nodes().node_count()];
+        let loose = VelocitySpace::new::<Ball<D>>(self.discretisation(), &[], &nowhere);
+        let operator: CellOperator<f64, D> = cell_operator(&loose, &self.cells, self.penalty.as_ref());
+        let mut forces = vec![0.0; loose.dim()];
+        operator.stokes_of_field(u, p, &mut forces, &mut [], &mut Workspace::default());
+        vector::scale(-1.0, &mut forces);
+        forces
     }
 
     /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made
@@ -164,6 +199,7 @@ impl<X: Scalar> Work<X> {
         vector::copy(p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, cells);
+        system.clear_held(yu);
         system.reduce_pressures(yp);
     }
 }
@@ -202,7 +238,6 @@ mod tests {
     use crate::space::solid_nodes;
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
-    use gluey_levelset::Ball;
 
     /// Constant pressures do no work on any admissible velocity.
     fn constants_are_in_the_kernel<const D: usize>(cut: CutCellPressures)
