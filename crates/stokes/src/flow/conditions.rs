@@ -84,21 +84,24 @@ where
         }
     }
 
-    /// Imposes the conditions on a problem: the field that carries the data, and its residual with the loads.
-    pub(super) fn impose(&self, problem: &mut Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+    /// Whether the bodies are held.
+    pub(super) fn hold_bodies(&self) -> bool {
+        matches!(self.bodies, Given::Twists(_))
+    }
+
+    /// The field that carries the data, and its residual with the loads.
+    pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
         let mut lift = problem.lift(self.boundary);
         match self.bodies {
             Given::Wrenches(wrenches) => {
-                problem.system.hold_twists(false);
                 let mut b = problem.right_hand_side(&lift, self.force);
                 problem.add_wrenches(wrenches, &mut b)?;
                 Ok((lift, b))
             }
             Given::Twists(twists) => {
-                problem.system.hold_twists(true);
                 problem.set_twists(twists, &mut lift)?;
                 let mut b = problem.right_hand_side(&lift, self.force);
-                problem.system.clear_held(&mut b);
+                problem.system.space.clear_held(&mut b);
                 Ok((lift, b))
             }
         }

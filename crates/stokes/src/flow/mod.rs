@@ -106,7 +106,8 @@ where
     Dim<D>: Space<D>,
 {
     params: FlowParams,
-    solver: Box<dyn SaddleSolver<D> + Send>,
+    /// For free bodies and for held ones.
+    solvers: [Box<dyn SaddleSolver<D> + Send>; 2],
     method: Arc<dyn Method<D>>,
     /// The last mesh, which the next one is often equal to.
     discretisation: Option<Discretisation<D>>,
@@ -139,12 +140,14 @@ where
     /// [`StokesError::Parameter`] for values out of range.
     pub fn new(params: FlowParams) -> Result<Self, StokesError> {
         check(&params)?;
-        let solver: Box<dyn SaddleSolver<D> + Send> = match params.solver {
-            SolverKind::Direct => Box::new(DirectSolver::default()),
-            SolverKind::Multigrid => Box::new(MultigridSolver::default()),
+        let solver = || -> Box<dyn SaddleSolver<D> + Send> {
+            match params.solver {
+                SolverKind::Direct => Box::new(DirectSolver::default()),
+                SolverKind::Multigrid => Box::new(MultigridSolver::default()),
+            }
         };
         let method = params.formulation.method()?;
-        Ok(Self { params, solver, method, discretisation: None, warm_start: None })
+        Ok(Self { params, solvers: [solver(), solver()], method, discretisation: None, warm_start: None })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same
@@ -182,16 +185,22 @@ where
         bodies: &[Ball<D>],
         conditions: &Conditions<'_, D>,
     ) -> Result<Flow<D>, StokesError> {
-        let (mut problem, times) = self.prepare(mesh, bodies)?;
-        let prepared = Instant::now();
-        let (guess, before) = self.initial_guess(&problem);
-        let (mut flow, x) = self.solved(&mut problem, conditions, guess)?;
-        self.keep_for_next(&problem, &x, &flow.pressure, before);
-        flow.times = PhaseTimes { solve: prepared.elapsed().as_secs_f64(), ..times };
+        let start = Instant::now();
+        let mut prepared = self.prepared(mesh, bodies)?;
+        let assembly = start.elapsed().as_secs_f64();
+        prepared.make_ready(conditions)?;
+        let preparation = start.elapsed().as_secs_f64() - assembly;
+        let Prepared { solver, problem, .. } = prepared;
+        let (guess, before) = solver.initial_guess(&problem);
+        let (mut flow, x) = solver.solved(&problem, conditions, guess)?;
+        solver.keep_for_next(&problem, &x, &flow.pressure, before);
+        let solve = start.elapsed().as_secs_f64() - assembly - preparation;
+        flow.times = PhaseTimes { assembly, preparation, solve };
         Ok(flow)
     }
 
-    /// Prepares for several flows around `bodies` on `mesh`.
+    /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first needed:
+    /// once for free bodies and once for held ones.
     ///
     /// ```
     /// use gluey_stokes::geom::{Aabb, Spin, Vector, Wrench};
@@ -211,41 +220,28 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`StokesError::Unresolved`] for a body smaller than a cell, and the errors of the linear solver.
+    /// [`StokesError::Unresolved`] for a body smaller than a cell.
     pub fn prepared(
         &mut self,
         mesh: TreeMesh<D>,
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'_, D>, StokesError> {
-        let (problem, _) = self.prepare(mesh, bodies)?;
-        Ok(Prepared { solver: self, problem })
-    }
-
-    fn prepare(
-        &mut self,
-        mesh: TreeMesh<D>,
-        bodies: &[Ball<D>],
-    ) -> Result<(Problem<D>, PhaseTimes), StokesError> {
-        let start = Instant::now();
         let discretisation = self.discretised(mesh);
         let problem = Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())?;
-        let assembly = start.elapsed().as_secs_f64();
-        self.solver.prepare(&problem)?;
-        let preparation = start.elapsed().as_secs_f64() - assembly;
-        Ok((problem, PhaseTimes { assembly, preparation, solve: 0.0 }))
+        Ok(Prepared { solver: self, problem, is_ready: [false; 2] })
     }
 
     /// The flow under some conditions from the guess `x`, and the reduced vector it belongs to.
     fn solved(
         &mut self,
-        problem: &mut Problem<D>,
+        problem: &Problem<D>,
         conditions: &Conditions<'_, D>,
         mut x: Vec<f64>,
     ) -> Result<(Flow<D>, Vec<f64>), StokesError> {
-        let (lift, b) = conditions.impose(problem)?;
-        problem.system.clear_held(&mut x);
+        let (lift, b) = conditions.data(problem)?;
         let mut effort = Effort::default();
-        let (solver, tolerance) = (&mut self.solver, self.params.tolerance);
+        let solver = &mut self.solvers[usize::from(problem.system.space.holds_twists())];
+        let tolerance = self.params.tolerance;
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
             effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
             Ok(())

@@ -15,29 +15,43 @@ use super::{Flow, FlowSolver};
 use crate::error::StokesError;
 use crate::formulation::Problem;
 
-/// Bodies on a mesh for which the linear solver is prepared: as many flows as wanted, each from a guess of
-/// zero and none dependent on those before.
+/// Bodies on a mesh with the linear solvers for them: as many flows as wanted, each from a guess of zero and
+/// none dependent on those before.
 pub struct Prepared<'s, const D: usize>
 where
     Dim<D>: Space<D>,
 {
     pub(super) solver: &'s mut FlowSolver<D>,
     pub(super) problem: Problem<D>,
+    /// Whether the solvers for free and for held bodies are prepared.
+    pub(super) is_ready: [bool; 2],
 }
 
 impl<const D: usize> Prepared<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    /// The flow under some conditions. With given twists it takes up to twice the iterations of free bodies:
-    /// the preconditioner is that of free ones.
+    /// The flow under some conditions, after a preparation of the linear solver at the first one with free
+    /// and the first one with held bodies.
     ///
     /// # Errors
     /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::Unsupported`] for twists in
-    /// a formulation that has no unknowns for them, and the errors of the solve.
+    /// a formulation that has no unknowns for them, and the errors of the linear solver.
     pub fn solve(&mut self, conditions: &Conditions<'_, D>) -> Result<Flow<D>, StokesError> {
+        self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
-        Ok(self.solver.solved(&mut self.problem, conditions, guess)?.0)
+        Ok(self.solver.solved(&self.problem, conditions, guess)?.0)
+    }
+
+    /// Holds or frees the bodies and prepares the solver for that, unless it is.
+    pub(super) fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
+        let (hold, which) = (conditions.hold_bodies(), usize::from(conditions.hold_bodies()));
+        self.problem.system.space.hold_twists(hold);
+        if !self.is_ready[which] {
+            self.solver.solvers[which].prepare(&self.problem)?;
+            self.is_ready[which] = true;
+        }
+        Ok(())
     }
 
     /// The stresslet of each body in a flow around them: the symmetric, traceless first moment of the force

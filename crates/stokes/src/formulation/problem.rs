@@ -219,7 +219,7 @@ where
     }
 
     /// Makes the bodies move with these twists in a field that [`Problem::lift`] gave, for bodies that are
-    /// held, see [`StokesSystem::hold_twists`].
+    /// held, see [`VelocitySpace::hold_twists`].
     ///
     /// # Errors
     /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::Unsupported`] in a

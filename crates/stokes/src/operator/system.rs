@@ -28,8 +28,6 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) penalty: Option<Penalty<D>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
-    /// See [`StokesSystem::hold_twists`].
-    holds_twists: bool,
 }
 
 impl<const D: usize> StokesSystem<D>
@@ -60,7 +58,6 @@ where
             cells,
             penalty,
             viscosity,
-            holds_twists: false,
         }
     }
 
@@ -72,25 +69,6 @@ where
     /// Viscosity of the fluid.
     pub fn viscosity(&self) -> f64 {
         self.viscosity
-    }
-
-    /// Makes the twists of the bodies data (`true`) or unknowns again (`false`, as at first). Where they are
-    /// data, the operator is the block without their rows and columns; vectors keep their length, and
-    /// solvers that were prepared before stay prepared.
-    pub fn hold_twists(&mut self, hold: bool) {
-        self.holds_twists = hold;
-    }
-
-    /// Whether the twists of the bodies are data.
-    pub fn holds_twists(&self) -> bool {
-        self.holds_twists
-    }
-
-    /// Clears the entries of twists that are data in the velocity part of a vector.
-    pub(crate) fn clear_held<T: Scalar>(&self, x: &mut [T]) {
-        if self.holds_twists {
-            x[self.space.full_dim()..self.space.dim()].fill(T::ZERO);
-        }
     }
 
     /// Length of a vector: reduced velocities, then all pressure nodes.
@@ -199,7 +177,7 @@ impl<X: Scalar> Work<X> {
         vector::copy(p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, cells);
-        system.clear_held(yu);
+        system.space.clear_held(yu);
         system.reduce_pressures(yp);
     }
 }

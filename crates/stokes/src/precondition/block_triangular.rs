@@ -1,9 +1,4 @@
 //! The block triangular preconditioner.
-//!
-//! It is made for free bodies. Where twists are data their block is left out of its answer too. With the
-//! matrix `K` of the other unknowns, their coupling `C` to the twists, the block `R` of these and
-//! the resistance `S = R - C^T K^-1 C` that block of the inverse is `K^-1 + K^-1 C S^-1 C^T K^-1`: what comes
-//! on top of `K^-1` has the rank of the twists, and its eigenvalues, those of `S^-1 R`, lie close together.
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
@@ -60,6 +55,6 @@ where
         vector::copy(answer, pressure);
         system.pressure.expand(pressure);
         cycle.answer(ru, |load| fluid.gradient(pressure, load, work), zu);
-        system.clear_held(zu);
+        system.space.clear_held(zu);
     }
 }

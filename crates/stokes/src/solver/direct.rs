@@ -18,10 +18,6 @@ const MAX_CORRECTIONS: usize = 12;
 /// Corrections between two computations of the true residual, from which the recurrence departs near rounding
 /// error.
 const RESTART: usize = 4;
-/// The same where the twists of the bodies are data. Each of them may cost a correction, since the factor is
-/// that of the matrix with all of them, but most are alike.
-const HELD: GcrParams =
-    GcrParams { relative_tolerance: 1e-8, absolute_floor: 0.0, max_iterations: 300, restart: 60 };
 
 /// Sparse `L B L^T` factorisation of the assembled saddle-point matrix, eliminated block by block in order of
 /// approximate minimum degree. The symbolic part is kept as long as the pattern of the matrix stands.
@@ -34,8 +30,6 @@ pub struct DirectSolver {
     factor: Option<DirectIndefinite>,
     unknowns: Option<Subset>,
     krylov: Gcr<f64>,
-    /// For bodies that are held.
-    held: Gcr<f64>,
     b: Vec<f64>,
     x: Vec<f64>,
 }
@@ -43,14 +37,7 @@ pub struct DirectSolver {
 impl Default for DirectSolver {
     fn default() -> Self {
         let params = GcrParams { max_iterations: MAX_CORRECTIONS, restart: RESTART, ..GcrParams::default() };
-        Self {
-            factor: None,
-            unknowns: None,
-            krylov: Gcr::new(params),
-            held: Gcr::new(HELD),
-            b: Vec::new(),
-            x: Vec::new(),
-        }
+        Self { factor: None, unknowns: None, krylov: Gcr::new(params), b: Vec::new(), x: Vec::new() }
     }
 }
 
@@ -105,10 +92,10 @@ where
         system.pressure.remove_mean(&mut consistent[system.velocity_dim()..]);
         let mut operator = SystemOperator::new(system);
         let mut substitution = Substitution { system, unknowns, factor, b: &mut self.b, x: &mut self.x };
-        let krylov = if system.holds_twists() { &mut self.held } else { &mut self.krylov };
-        krylov.set_relative_tolerance(tolerance);
-        let solved = krylov.solve(&mut operator, &mut substitution, &consistent, x, Reference::RightHandSide);
-        let residuals = krylov.residual_history().to_vec();
+        self.krylov.set_relative_tolerance(tolerance);
+        let solved =
+            self.krylov.solve(&mut operator, &mut substitution, &consistent, x, Reference::RightHandSide);
+        let residuals = self.krylov.residual_history().to_vec();
         match solved {
             Err(KrylovError::NotConverged { residual_norm, .. })
                 if residual_norm <= substitution.rounding_norm(&consistent, x) => {}
@@ -154,7 +141,6 @@ where
         self.unknowns.gather(r, self.b);
         self.factor.apply(self.b, self.x);
         self.unknowns.scatter(self.x, z);
-        self.system.clear_held(z);
         self.system.pressure.remove_mean(&mut z[self.system.velocity_dim()..]);
     }
 }

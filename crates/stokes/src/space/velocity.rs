@@ -41,6 +41,8 @@ pub struct VelocitySpace<const D: usize> {
     /// Inverse of `R^T R` over the rigid nodes of each body, row-major; `None` for a body without enough
     /// nodes.
     fit: Vec<Option<Vec<f64>>>,
+    /// See [`VelocitySpace::hold_twists`].
+    holds_twists: bool,
 }
 
 impl<const D: usize> VelocitySpace<D>
@@ -60,6 +62,7 @@ where
             radius: bodies.iter().map(|b| b.bounding_radius()).collect(),
             fit: gram_inverses(bodies.len(), &rigid),
             rigid,
+            holds_twists: false,
         };
         let fit = &space.fit;
         space.rigid.retain(|r| fit[r.body as usize].is_some());
@@ -87,6 +90,25 @@ where
     /// Whether the body has enough nodes on this mesh to be rigid.
     pub fn is_active(&self, body: usize) -> bool {
         self.fit[body].is_some()
+    }
+
+    /// Makes the twists data, which are zero in reduced vectors, or unknowns again. Vectors keep their length
+    /// and maps what they do, but for projections, which leave twists at zero; operators and solvers leave
+    /// out their rows and columns.
+    pub fn hold_twists(&mut self, hold: bool) {
+        self.holds_twists = hold;
+    }
+
+    /// Whether the twists are data.
+    pub fn holds_twists(&self) -> bool {
+        self.holds_twists
+    }
+
+    /// Clears the twists of a reduced vector where they are data.
+    pub fn clear_held<T: Scalar>(&self, x: &mut [T]) {
+        if self.holds_twists {
+            x[self.full_dim()..self.dim()].fill(T::ZERO);
+        }
     }
 
     /// Length of a reduced vector.
@@ -241,6 +263,9 @@ where
 
     fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {
         let n = Dim::<D>::RIGID;
+        if self.holds_twists {
+            return loads.fill(T::ZERO);
+        }
         for (load, inverse) in loads.chunks_exact_mut(n).zip(&self.fit) {
             let old: [f64; MOST_RIGID] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
             for (i, value) in load.iter_mut().enumerate() {
