@@ -51,23 +51,13 @@ mod tests {
 
     #[test]
     fn weight_and_force_add_up() {
-        let mut case = Case {
-            name: "weights".into(),
-            dimension: 2,
-            shear_rate: 0.0,
-            gravity: Some(vec![0.0, -2.0]),
-            reference: None,
-            domain: Default::default(),
-            particles: vec![ParticleSpec::new(vec![0.3, 0.5], 0.1), ParticleSpec::new(vec![0.7, 0.5], 0.2)],
-            time: super::super::TimeSpec {
-                step: 1.0,
-                end: 1.0,
-                scheme: Default::default(),
-                reverse_at: None,
-            },
-            contact: Default::default(),
-            flow: Default::default(),
-        };
+        let text = r#"
+            name = "weights"
+            dimension = 2
+            gravity = [0.0, -2.0]
+            particles = [{ position = [0.3, 0.5], radius = 0.1 }, { position = [0.7, 0.5], radius = 0.2 }]
+            time = { step = 1.0, end = 1.0 }"#;
+        let mut case = Case::parse(text, "weights.toml").expect("a good case");
         case.particles[1].force = Some(vec![0.5, 0.0]);
         case.particles[1].torque = Some(vec![-0.25]);
         let wrenches = case.wrenches::<2>();
