@@ -165,6 +165,36 @@ fn wrong_numbers_of_coordinates() {
 }
 
 #[test]
+fn forces_that_make_no_sense() {
+    let stokes = with_line(21, "hydrodynamics = \"stokes\"");
+    let with = |nth: usize, line: &str| {
+        let mut lines: Vec<&str> = stokes.lines().collect();
+        lines.insert(nth, line);
+        lines.join("\n") + "\n"
+    };
+    let refuse = |nth: usize, line: &str, expected: &[&str]| {
+        let place = format!("case.toml:{}:", nth + 1);
+        refused(&with(nth, line), &[&[place.as_str()], expected].concat());
+    };
+    refuse(3, "gravity = [0.0, -1.0]", &["gravity = [0.0, -1.0]", "2 coordinates in 3D"]);
+    refuse(3, "gravity = 9.81", &["gravity = 9.81", "expected a list like [1.0, 2.0]"]);
+    refuse(3, "gravity = [0.0, nan, 0.0]", &["gravity[1] = nan", "not a finite number"]);
+    refuse(9, "force = [1.0, inf, 0.0]", &["particles[0].force[1] = inf", "not a finite number"]);
+    refuse(12, "force = [1.0]", &["particles[1].force = [1.0]", "expected 3 coordinates"]);
+    let torque = "particles[0].torque = [1.0]";
+    refuse(9, "torque = [1.0]", &[torque, "a torque of 1 numbers in 3D", "expected a list of length 3"]);
+    refuse(9, "forces = [1.0, 0.0, 0.0]", &["particles[0].forces", "did you mean `force`?"]);
+    // The mobility of a pair answers to the shear alone.
+    let analytic = GOOD.replace("radius = 0.05\n[time]", "radius = 0.05\ntorque = [0.0, 0.0, 1.0]\n[time]");
+    let expected =
+        ["case.toml:13:", "particles[1].torque", "hydrodynamics = \"stokes\"", "has \"pair-mobility\""];
+    refused(&analytic, &expected);
+    let text = with(3, "gravity = [0.0, 0.0, -1.0]")
+        .replace("name = \"pair\"", "name = \"pair\"\nreference = \"pair3d_trajectory_box\"");
+    refused(&text, &["case.toml:2:", "needs particles without forces and torques"]);
+}
+
+#[test]
 fn overlapping_starts() {
     let message = "particles 1 and 2 overlap at the start: gap -4.000000e-2";
     let key = "particles[1].position = [0.36, 0.525, 0.5]";

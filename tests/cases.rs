@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use gluey::case::Hydrodynamics;
+use gluey::case::{Formulation, Hydrodynamics};
 use gluey::{Case, RunOptions, Silent, run};
 use tempfile::TempDir;
 
@@ -35,7 +35,7 @@ fn the_packaged_references_are_those_of_the_workspace() {
 fn the_papers_cases_are_there() {
     let names: Vec<String> =
         case_files().iter().map(|path| path.file_stem().expect("a name").to_string_lossy().into()).collect();
-    for name in ["pair-2d", "pair-3d", "pair-3d-mobility", "trio-2d", "trio-2d-couette"] {
+    for name in ["pair-2d", "pair-3d", "pair-3d-mobility", "sedimentation-2d", "trio-2d", "trio-2d-couette"] {
         assert!(names.iter().any(|found| found == name), "{name} is not among {names:?}");
     }
 }
@@ -57,6 +57,35 @@ fn the_papers_data_are_in_them() {
         assert!(case.particles.iter().all(|particle| particle.radius == 0.05));
         assert_eq!((case.shear_rate, case.lower()[0], case.upper()[0]), (1.0, 0.0, 1.0));
     }
+}
+
+/// How far the discs of the sedimentation fall in five steps under a multiple of gravity.
+fn drops(formulation: Formulation, gravity: f64) -> Vec<f64> {
+    let path = case_files().into_iter().find(|path| path.ends_with("sedimentation-2d.toml"));
+    let mut case = Case::load(path.expect("the case")).expect("a case");
+    case.time.end = 5.0 * case.time.step;
+    case.flow.formulation = formulation;
+    case.flow.mesh.cells_per_radius = Some(3.0);
+    case.gravity.iter_mut().flatten().for_each(|g| *g *= gravity);
+    let folder = TempDir::new().expect("a folder");
+    let csv = folder.path().join("trajectory.csv");
+    run(&case, &RunOptions::csv(&csv), &Silent).unwrap_or_else(|error| panic!("{error}"));
+    let rows = fs::read_to_string(&csv).expect("a trajectory");
+    let height = |line: usize, disc: usize| -> f64 {
+        let row = rows.lines().nth(line).expect("a row");
+        row.split(',').nth(2 + 2 * disc).expect("a column").parse().expect("a number")
+    };
+    (0..case.particles.len()).map(|disc| height(1, disc) - height(6, disc)).collect()
+}
+
+/// Discs fall with gravity, the largest fastest, rise against it, and stay where they are without it.
+#[test]
+fn heavy_discs_settle() {
+    let [rigid, soft] = [Formulation::RigidDofs, Formulation::Paper].map(|f| drops(f, 1.0));
+    assert!(rigid.iter().zip(&soft).all(|(a, b)| (a / b - 1.0).abs() < 0.06), "{rigid:?} {soft:?}");
+    assert!(rigid[..4].iter().all(|drop| (0.03..rigid[4]).contains(drop)), "{rigid:?}");
+    assert!(drops(Formulation::RigidDofs, -1.0).iter().all(|drop| *drop < -0.03));
+    assert!(drops(Formulation::RigidDofs, 0.0).iter().all(|drop| drop.abs() < 1e-12));
 }
 
 #[test]

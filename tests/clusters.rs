@@ -21,8 +21,7 @@ fn case(side: f64, centers: impl Iterator<Item = [f64; 2]>) -> Case {
          [flow.rigid-dofs]\ngap_fraction = 0.0\n"
     );
     let mut case = Case::parse(&text, "cluster.toml").expect("a good case");
-    case.particles =
-        centers.map(|center| ParticleSpec { position: center.to_vec(), radius: RADIUS }).collect();
+    case.particles = centers.map(|center| ParticleSpec::new(center.to_vec(), RADIUS)).collect();
     let middle = |d: usize| {
         let bounds = case.particles.iter().map(|particle| particle.position[d]);
         let (low, high) =

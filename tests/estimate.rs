@@ -62,7 +62,7 @@ fn random_case(seed: u64) -> Case {
     for _ in 0..count {
         let radius = random.random_range(0.03..0.1);
         let position: Vec<f64> = (0..dimension).map(|_| random.random_range(radius..1.0 - radius)).collect();
-        case.particles.push(ParticleSpec { position, radius });
+        case.particles.push(ParticleSpec::new(position, radius));
         if case.check().is_err() {
             case.particles.pop();
         }

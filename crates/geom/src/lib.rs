@@ -1,4 +1,4 @@
-//! Vectors, rotations, poses and twists in `D` = 2 and 3 dimensions.
+//! Vectors, rotations, poses, twists and wrenches in `D` = 2 and 3 dimensions.
 //!
 //! Code that is the same in every dimension is written once for `D`; what is not (the number of rotations,
 //! the cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and
@@ -16,7 +16,7 @@ mod motion;
 mod space;
 
 pub use aabb::Aabb;
-pub use motion::{Particle, Pose, Twist};
+pub use motion::{Particle, Pose, Twist, Wrench};
 pub use space::{Dim, Rotation, Space, Spin, Stored};
 
 /// A point, displacement or velocity in `D` dimensions.

@@ -1,4 +1,4 @@
-//! Poses, twists and round particles.
+//! Poses, twists, wrenches and round particles.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -64,49 +64,91 @@ where
     }
 }
 
-impl<const D: usize> Neg for Twist<D>
+/// Force on a body and torque about its centre. Forces are per unit of depth in 2D.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+pub struct Wrench<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    type Output = Self;
-
-    fn neg(self) -> Self {
-        Self { velocity: -self.velocity, spin: -self.spin }
-    }
+    /// Force.
+    pub force: Vector<D>,
+    /// Torque about the centre; counter-clockwise in 2D.
+    pub torque: Spin<D>,
 }
 
-impl<const D: usize> Add for Twist<D>
+impl<const D: usize> Default for Wrench<D>
 where
     Dim<D>: Space<D>,
 {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self { velocity: self.velocity + other.velocity, spin: self.spin + other.spin }
+    fn default() -> Self {
+        Self { force: Vector::zeros(), torque: Dim::<D>::zero_spin() }
     }
 }
 
-impl<const D: usize> Sub for Twist<D>
+impl<const D: usize> Wrench<D>
 where
     Dim<D>: Space<D>,
 {
-    type Output = Self;
-
-    fn sub(self, other: Self) -> Self {
-        Self { velocity: self.velocity - other.velocity, spin: self.spin - other.spin }
+    /// Power `F.U + T.w` on a body that moves with `twist`.
+    pub fn power(&self, twist: &Twist<D>) -> f64 {
+        let [torque, spin] = [&self.torque, &twist.spin].map(Dim::<D>::spin_slice);
+        self.force.dot(&twist.velocity) + torque.iter().zip(spin).map(|(t, w)| t * w).sum::<f64>()
     }
 }
 
-impl<const D: usize> Mul<f64> for Twist<D>
-where
-    Dim<D>: Space<D>,
-{
-    type Output = Self;
+/// Sums, differences and multiples of a pair of a vector and a spin.
+macro_rules! linear {
+    ($type:ident { $vector:ident, $spin:ident }) => {
+        impl<const D: usize> Neg for $type<D>
+        where
+            Dim<D>: Space<D>,
+        {
+            type Output = Self;
 
-    fn mul(self, factor: f64) -> Self {
-        Self { velocity: self.velocity * factor, spin: self.spin * factor }
-    }
+            fn neg(self) -> Self {
+                Self { $vector: -self.$vector, $spin: -self.$spin }
+            }
+        }
+
+        impl<const D: usize> Add for $type<D>
+        where
+            Dim<D>: Space<D>,
+        {
+            type Output = Self;
+
+            fn add(self, other: Self) -> Self {
+                Self { $vector: self.$vector + other.$vector, $spin: self.$spin + other.$spin }
+            }
+        }
+
+        impl<const D: usize> Sub for $type<D>
+        where
+            Dim<D>: Space<D>,
+        {
+            type Output = Self;
+
+            fn sub(self, other: Self) -> Self {
+                Self { $vector: self.$vector - other.$vector, $spin: self.$spin - other.$spin }
+            }
+        }
+
+        impl<const D: usize> Mul<f64> for $type<D>
+        where
+            Dim<D>: Space<D>,
+        {
+            type Output = Self;
+
+            fn mul(self, factor: f64) -> Self {
+                Self { $vector: self.$vector * factor, $spin: self.$spin * factor }
+            }
+        }
+    };
 }
+
+linear!(Twist { velocity, spin });
+linear!(Wrench { force, torque });
 
 /// A rigid disc (2D) or sphere (3D).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,5 +195,16 @@ mod tests {
             (a + b).velocity_at(&Vector::z()),
             a.velocity_at(&Vector::z()) + b.velocity_at(&Vector::z())
         );
+    }
+
+    /// A force at a point does the same work there as its wrench does on the body.
+    #[test]
+    fn wrenches_do_the_work_of_forces() {
+        let (r, f) = (Vector::<3>::new(0.3, -0.2, 0.5), Vector::<3>::new(1.0, 0.4, -0.7));
+        let twist =
+            Twist::<3> { velocity: Vector::<3>::new(0.1, 2.0, 0.7), spin: Spin::<3>::new(0.1, 3.0, -0.4) };
+        let wrench = Wrench::<3> { force: f, torque: Dim::<3>::moment(&r, &f) };
+        assert!((wrench.power(&twist) - f.dot(&twist.velocity_at(&r))).abs() < 1e-14);
+        assert_eq!(wrench * 2.0 - wrench, wrench);
     }
 }

@@ -18,6 +18,7 @@
 
 mod comparable;
 mod error;
+mod forces;
 mod load;
 mod mesh;
 mod names;
@@ -41,7 +42,9 @@ const WALLED_AXIS: usize = 1;
 
 /// A complete, checked description of one run.
 ///
-/// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1.
+/// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1. So
+/// forces are in units of the viscosity times a length squared over a time; in 2D, where they are those on a
+/// unit of depth, times a length over a time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
@@ -52,6 +55,10 @@ pub struct Case {
     /// The imposed shear rate `gamma_dot`: the undisturbed velocity is `gamma_dot (y - y_mid) e_x`.
     #[serde(default = "one")]
     pub shear_rate: f64,
+    /// Weight of the particles per unit of volume (in 2D: area), less that of the fluid: `(rho_s - rho_f) g`,
+    /// one coordinate per dimension. Nothing when absent. It is not reversed with the shear.
+    #[serde(default)]
+    pub gravity: Option<Vec<f64>>,
     /// Name of a reference solution to compare with, see [`crate::reference::NAMES`].
     #[serde(default)]
     pub reference: Option<String>,
@@ -90,6 +97,19 @@ pub struct ParticleSpec {
     pub position: Vec<f64>,
     /// Radius `a > 0`.
     pub radius: f64,
+    /// Force beside its weight, one coordinate per dimension; none when absent.
+    #[serde(default)]
+    pub force: Option<Vec<f64>>,
+    /// Torque: one number in 2D (positive counter-clockwise), three in 3D; none when absent.
+    #[serde(default)]
+    pub torque: Option<Vec<f64>>,
+}
+
+impl ParticleSpec {
+    /// A particle without forces but its weight.
+    pub fn new(position: Vec<f64>, radius: f64) -> Self {
+        Self { position, radius, force: None, torque: None }
+    }
 }
 
 /// Time stepping.

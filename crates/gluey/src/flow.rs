@@ -1,8 +1,8 @@
 //! The finite-element flow as [`Hydrodynamics`]: particles in, velocities out.
 //!
 //! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves
-//! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x`, and reads off
-//! the twists.
+//! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x` and under the
+//! forces and torques of the case, and reads off the twists.
 
 mod estimate;
 mod fields;
@@ -10,12 +10,12 @@ mod fields;
 use std::time::Instant;
 
 use gluey_fem::{MeshError, TreeMesh};
-use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 use gluey_stokes::{
-    CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind,
-    StokesError, WarmStartError,
+    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
+    SolverKind, StokesError, WarmStartError,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -101,6 +101,8 @@ where
     shear_rate: f64,
     shear_factor: f64,
     radii: Vec<f64>,
+    /// Forces and torques on the particles; empty if there are none.
+    wrenches: Vec<Wrench<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
 }
@@ -128,6 +130,7 @@ where
         shear_rate: case.shear_rate,
         shear_factor: 1.0,
         radii,
+        wrenches: case.wrenches(),
         last: None,
         last_balls: Vec::new(),
     })
@@ -171,7 +174,8 @@ where
             u[0] = rate * (x[1] - middle);
             u
         };
-        let mut flow = self.solver.solve(mesh, &balls, &shear)?;
+        let conditions = Conditions::boundary(&shear).with_wrenches(&self.wrenches);
+        let mut flow = self.solver.solve_under(mesh, &balls, &conditions)?;
         flow.times.assembly += meshed;
         twists.copy_from_slice(&flow.twists);
         self.last = Some(flow);

@@ -14,9 +14,9 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
-use gluey_stokes::{FlowParams, FlowSolver, Refinement, StokesError};
+use gluey_stokes::{Conditions, FlowParams, FlowSolver, Refinement, StokesError};
 
 const RADIUS: f64 = 0.05;
 const HALF_WIDTH: f64 = 0.5;
@@ -34,24 +34,18 @@ fn stokes_flow(r: &Vector<3>) -> Vector<3> {
     (down + along) * (0.75 * a) + (down - along * 3.0) * (0.25 * a.powi(3))
 }
 
-/// The force per volume: `FORCE` in all, spread smoothly over the inside of the sphere.
-fn weight(r: &Vector<3>) -> Vector<3> {
-    let core = 0.8 * RADIUS;
-    let depth = (1.0 - r.norm_squared() / core.powi(2)).max(0.0);
-    Vector::<3>::new(0.0, -FORCE * 105.0 / (32.0 * PI * core.powi(3)) * depth.powi(2), 0.0)
-}
-
 /// Velocities in the unbounded fluid and in the duct, with cells of `2^-level` around the sphere.
 pub fn velocities(level: u8) -> Result<[f64; 2], StokesError> {
     let sphere = Ball::new(Vector::<3>::new(0.5, 1.5, 0.5), RADIUS);
     let domain = Aabb { lower: Vector::zeros(), upper: Vector::<3>::new(1.0, 3.0, 1.0) };
     let refinement = Refinement { coarsest: 2, ..Refinement::to_level(level) };
     let from_centre = |x: &Vector<3>| sphere.arm(x);
-    let force = |x: &Vector<3>| weight(&from_centre(x));
+    let weight = [Wrench { force: Vector::<3>::new(0.0, -FORCE, 0.0), ..Wrench::default() }];
     let mut solver = FlowSolver::new(FlowParams::for_dimension(3))?;
     let mut velocity = |boundary: &dyn Fn(&Vector<3>) -> Vector<3>| -> Result<f64, StokesError> {
         let mesh = refinement.mesh(domain, [1, 3, 1], [false; 3], &[sphere])?;
-        Ok(-solver.solve_forced(mesh, &[sphere], boundary, Some(&force))?.twists[0].velocity[1])
+        let conditions = Conditions::boundary(boundary).with_wrenches(&weight);
+        Ok(-solver.solve_under(mesh, &[sphere], &conditions)?.twists[0].velocity[1])
     };
     Ok([velocity(&|x| stokes_flow(&from_centre(x)))?, velocity(&|_| Vector::zeros())?])
 }

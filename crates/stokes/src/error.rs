@@ -56,6 +56,22 @@ pub enum StokesError {
         /// Index of the body, from 0; messages count from 1.
         body: usize,
     },
+    /// Bodies need one entry each.
+    #[error("{found} {what} for {bodies} bodies: give one for each")]
+    Count {
+        /// What was given.
+        what: &'static str,
+        /// How many.
+        found: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
+    /// The formulation of rigidity cannot answer this.
+    #[error("{what} are not available in this formulation of rigidity; `rigid-dofs` has them")]
+    Unsupported {
+        /// What was asked for.
+        what: &'static str,
+    },
     /// A parameter is out of range.
     #[error("{name} = {value}: {wanted}")]
     Parameter {

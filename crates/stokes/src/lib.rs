@@ -1,7 +1,7 @@
 //! Stokes flow around rigid bodies by an unfitted Q2-Q1 finite-element method.
 //!
 //! `-div(2 eta eps(u)) + grad p = f`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body
-//! and no force or torque on any but those of `f`. [`Formulation`] names the two ways to impose rigidity.
+//! and no force or torque on any but those of `f` and those given. [`Formulation`] names the two ways to impose rigidity.
 //!
 //! ```
 //! use gluey_stokes::geom::{Aabb, Vector};
@@ -17,8 +17,9 @@
 //! # Ok::<(), gluey_stokes::StokesError>(())
 //! ```
 //!
-//! A program that only wants flows needs [`FlowSolver`], [`FlowParams`] and [`Refinement`]. One that calls
-//! the linear solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
+//! A program that only wants flows needs [`FlowSolver`], [`FlowParams`] and [`Refinement`]; [`Conditions`]
+//! say what acts on the bodies, [`Prepared`] has their mobility and resistance. One that calls the linear
+//! solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
 //!
 //! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, the penalised
 //! solid, operators, preconditioners, formulations of rigidity, solvers, flows.
@@ -37,7 +38,8 @@ mod surface;
 
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{
-    Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement, SolverKind, WarmStartError,
+    Conditions, Field, Flow, FlowParams, FlowSolver, Given, NodalFields, PhaseTimes, Prepared, Refinement,
+    SolverKind, WarmStartError,
 };
 // How rigidity is imposed.
 pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};

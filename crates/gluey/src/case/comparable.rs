@@ -37,6 +37,10 @@ fn other_flow(case: &Case, reference: &Reference) -> Option<Mismatch> {
         let needs = format!("flow.hydrodynamics = \"{hydrodynamics}\"");
         unless(found == hydrodynamics, needs, || format!("\"{found}\""))
     })
+    .or_else(|| {
+        let needs = "particles without forces and torques";
+        unless(!case.has_forces(), needs, || "some".to_owned())
+    })
     .or_else(|| unless(case.shear_rate == 1.0, "shear_rate = 1", || format!("{}", case.shear_rate)))
     .or_else(|| unless(reversal.is_none(), "a shear that is not reversed", || "time.reverse_at".to_owned()))
 }

@@ -190,6 +190,16 @@ pub enum Problem {
         /// Coordinates needed.
         dimension: usize,
     },
+    /// A torque with another number of components than the dimension has rotations.
+    #[error("a torque of {found} numbers in {dimension}D")]
+    TorqueCount {
+        /// Numbers given.
+        found: usize,
+        /// Numbers needed.
+        needed: usize,
+        /// Dimension of space.
+        dimension: usize,
+    },
     /// The upper corner is not above the lower one.
     #[error("the box is empty along {axis}: lower {lower}, upper {upper}")]
     EmptyBox {
@@ -322,6 +332,7 @@ impl Problem {
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
             Self::Parameter { wanted, .. } => format!("it {wanted}"),
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
+            Self::TorqueCount { needed, .. } => format!("expected a list of length {needed}"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
             Self::UnevenBox { .. } => format!(
                 "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than \

@@ -98,7 +98,7 @@ mod tests {
             .map(|_| {
                 let radius = random.random_range(0.01..0.06);
                 let position = (0..dimension).map(|_| random.random_range(0.0..1.0)).collect();
-                ParticleSpec { position, radius }
+                ParticleSpec::new(position, radius)
             })
             .collect();
         case

@@ -30,6 +30,7 @@ pub(super) fn check(case: &Case) -> Check {
         return fail(root.name("dimension"), Problem::Dimension { found: case.dimension });
     }
     finite(case.shear_rate, root.name("shear_rate"))?;
+    check_force(&case.gravity, case, &root.name("gravity"))?;
     check_domain(case, &root.name("domain"))?;
     check_particles(case, &root.name("particles"))?;
     check_time(case, &root.name("time"))?;
@@ -86,9 +87,39 @@ fn check_particles(case: &Case, key: &Key) -> Check {
         let key = key.index(index);
         coordinates(&particle.position, case.dimension, key.name("position"))?;
         positive(particle.radius, key.name("radius"))?;
+        check_force(&particle.force, case, &key.name("force"))?;
+        check_torque(&particle.torque, case, &key.name("torque"))?;
         check_inside(case, index, &key)?;
     }
     check_overlaps(case, key)
+}
+
+fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key) -> Check {
+    let Some(force) = force else { return Ok(()) };
+    coordinates(force, case.dimension, key.clone())?;
+    check_answered(case, key)
+}
+
+fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key) -> Check {
+    let Some(torque) = torque else { return Ok(()) };
+    let (found, needed) = (torque.len(), if case.dimension == 2 { 1 } else { 3 });
+    if found != needed {
+        return fail(key.clone(), Problem::TorqueCount { found, needed, dimension: case.dimension });
+    }
+    torque.iter().enumerate().try_for_each(|(index, &value)| finite(value, key.index(index)))?;
+    check_answered(case, key)
+}
+
+/// Only the finite-element flow answers to forces.
+fn check_answered(case: &Case, key: &Key) -> Check {
+    match case.flow.hydrodynamics {
+        Hydrodynamics::Stokes => Ok(()),
+        found => {
+            let choice = "forces and torques".to_owned();
+            let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
+            fail(key.clone(), Problem::Unfit { choice, needs, found: format!("\"{found}\"") })
+        }
+    }
 }
 
 fn check_inside(case: &Case, index: usize, key: &Key) -> Check {

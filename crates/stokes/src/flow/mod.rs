@@ -1,5 +1,7 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
+mod conditions;
+mod prepared;
 mod refinement;
 mod warm_start;
 
@@ -7,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
@@ -16,6 +18,8 @@ use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
 use crate::space::{CutCellPressures, Discretisation};
 use warm_start::WarmStart;
 
+pub use conditions::{Conditions, Field, Given};
+pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use warm_start::{NodalFields, WarmStartError};
 
@@ -72,6 +76,9 @@ where
     pub multiplier: Vec<f64>,
     /// Velocity and spin of each body.
     pub twists: Vec<Twist<D>>,
+    /// Force and torque on each body by something other than the fluid: those given, or those that hold it
+    /// at the twist given.
+    pub wrenches: Vec<Wrench<D>>,
     /// Linear solves made.
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
@@ -99,7 +106,8 @@ where
     Dim<D>: Space<D>,
 {
     params: FlowParams,
-    solver: Box<dyn SaddleSolver<D> + Send>,
+    /// For free bodies and for held ones.
+    solvers: [Box<dyn SaddleSolver<D> + Send>; 2],
     method: Arc<dyn Method<D>>,
     /// The last mesh, which the next one is often equal to.
     discretisation: Option<Discretisation<D>>,
@@ -132,12 +140,14 @@ where
     /// [`StokesError::Parameter`] for values out of range.
     pub fn new(params: FlowParams) -> Result<Self, StokesError> {
         check(&params)?;
-        let solver: Box<dyn SaddleSolver<D> + Send> = match params.solver {
-            SolverKind::Direct => Box::new(DirectSolver::default()),
-            SolverKind::Multigrid => Box::new(MultigridSolver::default()),
+        let solver = || -> Box<dyn SaddleSolver<D> + Send> {
+            match params.solver {
+                SolverKind::Direct => Box::new(DirectSolver::default()),
+                SolverKind::Multigrid => Box::new(MultigridSolver::default()),
+            }
         };
         let method = params.formulation.method()?;
-        Ok(Self { params, solver, method, discretisation: None, warm_start: None })
+        Ok(Self { params, solvers: [solver(), solver()], method, discretisation: None, warm_start: None })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same
@@ -160,32 +170,78 @@ where
         boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
         force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
     ) -> Result<Flow<D>, StokesError> {
+        self.solve_under(mesh, bodies, &Conditions::boundary(boundary).with_force(force))
+    }
+
+    /// The flow under any conditions. Where the solver is iterative it starts from the last flow, which is
+    /// meant for bodies that move on in small steps; for several flows around the same ones see
+    /// [`FlowSolver::prepared`].
+    ///
+    /// # Errors
+    /// Those of [`FlowSolver::prepared`] and [`Prepared::solve`].
+    pub fn solve_under(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        conditions: &Conditions<'_, D>,
+    ) -> Result<Flow<D>, StokesError> {
         let start = Instant::now();
-        let discretisation = self.discretised(mesh);
-        let problem = Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())?;
-        let assembled = Instant::now();
-        self.solver.prepare(&problem)?;
-        let prepared = Instant::now();
-        let mut flow = self.predict(&problem, boundary, force)?;
-        flow.times = PhaseTimes {
-            assembly: (assembled - start).as_secs_f64(),
-            preparation: (prepared - assembled).as_secs_f64(),
-            solve: prepared.elapsed().as_secs_f64(),
-        };
+        let mut prepared = self.prepared(mesh, bodies)?;
+        let assembly = start.elapsed().as_secs_f64();
+        prepared.make_ready(conditions)?;
+        let preparation = start.elapsed().as_secs_f64() - assembly;
+        let Prepared { solver, problem, .. } = prepared;
+        let (guess, before) = solver.initial_guess(&problem);
+        let (mut flow, x) = solver.solved(&problem, conditions, guess)?;
+        solver.keep_for_next(&problem, &x, &flow.pressure, before);
+        let solve = start.elapsed().as_secs_f64() - assembly - preparation;
+        flow.times = PhaseTimes { assembly, preparation, solve };
         Ok(flow)
     }
 
-    fn predict(
+    /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first needed:
+    /// once for free bodies and once for held ones.
+    ///
+    /// ```
+    /// use gluey_stokes::geom::{Aabb, Spin, Vector, Wrench};
+    /// use gluey_stokes::levelset::Ball;
+    /// use gluey_stokes::{Conditions, FlowParams, FlowSolver, Refinement};
+    ///
+    /// let disc = Ball::new(Vector::<2>::new(0.5, 0.5), 0.1);
+    /// let mesh = Refinement::to_level(6).mesh(Aabb::unit(), [1, 1], [false; 2], &[disc])?;
+    /// let mut solver = FlowSolver::<2>::new(FlowParams::for_dimension(2))?;
+    /// let mut prepared = solver.prepared(mesh, &[disc])?;
+    /// let weight = Wrench { force: Vector::<2>::new(0.0, -1.0), torque: Spin::<2>::new(0.0) };
+    /// let falling = prepared.solve(&Conditions::at_rest().with_wrenches(&[weight]))?;
+    /// // Held at the velocity at which it falls, it needs its weight.
+    /// let held = prepared.solve(&Conditions::at_rest().with_twists(&falling.twists))?;
+    /// assert!((held.wrenches[0] - weight).force.norm() < 1e-4);
+    /// # Ok::<(), gluey_stokes::StokesError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StokesError::Unresolved`] for a body smaller than a cell.
+    pub fn prepared(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+    ) -> Result<Prepared<'_, D>, StokesError> {
+        let discretisation = self.discretised(mesh);
+        let problem = Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())?;
+        Ok(Prepared { solver: self, problem, is_ready: [false; 2] })
+    }
+
+    /// The flow under some conditions from the guess `x`, and the reduced vector it belongs to.
+    fn solved(
         &mut self,
         problem: &Problem<D>,
-        boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
-        force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
-    ) -> Result<Flow<D>, StokesError> {
-        let lift = problem.lift(boundary);
-        let b = problem.right_hand_side(&lift, force);
-        let (mut x, before) = self.initial_guess(problem);
+        conditions: &Conditions<'_, D>,
+        mut x: Vec<f64>,
+    ) -> Result<(Flow<D>, Vec<f64>), StokesError> {
+        let (lift, b) = conditions.data(problem)?;
         let mut effort = Effort::default();
-        let (solver, tolerance) = (&mut self.solver, self.params.tolerance);
+        let solver = &mut self.solvers[usize::from(problem.system.space.holds_twists())];
+        let tolerance = self.params.tolerance;
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
             effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
             Ok(())
@@ -195,19 +251,21 @@ where
         let pressure = problem.pressure(&x);
         let mut velocity = problem.velocity(&lift, &x);
         let twists = problem.twists(&velocity)?;
+        let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
         velocity.truncate(problem.system.space.full_dim());
-        self.keep_for_next(problem, &x, &pressure, before);
-        Ok(Flow {
+        let flow = Flow {
             discretisation: problem.discretisation().clone(),
             velocity,
             pressure,
             multiplier,
             twists,
+            wrenches,
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,
             fine_operator_applications: effort.fine_operator_applications,
             times: PhaseTimes::default(),
-        })
+        };
+        Ok((flow, x))
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.

@@ -7,7 +7,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_linalg::vector;
 
@@ -57,6 +57,35 @@ where
         x: &mut [f64],
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError>;
+
+    /// Adds the loads of forces and torques on the bodies, one entry each, to a reduced right-hand side: to
+    /// the rows of the twists where these are unknowns.
+    ///
+    /// # Errors
+    /// [`StokesError::NoSolid`] for a body that has nothing to act on.
+    fn add_wrenches(
+        &self,
+        problem: &Problem<D>,
+        wrenches: &[Wrench<D>],
+        b: &mut [f64],
+    ) -> Result<(), StokesError> {
+        let space = problem.space_with_twists("forces on bodies")?;
+        wrenches.iter().enumerate().for_each(|(body, wrench)| space.add_wrench(b, body, wrench));
+        Ok(())
+    }
+
+    /// The stresslet of each body, see [`crate::Prepared::stresslets`], in nodal velocities and pressures.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] where the formulation has no forces on nodes of bodies.
+    fn stresslets(
+        &self,
+        _problem: &Problem<D>,
+        _velocity: &[f64],
+        _pressure: &[f64],
+    ) -> Result<Vec<Matrix<D>>, StokesError> {
+        Err(StokesError::Unsupported { what: "stresslets" })
+    }
 
     /// Whether the deviation from the undisturbed flow is smooth enough in time to be extrapolated.
     fn is_smooth_in_time(&self) -> bool;
@@ -165,13 +194,79 @@ where
 
     /// The load of the force `f(x)` per unit of volume, less that of the lift.
     pub fn right_hand_side(&self, lift: &[f64], force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
+        let mut b = self.loads(force);
+        self.system.residual(lift, &vec![0.0; self.system.pressure.dim()], &mut b);
+        b
+    }
+
+    /// The load of the force `f(x)` per unit of volume.
+    fn loads(&self, force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
         let mut b = vec![0.0; self.system.dim()];
         if let Some(force) = force {
             add_load(self.discretisation(), force, &mut b);
             self.system.reduce(&mut b);
         }
-        self.system.residual(lift, &vec![0.0; self.system.pressure.dim()], &mut b);
         b
+    }
+
+    /// Adds the loads of forces and torques on the bodies to a reduced right-hand side; no entries stand for
+    /// none on any.
+    ///
+    /// # Errors
+    /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::NoSolid`] for a penalised
+    /// body that others cover.
+    pub fn add_wrenches(&self, wrenches: &[Wrench<D>], b: &mut [f64]) -> Result<(), StokesError> {
+        if wrenches.is_empty() {
+            return Ok(());
+        }
+        self.check_count("wrenches", wrenches.len())?;
+        self.rigidity.add_wrenches(self, wrenches, b)
+    }
+
+    /// Makes the bodies move with these twists in a field that [`Problem::lift`] gave, for bodies that are
+    /// held, see [`VelocitySpace::hold_twists`].
+    ///
+    /// # Errors
+    /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::Unsupported`] in a
+    /// formulation without unknowns for twists.
+    pub fn set_twists(&self, twists: &[Twist<D>], lift: &mut [f64]) -> Result<(), StokesError> {
+        self.check_count("twists", twists.len())?;
+        let space = self.space_with_twists("bodies that are held")?;
+        twists.iter().enumerate().for_each(|(body, twist)| space.set_twist(lift, body, twist));
+        space.expand(lift);
+        Ok(())
+    }
+
+    /// The forces and torques on the bodies that make this velocity (as [`Problem::velocity`] gives it) and
+    /// pressure a solution, by action and reaction: what is missing in the rows of the twists.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] in a formulation without unknowns for twists.
+    pub fn wrenches(
+        &self,
+        velocity: &[f64],
+        pressure: &[f64],
+        force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
+    ) -> Result<Vec<Wrench<D>>, StokesError> {
+        let space = self.space_with_twists("forces on bodies that are held")?;
+        let mut b = self.loads(force);
+        self.system.residual(velocity, pressure, &mut b);
+        Ok((0..self.bodies.len()).map(|body| -space.wrench(&b, body)).collect())
+    }
+
+    fn check_count(&self, what: &'static str, found: usize) -> Result<(), StokesError> {
+        let bodies = self.bodies.len();
+        if found == bodies { Ok(()) } else { Err(StokesError::Count { what, found, bodies }) }
+    }
+
+    /// The reduced velocities, if the twists of all bodies are among them.
+    fn space_with_twists(&self, what: &'static str) -> Result<&VelocitySpace<D>, StokesError> {
+        let space = &self.system.space;
+        if space.body_count() == self.bodies.len() {
+            Ok(space)
+        } else {
+            Err(StokesError::Unsupported { what })
+        }
     }
 
     /// The velocity `lift + T x`: nodal values, then the twists of eliminated bodies.
@@ -213,6 +308,12 @@ where
         twist.spin += Dim::<D>::moment(&arm, &velocity) * (0.25 / arm.norm_squared());
     }
     twist
+}
+
+/// The part of a first moment of forces that is a stresslet.
+pub fn symmetric_and_traceless<const D: usize>(moment: &Matrix<D>) -> Matrix<D> {
+    let symmetric = (moment + moment.transpose()) * 0.5;
+    symmetric - Matrix::identity() * (symmetric.trace() / D as f64)
 }
 
 /// # Errors

@@ -3,10 +3,12 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist};
-use gluey_levelset::Ball;
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_levelset::{Ball, Body};
 
-use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
+use super::problem::{
+    Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
+};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
@@ -76,6 +78,26 @@ where
     ) -> Result<Multiplier, StokesError> {
         solve(data.b, x, 1.0)?;
         Ok(Multiplier::new())
+    }
+
+    /// By virtual work: the forces of the fluid on the rigid nodes, `S = sum_n f_n r_n`.
+    fn stresslets(
+        &self,
+        problem: &Problem<D>,
+        velocity: &[f64],
+        pressure: &[f64],
+    ) -> Result<Vec<Matrix<D>>, StokesError> {
+        let Problem { system, bodies, .. } = problem;
+        let (space, nodes) = (&system.space, system.space.nodes());
+        let forces = system.nodal_forces(velocity, pressure);
+        let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
+        for (node, force) in forces.chunks_exact(D).enumerate() {
+            if let Some(body) = space.body_of(node).map(|body| body as usize) {
+                let arm = bodies[body].arm(&nodes.point(node));
+                moments[body] += Vector::<D>::from_column_slice(force) * arm.transpose();
+            }
+        }
+        Ok(moments.iter().map(symmetric_and_traceless).collect())
     }
 
     /// Nodes change sides from step to step.

@@ -7,17 +7,19 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::{Dim, Matrix, Space, Twist};
 use gluey_levelset::Ball;
 
-use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
+use super::problem::{
+    Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
+};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
-use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling};
+use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling, first_moments};
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
@@ -81,6 +83,20 @@ where
     ) -> Result<Multiplier, StokesError> {
         solve(data.b, x, 1.0)?;
         Ok(Multiplier::new())
+    }
+
+    /// From the tractions on the true surface.
+    fn stresslets(
+        &self,
+        problem: &Problem<D>,
+        velocity: &[f64],
+        pressure: &[f64],
+    ) -> Result<Vec<Matrix<D>>, StokesError> {
+        let Problem { system, bodies, .. } = problem;
+        let Some(surfaces) = &system.surfaces else { return Ok(Vec::new()) };
+        let fields = [velocity, pressure];
+        let moments = first_moments(surfaces, &system.space, bodies, system.viscosity(), fields);
+        Ok(moments.iter().map(symmetric_and_traceless).collect())
     }
 
     /// Aggregates change from step to step, but what they change is small.

@@ -98,7 +98,7 @@ where
     Dim<D>: Space<D>,
 {
     match k.checked_sub(space.full_dim()) {
-        Some(twist) => space.is_active(twist / Dim::<D>::RIGID),
+        Some(twist) => !space.holds_twists() && space.is_active(twist / Dim::<D>::RIGID),
         None => space.is_free(k / D),
     }
 }

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
+use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
@@ -120,6 +121,18 @@ where
         vector::axpy(-1.0, &y, b);
     }
 
+    /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal velocities
+    /// and pressures, with the forces on hanging nodes moved to their masters.
+    pub(crate) fn nodal_forces(&self, u: &[f64], p: &[f64]) -> Vec<f64> {
+        let nowhere = vec![None; self.space.nodes().node_count()];
+        let loose = VelocitySpace::new::<Ball<D>>(self.discretisation(), &[], &nowhere);
+        let operator: CellOperator<f64, D> = cell_operator(&loose, &self.cells, self.penalty.as_ref());
+        let mut forces = vec![0.0; loose.dim()];
+        operator.stokes_of_field(u, p, &mut forces, &mut [], &mut Workspace::default());
+        vector::scale(-1.0, &mut forces);
+        forces
+    }
+
     /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made
     /// to sum to zero: where two bodies share cells without a free node the flow between them is not
     /// constrained, and constants would not quite be in the kernel.
@@ -198,6 +211,7 @@ impl<X: Scalar> Work<X> {
         if let Some(surfaces) = &system.surfaces {
             surfaces.add([u, pressure], [&mut *yu, &mut *yp], work);
         }
+        system.space.clear_held(yu);
         system.reduce_pressures(yp);
     }
 }
@@ -236,7 +250,6 @@ mod tests {
     use crate::space::solid_nodes;
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
-    use gluey_levelset::Ball;
 
     /// Constant pressures do no work on any admissible velocity.
     fn constants_are_in_the_kernel<const D: usize>(cut: CutCellPressures)

@@ -64,5 +64,6 @@ where
             }
         };
         cycle.answer(ru, gradient, zu);
+        system.space.clear_held(zu);
     }
 }

@@ -1,6 +1,6 @@
 //! The rigid motion closest to a velocity field in a weighted mean.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 
 /// Weighted sums over a body.
 #[derive(Clone, Debug)]
@@ -42,12 +42,24 @@ where
     /// Velocity and spin about the centroid of the weights, the velocity then moved to the reference point;
     /// `None` where the weights do not fix them.
     pub fn twist(&self) -> Option<Twist<D>> {
+        self.accelerated(&self.momentum, &self.angular)
+    }
+
+    /// The rigid field `f(r) = A + B x r` of forces per weight that add up to a force and a torque about the
+    /// reference point, as [`Twist`]; `None` where the weights do not fix it. By it the force does the work
+    /// of the wrench on the motion that [`Moments::twist`] finds, in any velocity field.
+    pub fn force_density(&self, wrench: &Wrench<D>) -> Option<Twist<D>> {
+        self.accelerated(&wrench.force, &wrench.torque)
+    }
+
+    /// The rigid field with this linear and angular momentum.
+    fn accelerated(&self, momentum: &Vector<D>, angular: &Spin<D>) -> Option<Twist<D>> {
         if self.mass <= 0.0 {
             return None;
         }
-        let (mean, centroid) = (self.momentum / self.mass, self.first / self.mass);
+        let (mean, centroid) = (momentum / self.mass, self.first / self.mass);
         let second = self.second - centroid * centroid.transpose() * self.mass;
-        let mut angular = self.angular;
+        let mut angular = *angular;
         angular += -(Dim::<D>::moment(&centroid, &mean) * self.mass);
         let spin = solve_inertia::<D>(&second, &angular)?;
         Some(Twist { velocity: mean - Dim::<D>::cross_spin(&spin, &centroid), spin })

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gluey_fem::NodeMap;
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body, Ramp};
 
 use super::moments::Moments;
@@ -100,6 +100,57 @@ where
         velocity: &[f64],
     ) -> Result<Vec<Twist<D>>, StokesError> {
         let mut moments = vec![Moments::<D>::new(); bodies.len()];
+        self.for_each_point(discretisation, bodies, matrices, |point| {
+            let mut u = Vector::<D>::zeros();
+            for (&node, &shape) in point.nodes.iter().zip(point.shapes) {
+                for d in 0..D {
+                    u[d] += shape * velocity[node as usize * D + d];
+                }
+            }
+            moments[point.body].add(point.weight, &point.arm, &u);
+        });
+        each_body(discretisation, bodies, |body| moments[body].twist())
+    }
+
+    /// Nodal loads of forces and torques on the bodies, each as a rigid field of force densities weighted
+    /// with `I`: the transpose of [`SolidRegion::twists`]. Their sum and moment are exact, since shape
+    /// functions reproduce rigid motions.
+    ///
+    /// # Errors
+    /// As for [`SolidRegion::twists`].
+    pub fn loads(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        matrices: &PointMatrices<D>,
+        wrenches: &[Wrench<D>],
+    ) -> Result<Vec<f64>, StokesError> {
+        let mut moments = vec![Moments::<D>::new(); bodies.len()];
+        self.for_each_point(discretisation, bodies, matrices, |point| {
+            moments[point.body].add(point.weight, &point.arm, &Vector::zeros());
+        });
+        let densities =
+            each_body(discretisation, bodies, |body| moments[body].force_density(&wrenches[body]))?;
+        let mut loads = vec![0.0; discretisation.velocity.node_count() * D];
+        self.for_each_point(discretisation, bodies, matrices, |point| {
+            let force = densities[point.body].velocity_at(&point.arm) * point.weight;
+            for (&node, &shape) in point.nodes.iter().zip(point.shapes) {
+                for d in 0..D {
+                    loads[node as usize * D + d] += shape * force[d];
+                }
+            }
+        });
+        Ok(loads)
+    }
+
+    /// Visits the quadrature points with any solid.
+    fn for_each_point(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        matrices: &PointMatrices<D>,
+        mut visit: impl FnMut(&SolidPoint<'_, D>),
+    ) {
         let tree = BallTree::new(bodies);
         for solid in self.cells.iter() {
             let cell = solid.cell as usize;
@@ -108,23 +159,44 @@ where
             let nodes = discretisation.velocity.cell(cell);
             let solid_points = matrices.points().enumerate().filter(|(q, _)| solid.fraction(*q) > 0.0);
             for (q, (x, weight, shapes)) in solid_points {
-                let mut u = Vector::<D>::zeros();
-                for (&node, &shape) in nodes.iter().zip(shapes) {
-                    for d in 0..D {
-                        u[d] += shape * velocity[node as usize * D + d];
-                    }
-                }
                 let position = lower + Vector::from_fn(|d, _| h * x[d]);
                 let Some((body, _)) = tree.nearest(&position) else { continue };
                 let weight = weight * h.powi(D as i32) * solid.fraction(q);
-                moments[body].add(weight, &bodies[body].arm(&position), &u);
+                visit(&SolidPoint { body, weight, arm: bodies[body].arm(&position), nodes, shapes });
             }
         }
-        let cell_size = discretisation.finest_cell_size();
-        let twist = |(body, moments): (usize, &Moments<D>)| {
-            let radius = bodies[body].bounding_radius();
-            moments.twist().ok_or(StokesError::NoSolid { body, radius, cell_size })
-        };
-        moments.iter().enumerate().map(twist).collect()
     }
+}
+
+/// A quadrature point in the solid.
+struct SolidPoint<'a, const D: usize> {
+    /// The nearest body.
+    body: usize,
+    /// Volume times solid fraction.
+    weight: f64,
+    /// From the body's reference point.
+    arm: Vector<D>,
+    /// Nodes of the cell, and their shape functions here.
+    nodes: &'a [u32],
+    shapes: &'a [f64],
+}
+
+/// A rigid motion for each body.
+///
+/// # Errors
+/// [`StokesError::NoSolid`] for a body that has none.
+fn each_body<const D: usize>(
+    discretisation: &Discretisation<D>,
+    bodies: &[Ball<D>],
+    motion: impl Fn(usize) -> Option<Twist<D>>,
+) -> Result<Vec<Twist<D>>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let cell_size = discretisation.finest_cell_size();
+    let of_body = |body: usize| {
+        let radius = bodies[body].bounding_radius();
+        motion(body).ok_or(StokesError::NoSolid { body, radius, cell_size })
+    };
+    (0..bodies.len()).map(of_body).collect()
 }

@@ -132,11 +132,15 @@ where
 {
     let Problem { system, bodies, rigidity } = problem;
     let levels = CycleLevels { meshes: &hierarchy.meshes, radius: problem.largest_radius() };
-    let finest = rigidity.finest_level(problem);
+    let holds_twists = system.space.holds_twists();
+    let mut finest = rigidity.finest_level(problem);
+    finest.hold_twists(holds_twists);
     let correction = rigidity.correction(elements, &finest, levels)?;
     let coarser = hierarchy.meshes[..hierarchy.meshes.len() - 1].iter().map(|mesh| {
         let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, rigidity.coarse_offset());
-        (VelocitySpace::new(mesh, bodies, &solid), false)
+        let mut space = VelocitySpace::new(mesh, bodies, &solid);
+        space.hold_twists(holds_twists);
+        (space, false)
     });
     let spaces = coarser.chain([(finest, true)]);
     let plan = |(space, is_finest)| LevelPlan { space, smoothing: rigidity.smoothing(levels, is_finest) };

@@ -8,7 +8,7 @@ use gluey_levelset::{Ball, Body};
 use gluey_linalg::{AffineConstraints, Scalar, Subset};
 
 use super::aggregates::Aggregates;
-use super::cut_cells::CutCells;
+use super::cut_cells::{CutCell, CutCells};
 use super::penalty::penalties;
 use crate::space::{Discretisation, VelocitySpace};
 
@@ -19,6 +19,8 @@ pub struct SurfaceCoupling<const D: usize> {
     pub cut: CutCells<D>,
     discretisation: Discretisation<D>,
     roots: Vec<u32>,
+    /// `beta h / eta` of each cut cell.
+    penalties: Vec<f64>,
     /// Cut cell and body of each piece.
     pieces: Vec<(u32, u32)>,
     /// The velocity nodes of cut cells in the nodes of the mesh: themselves, or what they take their values
@@ -77,7 +79,9 @@ where
         boundary.sort_unstable();
         boundary.dedup();
         let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
-        let data = PieceData::new(discretisation, bodies, viscosity, &cut, aggregates, [&nodes, &pressures]);
+        let penalties = penalties(discretisation, &cut, aggregates);
+        let medium = (bodies, viscosity);
+        let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
         let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
         let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
@@ -89,6 +93,7 @@ where
         Self {
             discretisation,
             roots,
+            penalties,
             wide,
             narrow,
             pieces,
@@ -111,6 +116,11 @@ where
     /// The cells whose nodes are unknowns and that are cut or carry bad cells, ascending; indices in the mesh.
     pub fn roots(&self) -> &[u32] {
         &self.roots
+    }
+
+    /// `beta h / eta` of a cut cell, by its place among these.
+    pub fn penalty(&self, place: usize) -> f64 {
+        self.penalties[place]
     }
 
     /// Rows of the matrix of a piece.
@@ -230,14 +240,12 @@ where
 {
     fn new(
         discretisation: &'a Discretisation<D>,
-        bodies: &'a [Ball<D>],
-        viscosity: f64,
+        (bodies, viscosity): (&'a [Ball<D>], f64),
         cut: &'a CutCells<D>,
-        aggregates: &Aggregates,
+        beta: &[f64],
         [nodes, pressures]: [&Subset; 2],
     ) -> Self {
-        let beta = penalties(discretisation, cut, aggregates);
-        let of_cell = |(cell, beta): (&super::cut_cells::CutCell<D>, f64)| {
+        let of_cell = |(cell, beta): (&CutCell<D>, &f64)| {
             let surfaces = cell.moments.surfaces.iter();
             surfaces.map(|surface| surface.area.iter().map(|area| beta * area).collect()).collect()
         };

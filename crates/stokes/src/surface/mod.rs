@@ -5,7 +5,9 @@ mod aggregates;
 mod coupling;
 mod cut_cells;
 mod penalty;
+mod traction;
 
 pub use aggregates::Aggregates;
 pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
+pub use traction::first_moments;

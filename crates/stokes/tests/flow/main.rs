@@ -8,6 +8,8 @@ mod exactness;
 mod examples;
 mod forces;
 mod formulations;
+mod laws;
+mod mobility;
 mod operators;
 mod orders;
 mod pairs;

@@ -7,8 +7,9 @@ mod uzawa;
 use gluey_fem::Evaluator;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::{Dim, Space, Twist, Wrench};
 use gluey_levelset::{Ball, Ramp, ViscosityLaw};
+use gluey_linalg::vector;
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
@@ -98,6 +99,20 @@ where
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError> {
         uzawa::solve(&self.params, problem, data, x, solve)
+    }
+
+    /// As forces per unit of volume, spread over the solid.
+    fn add_wrenches(
+        &self,
+        problem: &Problem<D>,
+        wrenches: &[Wrench<D>],
+        b: &mut [f64],
+    ) -> Result<(), StokesError> {
+        let (discretisation, space) = (problem.discretisation(), &problem.system.space);
+        let mut loads = self.region.loads(discretisation, &problem.bodies, &self.matrices, wrenches)?;
+        space.reduce(&mut loads);
+        vector::axpy(1.0, &loads, &mut b[..space.dim()]);
+        Ok(())
     }
 
     fn is_smooth_in_time(&self) -> bool {

@@ -88,7 +88,7 @@ where
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
         let mut diagonal = block_diagonal(space, &cells, smoothed)?;
-        if !smooths_twists {
+        if !smooths_twists || space.holds_twists() {
             diagonal.hold_twists();
         }
         let lambda_max = cell_lambda_max::<D>();

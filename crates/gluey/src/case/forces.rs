@@ -1,0 +1,72 @@
+//! Forces and torques on the particles of a case.
+
+use std::f64::consts::PI;
+
+use gluey_geom::{Dim, Space, Vector, Wrench};
+
+use super::{Case, ParticleSpec};
+
+impl Case {
+    /// Whether anything beside fluid and contact acts on a particle.
+    pub fn has_forces(&self) -> bool {
+        let of_particle = |particle: &ParticleSpec| is_given(&particle.force) || is_given(&particle.torque);
+        is_given(&self.gravity) || self.particles.iter().any(of_particle)
+    }
+
+    /// Force and torque on each particle of a checked case; no entries where there are none on any.
+    pub(crate) fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>>
+    where
+        Dim<D>: Space<D>,
+    {
+        if !self.has_forces() {
+            return Vec::new();
+        }
+        let vector = |numbers: &Option<Vec<f64>>| {
+            numbers.as_ref().map_or(Vector::zeros(), |numbers| Vector::<D>::from_fn(|d, _| numbers[d]))
+        };
+        let gravity = vector(&self.gravity);
+        let wrench = |particle: &ParticleSpec| {
+            let mut torque = Dim::<D>::zero_spin();
+            let numbers = particle.torque.iter().flatten();
+            numbers.enumerate().for_each(|(k, number)| torque[k] = *number);
+            Wrench { force: gravity * volume(D, particle.radius) + vector(&particle.force), torque }
+        };
+        self.particles.iter().map(wrench).collect()
+    }
+}
+
+/// Whether any of the numbers is not zero.
+fn is_given(numbers: &Option<Vec<f64>>) -> bool {
+    numbers.iter().flatten().any(|&number| number != 0.0)
+}
+
+/// Volume of a sphere or area of a disc.
+fn volume(dimension: usize, radius: f64) -> f64 {
+    if dimension == 2 { PI * radius.powi(2) } else { 4.0 / 3.0 * PI * radius.powi(3) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weight_and_force_add_up() {
+        let text = r#"
+            name = "weights"
+            dimension = 2
+            gravity = [0.0, -2.0]
+            particles = [{ position = [0.3, 0.5], radius = 0.1 }, { position = [0.7, 0.5], radius = 0.2 }]
+            time = { step = 1.0, end = 1.0 }"#;
+        let mut case = Case::parse(text, "weights.toml").expect("a good case");
+        case.particles[1].force = Some(vec![0.5, 0.0]);
+        case.particles[1].torque = Some(vec![-0.25]);
+        let wrenches = case.wrenches::<2>();
+        assert!((wrenches[0].force - Vector::<2>::new(0.0, -0.02 * PI)).norm() < 1e-15);
+        assert!((wrenches[1].force - Vector::<2>::new(0.5, -0.08 * PI)).norm() < 1e-15);
+        assert_eq!([wrenches[0].torque[0], wrenches[1].torque[0]], [0.0, -0.25]);
+        case.gravity = Some(vec![0.0, 0.0]);
+        assert!(case.has_forces());
+        case.particles[1] = ParticleSpec::new(vec![0.7, 0.5], 0.2);
+        assert!(!case.has_forces() && case.wrenches::<2>().is_empty());
+    }
+}

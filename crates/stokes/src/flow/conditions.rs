@@ -1,0 +1,109 @@
+//! What drives a flow: boundary, forces, and of the bodies either wrenches or twists.
+
+use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+
+use crate::error::StokesError;
+use crate::formulation::Problem;
+
+/// A vector field in the box.
+pub type Field<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
+
+/// What drives a flow.
+///
+/// Wrenches are those that something other than the fluid exerts on the bodies (weight, contact, a hand that
+/// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the nodes inside.
+#[derive(Clone, Copy)]
+pub struct Conditions<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity on the outer boundary. The same function, which must be divergence-free, is the undisturbed
+    /// flow inside.
+    pub boundary: Field<'a, D>,
+    /// Force per unit of volume, on fluid and bodies alike.
+    pub force: Option<Field<'a, D>>,
+    /// What is known of the bodies.
+    pub bodies: Given<'a, D>,
+}
+
+/// What is known of the bodies, one entry each in their order; the other follows from the flow.
+#[derive(Clone, Copy, Debug)]
+pub enum Given<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Forces and torques on free bodies: the mobility problem. No entries: none on any of them.
+    Wrenches(&'a [Wrench<D>]),
+    /// Velocities and spins of held bodies: the resistance problem.
+    Twists(&'a [Twist<D>]),
+}
+
+impl<'a, const D: usize> Conditions<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Free bodies without forces in a flow with this velocity on the boundary.
+    pub fn boundary(boundary: Field<'a, D>) -> Self {
+        Self { boundary, force: None, bodies: Given::Wrenches(&[]) }
+    }
+
+    /// Free bodies without forces in a box at rest, where nothing moves.
+    pub fn at_rest() -> Self {
+        Self::boundary(&|_| Vector::zeros())
+    }
+
+    /// The same with a force per unit of volume.
+    #[must_use]
+    pub fn with_force(self, force: Option<Field<'a, D>>) -> Self {
+        Self { force, ..self }
+    }
+
+    /// The same with forces and torques on the bodies, which are free.
+    #[must_use]
+    pub fn with_wrenches(self, wrenches: &'a [Wrench<D>]) -> Self {
+        Self { bodies: Given::Wrenches(wrenches), ..self }
+    }
+
+    /// The same with bodies that are held at these twists.
+    #[must_use]
+    pub fn with_twists(self, twists: &'a [Twist<D>]) -> Self {
+        Self { bodies: Given::Twists(twists), ..self }
+    }
+
+    /// The wrenches on the bodies in a flow under these conditions: those given, or what they lack.
+    pub(super) fn wrenches(
+        &self,
+        problem: &Problem<D>,
+        velocity: &[f64],
+        pressure: &[f64],
+    ) -> Result<Vec<Wrench<D>>, StokesError> {
+        match self.bodies {
+            Given::Wrenches([]) => Ok(vec![Wrench::default(); problem.bodies.len()]),
+            Given::Wrenches(wrenches) => Ok(wrenches.to_vec()),
+            Given::Twists(_) => problem.wrenches(velocity, pressure, self.force),
+        }
+    }
+
+    /// Whether the bodies are held.
+    pub(super) fn hold_bodies(&self) -> bool {
+        matches!(self.bodies, Given::Twists(_))
+    }
+
+    /// The field that carries the data, and its residual with the loads.
+    pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+        let mut lift = problem.lift(self.boundary);
+        match self.bodies {
+            Given::Wrenches(wrenches) => {
+                let mut b = problem.right_hand_side(&lift, self.force);
+                problem.add_wrenches(wrenches, &mut b)?;
+                Ok((lift, b))
+            }
+            Given::Twists(twists) => {
+                problem.set_twists(twists, &mut lift)?;
+                let mut b = problem.right_hand_side(&lift, self.force);
+                problem.system.space.clear_held(&mut b);
+                Ok((lift, b))
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Several flows around the same bodies: mobility and resistance.
+//!
+//! In a box at rest the twists `V = (U_1, w_1, U_2, ...)` of the bodies are linear in the forces and torques
+//! `W = (F_1, T_1, F_2, ...)` on them: `V = M W` with the mobility matrix `M`, `W = R V` with the resistance
+//! matrix `R = M^-1`. Both are symmetric by the reciprocal theorem and positive definite, since the power
+//! `W.V` is dissipated (S. Kim and S. J. Karrila, Microhydrodynamics, 1991, chapter 5). In the discrete
+//! system `M` is the block of the inverse matrix that belongs to the twists, so both hold but for the
+//! tolerance of the solves.
+
+use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use nalgebra::DMatrix;
+
+use super::conditions::Conditions;
+use super::{Flow, FlowSolver};
+use crate::error::StokesError;
+use crate::formulation::Problem;
+
+/// Bodies on a mesh with the linear solvers for them: as many flows as wanted, each from a guess of zero and
+/// none dependent on those before.
+pub struct Prepared<'s, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub(super) solver: &'s mut FlowSolver<D>,
+    pub(super) problem: Problem<D>,
+    /// Whether the solvers for free and for held bodies are prepared.
+    pub(super) is_ready: [bool; 2],
+}
+
+impl<const D: usize> Prepared<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow under some conditions, after a preparation of the linear solver at the first one with free
+    /// and the first one with held bodies.
+    ///
+    /// # Errors
+    /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::Unsupported`] for twists in
+    /// a formulation that has no unknowns for them, and the errors of the linear solver.
+    pub fn solve(&mut self, conditions: &Conditions<'_, D>) -> Result<Flow<D>, StokesError> {
+        self.make_ready(conditions)?;
+        let guess = vec![0.0; self.problem.system.dim()];
+        Ok(self.solver.solved(&self.problem, conditions, guess)?.0)
+    }
+
+    /// Holds or frees the bodies and prepares the solver for that, unless it is.
+    pub(super) fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
+        let (hold, which) = (conditions.hold_bodies(), usize::from(conditions.hold_bodies()));
+        self.problem.system.space.hold_twists(hold);
+        if !self.is_ready[which] {
+            self.solver.solvers[which].prepare(&self.problem)?;
+            self.is_ready[which] = true;
+        }
+        Ok(())
+    }
+
+    /// The stresslet of each body in a flow around them: the symmetric, traceless first moment of the force
+    /// that the *fluid exerts on the body*, `S = sym int (sigma.n) r dA`, with `r` from its centre (Batchelor
+    /// 1970, 10.1017/S0022112070000745). A sphere in the strain `E` has `S = (20/3) pi eta a^3 E`. The force
+    /// dipole that the body exerts on the fluid is `-S`.
+    ///
+    /// A force per unit of volume on the fluid next to the body counts as an error of first order in the size
+    /// of the cells there.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] in a formulation without rigid nodes.
+    pub fn stresslets(&self, flow: &Flow<D>) -> Result<Vec<Matrix<D>>, StokesError> {
+        let space = &self.problem.system.space;
+        let mut velocity = flow.velocity.clone();
+        velocity.resize(space.dim(), 0.0);
+        let twists = flow.twists.iter().take(space.body_count());
+        twists.enumerate().for_each(|(body, twist)| space.set_twist(&mut velocity, body, twist));
+        self.problem.rigidity.stresslets(&self.problem, &velocity, &flow.pressure)
+    }
+
+    /// The mobility matrix: velocities and spins (rows) by forces and torques (columns), `D` numbers and the
+    /// spin's for each body in turn. As many solves as it has columns.
+    ///
+    /// # Errors
+    /// Those of [`Prepared::solve`].
+    pub fn mobility(&mut self) -> Result<DMatrix<f64>, StokesError> {
+        self.columns(|prepared, units| {
+            let wrenches: Vec<_> = units.iter().map(|&(force, torque)| Wrench { force, torque }).collect();
+            let flow = prepared.solve(&Conditions::at_rest().with_wrenches(&wrenches))?;
+            Ok(flow.twists.iter().map(|twist| (twist.velocity, twist.spin)).collect())
+        })
+    }
+
+    /// The resistance matrix: forces and torques (rows) by velocities and spins (columns), ordered as in
+    /// [`Prepared::mobility`]. As many solves as it has columns; for one motion of many bodies
+    /// [`Prepared::solve`] with its twists is a single one.
+    ///
+    /// # Errors
+    /// Those of [`Prepared::solve`].
+    pub fn resistance(&mut self) -> Result<DMatrix<f64>, StokesError> {
+        self.columns(|prepared, units| {
+            let twists: Vec<_> = units.iter().map(|&(velocity, spin)| Twist { velocity, spin }).collect();
+            let flow = prepared.solve(&Conditions::at_rest().with_twists(&twists))?;
+            Ok(flow.wrenches.iter().map(|wrench| (wrench.force, wrench.torque)).collect())
+        })
+    }
+
+    /// The matrix whose columns are the responses to unit vectors.
+    fn columns(
+        &mut self,
+        respond: impl Fn(&mut Self, &[Pair<D>]) -> Result<Vec<Pair<D>>, StokesError>,
+    ) -> Result<DMatrix<f64>, StokesError> {
+        let (bodies, rigid) = (self.problem.bodies.len(), Dim::<D>::RIGID);
+        let mut matrix = DMatrix::zeros(bodies * rigid, bodies * rigid);
+        for (column, mut entries) in matrix.column_iter_mut().enumerate() {
+            let mut units = vec![(Vector::zeros(), Dim::<D>::zero_spin()); bodies];
+            set_unit(&mut units[column / rigid], column % rigid);
+            let response = respond(self, &units)?;
+            let numbers = response.iter().flat_map(|(vector, spin)| vector.iter().chain(spin_of(spin)));
+            entries.iter_mut().zip(numbers).for_each(|(entry, number)| *entry = *number);
+        }
+        Ok(matrix)
+    }
+}
+
+/// A velocity and a spin, or a force and a torque.
+type Pair<const D: usize> = (Vector<D>, Spin<D>);
+
+/// Sets number `k` of a pair of zeros to one.
+fn set_unit<const D: usize>((vector, spin): &mut Pair<D>, k: usize)
+where
+    Dim<D>: Space<D>,
+{
+    match k.checked_sub(D) {
+        Some(k) => spin[k] = 1.0,
+        None => vector[k] = 1.0,
+    }
+}
+
+fn spin_of<const D: usize>(spin: &Spin<D>) -> &[f64]
+where
+    Dim<D>: Space<D>,
+{
+    Dim::<D>::spin_slice(spin)
+}

@@ -1,0 +1,127 @@
+//! The bodies' entries of reduced vectors: twists, forces and torques, and twists that are data.
+
+use gluey_geom::{Dim, Space, Twist, Wrench};
+use gluey_linalg::Scalar;
+
+use super::VelocitySpace;
+
+impl<const D: usize> VelocitySpace<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The twist of a body in a reduced vector.
+    pub fn twist<T: Scalar>(&self, x: &[T], body: usize) -> Twist<D> {
+        let entries = &x[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        let mut twist = Twist::default();
+        for c in 0..D {
+            twist.velocity[c] = entries[c].to_f64();
+        }
+        for k in 0..Dim::<D>::ROT {
+            twist.spin[k] = entries[D + k].to_f64() / self.radius[body];
+        }
+        twist
+    }
+
+    /// Writes the twist of a body into a reduced vector.
+    pub fn set_twist<T: Scalar>(&self, x: &mut [T], body: usize, twist: &Twist<D>) {
+        let entries = &mut x[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        for c in 0..D {
+            entries[c] = T::from_f64(twist.velocity[c]);
+        }
+        for k in 0..Dim::<D>::ROT {
+            entries[D + k] = T::from_f64(twist.spin[k] * self.radius[body]);
+        }
+    }
+
+    /// Adds force and torque on a body to a reduced load. What does the work on `s w` is the torque over `s`.
+    pub fn add_wrench(&self, load: &mut [f64], body: usize, wrench: &Wrench<D>) {
+        let rows = &mut load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        for c in 0..D {
+            rows[c] += wrench.force[c];
+        }
+        for k in 0..Dim::<D>::ROT {
+            rows[D + k] += wrench.torque[k] / self.radius[body];
+        }
+    }
+
+    /// Force and torque on a body in a reduced load.
+    pub fn wrench(&self, load: &[f64], body: usize) -> Wrench<D> {
+        let rows = &load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        let mut wrench = Wrench::default();
+        wrench.force.copy_from_slice(&rows[..D]);
+        for k in 0..Dim::<D>::ROT {
+            wrench.torque[k] = rows[D + k] * self.radius[body];
+        }
+        wrench
+    }
+
+    /// Makes the twists data, which are zero in reduced vectors, or unknowns again. Vectors keep their length
+    /// and maps what they do, but for projections, which leave twists at zero; operators and solvers leave
+    /// out their rows and columns.
+    pub fn hold_twists(&mut self, hold: bool) {
+        self.holds_twists = hold;
+    }
+
+    /// Whether the twists are data.
+    pub fn holds_twists(&self) -> bool {
+        self.holds_twists
+    }
+
+    /// Clears the twists of a reduced vector where they are data.
+    pub fn clear_held<T: Scalar>(&self, x: &mut [T]) {
+        if self.holds_twists {
+            x[self.full_dim()..self.dim()].fill(T::ZERO);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::space;
+    use super::*;
+    use gluey_geom::{Spin, Vector};
+
+    #[test]
+    fn twists_survive_storage() {
+        let space = space::<3>();
+        let twist = Twist { velocity: Vector::<3>::new(1.0, 2.0, 3.0), spin: Spin::<3>::new(-0.5, 0.1, 0.2) };
+        let mut x = vec![0.0; space.dim()];
+        space.set_twist(&mut x, 1, &twist);
+        let back = space.twist(&x, 1);
+        assert!((back.velocity - twist.velocity).norm() + (back.spin - twist.spin).norm() < 1e-15);
+        space.expand(&mut x);
+        let rim = (0..space.nodes().node_count()).find(|&n| space.body_of(n) == Some(1)).unwrap();
+        let arm = space.nodes().point(rim) - Vector::<3>::repeat(0.7);
+        let want = twist.velocity_at(&arm);
+        assert!((0..3).all(|c| (x[rim * 3 + c] - want[c]).abs() < 1e-14));
+    }
+
+    /// The load of a wrench does the work of the wrench.
+    fn wrenches_work<const D: usize>()
+    where
+        Dim<D>: Space<D>,
+    {
+        let space = space::<D>();
+        let (mut twist, mut wrench) = (Twist::default(), Wrench::default());
+        twist.velocity = Vector::<D>::from_fn(|d, _| 0.3 - d as f64);
+        wrench.force = Vector::<D>::from_fn(|d, _| 1.0 + d as f64);
+        for k in 0..Dim::<D>::ROT {
+            (twist.spin[k], wrench.torque[k]) = (0.7 + k as f64, -0.4 * k as f64 + 2.0);
+        }
+        let (mut x, mut load) = (vec![0.0; space.dim()], vec![0.0; space.dim()]);
+        space.set_twist(&mut x, 1, &twist);
+        space.add_wrench(&mut load, 1, &wrench);
+        let work: f64 = x.iter().zip(&load).map(|(x, f)| x * f).sum();
+        assert!((work - wrench.power(&twist)).abs() < 1e-14);
+        let back = space.wrench(&load, 1) - wrench;
+        assert!(
+            back.force.amax() < 1e-15 && Dim::<D>::spin_slice(&back.torque).iter().all(|t| t.abs() < 1e-15)
+        );
+    }
+
+    #[test]
+    fn loads_of_wrenches_do_their_work() {
+        wrenches_work::<2>();
+        wrenches_work::<3>();
+    }
+}

@@ -1,0 +1,96 @@
+//! First moments of the tractions on the surfaces.
+
+use gluey_fem::cut::POINTS;
+use gluey_fem::element::{gauss_cube, gradient, node_count, value};
+use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_levelset::{Ball, Body};
+
+use super::coupling::SurfaceCoupling;
+use crate::space::{Discretisation, VelocitySpace};
+
+/// A field at a point of a cut cell, and the weights there.
+struct Sample<const D: usize> {
+    velocity: Vector<D>,
+    /// Twice the strain in the unit cube.
+    strain: Matrix<D>,
+    pressure: f64,
+}
+
+/// Shape functions at the points of a cell.
+struct Shapes<const D: usize> {
+    points: Vec<[f64; D]>,
+    velocity: Vec<Vec<(f64, [f64; D])>>,
+    pressure: Vec<Vec<f64>>,
+}
+
+impl<const D: usize> Shapes<D> {
+    fn new() -> Self {
+        let points: Vec<[f64; D]> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.0).collect();
+        let of_velocity = |x: &[f64; D]| {
+            (0..node_count::<D>(2)).map(|i| (value::<D>(2, i, x), gradient::<D>(2, i, x))).collect()
+        };
+        let of_pressure = |x: &[f64; D]| (0..node_count::<D>(1)).map(|i| value::<D>(1, i, x)).collect();
+        Self {
+            velocity: points.iter().map(of_velocity).collect(),
+            pressure: points.iter().map(of_pressure).collect(),
+            points,
+        }
+    }
+
+    fn sample(
+        &self,
+        discretisation: &Discretisation<D>,
+        cell: usize,
+        point: usize,
+        [velocity, pressure]: [&[f64]; 2],
+    ) -> Sample<D> {
+        let mut sample = Sample { velocity: Vector::zeros(), strain: Matrix::zeros(), pressure: 0.0 };
+        let nodes = discretisation.velocity.cell(cell);
+        for (&node, (shape, slope)) in nodes.iter().zip(&self.velocity[point]) {
+            let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
+            sample.velocity += u * *shape;
+            let gradient = u * Vector::<D>::from_column_slice(slope).transpose();
+            sample.strain += gradient + gradient.transpose();
+        }
+        let nodes = discretisation.pressure.cell(cell).iter().zip(&self.pressure[point]);
+        sample.pressure = nodes.map(|(&node, shape)| shape * pressure[node as usize]).sum();
+        sample
+    }
+}
+
+/// `int_G t r` for the traction `t = sigma n` on each body, `n` out of it, and the arm `r` from its centre, of
+/// a nodal field with all constraints fulfilled and the pressures at all nodes. The traction is the one that
+/// balances the forces: with the penalty in it.
+pub fn first_moments<const D: usize>(
+    surfaces: &SurfaceCoupling<D>,
+    space: &VelocitySpace<D>,
+    bodies: &[Ball<D>],
+    viscosity: f64,
+    [velocity, pressure]: [&[f64]; 2],
+) -> Vec<Matrix<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = space.discretisation();
+    let shapes = Shapes::<D>::new();
+    let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
+    for (place, cut) in surfaces.cut.cells.iter().enumerate() {
+        let cell = cut.cell as usize;
+        let h = discretisation.cell_size(cell);
+        let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
+        for (q, at) in shapes.points.iter().enumerate() {
+            let sample = shapes.sample(discretisation, cell, q, [velocity, pressure]);
+            for ((&body, ball), surface) in cut.bodies.iter().zip(&cut.balls).zip(&cut.moments.surfaces) {
+                let arm = Vector::<D>::from_fn(|d, _| h * (at[d] - ball.center[d]));
+                let motion = space.twist(velocity, body as usize).velocity_at(&arm);
+                let normal = Vector::<D>::from_column_slice(&surface.normal[q]);
+                let penalty = surfaces.penalty(place) * surface.area[q];
+                let viscous = (sample.velocity - motion) * penalty - sample.strain * normal;
+                let traction = viscous * stress + normal * (area * sample.pressure);
+                debug_assert!((ball.radius * h - bodies[body as usize].bounding_radius()).abs() < 1e-9);
+                moments[body as usize] += traction * arm.transpose();
+            }
+        }
+    }
+    moments
+}
