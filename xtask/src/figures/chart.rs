@@ -41,7 +41,7 @@ pub struct Curve {
     pub pieces: Vec<Vec<(f64, f64)>>,
 }
 
-/// One axis.
+/// One axis; a logarithmic one begins and ends at whole powers of ten where it has to be read.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Label with the markup of [`super::text`].
@@ -74,10 +74,18 @@ pub struct Chart {
 /// A dot with a label.
 #[derive(Clone, Debug)]
 pub struct Mark {
-    /// Where, in data coordinates (linear axes).
+    /// Where, in data coordinates.
     pub at: (f64, f64),
-    /// Text with the markup of [`super::text`].
+    /// Text with the markup of [`super::text`]; may be empty.
     pub label: String,
+}
+
+impl Axis {
+    /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
+    fn fraction(&self, value: f64) -> f64 {
+        let scale = |x: f64| if self.log { x.log10() } else { x };
+        (scale(value) - scale(self.min)) / (scale(self.max) - scale(self.min))
+    }
 }
 
 /// Stacks charts of equal width, the legend of all of them on top, into one SVG canvas.
@@ -116,7 +124,6 @@ impl Chart {
             .with_x_axis_max(self.x.max)
             .with_y_axis_min(self.y.min)
             .with_y_axis_max(self.y.max)
-            .with_x_tick_step(self.x.tick)
             .with_x_label(&*self.x.label)
             .with_y_label(&*self.y.label)
             .with_font_family(FONT_FAMILY)
@@ -128,6 +135,7 @@ impl Chart {
             .with_tick_pos("both")
             .with_x_tick_format(tick_format(&self.x))
             .with_y_tick_format(tick_format(&self.y));
+        layout = if self.x.log { layout.with_log_x() } else { layout.with_x_tick_step(self.x.tick) };
         layout = if self.y.log { layout.with_log_y() } else { layout.with_y_tick_step(self.y.tick) };
         SvgBackend::new().render_scene(&render_multiple(plots, layout))
     }
@@ -137,18 +145,17 @@ impl Chart {
         if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
     }
 
-    /// Where a point (linear axes) lies on a canvas of this height that has only this chart, with equal
-    /// scales.
+    /// Where a point lies on a canvas of this height that has only this chart, with equal scales.
     pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_height = equal_aspect_height(self);
         self.point(canvas_height - self.margin_bottom() - frame_height, frame_height, at)
     }
 
-    /// A point (linear axes) in a frame of this height whose upper edge is at `top`.
+    /// A point in a frame of this height whose upper edge is at `top`.
     fn point(&self, top: f64, frame_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
-        let x = MARGIN_LEFT + frame_width * (at.0 - self.x.min) / (self.x.max - self.x.min);
-        (x, top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min))
+        let x = MARGIN_LEFT + frame_width * self.x.fraction(at.0);
+        (x, top + frame_height * (1.0 - self.y.fraction(at.1)))
     }
 
     /// Draws the marks over a frame whose upper edge is at `top`, their labels where curves leave room.
@@ -158,6 +165,9 @@ impl Chart {
         for Mark { at, label } in &self.marks {
             let dot = self.point(top, frame_height, *at);
             canvas.circle(dot, 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
+            if label.is_empty() {
+                continue;
+            }
             let (x, y) = place_of_label(dot, &taken);
             canvas.text(x, y + 0.35 * MARK_SIZE, MARK_SIZE, "middle", label);
         }

@@ -1,0 +1,105 @@
+//! Orders in time of the integrators, with exact velocities.
+
+use gluey_geom::{Particle, Twist, Vector};
+use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+use gluey_testkit::convergence_order;
+use gluey_testkit::reference::pair_3d_trajectory_unbounded;
+
+use crate::case::{Case, Extent, Number, Table, Tables, Task, VerifyError};
+use crate::plot::{Curve, Plot};
+
+const RADIUS: f64 = 0.05;
+/// Steps to the end of the encounter.
+const STEPS: [u32; 4] = [400, 800, 1600, 3200];
+const SCHEMES: [(&str, Scheme); 2] =
+    [("euler", Scheme::Euler), ("adams-bashforth-2", Scheme::AdamsBashforth2)];
+
+/// The chapter.
+pub const CASE: Case = Case {
+    name: "integrator",
+    title: "Order in time",
+    text: "The encounter of two spheres in unbounded shear (paper, figure 7) with exact velocities (Batchelor and Green 1972), \
+           from the first to the last row of data/reference/pair3d_trajectory_unbounded.csv (1e-8): distance of a centre from \
+           where it should be at the end, and from where it began after the shear was reversed and as many steps were made \
+           back, in radii. Euler has order 1, Adams-Bashforth 2 order 2.",
+    keys: &["time step"],
+    measures: &["end", "return"],
+    tasks,
+    numbers,
+    plot,
+};
+
+fn tasks(_: Extent) -> Vec<Task> {
+    let all = SCHEMES.into_iter().flat_map(|scheme| STEPS.map(|steps| (scheme, steps)));
+    all.map(|((name, scheme), steps)| {
+        let end = pair_3d_trajectory_unbounded().and_then(|table| Ok(last(table.column("t")?)));
+        let step = end.map_or(f64::NAN, |end| end / f64::from(steps));
+        Task::new(name, &[step], move || measure(scheme, step, steps))
+    })
+    .collect()
+}
+
+fn last(column: &[f64]) -> f64 {
+    column.last().copied().unwrap_or(f64::NAN)
+}
+
+fn measure(scheme: Scheme, step: f64, steps: u32) -> Result<Vec<f64>, VerifyError> {
+    let reference = pair_3d_trajectory_unbounded()?;
+    let exact = Vector::<3>::new(last(reference.column("x1")?), last(reference.column("y1")?), 0.5);
+    let starts = [Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)];
+    let mut particles = starts.map(|x| Particle::new(x, RADIUS));
+    let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
+    let mut integrator = Integrator::new(scheme);
+    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    let end = (particles[0].pose.position - exact).norm() / RADIUS;
+    flow.set_shear_factor(-1.0);
+    integrator.reverse();
+    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    Ok(vec![end, (particles[0].pose.position - starts[0]).norm() / RADIUS])
+}
+
+fn advance(
+    flow: &mut PairMobility,
+    integrator: &mut Integrator<3>,
+    particles: &mut [Particle<3>; 2],
+    step: f64,
+    steps: u32,
+) -> Result<(), VerifyError> {
+    let mut twists = [Twist::default(); 2];
+    for n in 0..steps {
+        flow.predict(step * f64::from(n), particles, &mut twists)?;
+        integrator.advance(step, particles, &twists);
+    }
+    Ok(())
+}
+
+fn points(table: &Table, measure: &str, scheme: &str) -> Vec<(f64, f64)> {
+    table.values("time step", scheme, &[]).into_iter().zip(table.values(measure, scheme, &[])).collect()
+}
+
+fn numbers(tables: &Tables) -> Vec<Number> {
+    let table = tables.of(CASE.name);
+    let mut numbers = Vec::new();
+    for measure in CASE.measures {
+        for (method, _) in SCHEMES {
+            let (steps, errors): (Vec<f64>, Vec<f64>) = points(&table, measure, method).into_iter().unzip();
+            let what = format!("order of the error at the {measure}");
+            numbers.push(Number { what, method, value: convergence_order(&steps, &errors) });
+            let what = format!("error at the {measure}, smallest step");
+            numbers.push(Number { what, method, value: last(&errors) });
+        }
+    }
+    numbers
+}
+
+fn plot(tables: &Tables) -> Plot {
+    let table = tables.of(CASE.name);
+    let curve = |color: usize, dashes: usize| Curve {
+        label: format!("{}, {}", SCHEMES[color].0, CASE.measures[dashes]),
+        color,
+        dashes,
+        points: points(&table, CASE.measures[dashes], SCHEMES[color].0).into_iter().rev().collect(),
+    };
+    let curves = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(color, dashes)| curve(color, dashes));
+    Plot { x: "time step", y: "error in radii", curves: curves.to_vec() }
+}
