@@ -27,7 +27,7 @@ pub struct Curve {
 }
 
 impl Plot {
-    /// One curve for each formulation and each of several things: `points` gives it.
+    /// One curve for each formulation and each of several things, where `points` gives it any.
     pub fn of_methods(
         x: &'static str,
         y: &'static str,
@@ -42,6 +42,6 @@ impl Plot {
         };
         let of_method = |color: usize| (0..things.len()).map(move |thing| (color, thing));
         let curves = (0..METHODS.len()).flat_map(of_method).map(|(color, thing)| curve(color, thing));
-        Self { x, y, curves: curves.collect() }
+        Self { x, y, curves: curves.filter(|curve| curve.points.iter().any(|p| p.1.is_finite())).collect() }
     }
 }

@@ -41,7 +41,7 @@ pub struct Curve {
     pub pieces: Vec<Vec<(f64, f64)>>,
 }
 
-/// One axis; a logarithmic one begins and ends at whole powers of ten where it has to be read.
+/// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Label with the markup of [`super::text`].
@@ -81,6 +81,14 @@ pub struct Mark {
 }
 
 impl Axis {
+    /// A logarithmic axis around these values, from a whole power of ten to a whole power of ten.
+    pub fn decades(label: &str, low: f64, high: f64) -> Self {
+        let (first, last) = ((low.log10() + 1e-9).floor(), (high.log10() - 1e-9).ceil());
+        let decade = |exponent: f64| 10f64.powf(exponent);
+        let max = decade(last.max(first + 1.0));
+        Self { label: label.to_owned(), min: decade(first), max, tick: 1.0, log: true }
+    }
+
     /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
     fn fraction(&self, value: f64) -> f64 {
         let scale = |x: f64| if self.log { x.log10() } else { x };
@@ -133,7 +141,7 @@ impl Chart {
             .with_box_axes()
             .with_tick_align("inside")
             .with_tick_pos("both")
-            .with_x_tick_format(tick_format(&self.x))
+            .with_x_tick_format(if few_decades(&self.x) { plain() } else { tick_format(&self.x) })
             .with_y_tick_format(tick_format(&self.y));
         layout = if self.x.log { layout.with_log_x() } else { layout.with_x_tick_step(self.x.tick) };
         layout = if self.y.log { layout.with_log_y() } else { layout.with_y_tick_step(self.y.tick) };
@@ -250,6 +258,16 @@ fn power_of_ten(value: f64) -> String {
         return String::new();
     }
     format!("10^{{{}}}", format!("{exponent:.0}").replace("-0", "0").replace('-', "\u{2212}"))
+}
+
+/// Whether an axis is logarithmic and so short that its ticks between powers of ten have room for a number.
+fn few_decades(axis: &Axis) -> bool {
+    axis.log && axis.min > 0.9e-3 && axis.max < 1.1e3 && axis.max < 1.1e3 * axis.min
+}
+
+/// Ticks as decimals with as many digits as they have.
+fn plain() -> TickFormat {
+    TickFormat::Custom(Arc::new(|value| format!("{}", (value * 1e6).round() / 1e6)))
 }
 
 /// Ticks: decimals as the step needs on a linear axis, powers of ten on a logarithmic one.

@@ -35,13 +35,10 @@ fn curve(curve: &gluey_verify::Curve) -> Curve {
     Curve { label: Some(curve.label.clone()), stroke, pieces: vec![points.collect()] }
 }
 
-/// From a whole power of ten to a whole power of ten.
+/// The axis that holds all values.
 fn axis(label: &str, values: impl Iterator<Item = f64> + Clone) -> Axis {
-    let (low, high) =
-        (values.clone().reduce(f64::min).unwrap_or(1.0), values.reduce(f64::max).unwrap_or(1.0));
-    let (first, last) = ((low.log10() + 1e-9).floor(), (high.log10() - 1e-9).ceil());
-    let last = last.max(first + 1.0);
-    Axis { label: label.to_owned(), min: 10f64.powf(first), max: 10f64.powf(last), tick: 1.0, log: true }
+    let (low, high) = (values.clone().reduce(f64::min), values.reduce(f64::max));
+    Axis::decades(label, low.unwrap_or(1.0), high.unwrap_or(1.0))
 }
 
 #[cfg(test)]

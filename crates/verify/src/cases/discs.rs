@@ -40,8 +40,8 @@ pub const CASE: Case = Case {
 /// Cells per radius of the meshes of an extent.
 fn cells_per_radius(extent: Extent) -> &'static [f64] {
     match extent {
-        Extent::Quick => &[3.2, 6.4],
-        Extent::Full => &[3.2, 6.4, 12.8],
+        Extent::Quick => &[3.2, 6.4, 12.8],
+        Extent::Full => &[3.2, 6.4, 12.8, 25.6],
     }
 }
 
@@ -133,8 +133,8 @@ fn numbers(tables: &Tables) -> Vec<Number> {
 
 fn plot(tables: &Tables) -> Plot {
     let table = tables.of(CASE.name);
-    let cells = [3.2, 6.4, 12.8];
-    let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8"];
+    let cells = [3.2, 6.4, 12.8, 25.6];
+    let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8", "*a*/*h* = 25.6"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {
         let at = |gap| [("refined film", 0.0), ("a/h", cells[thing]), ("gap", gap), ("angle", PRESSED)];
         GAPS.map(|gap| (gap, rms(&table.values("approach", method, &at(gap))))).to_vec()

@@ -129,7 +129,14 @@ where
     let of_strain = if D == 2 { 4.0 } else { 20.0 / 3.0 } * std::f64::consts::PI * far.strain.norm_squared();
     let stresslet = lattice.stresslet(&flow, &boundary, &far.strain) / of_strain - 1.0;
     let errors = errors(&flow, exact, &[ball]);
-    Ok(vec![twist.velocity.norm(), turned, stresslet, errors.velocity, errors.largest, errors.pressure])
+    Ok(vec![
+        twist.velocity.norm(),
+        turned,
+        stresslet,
+        errors.velocity,
+        errors.largest,
+        errors.pressure / errors.pressure_scale,
+    ])
 }
 
 /// The mesh with as few roots as possible.

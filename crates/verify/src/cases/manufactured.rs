@@ -20,7 +20,7 @@ pub const CASE: Case = Case {
     text: "The flow of the stream function g(x) g(y), g(t) = t^2 (1-t)^2 (in 3D the curl of g(x) g(y) g(z) (1, 1, 1)), with the \
            pressure xy - 1/4 (xyz - 1/8) plus the sum of cos(pi x_d), under the body force that makes it a solution; on \
            uniform meshes and on meshes with half the cell size in one corner (hanging nodes). Errors are relative, in the \
-           mean square. Q2-Q1 elements have order 3 in the velocity and 2 in the pressure.",
+           mean square; orders are those between the two finest meshes. Q2-Q1 elements have order 3 in the velocity and 2 in the pressure.",
     keys: &["dimension", "hanging nodes", "h"],
     measures: &["velocity", "pressure"],
     tasks,
@@ -30,8 +30,8 @@ pub const CASE: Case = Case {
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let (plane, space): (&[u8], &[u8]) = match extent {
-        Extent::Quick => (&[3, 4, 5], &[2, 3]),
-        Extent::Full => (&[3, 4, 5, 6], &[2, 3, 4]),
+        Extent::Quick => (&[3, 4, 5], &[2, 3, 4]),
+        Extent::Full => (&[3, 4, 5, 6], &[2, 3, 4, 5]),
     };
     let mut tasks = Vec::new();
     for method in METHODS {
@@ -72,7 +72,7 @@ where
     let mut solver = FlowSolver::new(method.params::<D>(1e-9))?;
     let flow = solver.solve_forced(mesh, &[], &boundary, Some(&force))?;
     let errors = errors(&flow, &FLOW, &[]);
-    Ok(vec![errors.velocity, errors.pressure])
+    Ok(vec![errors.velocity, errors.pressure / errors.pressure_scale])
 }
 
 fn numbers(tables: &Tables) -> Vec<Number> {
@@ -88,7 +88,8 @@ fn numbers(tables: &Tables) -> Vec<Number> {
                     method.name,
                     &[("dimension", dimension), ("hanging nodes", hanging)],
                 );
-                let (sizes, errors): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+                let finest = &points[points.len().saturating_sub(2)..];
+                let (sizes, errors): (Vec<f64>, Vec<f64>) = finest.iter().copied().unzip();
                 let what = format!("order of the {measure}, {dimension}D, {mesh}");
                 Number { what, method: method.name, value: convergence_order(&sizes, &errors) }
             }));

@@ -36,8 +36,8 @@ pub const CASE: Case = Case {
 /// Cells per radius, and positions of the lattice.
 fn meshes(extent: Extent) -> &'static [(f64, usize)] {
     match extent {
-        Extent::Quick => &[(1.6, 3), (3.2, 2)],
-        Extent::Full => &[(1.6, 27), (3.2, 9)],
+        Extent::Quick => &[(1.6, 8), (3.2, 6)],
+        Extent::Full => &[(1.6, 27), (3.2, 27), (6.4, 8)],
     }
 }
 
@@ -92,8 +92,8 @@ fn numbers(tables: &Tables) -> Vec<Number> {
 
 fn plot(tables: &Tables) -> Plot {
     let table = tables.of(CASE.name);
-    let cells = [1.6, 3.2];
-    let things = ["*a*/*h* = 1.6", "*a*/*h* = 3.2"];
+    let cells = [1.6, 3.2, 6.4];
+    let things = ["*a*/*h* = 1.6", "*a*/*h* = 3.2", "*a*/*h* = 6.4"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {
         let error = |gap| rms(&table.values("approach", method, &[("a/h", cells[thing]), ("gap", gap)]));
         GAPS.map(|gap| (gap, error(gap))).to_vec()
