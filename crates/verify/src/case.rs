@@ -9,6 +9,7 @@ use gluey_stokes::fem::MeshError;
 use gluey_testkit::reference::TableError;
 
 use crate::clock::CpuClock;
+use crate::number::Number;
 use crate::plot::Plot;
 
 /// How much is computed.
@@ -191,17 +192,6 @@ impl Tables {
     pub fn of(&self, name: &str) -> Table {
         self.0.get(name).cloned().unwrap_or_default()
     }
-}
-
-/// A number that is judged.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Number {
-    /// What it is, in words; names it in `limits.csv`.
-    pub what: String,
-    /// Name of the formulation.
-    pub method: &'static str,
-    /// The number.
-    pub value: f64,
 }
 
 #[cfg(test)]

@@ -24,14 +24,16 @@ mod clock;
 mod limits;
 mod method;
 mod norms;
+mod number;
 mod plot;
 mod set_up;
 mod statistics;
 mod verdict;
 
-pub use case::{CPU_TIME, Case, Extent, Number, Row, Table, Tables, Task, VerifyError};
+pub use case::{CPU_TIME, Case, Extent, Row, Table, Tables, Task, VerifyError};
 pub use cases::CASES;
-pub use limits::{Judged, Limit, LimitError, judge, limits};
+pub use limits::{Judged, Limit, LimitError, judge, limits, proposal};
 pub use method::{METHODS, Method};
+pub use number::{Kind, Number};
 pub use plot::{Curve, Plot};
 pub use verdict::{Outcome, Wanted};

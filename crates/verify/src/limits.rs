@@ -2,9 +2,11 @@
 //!
 //! A line is `case; number; formulation; wanted; limit; from; reason`: wanted is `at least`, `at most` or
 //! `within` (of zero), from is `quick` or `full`, the first extent that measures it. A line whose number is
-//! not measured fails; a number without a line is shown and decides nothing.
+//! not measured fails; a number without a line is shown and decides
+//! nothing.
 
-use crate::case::{Extent, Number};
+use crate::case::Extent;
+use crate::number::{Kind, Number};
 use crate::verdict::{Outcome, Wanted};
 
 /// The limit of a number.
@@ -96,6 +98,31 @@ fn limit(line: &str) -> Result<Limit, &'static str> {
     Ok(Limit { case, what, method, wanted, from, reason })
 }
 
+/// The line that would limit a number to twice what it is, or to 0.9 of an order; `None` where nothing is
+/// wanted of it. What is nothing but rounding may be as large as [`ROUNDING`].
+pub fn proposal(case: &str, number: &Number, from: Extent) -> Option<String> {
+    let twice = round_up(2.0 * number.value.abs().max(0.5 * ROUNDING));
+    let (wanted, limit) = match number.kind {
+        Kind::Order => ("at least", (9.0 * number.value).floor() / 10.0),
+        Kind::Error => ("within", twice),
+        Kind::Size => ("at most", twice),
+        Kind::Remark => return None,
+    };
+    let from = if from == Extent::Quick { "quick" } else { "full" };
+    let Number { what, method, .. } = number;
+    Some(format!("{case}; {what}; {method}; {wanted}; {limit:?}; {from};"))
+}
+
+/// Smallest limit of an error.
+const ROUNDING: f64 = 1e-11;
+
+/// The next number with two digits.
+fn round_up(value: f64) -> f64 {
+    let exponent = value.log10().floor() - 1.0;
+    let digits = (value / 10f64.powf(exponent) - 1e-9).ceil();
+    format!("{digits}e{exponent}").parse().unwrap_or(value)
+}
+
 /// Judges the numbers of a case: those measured, then those that should have been.
 pub fn judge(case: &str, numbers: &[Number], limits: &[Limit], extent: Extent) -> Vec<Judged> {
     let limits: Vec<&Limit> = limits.iter().filter(|limit| limit.case == case).collect();
@@ -131,7 +158,7 @@ mod tests {
                          disc; speed; soft; at most; 2; full;\n";
 
     fn number(what: &str, value: f64) -> Number {
-        Number { what: what.to_owned(), method: "soft", value }
+        Number::new(Kind::Error, what.to_owned(), "soft", value)
     }
 
     #[test]
@@ -172,6 +199,29 @@ mod tests {
         assert_eq!(fails(&[], Extent::Quick), 1);
         assert_eq!(fails(&[number("spin", 0.0)], Extent::Full), 1, "the speed is due");
         assert_eq!(fails(&[number("spin", 0.0), number("speed", 2.5)], Extent::Full), 1);
+    }
+
+    #[test]
+    fn a_proposal_is_a_line_that_lets_its_number_pass() {
+        let kinds = [
+            (Kind::Error, -0.0123, "within; 0.025"),
+            (Kind::Size, 0.5, "at most; 1.0"),
+            (Kind::Order, 2.97, "at least; 2.6"),
+        ];
+        for (kind, value, expected) in kinds {
+            let number = Number::new(kind, "spin".to_owned(), "soft", value);
+            let line = proposal("disc", &number, Extent::Quick).unwrap();
+            assert_eq!(line, format!("disc; spin; soft; {expected}; quick;"));
+            let limits = parse(&line).unwrap();
+            assert!(!judge("disc", &[number], &limits, Extent::Quick)[0].is_failure());
+        }
+        let seconds = Number::new(Kind::Remark, "seconds".to_owned(), "soft", 1.0);
+        assert_eq!(proposal("cost", &seconds, Extent::Full), None);
+        let nothing = Number::new(Kind::Size, "turn".to_owned(), "soft", 0.0);
+        assert_eq!(
+            proposal("symmetry", &nothing, Extent::Full).unwrap(),
+            "symmetry; turn; soft; at most; 1e-11; full;"
+        );
     }
 
     #[test]

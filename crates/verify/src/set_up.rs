@@ -2,12 +2,12 @@
 
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
+use gluey_stokes::fem::TreeMesh;
 use gluey_stokes::{Flow, FlowSolver, Refinement};
 
-use gluey_stokes::fem::TreeMesh;
-
-use crate::case::{Number, Table, VerifyError};
+use crate::case::{Table, VerifyError};
 use crate::method::Method;
+use crate::number::Number;
 use crate::statistics::{mean, scatter};
 
 /// Radius of the discs in the reference data.
@@ -67,7 +67,7 @@ pub struct PairMotion {
     pub normal_speed: f64,
     /// Rate at which the line of centres turns.
     pub line_rotation: f64,
-    /// Mean of the spins about the axis of vorticity.
+    /// Spin of the first ball about the axis of vorticity.
     pub spin: f64,
 }
 
@@ -80,11 +80,10 @@ impl PairMotion {
         let line = centers[1] - centers[0];
         let e = line.normalize();
         let relative = twists[1].velocity - twists[0].velocity;
-        let spin = |body: usize| twists[body].spin[Dim::<D>::ROT - 1];
         Self {
             normal_speed: relative.dot(&e),
             line_rotation: (e[0] * relative[1] - e[1] * relative[0]) / line.norm(),
-            spin: 0.5 * (spin(0) + spin(1)),
+            spin: twists[0].spin[Dim::<D>::ROT - 1],
         }
     }
 }
@@ -98,11 +97,7 @@ pub fn mean_and_scatter(
     name: &str,
 ) -> [Number; 2] {
     let values = table.values(measure, method, at);
-    [("mean error", mean(&values)), ("scatter", scatter(&values))].map(|(statistic, value)| Number {
-        what: format!("{name}, {statistic}"),
-        method,
-        value,
-    })
+    Number::mean_and_scatter(name, method, mean(&values), scatter(&values))
 }
 
 #[cfg(test)]

@@ -10,7 +10,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use gluey_verify::{CASES, Case, Extent, Judged, LimitError, Outcome, Row, Table, Tables, Task, VerifyError};
+use gluey_verify::{
+    CASES, Case, Extent, Judged, Limit, LimitError, Outcome, Row, Table, Tables, Task, VerifyError,
+};
 
 use crate::book::files::{self, WriteError};
 use crate::book::schedule::{self, JobError};
@@ -57,6 +59,8 @@ pub struct Chapter {
     pub case: &'static Case,
     /// Its numbers with what is said of them.
     pub judged: Vec<Judged>,
+    /// Lines for `limits.csv`, for the numbers that it does not have.
+    pub proposals: Vec<String>,
     /// Its picture.
     pub drawing: Canvas,
 }
@@ -115,14 +119,8 @@ pub fn verify(options: &Options) -> Result<Book, BookError> {
     let extent = if options.quick { Extent::Quick } else { Extent::Full };
     let mut failures = Vec::new();
     let tables = compute(&cases, extent, &mut failures);
-    let chapters: Vec<Chapter> = cases
-        .into_iter()
-        .map(|case| Chapter {
-            case,
-            judged: gluey_verify::judge(case.name, &(case.numbers)(&tables), &limits, extent),
-            drawing: drawing::draw(&(case.plot)(&tables)),
-        })
-        .collect();
+    let chapters: Vec<Chapter> =
+        cases.into_iter().map(|case| chapter(case, &tables, &limits, extent)).collect();
     for Chapter { case, drawing, .. } in &chapters {
         files::write(&options.out.join(format!("{}.csv", case.name)), tables.of(case.name).csv().as_bytes())?;
         write_drawing(&options.out, case.name, drawing, &mut failures)?;
@@ -130,8 +128,20 @@ pub fn verify(options: &Options) -> Result<Book, BookError> {
     let wall_s = start.elapsed().as_secs_f64();
     let book = Book { quick: options.quick, commit: commit(&options.root), wall_s, chapters, failures };
     files::write(&options.out.join("numbers.csv"), page::csv(&book).as_bytes())?;
+    let proposals = book.chapters.iter().flat_map(|chapter| &chapter.proposals);
+    let proposals: String = proposals.map(|line| format!("{line}\n")).collect();
+    files::write(&options.out.join("proposed-limits.csv"), proposals.as_bytes())?;
     files::write(&options.out.join("index.html"), page::html(&book).as_bytes())?;
     Ok(book)
+}
+
+fn chapter(case: &'static Case, tables: &Tables, limits: &[Limit], extent: Extent) -> Chapter {
+    let numbers = (case.numbers)(tables);
+    let judged = gluey_verify::judge(case.name, &numbers, limits, extent);
+    let free = numbers.iter().zip(&judged).filter(|(_, judged)| judged.verdict.is_none());
+    let proposals =
+        free.filter_map(|(number, _)| gluey_verify::proposal(case.name, number, extent)).collect();
+    Chapter { case, judged, proposals, drawing: drawing::draw(&(case.plot)(tables)) }
 }
 
 fn chosen(only: &[String]) -> Result<Vec<&'static Case>, BookError> {
@@ -208,6 +218,8 @@ fn commit(root: &Path) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use gluey_verify::Number;
+
     use super::*;
 
     fn judged(value: Option<f64>, outcome: Outcome) -> Judged {
@@ -216,7 +228,8 @@ mod tests {
     }
 
     fn book(judged: Vec<Judged>, failures: Vec<Failure>) -> Book {
-        let chapters = vec![Chapter { case: &CASES[0], judged, drawing: Canvas::new(1.0, 1.0) }];
+        let chapters =
+            vec![Chapter { case: &CASES[0], judged, proposals: vec![], drawing: Canvas::new(1.0, 1.0) }];
         Book { quick: true, commit: Some("0123456789ab".into()), wall_s: 1.0, chapters, failures }
     }
 
@@ -255,7 +268,7 @@ mod tests {
         let tables = compute(&[case], Extent::Quick, &mut failures);
         let numbers = (case.numbers)(&tables);
         let limits = gluey_verify::limits().unwrap();
-        let fails = |numbers: &[gluey_verify::Number]| {
+        let fails = |numbers: &[Number]| {
             let judged = gluey_verify::judge(case.name, numbers, &limits, Extent::Quick);
             judged.iter().any(Judged::is_failure)
         };

@@ -1,7 +1,8 @@
 //! What an error costs: CPU time of a solve against the error of the speed of approach at a gap of one radius.
 
-use crate::case::{CPU_TIME, Case, Number, Table, Tables};
+use crate::case::{CPU_TIME, Case, Table, Tables};
 use crate::method::METHODS;
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::statistics::{mean, rms};
 
@@ -38,12 +39,11 @@ fn numbers(tables: &Tables) -> Vec<Number> {
         let table = tables.of(name);
         for method in METHODS {
             for (cells, seconds, error) in points(&table, method.name, at) {
-                let number = |what, value| Number {
-                    what: format!("{name}, a/h = {cells}, {what}"),
-                    method: method.name,
-                    value,
+                let number = |kind, what: &str, value| {
+                    Number::new(kind, format!("{name}, a/h = {cells}, {what}"), method.name, value)
                 };
-                numbers.extend([number("CPU seconds a solve", seconds), number("rms error", error)]);
+                numbers.push(number(Kind::Remark, "CPU seconds a solve", seconds));
+                numbers.push(number(Kind::Size, "rms error", error));
             }
         }
     }

@@ -5,8 +5,9 @@ use gluey_levelset::Ball;
 use gluey_stokes::Refinement;
 use gluey_testkit::reference::single_2d_velocities;
 
-use crate::case::{Case, Extent, Number, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
+use crate::number::Number;
 use crate::plot::Plot;
 use crate::set_up::{RADIUS, couette, level, mesh, shift, solve};
 use crate::statistics::fit;
@@ -60,13 +61,8 @@ fn numbers(tables: &Tables) -> Vec<Number> {
         for measure in CASE.measures {
             for method in METHODS {
                 let (mean, scatter) = mean_and_scatter(&table, method.name, measure, cells);
-                numbers.extend([("mean error", mean), ("scatter", scatter)].map(|(statistic, value)| {
-                    Number {
-                        what: format!("{measure}, a/h = {cells}, {statistic}"),
-                        method: method.name,
-                        value,
-                    }
-                }));
+                let name = format!("{measure}, a/h = {cells}");
+                numbers.extend(Number::mean_and_scatter(&name, method.name, mean, scatter));
             }
         }
     }

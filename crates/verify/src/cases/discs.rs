@@ -4,8 +4,9 @@ use gluey_geom::Vector;
 use gluey_stokes::Refinement;
 use gluey_testkit::reference::pair_2d_velocities;
 
-use crate::case::{Case, Extent, Number, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
+use crate::number::Number;
 use crate::plot::Plot;
 use crate::set_up::{PairMotion, RADIUS, couette, level, mean_and_scatter, mesh, pair, shift, solve};
 use crate::statistics::rms;

@@ -5,8 +5,9 @@ use gluey_levelset::Ball;
 use gluey_motion::{Integrator, Scheme};
 use gluey_stokes::{FlowSolver, Refinement};
 
-use crate::case::{Case, Extent, Number, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::set_up::{RADIUS, couette, level, mesh, pair};
 use crate::statistics::mean;
@@ -102,10 +103,12 @@ fn numbers(tables: &Tables) -> Vec<Number> {
                     let at = [("start", start), ("a/h", cells), ("time step", step)];
                     let run = format!("{name}, a/h = {cells}, step {step}");
                     let value = mean(&table.values("gap", method, &at));
-                    numbers.push(Number { what: format!("{run}, change of the gap"), method, value });
+                    let what = format!("{run}, change of the gap");
+                    numbers.push(Number::new(Kind::Error, what, method, value));
                     if start == 1.0 {
                         let value = mean(&table.values("half a turn", method, &at)) / HALF_TURN - 1.0;
-                        numbers.push(Number { what: format!("{run}, time of half a turn"), method, value });
+                        let what = format!("{run}, time of half a turn");
+                        numbers.push(Number::new(Kind::Error, what, method, value));
                     }
                 }
             }

@@ -4,9 +4,10 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution};
 
-use crate::case::{Case, Extent, Number, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::set_up::{couette, solve};
 use crate::statistics::largest;
@@ -95,10 +96,14 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     {
         let at = [("dimension", dimension), ("flow", flow), ("tolerance", TOLERANCES[2])];
         for measure in CASE.measures.iter().take(1 + flow as usize) {
-            numbers.extend(METHODS.iter().map(|method| Number {
-                what: format!("{name} flow, {dimension}D, {measure}, tolerance 1e-12"),
-                method: method.name,
-                value: largest(&table.values(measure, method.name, &at)),
+            numbers.extend(METHODS.iter().map(|method| {
+                let value = largest(&table.values(measure, method.name, &at));
+                Number::new(
+                    Kind::Size,
+                    format!("{name} flow, {dimension}D, {measure}, tolerance 1e-12"),
+                    method.name,
+                    value,
+                )
             }));
         }
     }

@@ -5,7 +5,8 @@ use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 use gluey_testkit::convergence_order;
 use gluey_testkit::reference::pair_3d_trajectory_unbounded;
 
-use crate::case::{Case, Extent, Number, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::number::{Kind, Number};
 use crate::plot::{Curve, Plot};
 
 const RADIUS: f64 = 0.05;
@@ -82,9 +83,10 @@ fn numbers(tables: &Tables) -> Vec<Number> {
         for (method, _) in SCHEMES {
             let (steps, errors): (Vec<f64>, Vec<f64>) = points(&table, measure, method).into_iter().unzip();
             let what = format!("order of the error at the {measure}");
-            numbers.push(Number { what, method, value: convergence_order(&steps, &errors) });
+            numbers.push(Number::new(Kind::Order, what, method, convergence_order(&steps, &errors)));
             let what = format!("error at the {measure}, smallest step");
-            numbers.push(Number { what, method, value: errors.last().copied().unwrap_or(f64::NAN) });
+            let smallest = errors.last().copied().unwrap_or(f64::NAN);
+            numbers.push(Number::new(Kind::Size, what, method, smallest));
         }
     }
     numbers

@@ -6,9 +6,10 @@ use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, RigidSphere, StokesSolution, ViscousInclusion};
 
-use crate::case::{Case, Extent, Number, Table, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::{Lattice, errors};
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::set_up::{shift, solve};
 use crate::statistics::{mean, rms};
@@ -155,21 +156,20 @@ fn statistic(table: &Table, method: &str, measure: &str, cells: f64) -> f64 {
 fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
     for measure in MEASURES {
+        let kind = if *measure == "stresslet" { Kind::Error } else { Kind::Size };
         for method in METHODS {
             let computed = table.steps("a/h", method.name, &[]);
             let errors: Vec<f64> =
                 computed.iter().map(|&cells| statistic(table, method.name, measure, cells)).collect();
             for (cells, &value) in computed.iter().zip(&errors) {
-                numbers.push(Number {
-                    what: format!("{measure}, a/h = {cells}"),
-                    method: method.name,
-                    value,
-                });
+                let what = format!("{measure}, a/h = {cells}");
+                numbers.push(Number::new(kind, what, method.name, value));
             }
             let (sizes, magnitudes): (Vec<f64>, Vec<f64>) =
                 computed.iter().zip(&errors).map(|(cells, e)| (1.0 / cells, e.abs())).unzip();
             let value = convergence_order(&sizes, &magnitudes);
-            numbers.push(Number { what: format!("{measure}, order"), method: method.name, value });
+            let what = format!("{measure}, order");
+            numbers.push(Number::new(Kind::Order, what, method.name, value));
         }
     }
     numbers

@@ -6,9 +6,10 @@ use gluey_stokes::fem::{MeshError, TreeMesh};
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution, WavyPressure};
 
-use crate::case::{Case, Extent, Number, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 
 const FLOW: WavyPressure = WavyPressure(PolynomialFlow { viscosity: 1.0 });
@@ -91,7 +92,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
                 let finest = &points[points.len().saturating_sub(2)..];
                 let (sizes, errors): (Vec<f64>, Vec<f64>) = finest.iter().copied().unzip();
                 let what = format!("order of the {measure}, {dimension}D, {mesh}");
-                Number { what, method: method.name, value: convergence_order(&sizes, &errors) }
+                Number::new(Kind::Order, what, method.name, convergence_order(&sizes, &errors))
             }));
         }
     }

@@ -7,8 +7,9 @@ use gluey_levelset::Ball;
 use gluey_motion::{Hydrodynamics, LinearFlow, PairMobility};
 use gluey_stokes::Refinement;
 
-use crate::case::{Case, Extent, Number, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
+use crate::number::Number;
 use crate::plot::Plot;
 use crate::set_up::{PairMotion, couette, level, mean_and_scatter, mesh, shift, solve};
 use crate::statistics::rms;

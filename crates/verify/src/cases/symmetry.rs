@@ -4,8 +4,9 @@ use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::fem::TreeMesh;
 
-use crate::case::{Case, Extent, Number, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
+use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::set_up::{couette, solve};
 use crate::statistics::largest;
@@ -134,10 +135,9 @@ fn numbers(tables: &Tables) -> Vec<Number> {
         for (operation, name) in OPERATIONS.iter().enumerate() {
             let at =
                 [("dimension", dimension), ("operation", operation as f64), ("tolerance", TOLERANCES[2])];
-            numbers.extend(METHODS.iter().map(|method| Number {
-                what: format!("{name}, {dimension}D, tolerance 1e-10"),
-                method: method.name,
-                value: largest(&table.values("difference", method.name, &at)),
+            numbers.extend(METHODS.iter().map(|method| {
+                let value = largest(&table.values("difference", method.name, &at));
+                Number::new(Kind::Size, format!("{name}, {dimension}D, tolerance 1e-10"), method.name, value)
             }));
         }
     }
