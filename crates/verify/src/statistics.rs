@@ -8,6 +8,9 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// The standard deviation from the mean; NaN for less than two values.
 pub fn scatter(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return f64::NAN;
+    }
     let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()
