@@ -1,4 +1,4 @@
-//! The verification book of the Stokes solver: what it computes beside exact solutions, for every formulation.
+//! The verification book of the Stokes solver: what it computes beside exact solutions, in every formulation.
 //!
 //! A [`Case`] is a chapter: its [`Task`]s are computed one by one, their results make a [`Table`], numbers
 //! taken from it are held against `limits.csv`. `cargo xtask verify` computes the tasks side by side and

@@ -1,5 +1,5 @@
-//! What is said of several measurements of one thing. Of nothing, and of what contains a NaN, it is NaN, which
-//! no limit lets pass.
+//! What is said of several measurements of one thing. Of nothing, and of what contains a NaN, it is NaN,
+//! which no limit lets pass.
 
 /// The mean.
 pub fn mean(values: &[f64]) -> f64 {
@@ -27,8 +27,8 @@ pub fn largest(values: &[f64]) -> f64 {
     if values.is_empty() { f64::NAN } else { values.iter().map(|value| value.abs()).fold(0.0, larger) }
 }
 
-/// Coefficients `c` of the sum of `basis[j](i) c_j` that is closest to `values[i]` in the mean square, and the
-/// standard deviation from it; NaN where there are no more values than coefficients.
+/// Coefficients `c` of the sum of `basis[i][j] c_j` that is closest to `values[i]` in the mean square, and
+/// the standard deviation from it; NaN where there are no more values than coefficients.
 pub fn fit<const N: usize>(basis: &[[f64; N]], values: &[f64]) -> ([f64; N], f64) {
     if basis.len() != values.len() || values.len() <= N {
         return ([f64::NAN; N], f64::NAN);

@@ -1,5 +1,5 @@
-//! What the books of figures and of verification share: files written whole, jobs side by side, the frame of a
-//! page.
+//! What the books of figures and of verification share: files written whole, jobs side by side, the frame of
+//! a page.
 
 pub mod files;
 pub mod page;

@@ -154,8 +154,8 @@ fn chosen(only: &[String]) -> Result<Vec<&'static Case>, BookError> {
     }
 }
 
-/// All computations of the cases, as many at a time as there are cores; the last cases, which have the longest
-/// computations, go first.
+/// All computations of the cases, as many at a time as there are cores; the last cases, which have the
+/// longest computations, go first.
 fn compute(cases: &[&'static Case], extent: Extent, failures: &mut Vec<Failure>) -> Tables {
     let of_case =
         |case: &&'static Case| (case.tasks)(extent).into_iter().map(|task| (*case, task)).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! What an error costs: CPU time of a solve against the error of the speed of approach at a gap of one radius.
+//! What an error costs: CPU time of a solve against the error of the speed of approach at a gap of a radius.
 
 use crate::case::{CPU_TIME, Case, Table, Tables};
 use crate::method::METHODS;
@@ -42,7 +42,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
                 let number = |kind, what: &str, value| {
                     Number::new(kind, format!("{name}, a/h = {cells}, {what}"), method.name, value)
                 };
-                numbers.push(number(Kind::Remark, "CPU seconds a solve", seconds));
+                numbers.push(number(Kind::Remark, "CPU seconds per solve", seconds));
                 numbers.push(number(Kind::Size, "rms error", error));
             }
         }
@@ -52,7 +52,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
 
 fn plot(tables: &Tables) -> Plot {
     Plot::of_methods(
-        "CPU seconds a solve",
+        "CPU seconds per solve",
         "rms relative error of the approach",
         &["discs", "spheres"],
         |method, thing| {

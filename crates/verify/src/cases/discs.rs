@@ -14,9 +14,9 @@ use crate::statistics::rms;
 const POSITIONS: usize = 8;
 /// Gaps in radii.
 const GAPS: [f64; 4] = [1.0, 0.2, 0.1, 0.05];
-/// Normal speed at 45 degrees and a gap of 0.05 radii, which the table does not have: the force that holds the
-/// pair (speed times the resistance of unbounded discs) and `xi^1.5` over the speed are both nearly linear in
-/// the gap; interpolated, they give 1.14740e-3 and 1.14759e-3.
+/// Normal speed at 45 degrees and a gap of 0.05 radii, which the table does not have: the force that holds
+/// the pair (speed times the resistance of unbounded discs) and `xi^1.5` over the speed are both nearly linear
+/// in the gap; interpolated, they give 1.14740e-3 and 1.14759e-3.
 const SPEED_AT_FIVE_HUNDREDTHS: f64 = 1.1475e-3;
 /// Angle at which the shear presses the pair together, degrees.
 const PRESSED: f64 = 135.0;
@@ -88,8 +88,8 @@ fn measure(
     Ok(vec![approach, found.line_rotation - exact.line_rotation, found.spin - exact.spin])
 }
 
-/// The exact motion. At 135 degrees it is that at 45 with the speed reversed; the line and the discs turn with
-/// the flow there.
+/// The exact motion. At 135 degrees it is that at 45 with the speed reversed; the line and the discs turn
+/// with the flow there.
 fn exact(gap: f64, angle: f64) -> Result<PairMotion, VerifyError> {
     let table = pair_2d_velocities()?;
     let (degrees, sign) = if angle == PRESSED { (45.0, -1.0) } else { (angle, 1.0) };
