@@ -64,7 +64,7 @@ struct ReproduceArguments {
 
 #[derive(clap::Args)]
 struct VerifyArguments {
-    /// Fewer positions and coarser meshes: two minutes.
+    /// Fewer positions and coarser meshes: a minute.
     #[arg(long)]
     quick: bool,
     /// Only these cases, separated by commas; `cost` needs `discs` and `spheres`.

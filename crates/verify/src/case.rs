@@ -15,7 +15,7 @@ use crate::plot::Plot;
 /// How much is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Extent {
-    /// What takes two minutes.
+    /// What takes a minute.
     Quick,
     /// Everything.
     Full,

@@ -58,16 +58,11 @@ fn write_body(out: &mut String, book: &Book) -> std::fmt::Result {
         writeln!(out, "<p class=\"note bad\">{}: {}</p>", escape(&failure.what), escape(&failure.error))?;
     }
     let (limits, held, free) = book.counts();
-    writeln!(out, "<p>Of {limits} numbers with a limit {held} are within it; {free} have none.</p>\n<ul>")?;
+    writeln!(out, "<p>Of {limits} numbers with a limit {held} are within it; {free} have none.</p>")?;
     for (case, judged) in book.judged().filter(|(_, judged)| judged.is_failure()) {
         let name = case.name;
-        writeln!(
-            out,
-            "<li class=\"bad\"><a href=\"#{name}\">{name}</a>, {}</li>",
-            escape(&sentence(judged))
-        )?;
+        writeln!(out, "<p class=\"bad\"><a href=\"#{name}\">{name}</a>, {}</p>", escape(&sentence(judged)))?;
     }
-    writeln!(out, "</ul>")?;
     book.chapters.iter().try_for_each(|chapter| write_chapter(out, chapter))
 }
 

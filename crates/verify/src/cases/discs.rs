@@ -15,8 +15,8 @@ const POSITIONS: usize = 8;
 /// Gaps in radii.
 const GAPS: [f64; 4] = [1.0, 0.2, 0.1, 0.05];
 /// Normal speed at 45 degrees and a gap of 0.05 radii, which the table does not have: the force that holds
-/// the pair (speed times the resistance of unbounded discs) and `xi^1.5` over the speed are both nearly linear
-/// in the gap; interpolated, they give 1.14740e-3 and 1.14759e-3.
+/// the pair (speed times the resistance of unbounded discs) and `xi^1.5` over the speed are both nearly
+/// linear in the gap; interpolated, they give 1.14740e-3 and 1.14759e-3.
 const SPEED_AT_FIVE_HUNDREDTHS: f64 = 1.1475e-3;
 /// Angle at which the shear presses the pair together, degrees.
 const PRESSED: f64 = 135.0;
