@@ -1,21 +1,24 @@
-//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask bench-stokes`, `cargo xtask tidy`,
-//! `cargo xtask ci`.
+//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask bench-stokes`,
+//! `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
+mod book;
 mod ci;
 mod figures;
 mod reproduce;
 mod tidy;
+mod verify;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use gluey_verify::Outcome;
 
 use reproduce::plan::FigureName;
 use reproduce::summary::Summary;
-use reproduce::verdict::{self, Kind, Outcome};
+use reproduce::verdict::{self, Kind};
 
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask", about = "Project tasks of gluey", max_term_width = 100)]
@@ -28,6 +31,8 @@ struct Arguments {
 enum Task {
     /// Compute and draw the figures of Verdon et al. (2010).
     ReproduceFigures(ReproduceArguments),
+    /// Compute what has an exact solution, with all formulations, and hold it against limits.
+    Verify(VerifyArguments),
     /// Time one solve of the Stokes core and print one line of JSON.
     #[command(disable_help_flag = true)]
     BenchStokes {
@@ -57,9 +62,23 @@ struct ReproduceArguments {
     jobs: Option<std::num::NonZeroUsize>,
 }
 
+#[derive(clap::Args)]
+struct VerifyArguments {
+    /// Fewer positions and coarser meshes: a minute.
+    #[arg(long)]
+    quick: bool,
+    /// Only these cases, separated by commas; `cost` needs `discs` and `spheres`.
+    #[arg(long, value_delimiter = ',', value_name = "CASES")]
+    only: Vec<String>,
+    /// Output folder.
+    #[arg(long, default_value = "target/verification", value_name = "DIR")]
+    out: PathBuf,
+}
+
 fn main() -> ExitCode {
     match Arguments::parse().task {
         Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
+        Task::Verify(arguments) => verify(arguments),
         Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
@@ -90,6 +109,19 @@ fn outcome<E: std::error::Error>(result: Result<(), E>) -> ExitCode {
 fn workspace_root() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     own.parent().expect("xtask lies in the workspace").to_owned()
+}
+
+fn verify(arguments: VerifyArguments) -> ExitCode {
+    let VerifyArguments { quick, only, out } = arguments;
+    let options = verify::Options { quick, only, root: workspace_root(), out };
+    match verify::verify(&options) {
+        Ok(book) => {
+            println!("{}", book.account());
+            println!("tables, pictures and index.html are in {}", options.out.display());
+            if book.holds() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        }
+        Err(error) => outcome(Err(error)),
+    }
 }
 
 fn reproduce_figures(arguments: ReproduceArguments) -> ExitCode {

@@ -5,7 +5,7 @@ mod polynomial;
 mod sphere;
 
 pub use inclusion::{InclusionViscosity, ViscousInclusion};
-pub use polynomial::PolynomialFlow;
+pub use polynomial::{PolynomialFlow, WavyPressure};
 pub use sphere::RigidSphere;
 
 use gluey_geom::{Matrix, Vector};

@@ -117,6 +117,11 @@ reference_table!(
     pair_2d_velocities,
     "pair2d_velocities.csv"
 );
+reference_table!(
+    /// Two spheres that meet in unbounded shear: `t, D_over_a, theta, x1, y1, x2, y2, omega_z`.
+    pair_3d_trajectory_unbounded,
+    "pair3d_trajectory_unbounded.csv"
+);
 
 #[cfg(test)]
 mod tests {

@@ -74,10 +74,26 @@ pub struct Chart {
 /// A dot with a label.
 #[derive(Clone, Debug)]
 pub struct Mark {
-    /// Where, in data coordinates (linear axes).
+    /// Where, in data coordinates.
     pub at: (f64, f64),
-    /// Text with the markup of [`super::text`].
+    /// Text with the markup of [`super::text`]; may be empty.
     pub label: String,
+}
+
+impl Axis {
+    /// A logarithmic axis around these values, from a whole power of ten to a whole power of ten.
+    pub fn decades(label: &str, low: f64, high: f64) -> Self {
+        let (first, last) = ((low.log10() + 1e-9).floor(), (high.log10() - 1e-9).ceil());
+        let decade = |exponent: f64| 10f64.powf(exponent);
+        let max = decade(last.max(first + 1.0));
+        Self { label: label.to_owned(), min: decade(first), max, tick: 1.0, log: true }
+    }
+
+    /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
+    fn fraction(&self, value: f64) -> f64 {
+        let scale = |x: f64| if self.log { x.log10() } else { x };
+        (scale(value) - scale(self.min)) / (scale(self.max) - scale(self.min))
+    }
 }
 
 /// Stacks charts of equal width, the legend of all of them on top, into one SVG canvas.
@@ -116,7 +132,6 @@ impl Chart {
             .with_x_axis_max(self.x.max)
             .with_y_axis_min(self.y.min)
             .with_y_axis_max(self.y.max)
-            .with_x_tick_step(self.x.tick)
             .with_x_label(&*self.x.label)
             .with_y_label(&*self.y.label)
             .with_font_family(FONT_FAMILY)
@@ -126,8 +141,9 @@ impl Chart {
             .with_box_axes()
             .with_tick_align("inside")
             .with_tick_pos("both")
-            .with_x_tick_format(tick_format(&self.x))
+            .with_x_tick_format(if few_decades(&self.x) { plain() } else { tick_format(&self.x) })
             .with_y_tick_format(tick_format(&self.y));
+        layout = if self.x.log { layout.with_log_x() } else { layout.with_x_tick_step(self.x.tick) };
         layout = if self.y.log { layout.with_log_y() } else { layout.with_y_tick_step(self.y.tick) };
         SvgBackend::new().render_scene(&render_multiple(plots, layout))
     }
@@ -137,18 +153,17 @@ impl Chart {
         if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
     }
 
-    /// Where a point (linear axes) lies on a canvas of this height that has only this chart, with equal
-    /// scales.
+    /// Where a point lies on a canvas of this height that has only this chart, with equal scales.
     pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_height = equal_aspect_height(self);
         self.point(canvas_height - self.margin_bottom() - frame_height, frame_height, at)
     }
 
-    /// A point (linear axes) in a frame of this height whose upper edge is at `top`.
+    /// A point in a frame of this height whose upper edge is at `top`.
     fn point(&self, top: f64, frame_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
-        let x = MARGIN_LEFT + frame_width * (at.0 - self.x.min) / (self.x.max - self.x.min);
-        (x, top + frame_height * (self.y.max - at.1) / (self.y.max - self.y.min))
+        let x = MARGIN_LEFT + frame_width * self.x.fraction(at.0);
+        (x, top + frame_height * (1.0 - self.y.fraction(at.1)))
     }
 
     /// Draws the marks over a frame whose upper edge is at `top`, their labels where curves leave room.
@@ -158,6 +173,9 @@ impl Chart {
         for Mark { at, label } in &self.marks {
             let dot = self.point(top, frame_height, *at);
             canvas.circle(dot, 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
+            if label.is_empty() {
+                continue;
+            }
             let (x, y) = place_of_label(dot, &taken);
             canvas.text(x, y + 0.35 * MARK_SIZE, MARK_SIZE, "middle", label);
         }
@@ -240,6 +258,16 @@ fn power_of_ten(value: f64) -> String {
         return String::new();
     }
     format!("10^{{{}}}", format!("{exponent:.0}").replace("-0", "0").replace('-', "\u{2212}"))
+}
+
+/// Whether an axis is logarithmic and so short that its ticks between powers of ten have room for a number.
+fn few_decades(axis: &Axis) -> bool {
+    axis.log && axis.min > 0.9e-3 && axis.max < 1.1e3 && axis.max < 1.1e3 * axis.min
+}
+
+/// Ticks as decimals with as many digits as they have.
+fn plain() -> TickFormat {
+    TickFormat::Custom(Arc::new(|value| format!("{}", (value * 1e6).round() / 1e6)))
 }
 
 /// Ticks: decimals as the step needs on a linear axis, powers of ten on a logarithmic one.

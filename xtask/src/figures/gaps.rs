@@ -124,12 +124,5 @@ fn time_axis(curves: &[Curve]) -> Axis {
 fn gap_axis(label: &str, curves: &[Curve], floor: f64) -> Axis {
     let low = values(curves).map(|(_, value)| *value).fold(1.0, f64::min).max(floor);
     let high = values(curves).map(|(_, value)| *value).fold(low * 10.0, f64::max);
-    let decade = |value: f64| 10f64.powf(value);
-    Axis {
-        label: label.to_owned(),
-        min: decade((low.log10() + 1e-9).floor()),
-        max: decade((high.log10() - 1e-9).ceil()),
-        tick: 1.0,
-        log: true,
-    }
+    Axis::decades(label, low, high)
 }

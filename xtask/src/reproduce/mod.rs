@@ -1,6 +1,5 @@
 //! `cargo xtask reproduce-figures`: makes the runs, draws the figures, says how they compare.
 
-pub mod files;
 pub mod findings;
 pub mod known;
 pub mod measures;
@@ -10,7 +9,6 @@ pub mod progress;
 pub mod reference;
 pub mod rows;
 mod runner;
-pub mod schedule;
 pub mod settings;
 pub mod summary;
 pub mod trajectory;
@@ -22,13 +20,14 @@ use std::time::Instant;
 
 use gluey::RunReport;
 
+use crate::book::files::{self, WriteError};
+use crate::book::{Failure, schedule, write_drawing};
 use crate::figures::{self, Data};
-use files::WriteError;
 use page::Section;
 use plan::{CaseName, FigureName, RunKey};
 use rows::Evidence;
 use settings::Settings;
-use summary::{Failure, Run, Summary};
+use summary::{Run, Summary};
 use trajectory::Trajectory;
 
 /// Times shown by figures of the 2D pair end here; its exact orbit is continued to this time.
@@ -65,7 +64,7 @@ pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
     let sections: Vec<Section> = options.figures.iter().map(|&figure| section(figure, &evidence)).collect();
     let rows = rows::all(&options.figures, &evidence);
     for section in &sections {
-        write_figure(&options.out, section, &mut failures)?;
+        write_drawing(&options.out, section.figure.as_str(), &section.drawing, &mut failures)?;
     }
 
     let summary = Summary {
@@ -88,7 +87,7 @@ fn settings(options: &Options, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, 
     for key in plan::runs_for(&options.figures, options.quick) {
         match runner::case(&options.root, key, options.quick) {
             Ok(case) => drop(settings.insert(key, Settings::of(&case))),
-            Err(error) => failures.push(Failure { what: format!("run {key}"), error: runner::chain(&error) }),
+            Err(error) => failures.push(Failure::new(format!("run {key}"), &error)),
         }
     }
     settings
@@ -118,7 +117,7 @@ fn make_runs(
     for (key, result) in keys.into_iter().zip(results) {
         match result {
             Ok(report) => drop(reports.insert(key, report)),
-            Err(error) => failures.push(Failure { what: format!("run {key}"), error: runner::chain(&error) }),
+            Err(error) => failures.push(Failure::new(format!("run {key}"), &error)),
         }
     }
     reports
@@ -133,7 +132,7 @@ fn load(
 ) -> Data {
     let mut data = Data { quick: options.quick, ..Data::default() };
     let mut keep = |what: String, result: Result<Trajectory, trajectory::TrajectoryError>| {
-        result.map_err(|error| failures.push(Failure { what, error: runner::chain(&error) })).ok()
+        result.map_err(|error| failures.push(Failure::new(what, &error))).ok()
     };
     for &key in reports.keys() {
         let run = keep(format!("run {key}"), Trajectory::read(&folder.join(format!("{key}.csv"))));
@@ -156,16 +155,6 @@ fn section(figure: FigureName, evidence: &Evidence<'_>) -> Section {
         drawing: figures::draw(figure, evidence.data),
         table: findings::table(figure, evidence),
     }
-}
-
-fn write_figure(out: &Path, section: &Section, failures: &mut Vec<Failure>) -> Result<(), WriteError> {
-    let name = section.figure.as_str();
-    files::write(&out.join(format!("{name}.svg")), section.drawing.svg().as_bytes())?;
-    match section.drawing.png() {
-        Ok(png) => files::write(&out.join(format!("{name}.png")), &png)?,
-        Err(error) => failures.push(Failure { what: format!("{name}.png"), error: runner::chain(&error) }),
-    }
-    Ok(())
 }
 
 fn write_summary(out: &Path, summary: &Summary) -> Result<(), WriteError> {

@@ -2,12 +2,14 @@
 
 use std::fmt::Write;
 
+use gluey_verify::Outcome;
+
 use super::findings::{self, Table};
 use super::plan::FigureName;
-use super::progress::duration;
 use super::summary::{self, Summary};
-use super::verdict::{self, Kind, Outcome, Row};
-use crate::figures::canvas::{Canvas, font_faces};
+use super::verdict::{self, Kind, Row};
+use crate::book::page::{self, duration, escape, number};
+use crate::figures::canvas::Canvas;
 
 /// A figure with what is said about it.
 pub struct Section {
@@ -19,13 +21,6 @@ pub struct Section {
     pub table: Option<Table>,
 }
 
-const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:66rem;margin:2rem auto;padding:0 1rem;\
-line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\
-table{border-collapse:collapse;margin:1rem 0;font-size:.9rem;display:block;overflow-x:auto}\
-th,td{padding:.2rem .5rem;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap;font-variant-numeric:lining-nums}\
-th{font-weight:normal;border-bottom:1px solid #111;vertical-align:bottom}td:first-child,th:first-child,td.t,th.t{text-align:left}\
-.rows td.t{white-space:normal}.reason{color:#444;padding-left:2rem}.bad{color:#b00020}.note{background:#fff4d6;padding:.6rem 1rem}";
-
 /// What a reader of the paper asks first: why not its viscosity ratio.
 const SETTING_OF_PAPER: &str = "All runs of <code>paper</code> have one setting, stated under every figure: viscosity ratio \
 r = 100, a ramp of one cell and two Uzawa steps from a multiplier of zero, so that the update [10] acts (without it, one solve, \
@@ -35,24 +30,14 @@ and in 2D inelastic contact changes the orbit by less than 1 %.";
 
 /// The page.
 pub fn html(summary: &Summary, sections: &[Section]) -> String {
-    let mut page = String::new();
-    write_page(&mut page, summary, sections).expect("writing to a String cannot fail");
-    page
+    let mut body = String::new();
+    write_body(&mut body, summary, sections).expect("writing to a String cannot fail");
+    page::document("gluey: the paper's figures", &body)
 }
 
-fn write_page(out: &mut String, summary: &Summary, sections: &[Section]) -> std::fmt::Result {
-    writeln!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>gluey: the paper's figures</title>\n\
-         <style>{}{STYLE}</style>\n</head>\n<body>",
-        font_faces()
-    )?;
+fn write_body(out: &mut String, summary: &Summary, sections: &[Section]) -> std::fmt::Result {
     write_head(out, summary)?;
-    for section in sections {
-        write_section(out, summary, section)?;
-    }
-    writeln!(out, "</body>\n</html>")
+    sections.iter().try_for_each(|section| write_section(out, summary, section))
 }
 
 fn write_head(out: &mut String, summary: &Summary) -> std::fmt::Result {
@@ -224,43 +209,13 @@ fn write_table(out: &mut String, table: &Table) -> std::fmt::Result {
     writeln!(out, "</table>")
 }
 
-/// Four significant digits; a dash for what was not measured.
-pub fn number(value: Option<f64>) -> String {
-    match value {
-        None => "–".to_owned(),
-        Some(0.0) => "0".to_owned(),
-        Some(value) if (1e-3..1e4).contains(&value.abs()) => {
-            let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
-            format!("{value:.digits$}").replace('-', "−")
-        }
-        Some(value) => {
-            let text = format!("{value:.2e}");
-            let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-            format!("{mantissa}·10<sup>{exponent}</sup>").replace('-', "−")
-        }
-    }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_four_digits_or_a_power_of_ten() {
-        assert_eq!(number(Some(7.76913)), "7.769");
-        assert_eq!(number(Some(-0.0153)), "−0.01530");
-        assert_eq!(number(Some(4.03e-4)), "4.03·10<sup>−4</sup>");
-        assert_eq!(number(Some(0.0)), "0");
-        assert_eq!(number(None), "–");
-    }
-
-    #[test]
     fn a_page_without_runs_names_the_failure() {
-        let failures = vec![super::super::summary::Failure { what: "pair-2d".into(), error: "a < b".into() }];
+        let failures = vec![crate::book::Failure { what: "pair-2d".into(), error: "a < b".into() }];
         let summary = Summary {
             version: "0",
             quick: true,

@@ -8,6 +8,7 @@ use gluey::ProgressState;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use super::plan::RunKey;
+use crate::book::page::duration;
 
 /// Time between two lines of a run where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(20);
@@ -89,26 +90,9 @@ fn describe(state: &ProgressState<'_>) -> String {
     }
 }
 
-/// Seconds for people: `8 s`, `3 min 20 s`, `1 h 05 min`.
-pub fn duration(seconds: f64) -> String {
-    let whole = seconds.max(0.0).round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn durations_read_like_speech() {
-        assert_eq!(duration(8.4), "8 s");
-        assert_eq!(duration(200.0), "3 min 20 s");
-        assert_eq!(duration(3900.0), "1 h 05 min");
-    }
 
     #[test]
     fn a_state_shows_phase_rate_and_time_left() {

@@ -1,13 +1,13 @@
 //! One run: the case file with the approach's settings, handed to `gluey::run`.
 
-use std::error::Error;
 use std::path::Path;
 
 use gluey::case::{Memory, ParticleVelocity};
 use gluey::{Case, CaseError, Formulation, RunError, RunOptions, RunReport, Strategy};
 
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
-use super::progress::{Board, duration};
+use super::progress::Board;
+use crate::book::{chain, page::duration};
 
 /// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact
 /// solution.
@@ -75,13 +75,4 @@ fn run_to_files(
 ) -> Result<RunReport, RunError> {
     let csv = folder.join(format!("{key}.csv"));
     gluey::run(&case(root, key, quick)?, &RunOptions::csv(csv), line)
-}
-
-/// An error with its causes.
-pub fn chain(error: &dyn Error) -> String {
-    let causes = std::iter::successors(error.source(), |&cause| cause.source());
-    causes.fold(error.to_string(), |text, cause| {
-        let cause = cause.to_string();
-        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
-    })
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::plan::FigureName;
 use super::settings::Settings;
 use super::verdict::Row;
+use crate::book::Failure;
 
 /// The content of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -35,15 +36,6 @@ pub struct Run {
     pub settings: Settings,
     /// Its result in numbers.
     pub report: RunReport,
-}
-
-/// Something that did not work.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Failure {
-    /// The run, figure or file.
-    pub what: String,
-    /// Why.
-    pub error: String,
 }
 
 impl Summary {

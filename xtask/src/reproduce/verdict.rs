@@ -1,5 +1,6 @@
 //! Rows under the figures: what is claimed, the number that decides it, and whether it is so.
 
+use gluey_verify::{Outcome, Wanted};
 use serde::Serialize;
 
 use super::known::{self, Mode};
@@ -16,52 +17,6 @@ pub enum Kind {
     /// Holds by construction of the contact model, for any flow: no evidence, but a defect if it does not
     /// hold.
     Guarantee,
-}
-
-/// Whether a row's number is what it should be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Outcome {
-    /// It is.
-    Yes,
-    /// It is not.
-    No,
-    /// The run is missing or too short, or the number is not finite.
-    NotMeasured,
-}
-
-/// An interval of wanted values.
-#[derive(Clone, Copy, Debug)]
-pub enum Wanted {
-    /// No smaller than this.
-    AtLeast(f64),
-    /// No larger than this.
-    AtMost(f64),
-    /// From the first to the second.
-    Between(f64, f64),
-}
-
-impl Wanted {
-    fn holds(self, value: f64) -> bool {
-        match self {
-            Self::AtLeast(low) => value >= low,
-            Self::AtMost(high) => value <= high,
-            Self::Between(low, high) => (low..=high).contains(&value),
-        }
-    }
-
-    fn text(self) -> String {
-        match self {
-            Self::AtLeast(low) => format!("at least {}", short(low)),
-            Self::AtMost(high) => format!("at most {}", short(high)),
-            Self::Between(low, high) => format!("between {} and {}", short(low), short(high)),
-        }
-    }
-}
-
-/// A number in few characters.
-fn short(value: f64) -> String {
-    if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { format!("{value}") }
 }
 
 /// A statement with the number that decides it, before it is judged.
@@ -94,11 +49,7 @@ impl Claim {
     /// The row that stands under `figure`.
     pub fn judge(self, figure: FigureName, mode: Mode) -> Row {
         let value = self.value.filter(|value| value.is_finite());
-        let outcome = match value {
-            None => Outcome::NotMeasured,
-            Some(value) if self.wanted.holds(value) => Outcome::Yes,
-            Some(_) => Outcome::No,
-        };
+        let outcome = self.wanted.outcome(value);
         Row {
             id: self.id,
             figure,
@@ -107,7 +58,7 @@ impl Claim {
             run: self.run,
             measure: self.measure,
             value,
-            wanted: self.wanted.text(),
+            wanted: self.wanted.to_string(),
             outcome,
             reason: known::reason(self.id, mode).filter(|_| outcome == Outcome::No),
         }

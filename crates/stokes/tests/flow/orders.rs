@@ -1,14 +1,12 @@
 //! Convergence to smooth solutions, and of a particle's motion to the exact one.
 
-use std::f64::consts::PI;
-
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{FlowSolver, SolverKind};
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{
-    InclusionViscosity, PolynomialFlow, RigidSphere, StokesSolution, ViscousInclusion,
+    InclusionViscosity, PolynomialFlow, RigidSphere, StokesSolution, ViscousInclusion, WavyPressure,
 };
 
 use crate::support::{RIGID, SOLVERS, graded, l2_errors, mesh, params, resolved_gaps, solve};
@@ -72,33 +70,9 @@ fn smooth_flows_converge_at_order_three_and_two() {
     check(&sphere(Vector::<3>::new(-0.4, 0.3, 0.6), 0.3), &[2, 3], SolverKind::Multigrid);
 }
 
-/// The polynomial flow with a pressure that bilinear elements do not hold: `p + sum_d cos(pi x_d)`.
-struct Wavy(PolynomialFlow);
-
-impl<const D: usize> StokesSolution<D> for Wavy
-where
-    PolynomialFlow: StokesSolution<D>,
-{
-    fn velocity(&self, x: &Vector<D>) -> Vector<D> {
-        self.0.velocity(x)
-    }
-
-    fn pressure(&self, x: &Vector<D>) -> f64 {
-        self.0.pressure(x) + x.map(|t| (PI * t).cos()).sum()
-    }
-
-    fn viscosity(&self, x: &Vector<D>) -> f64 {
-        self.0.viscosity(x)
-    }
-
-    fn body_force(&self, x: &Vector<D>) -> Vector<D> {
-        self.0.body_force(x) - x.map(|t| PI * (PI * t).sin())
-    }
-}
-
 #[test]
 fn flows_under_a_body_force_converge_at_order_three_and_two() {
-    let flow = Wavy(PolynomialFlow { viscosity: 1.0 });
+    let flow = WavyPressure(PolynomialFlow { viscosity: 1.0 });
     for solver in SOLVERS {
         check::<2>(&flow, &[3, 4, 5], solver);
     }

@@ -5,6 +5,8 @@
 //! of `phi (1, 1, 1)`, `u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y)`, `phi = g(x) g(y) g(z)`,
 //! `p = xyz - 1/8`. Both pressures have mean zero. The forcing is `f = grad p - eta laplace u`.
 
+use std::f64::consts::PI;
+
 use gluey_geom::Vector;
 
 use super::StokesSolution;
@@ -98,6 +100,31 @@ impl StokesSolution<3> for PolynomialFlow {
     }
 }
 
+/// The polynomial flow with a pressure that bilinear elements do not hold: `p + sum_d cos(pi x_d)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WavyPressure(pub PolynomialFlow);
+
+impl<const D: usize> StokesSolution<D> for WavyPressure
+where
+    PolynomialFlow: StokesSolution<D>,
+{
+    fn velocity(&self, x: &Vector<D>) -> Vector<D> {
+        self.0.velocity(x)
+    }
+
+    fn pressure(&self, x: &Vector<D>) -> f64 {
+        self.0.pressure(x) + x.map(|t| (PI * t).cos()).sum()
+    }
+
+    fn viscosity(&self, x: &Vector<D>) -> f64 {
+        self.0.viscosity(x)
+    }
+
+    fn body_force(&self, x: &Vector<D>) -> Vector<D> {
+        self.0.body_force(x) - x.map(|t| PI * (PI * t).sin())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::checks::{points, solves_stokes};
@@ -131,6 +158,9 @@ mod tests {
     fn both_flows_solve_the_equations() {
         solves_and_rests_on_the_boundary::<2>();
         solves_and_rests_on_the_boundary::<3>();
+        let wavy = WavyPressure(PolynomialFlow { viscosity: 2.5 });
+        solves_stokes::<2>(&wavy, &in_unit_box(), 1e-6);
+        solves_stokes::<3>(&wavy, &in_unit_box(), 1e-6);
     }
 
     #[test]

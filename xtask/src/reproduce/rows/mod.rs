@@ -11,11 +11,12 @@ mod trio;
 use std::collections::BTreeMap;
 
 use gluey::RunReport;
+use gluey_verify::Wanted;
 
 use super::known::Mode;
 use super::plan::{Approach, CaseName, FigureName, RunKey};
 use super::trajectory::Trajectory;
-use super::verdict::{Claim, Kind, Row, Wanted};
+use super::verdict::{Claim, Kind, Row};
 use crate::figures::Data;
 
 /// Gaps under a contact model that is exact at the end of the step may be negative by round-off only, in

@@ -10,7 +10,8 @@ use crate::reproduce::measures::{
 use crate::reproduce::plan::{Approach, CaseName};
 use crate::reproduce::reference::HALF_TURN_TIME;
 use crate::reproduce::trajectory::Trajectory;
-use crate::reproduce::verdict::{Claim, Wanted};
+use crate::reproduce::verdict::Claim;
+use gluey_verify::Wanted;
 
 const CASE: CaseName = CaseName::Pair2d;
 const PAIR: (usize, usize) = (1, 2);

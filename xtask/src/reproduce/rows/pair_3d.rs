@@ -6,7 +6,8 @@ use crate::reproduce::measures::{
 };
 use crate::reproduce::plan::{Approach, CaseName};
 use crate::reproduce::reference::CLOSEST_APPROACH_TIME;
-use crate::reproduce::verdict::{Claim, Wanted};
+use crate::reproduce::verdict::Claim;
+use gluey_verify::Wanted;
 
 const CASE: CaseName = CaseName::Pair3d;
 const REVERSIBILITY: &str = "reversibility error: |D(t* + s) - D(t* - s)| / D(t* - s)";

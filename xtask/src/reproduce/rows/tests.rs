@@ -4,7 +4,7 @@ use super::*;
 use crate::reproduce::known::KNOWN;
 use crate::reproduce::reference;
 use crate::reproduce::settings::Settings;
-use crate::reproduce::verdict::Outcome;
+use gluey_verify::Outcome;
 
 const RUNS: [(CaseName, f64); 3] =
     [(CaseName::Pair2d, 30.0), (CaseName::Pair3d, 16.8), (CaseName::Trio2d, 12.0)];

@@ -4,7 +4,8 @@ use super::{Evidence, RADIUS, exact, measured, no_overlap, paper};
 use crate::reproduce::measures::{center_deviation, last_gap, median_gap, offset_of_the_pair, smallest_gap};
 use crate::reproduce::plan::{Approach, CaseName};
 use crate::reproduce::trajectory::Trajectory;
-use crate::reproduce::verdict::{Claim, Wanted};
+use crate::reproduce::verdict::Claim;
+use gluey_verify::Wanted;
 
 const CASE: CaseName = CaseName::Trio2d;
 const MEDIAN_D12: &str = "median of D12/a over the second half of the run";

@@ -1,0 +1,105 @@
+//! Orders in time of the integrators, with exact velocities.
+
+use gluey_geom::{Particle, Twist, Vector};
+use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+use gluey_testkit::convergence_order;
+use gluey_testkit::reference::pair_3d_trajectory_unbounded;
+
+use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::number::{Kind, Number};
+use crate::plot::{Curve, Plot};
+
+const RADIUS: f64 = 0.05;
+/// Before the closest approach: errors made on the way in are not undone on the way out.
+const END: f64 = 7.0;
+const STEPS: [u32; 4] = [700, 1400, 2800, 5600];
+const SCHEMES: [(&str, Scheme); 2] =
+    [("euler", Scheme::Euler), ("adams-bashforth-2", Scheme::AdamsBashforth2)];
+
+/// The chapter.
+pub const CASE: Case = Case {
+    name: "integrator",
+    title: "Order in time",
+    text: "Two spheres that meet in unbounded shear (paper, figure 7) with exact velocities (Batchelor and Green 1972), to t = 7, \
+           against data/reference/pair3d_trajectory_unbounded.csv (1e-8): distance of a centre from where it should be at the \
+           end, and from where it began after the shear was reversed and as many steps were made back, in radii. Euler has \
+           order 1, Adams-Bashforth 2 order 2, and order 3 on its way back.",
+    keys: &["time step"],
+    measures: &["end", "return"],
+    tasks,
+    numbers,
+    plot,
+};
+
+fn tasks(_: Extent) -> Vec<Task> {
+    let all = SCHEMES.into_iter().flat_map(|scheme| STEPS.map(|steps| (scheme, steps)));
+    all.map(|((name, scheme), steps)| {
+        let step = END / f64::from(steps);
+        Task::new(name, &[step], move || measure(scheme, step, steps))
+    })
+    .collect()
+}
+
+fn measure(scheme: Scheme, step: f64, steps: u32) -> Result<Vec<f64>, VerifyError> {
+    let reference = pair_3d_trajectory_unbounded()?;
+    let row = reference.column("t")?.iter().position(|&t| t == END);
+    let row = row.ok_or_else(|| VerifyError::NoReference(format!("t = {END}")))?;
+    let exact = Vector::<3>::new(reference.column("x1")?[row], reference.column("y1")?[row], 0.5);
+    let starts = [Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)];
+    let mut particles = starts.map(|x| Particle::new(x, RADIUS));
+    let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
+    let mut integrator = Integrator::new(scheme);
+    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    let end = (particles[0].pose.position - exact).norm() / RADIUS;
+    flow.set_shear_factor(-1.0);
+    integrator.reverse();
+    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    Ok(vec![end, (particles[0].pose.position - starts[0]).norm() / RADIUS])
+}
+
+fn advance(
+    flow: &mut PairMobility,
+    integrator: &mut Integrator<3>,
+    particles: &mut [Particle<3>; 2],
+    step: f64,
+    steps: u32,
+) -> Result<(), VerifyError> {
+    let mut twists = [Twist::default(); 2];
+    for n in 0..steps {
+        flow.predict(step * f64::from(n), particles, &mut twists)?;
+        integrator.advance(step, particles, &twists);
+    }
+    Ok(())
+}
+
+fn points(table: &Table, measure: &str, scheme: &str) -> Vec<(f64, f64)> {
+    table.values("time step", scheme, &[]).into_iter().zip(table.values(measure, scheme, &[])).collect()
+}
+
+fn numbers(tables: &Tables) -> Vec<Number> {
+    let table = tables.of(CASE.name);
+    let mut numbers = Vec::new();
+    for measure in CASE.measures {
+        for (method, _) in SCHEMES {
+            let (steps, errors): (Vec<f64>, Vec<f64>) = points(&table, measure, method).into_iter().unzip();
+            let what = format!("order of the error at the {measure}");
+            numbers.push(Number::new(Kind::Order, what, method, convergence_order(&steps, &errors)));
+            let what = format!("error at the {measure}, smallest step");
+            let smallest = errors.last().copied().unwrap_or(f64::NAN);
+            numbers.push(Number::new(Kind::Size, what, method, smallest));
+        }
+    }
+    numbers
+}
+
+fn plot(tables: &Tables) -> Plot {
+    let table = tables.of(CASE.name);
+    let curve = |color: usize, dashes: usize| Curve {
+        label: format!("{}, {}", SCHEMES[color].0, CASE.measures[dashes]),
+        color,
+        dashes,
+        points: points(&table, CASE.measures[dashes], SCHEMES[color].0).into_iter().rev().collect(),
+    };
+    let curves = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(color, dashes)| curve(color, dashes));
+    Plot { x: "time step", y: "error in radii", curves: curves.to_vec() }
+}

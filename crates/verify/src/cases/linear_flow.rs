@@ -1,0 +1,184 @@
+//! One disc or sphere in a linear flow, with the exact velocity on a box around it.
+
+use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::fem::TreeMesh;
+use gluey_testkit::convergence_order;
+use gluey_testkit::exact::{InclusionViscosity, RigidSphere, StokesSolution, ViscousInclusion};
+
+use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::method::{METHODS, Method};
+use crate::norms::{Lattice, errors};
+use crate::number::{Kind, Number};
+use crate::plot::Plot;
+use crate::set_up::{shift, solve};
+use crate::statistics::{mean, rms};
+
+const KEYS: &[&str] = &["a/h", "position"];
+const MEASURES: &[&str] = &["velocity", "spin", "stresslet", "field", "field, largest", "pressure"];
+/// Half the edge of the box in radii.
+const HALF_WIDTH: f64 = 2.5;
+/// Cells per radius, and positions of the lattice.
+type Meshes = &'static [(f64, usize)];
+
+/// The chapter of the disc.
+pub const DISC: Case = Case {
+    name: "disc-in-linear-flow",
+    title: "A disc in a linear flow, exact data on a box",
+    text: "A free disc of radius one in the flow of Schmid and Podladchikov (2003) for a rigid inclusion, whose velocity is given \
+           on the sides of a box of half-width 2.5 radii (less the net flux of its interpolation): no error but that of the \
+           method. Rigid velocity and spin (rms over positions), stresslet (mean; exact 4 pi mu a^2 E), velocity and pressure in \
+           the fluid (relative, mean square; largest at a node).",
+    keys: KEYS,
+    measures: MEASURES,
+    tasks: |extent| tasks(disc, disc_meshes(extent)),
+    numbers: |tables| numbers(&tables.of(DISC.name)),
+    plot: |tables| plot(&tables.of(DISC.name)),
+};
+
+/// The chapter of the sphere.
+pub const SPHERE: Case = Case {
+    name: "sphere-in-linear-flow",
+    title: "A sphere in a linear flow, exact data on a box",
+    text: "The same for a free sphere in a general linear flow (Batchelor 1967, section 4.11; Kim and Karrila 1991, section 3.3); \
+           stresslet exact 20/3 pi mu a^3 E (Einstein).",
+    keys: KEYS,
+    measures: MEASURES,
+    tasks: |extent| tasks(sphere, sphere_meshes(extent)),
+    numbers: |tables| numbers(&tables.of(SPHERE.name)),
+    plot: |tables| plot(&tables.of(SPHERE.name)),
+};
+
+fn disc_meshes(extent: Extent) -> Meshes {
+    match extent {
+        Extent::Quick => &[(3.2, 8), (6.4, 8), (12.8, 4)],
+        Extent::Full => &[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)],
+    }
+}
+
+fn sphere_meshes(extent: Extent) -> Meshes {
+    match extent {
+        Extent::Quick => &[(1.6, 8), (3.2, 2)],
+        Extent::Full => &[(1.6, 16), (3.2, 4), (4.8, 1)],
+    }
+}
+
+type Measure = fn(&'static Method, f64, usize) -> Result<Vec<f64>, VerifyError>;
+
+fn tasks(measure: Measure, meshes: Meshes) -> Vec<Task> {
+    let places = meshes.iter().flat_map(|&(cells, count)| (0..count).map(move |k| (cells, k)));
+    let places: Vec<(f64, usize)> = places.collect();
+    let task = |method: &'static Method, (cells, k): (f64, usize)| {
+        Task::new(method.name, &[cells, k as f64], move || measure(method, cells, k))
+    };
+    METHODS.iter().flat_map(|method| places.iter().map(move |&place| task(method, place))).collect()
+}
+
+fn disc(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
+    let exact = ViscousInclusion {
+        center: shift::<2>(position) / cells,
+        radius: 1.0,
+        matrix_viscosity: 1.0,
+        inclusion_viscosity: InclusionViscosity::Rigid,
+        pure_shear: 0.6,
+        simple_shear: 1.0,
+        spin: -0.5,
+    };
+    let far = Far { strain: Matrix::<2>::new(0.6, 0.5, 0.5, -0.6), spin: Spin::<2>::new(exact.spin) };
+    measure(method, cells, &exact, Ball::new(exact.center, 1.0), far)
+}
+
+fn sphere(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
+    let exact = RigidSphere {
+        center: shift::<3>(position) / cells,
+        radius: 1.0,
+        viscosity: 1.0,
+        strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
+        spin: Spin::<3>::new(0.3, -0.2, -0.5),
+    };
+    let far = Far { strain: exact.strain, spin: exact.spin };
+    measure(method, cells, &exact, Ball::new(exact.center, 1.0), far)
+}
+
+/// The flow far away.
+struct Far<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    strain: Matrix<D>,
+    spin: Spin<D>,
+}
+
+fn measure<const D: usize>(
+    method: &Method,
+    cells: f64,
+    exact: &impl StokesSolution<D>,
+    ball: Ball<D>,
+    far: Far<D>,
+) -> Result<Vec<f64>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    let corner = Vector::<D>::repeat(HALF_WIDTH);
+    let domain = Aabb { lower: -corner, upper: corner };
+    let lattice = Lattice { domain, cells: (2.0 * HALF_WIDTH * cells).round() as usize };
+    let boundary = lattice.without_net_flux(|x| exact.velocity(x));
+    let flow = solve(method, 1e-9, uniform(&lattice)?, &[ball], &boundary)?;
+    let twist = flow.twists[0];
+    let turned = twist.spin - far.spin;
+    let turned = Dim::<D>::spin_slice(&turned).iter().map(|w| w * w).sum::<f64>().sqrt();
+    let of_strain = if D == 2 { 4.0 } else { 20.0 / 3.0 } * std::f64::consts::PI * far.strain.norm_squared();
+    let stresslet = lattice.stresslet(&flow, &boundary, &far.strain) / of_strain - 1.0;
+    let errors = errors(&flow, exact, &[ball]);
+    Ok(vec![
+        twist.velocity.norm(),
+        turned,
+        stresslet,
+        errors.velocity,
+        errors.largest,
+        errors.pressure / errors.pressure_scale,
+    ])
+}
+
+/// The mesh with as few roots as possible.
+fn uniform<const D: usize>(lattice: &Lattice<D>) -> Result<TreeMesh<D>, VerifyError> {
+    let level = lattice.cells.trailing_zeros();
+    let roots = (lattice.cells >> level) as u32;
+    Ok(TreeMesh::uniform(lattice.domain, [roots; D], [false; D], level as u8)?)
+}
+
+/// The statistic of a measure over positions: the stresslet has a sign, errors of vectors do not.
+fn statistic(table: &Table, method: &str, measure: &str, cells: f64) -> f64 {
+    let values = table.values(measure, method, &[("a/h", cells)]);
+    if measure == "stresslet" { mean(&values) } else { rms(&values) }
+}
+
+fn numbers(table: &Table) -> Vec<Number> {
+    let mut numbers = Vec::new();
+    for measure in MEASURES {
+        let kind = if *measure == "stresslet" { Kind::Error } else { Kind::Size };
+        for method in METHODS {
+            let computed = table.steps("a/h", method.name, &[]);
+            let errors: Vec<f64> =
+                computed.iter().map(|&cells| statistic(table, method.name, measure, cells)).collect();
+            for (cells, &value) in computed.iter().zip(&errors) {
+                let what = format!("{measure}, a/h = {cells}");
+                numbers.push(Number::new(kind, what, method.name, value));
+            }
+            let (sizes, magnitudes): (Vec<f64>, Vec<f64>) =
+                computed.iter().zip(&errors).map(|(cells, e)| (1.0 / cells, e.abs())).unzip();
+            let value = convergence_order(&sizes, &magnitudes);
+            let what = format!("{measure}, order");
+            numbers.push(Number::new(Kind::Order, what, method.name, value));
+        }
+    }
+    numbers
+}
+
+fn plot(table: &Table) -> Plot {
+    let things = ["velocity", "spin", "stresslet", "field"];
+    Plot::of_methods("cells per radius *a*/*h*", "error", &things, |method, thing| {
+        let point = |cells: f64| (cells, statistic(table, method, things[thing], cells).abs());
+        table.steps("a/h", method, &[]).into_iter().map(point).collect()
+    })
+}

@@ -1,0 +1,29 @@
+//! The chapters of the book.
+
+mod cost;
+mod disc;
+mod discs;
+mod doublet;
+mod exact_flows;
+mod integrator;
+mod linear_flow;
+mod manufactured;
+mod spheres;
+mod symmetry;
+
+use crate::case::Case;
+
+/// All of them, in the order of the book.
+pub const CASES: &[Case] = &[
+    manufactured::CASE,
+    exact_flows::CASE,
+    disc::CASE,
+    discs::CASE,
+    linear_flow::DISC,
+    linear_flow::SPHERE,
+    spheres::CASE,
+    integrator::CASE,
+    doublet::CASE,
+    symmetry::CASE,
+    cost::CASE,
+];

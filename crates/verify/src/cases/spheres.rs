@@ -1,0 +1,102 @@
+//! Two spheres over gap and position of the lattice.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use gluey_geom::{Particle, Twist, Vector};
+use gluey_levelset::Ball;
+use gluey_motion::{Hydrodynamics, LinearFlow, PairMobility};
+use gluey_stokes::Refinement;
+
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::method::{METHODS, Method};
+use crate::number::Number;
+use crate::plot::Plot;
+use crate::set_up::{PairMotion, couette, level, mean_and_scatter, mesh, shift, solve};
+use crate::statistics::rms;
+
+/// So small that the box changes the speed by less than 2e-4.
+const RADIUS: f64 = 0.0125;
+/// Gaps in radii.
+const GAPS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+
+/// The chapter.
+pub const CASE: Case = Case {
+    name: "spheres",
+    title: "Two spheres",
+    text: "Two free spheres of radius 0.0125 in the middle of the unit box with u = y - 1/2 on all sides, the line of centres at \
+           135 degrees in the plane of shear, on adaptive meshes, at several places in their cells: speed of approach against \
+           the exact one in unbounded fluid (Batchelor and Green 1972; data/reference/sphere_pair_mobility_unbounded.csv, \
+           error 1e-9; the box changes it by less than 2e-4).",
+    keys: &["a/h", "gap", "position"],
+    measures: &["approach", "line rotation", "spin"],
+    tasks,
+    numbers,
+    plot,
+};
+
+/// Cells per radius, and positions of the lattice.
+fn meshes(extent: Extent) -> &'static [(f64, usize)] {
+    match extent {
+        Extent::Quick => &[(1.6, 8), (3.2, 6)],
+        Extent::Full => &[(1.6, 27), (3.2, 27), (6.4, 8)],
+    }
+}
+
+fn tasks(extent: Extent) -> Vec<Task> {
+    let mut tasks = Vec::new();
+    for method in METHODS {
+        for &(cells, count) in meshes(extent) {
+            for gap in GAPS {
+                tasks.extend((0..count).map(|k| {
+                    Task::new(method.name, &[cells, gap, k as f64], move || measure(method, cells, gap, k))
+                }));
+            }
+        }
+    }
+    tasks
+}
+
+fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
+    let half = (1.0 + 0.5 * gap) * RADIUS * FRAC_1_SQRT_2;
+    let arm = Vector::<3>::new(-half, half, 0.0);
+    let center = Vector::<3>::repeat(0.5) + shift::<3>(position) * (RADIUS / cells);
+    let centers = [center - arm, center + arm];
+    let spheres = centers.map(|center| Ball::new(center, RADIUS));
+    let mesh = mesh(&Refinement::to_level(level(RADIUS, cells)), &spheres)?;
+    let found = PairMotion::of(centers, &solve(method, 1e-6, mesh, &spheres, &couette)?.twists);
+
+    let particles = centers.map(|center| Particle::new(center, RADIUS));
+    let mut twists = [Twist::default(); 2];
+    PairMobility::new(LinearFlow::shear(1.0, 0.5)).predict(0.0, &particles, &mut twists)?;
+    let exact = PairMotion::of(centers, &twists);
+    Ok(vec![
+        found.normal_speed / exact.normal_speed - 1.0,
+        found.line_rotation - exact.line_rotation,
+        found.spin - exact.spin,
+    ])
+}
+
+fn numbers(tables: &Tables) -> Vec<Number> {
+    let table = tables.of(CASE.name);
+    let mut numbers = Vec::new();
+    for method in METHODS {
+        for cells in table.steps("a/h", method.name, &[]) {
+            for gap in GAPS {
+                let name = format!("approach, a/h = {cells}, gap {gap} a");
+                let at = [("a/h", cells), ("gap", gap)];
+                numbers.extend(mean_and_scatter(&table, method.name, "approach", &at, &name));
+            }
+        }
+    }
+    numbers
+}
+
+fn plot(tables: &Tables) -> Plot {
+    let table = tables.of(CASE.name);
+    let cells = [1.6, 3.2, 6.4];
+    let things = ["*a*/*h* = 1.6", "*a*/*h* = 3.2", "*a*/*h* = 6.4"];
+    Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {
+        let error = |gap| rms(&table.values("approach", method, &[("a/h", cells[thing]), ("gap", gap)]));
+        GAPS.map(|gap| (gap, error(gap))).to_vec()
+    })
+}

@@ -1,0 +1,35 @@
+//! The formulations that the book compares.
+
+use gluey_stokes::{FlowParams, Formulation, PaperParams};
+
+/// A formulation with the settings that a case has by default.
+#[derive(Debug)]
+pub struct Method {
+    /// Its name in case files.
+    pub name: &'static str,
+    /// Whether cells in narrow films are smaller by default in 2D.
+    pub refines_films: bool,
+    /// The formulation in a number of dimensions.
+    pub formulation: fn(usize) -> Formulation,
+}
+
+/// All of them. Another one is a line here; its limits are lines of `limits.csv`.
+pub const METHODS: &[Method] = &[
+    Method {
+        name: "rigid-dofs",
+        refines_films: true,
+        formulation: |d| FlowParams::for_dimension(d).formulation,
+    },
+    Method {
+        name: "paper",
+        refines_films: false,
+        formulation: |_| Formulation::Paper(PaperParams::default()),
+    },
+];
+
+impl Method {
+    /// Parameters of its flows in `D` dimensions, in a fluid of viscosity one, by the usual solver.
+    pub fn params<const D: usize>(&self, tolerance: f64) -> FlowParams {
+        FlowParams { formulation: (self.formulation)(D), tolerance, ..FlowParams::for_dimension(D) }
+    }
+}

@@ -1,0 +1,134 @@
+//! Set-ups and measures that several cases share.
+
+use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::fem::TreeMesh;
+use gluey_stokes::{Flow, FlowSolver, Refinement};
+
+use crate::case::{Table, VerifyError};
+use crate::method::Method;
+use crate::number::Number;
+use crate::statistics::{mean, scatter};
+
+/// Radius of the discs in the reference data.
+pub const RADIUS: f64 = 0.05;
+
+/// One flow, computed from nothing.
+pub fn solve<const D: usize>(
+    method: &Method,
+    tolerance: f64,
+    mesh: TreeMesh<D>,
+    balls: &[Ball<D>],
+    boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
+) -> Result<Flow<D>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    Ok(FlowSolver::new(method.params::<D>(tolerance))?.solve(mesh, balls, boundary)?)
+}
+
+/// The mesh of the unit box.
+pub fn mesh<const D: usize>(refinement: &Refinement, balls: &[Ball<D>]) -> Result<TreeMesh<D>, VerifyError> {
+    Ok(refinement.mesh(Aabb::unit(), [1; D], [false; D], balls)?)
+}
+
+/// The level of the unit box whose cells fit this many times into a radius.
+pub fn level(radius: f64, cells_per_radius: f64) -> u8 {
+    (cells_per_radius / radius).log2().round() as u8
+}
+
+/// Couette flow `(y - 1/2) e_x`.
+pub fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
+    let mut u = Vector::zeros();
+    u[0] = x[1] - 0.5;
+    u
+}
+
+/// Position number `k` of a body relative to the lattice, in cells from -1/2 to 1/2: multiples of powers of
+/// the root of `x^4 = x + 1` modulo one, which fill the cell evenly.
+pub fn shift<const D: usize>(k: usize) -> Vector<D> {
+    let steps = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2];
+    Vector::from_fn(|d, _| ((k + 1) as f64 * steps[d]).fract() - 0.5)
+}
+
+/// Two balls around `center`, at a gap of `gap` radii and an angle of their line of centres in degrees.
+pub fn pair<const D: usize>(center: Vector<D>, radius: f64, gap: f64, degrees: f64) -> [Ball<D>; 2] {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let mut arm = Vector::zeros();
+    arm[0] = cos * radius * (1.0 + 0.5 * gap);
+    arm[1] = sin * radius * (1.0 + 0.5 * gap);
+    [Ball::new(center - arm, radius), Ball::new(center + arm, radius)]
+}
+
+/// How two balls move relative to each other in the plane of shear.
+#[derive(Clone, Copy, Debug)]
+pub struct PairMotion {
+    /// Speed along the line of centres, negative when they approach.
+    pub normal_speed: f64,
+    /// Rate at which the line of centres turns.
+    pub line_rotation: f64,
+    /// Spin of the first ball about the axis of vorticity.
+    pub spin: f64,
+}
+
+impl PairMotion {
+    /// That of two balls at these centres.
+    pub fn of<const D: usize>(centers: [Vector<D>; 2], twists: &[Twist<D>]) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let line = centers[1] - centers[0];
+        let e = line.normalize();
+        let relative = twists[1].velocity - twists[0].velocity;
+        Self {
+            normal_speed: relative.dot(&e),
+            line_rotation: (e[0] * relative[1] - e[1] * relative[0]) / line.norm(),
+            spin: twists[0].spin[Dim::<D>::ROT - 1],
+        }
+    }
+}
+
+/// Mean and scatter of a measure over the rows at `at`, as numbers of what `name` says.
+pub fn mean_and_scatter(
+    table: &Table,
+    method: &'static str,
+    measure: &str,
+    at: &[(&str, f64)],
+    name: &str,
+) -> [Number; 2] {
+    let values = table.values(measure, method, at);
+    Number::mean_and_scatter(name, method, mean(&values), scatter(&values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_lie_in_a_cell_and_are_spread() {
+        let shifts: Vec<Vector<3>> = (0..27).map(shift).collect();
+        assert!(shifts.iter().all(|s| s.amax() <= 0.5));
+        let mean = shifts.iter().sum::<Vector<3>>() / 27.0;
+        assert!(mean.amax() < 0.12, "{mean:?}");
+    }
+
+    #[test]
+    fn levels_have_the_cells_they_are_asked_for() {
+        assert_eq!([3.2, 6.4, 12.8].map(|cells| level(RADIUS, cells)), [6, 7, 8]);
+        assert_eq!(level(0.0125, 3.2), 8);
+    }
+
+    /// In a rigid rotation the pair keeps its distance and turns with it.
+    #[test]
+    fn a_pair_in_a_rigid_motion_only_turns() {
+        let balls = pair(Vector::<2>::new(0.4, 0.6), RADIUS, 0.3, 35.0);
+        let centers = balls.map(|ball| *ball.center());
+        let twists = centers.map(|x| Twist {
+            velocity: Vector::<2>::new(-x[1], x[0]) * 0.7,
+            spin: gluey_geom::Spin::<2>::new(0.7),
+        });
+        let motion = PairMotion::of(centers, &twists);
+        assert!(motion.normal_speed.abs() < 1e-16);
+        assert!((motion.line_rotation - 0.7).abs() < 1e-15 && motion.spin == 0.7);
+    }
+}
