@@ -25,6 +25,7 @@ pub const METHODS: &[Method] = &[
         refines_films: false,
         formulation: |_| Formulation::Paper(PaperParams::default()),
     },
+    Method { name: "unfitted", refines_films: false, formulation: |_| Formulation::Unfitted },
 ];
 
 impl Method {

@@ -57,6 +57,7 @@ fn flow(case: &Case) -> String {
             let offset = case.rigid_offset();
             format!("rigid-dofs, offset {offset} h")
         }
+        Formulation::Unfitted => "unfitted".to_owned(),
         Formulation::Paper => {
             let paper = &flow.paper;
             let velocity = match paper.velocity {

@@ -132,10 +132,6 @@ where
     let found = errors::<D>(formulation, level);
     let is_near = |(found, measured): (&f64, &f64)| *found <= 2.0 * measured;
     let name = format!("{D}D, {formulation:?}, level {level}");
-    if measured == [0.0; 5] {
-        println!("{name}: {found:.8?}");
-        return;
-    }
     assert!(found.iter().zip(&measured).all(is_near), "{name}: {found:.7?}, was {measured:.7?}");
 }
 
@@ -164,16 +160,23 @@ fn a_sphere_obeys_the_laws() {
     }
 }
 
+/// Of third order but where the mesh away from the disc, which has larger cells, is what is seen.
 #[test]
 fn a_disc_with_its_true_surface_obeys_the_laws() {
-    for (level, measured) in [(4, [0.0; 5]), (5, [0.0; 5]), (6, [0.0; 5])] {
+    for (level, measured) in [
+        (4, [3.9e-4, 4.5e-4, 9.3e-4, 4.7e-4, 3.1e-3]),
+        (5, [2.8e-5, 6.3e-5, 6.8e-5, 6.7e-5, 2.8e-4]),
+        (6, [4.5e-6, 4.2e-5, 1.1e-5, 4.6e-5, 8.3e-5]),
+    ] {
         obeys::<2>(Formulation::Unfitted, level, measured);
     }
 }
 
 #[test]
 fn a_sphere_with_its_true_surface_obeys_the_laws() {
-    for (level, measured) in [(4, [0.0; 5]), (5, [0.0; 5])] {
+    for (level, measured) in
+        [(4, [5.6e-4, 1.3e-3, 1.3e-3, 1.3e-3, 3.9e-3]), (5, [6.9e-5, 1.4e-4, 1.5e-4, 1.4e-4, 5.1e-4])]
+    {
         obeys::<3>(Formulation::Unfitted, level, measured);
     }
 }
