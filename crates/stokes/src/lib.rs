@@ -1,7 +1,8 @@
 //! Stokes flow around rigid bodies by an unfitted Q2-Q1 finite-element method.
 //!
 //! `-div(2 eta eps(u)) + grad p = f`, `div u = 0` in a box, with `u` a rigid motion `U + w x r` in each body
-//! and no force or torque on any but those of `f` and those given. [`Formulation`] names the two ways to impose rigidity.
+//! and no force or torque on any but those of `f` and those given. [`Formulation`] names the two ways to
+//! impose rigidity.
 //!
 //! ```
 //! use gluey_stokes::geom::{Aabb, Vector};

@@ -186,49 +186,30 @@ where
         conditions: &Conditions<'_, D>,
     ) -> Result<Flow<D>, StokesError> {
         let start = Instant::now();
-        let mut prepared = self.prepared(mesh, bodies)?;
-        let assembly = start.elapsed().as_secs_f64();
-        prepared.make_ready(conditions)?;
-        let preparation = start.elapsed().as_secs_f64() - assembly;
-        let Prepared { solver, problem, .. } = prepared;
-        let (guess, before) = solver.initial_guess(&problem);
-        let (mut flow, x) = solver.solved(&problem, conditions, guess)?;
-        solver.keep_for_next(&problem, &x, &flow.pressure, before);
-        let solve = start.elapsed().as_secs_f64() - assembly - preparation;
-        flow.times = PhaseTimes { assembly, preparation, solve };
+        let mut problem = self.problem(mesh, bodies)?;
+        problem.system.space.hold_twists(conditions.hold_bodies());
+        let assembled = Instant::now();
+        self.solver(&problem).prepare(&problem)?;
+        let prepared = Instant::now();
+        let (guess, before) = self.initial_guess(&problem);
+        let (mut flow, x) = self.solved(&problem, conditions, guess)?;
+        self.keep_for_next(&problem, &x, &flow.pressure, before);
+        flow.times = PhaseTimes {
+            assembly: (assembled - start).as_secs_f64(),
+            preparation: (prepared - assembled).as_secs_f64(),
+            solve: prepared.elapsed().as_secs_f64(),
+        };
         Ok(flow)
     }
 
-    /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first needed:
-    /// once for free bodies and once for held ones.
-    ///
-    /// ```
-    /// use gluey_stokes::geom::{Aabb, Spin, Vector, Wrench};
-    /// use gluey_stokes::levelset::Ball;
-    /// use gluey_stokes::{Conditions, FlowParams, FlowSolver, Refinement};
-    ///
-    /// let disc = Ball::new(Vector::<2>::new(0.5, 0.5), 0.1);
-    /// let mesh = Refinement::to_level(6).mesh(Aabb::unit(), [1, 1], [false; 2], &[disc])?;
-    /// let mut solver = FlowSolver::<2>::new(FlowParams::for_dimension(2))?;
-    /// let mut prepared = solver.prepared(mesh, &[disc])?;
-    /// let weight = Wrench { force: Vector::<2>::new(0.0, -1.0), torque: Spin::<2>::new(0.0) };
-    /// let falling = prepared.solve(&Conditions::at_rest().with_wrenches(&[weight]))?;
-    /// // Held at the velocity at which it falls, it needs its weight.
-    /// let held = prepared.solve(&Conditions::at_rest().with_twists(&falling.twists))?;
-    /// assert!((held.wrenches[0] - weight).force.norm() < 1e-4);
-    /// # Ok::<(), gluey_stokes::StokesError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`StokesError::Unresolved`] for a body smaller than a cell.
-    pub fn prepared(
-        &mut self,
-        mesh: TreeMesh<D>,
-        bodies: &[Ball<D>],
-    ) -> Result<Prepared<'_, D>, StokesError> {
+    fn problem(&mut self, mesh: TreeMesh<D>, bodies: &[Ball<D>]) -> Result<Problem<D>, StokesError> {
         let discretisation = self.discretised(mesh);
-        let problem = Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())?;
-        Ok(Prepared { solver: self, problem, is_ready: [false; 2] })
+        Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
+    }
+
+    /// The solver for free bodies or for held ones.
+    fn solver(&mut self, problem: &Problem<D>) -> &mut Box<dyn SaddleSolver<D> + Send> {
+        &mut self.solvers[usize::from(problem.system.space.holds_twists())]
     }
 
     /// The flow under some conditions from the guess `x`, and the reduced vector it belongs to.
@@ -240,8 +221,8 @@ where
     ) -> Result<(Flow<D>, Vec<f64>), StokesError> {
         let (lift, b) = conditions.data(problem)?;
         let mut effort = Effort::default();
-        let solver = &mut self.solvers[usize::from(problem.system.space.holds_twists())];
         let tolerance = self.params.tolerance;
+        let solver = self.solver(problem);
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
             effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
             Ok(())

@@ -7,7 +7,9 @@
 //! system `M` is the block of the inverse matrix that belongs to the twists, so both hold but for the
 //! tolerance of the solves.
 
+use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
 use super::conditions::Conditions;
@@ -21,10 +23,46 @@ pub struct Prepared<'s, const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    pub(super) solver: &'s mut FlowSolver<D>,
-    pub(super) problem: Problem<D>,
+    solver: &'s mut FlowSolver<D>,
+    problem: Problem<D>,
     /// Whether the solvers for free and for held bodies are prepared.
-    pub(super) is_ready: [bool; 2],
+    is_ready: [bool; 2],
+}
+
+impl<const D: usize> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first
+    /// needed: once for free bodies and once for held ones.
+    ///
+    /// ```
+    /// use gluey_stokes::geom::{Aabb, Spin, Vector, Wrench};
+    /// use gluey_stokes::levelset::Ball;
+    /// use gluey_stokes::{Conditions, FlowParams, FlowSolver, Refinement};
+    ///
+    /// let disc = Ball::new(Vector::<2>::new(0.5, 0.5), 0.1);
+    /// let mesh = Refinement::to_level(6).mesh(Aabb::unit(), [1, 1], [false; 2], &[disc])?;
+    /// let mut solver = FlowSolver::<2>::new(FlowParams::for_dimension(2))?;
+    /// let mut prepared = solver.prepared(mesh, &[disc])?;
+    /// let weight = Wrench { force: Vector::<2>::new(0.0, -1.0), torque: Spin::<2>::new(0.0) };
+    /// let falling = prepared.solve(&Conditions::at_rest().with_wrenches(&[weight]))?;
+    /// // Held at the velocity at which it falls, it needs its weight.
+    /// let held = prepared.solve(&Conditions::at_rest().with_twists(&falling.twists))?;
+    /// assert!((held.wrenches[0] - weight).force.norm() < 1e-4);
+    /// # Ok::<(), gluey_stokes::StokesError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`StokesError::Unresolved`] for a body smaller than a cell.
+    pub fn prepared(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+    ) -> Result<Prepared<'_, D>, StokesError> {
+        let problem = self.problem(mesh, bodies)?;
+        Ok(Prepared { solver: self, problem, is_ready: [false; 2] })
+    }
 }
 
 impl<const D: usize> Prepared<'_, D>
@@ -44,12 +82,14 @@ where
     }
 
     /// Holds or frees the bodies and prepares the solver for that, unless it is.
-    pub(super) fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
-        let (hold, which) = (conditions.hold_bodies(), usize::from(conditions.hold_bodies()));
-        self.problem.system.space.hold_twists(hold);
-        if !self.is_ready[which] {
-            self.solver.solvers[which].prepare(&self.problem)?;
-            self.is_ready[which] = true;
+    fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
+        let hold = conditions.hold_bodies();
+        let Self { solver, problem, is_ready } = self;
+        problem.system.space.hold_twists(hold);
+        let is_ready = &mut is_ready[usize::from(hold)];
+        if !*is_ready {
+            solver.solver(problem).prepare(problem)?;
+            *is_ready = true;
         }
         Ok(())
     }

@@ -121,8 +121,8 @@ where
         vector::axpy(-1.0, &y, b);
     }
 
-    /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal velocities
-    /// and pressures, with the forces on hanging nodes moved to their masters.
+    /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal
+    /// velocities and pressures, with the forces on hanging nodes moved to their masters.
     pub(crate) fn nodal_forces(&self, u: &[f64], p: &[f64]) -> Vec<f64> {
         let nowhere = vec![None; self.space.nodes().node_count()];
         let loose = VelocitySpace::new::<Ball<D>>(self.discretisation(), &[], &nowhere);
