@@ -20,7 +20,8 @@ pub struct RunReport {
     pub case: String,
     /// Contact strategy.
     pub strategy: Strategy,
-    /// `paper`, `rigid-dofs` or `unfitted`; the name of the analytic model where there is no finite-element flow.
+    /// `paper`, `rigid-dofs` or `unfitted`; the name of the analytic model where there is no finite-element
+    /// flow.
     pub formulation: String,
     /// Time steps.
     pub steps: usize,

@@ -99,7 +99,7 @@ fn limit(line: &str) -> Result<Limit, &'static str> {
 }
 
 /// The line that would limit a number to twice what it is, or to 0.9 of an order; `None` where nothing is
-/// wanted of it. What is nothing but rounding may be as large as [`ROUNDING`].
+/// wanted of it. What is nothing but rounding may be as large as a hundred-billionth.
 pub fn proposal(case: &str, number: &Number, from: Extent) -> Option<String> {
     let twice = round_up(2.0 * number.value.abs().max(0.5 * ROUNDING));
     let (wanted, limit) = match number.kind {

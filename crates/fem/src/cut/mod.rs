@@ -11,10 +11,10 @@
 //! costs what a cell with a viscosity of its own at each point costs, and the divergence theorem holds
 //! between its volume and its surfaces to rounding, which Nitsche's method needs.
 //!
-//! The integrals of `l_q` are taken along rays ([`rays`]): the places where a ray in direction `k` enters and
+//! The integrals of `l_q` are taken along rays (`rays`): the places where a ray in direction `k` enters and
 //! leaves the ball give `n_k dS = -+dA`, its length inside the volume. Rays are parametrised by angles, in
 //! which chords have no square roots, and cut where they begin to miss faces and edges of the cell
-//! ([`intervals`]). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a ball.
+//! (`intervals`). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a ball.
 
 mod intervals;
 mod moments;

@@ -113,7 +113,8 @@ where
         })
     }
 
-    /// The cells whose nodes are unknowns and that are cut or carry bad cells, ascending; indices in the mesh.
+    /// The cells whose nodes are unknowns and that are cut or carry bad cells, ascending; indices in the
+    /// mesh.
     pub fn roots(&self) -> &[u32] {
         &self.roots
     }

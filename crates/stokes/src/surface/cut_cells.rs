@@ -98,8 +98,8 @@ impl<const D: usize> CutCells<D> {
         self.cells.get(self.place[cell] as usize)
     }
 
-    /// Cells and bodies of all pieces, a piece for each body that cuts a cell: place of the cut cell, place of
-    /// the body in it.
+    /// Cells and bodies of all pieces, a piece for each body that cuts a cell: place of the cut cell, place
+    /// of the body in it.
     pub fn pieces(&self) -> Jagged<(u32, u32)> {
         let of = |(k, cell): (usize, &CutCell<D>)| (0..cell.bodies.len()).map(move |s| (k as u32, s as u32));
         self.cells.iter().enumerate().map(of).collect()

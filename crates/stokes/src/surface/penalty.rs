@@ -4,8 +4,8 @@
 //! `int_F 2 eta eps(u):eps(u)` over the polynomials of a root, on the root and the bad cells that it carries
 //! (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem); twice that is safe where bad cells
 //! next to each other have different roots. Since `|eps n|^2 <= eps:eps`, the largest ratio `mu` of
-//! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products of
-//! gradients in the volume and on the surface:
+//! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products
+//! of gradients in the volume and on the surface:
 //!
 //! `beta = 1.7 mu eta`.
 //!

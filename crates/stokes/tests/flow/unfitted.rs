@@ -138,7 +138,7 @@ where
     let motion = |x: f64| {
         let center = Vector::<D>::from_fn(|d, _| if d == 1 { 0.4 } else { x });
         let ball = [Ball::periodic(center, 0.2, period)];
-        let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], periodic, level.into()).unwrap();
+        let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], periodic, level).unwrap();
         solve(params(Formulation::Unfitted, solver, 1e-9), mesh, &ball, &couette).twists
     };
     let distance = twist_distance(&motion(0.5), &motion(0.0));

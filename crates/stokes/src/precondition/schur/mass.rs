@@ -71,7 +71,7 @@ where
             let value = value / system.viscosity();
             for &(r, wr) in expansion.terms(nodes[i] as usize) {
                 for &(c, wc) in expansion.terms(nodes[j] as usize) {
-                    added = added.clone().and(mass.add(r as usize, c as usize, wr * wc * value));
+                    added = added.and(mass.add(r as usize, c as usize, wr * wc * value));
                 }
             }
         });

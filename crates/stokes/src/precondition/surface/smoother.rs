@@ -1,9 +1,9 @@
 //! The smoothers of a mesh that surfaces cut.
 //!
-//! Where aggregates extrapolate and penalties act, motions of every stiffness meet in one cell: the operator's
-//! block on the free nodes of every root tells them apart. A sweep of restricted additive Schwarz over these
-//! (Cai and Sarkis 1999), `z = sum R_c^T W_c A_c^-1 R_c r` with `W` the inverse number of blocks a node
-//! belongs to, needs no damping. Elsewhere Chebyshev's method with the diagonal is enough.
+//! Where aggregates extrapolate and penalties act, motions of every stiffness meet in one cell: the
+//! operator's block on the free nodes of every root tells them apart. A sweep of restricted additive Schwarz
+//! over these (Cai and Sarkis 1999), `z = sum R_c^T W_c A_c^-1 R_c r` with `W` the inverse number of blocks a
+//! node belongs to, needs no damping. Elsewhere Chebyshev's method with the diagonal is enough.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
