@@ -27,6 +27,7 @@
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
+mod dimension;
 mod error;
 mod flow;
 mod formulation;
@@ -40,7 +41,7 @@ mod surface;
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{
     Conditions, Field, Flow, FlowParams, FlowSolver, Given, NodalFields, PhaseTimes, Prepared, Refinement,
-    SolverKind, WarmStartError,
+    WarmStartError,
 };
 // How rigidity is imposed.
 pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
@@ -50,7 +51,7 @@ pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
-pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
+pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
 // The parts of the system: unknowns, and where the penalised solid is.
 pub use solid::{PointMatrices, SolidRegion};
 pub use space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};

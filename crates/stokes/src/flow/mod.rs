@@ -14,7 +14,7 @@ use gluey_levelset::Ball;
 
 use crate::error::StokesError;
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
-use crate::solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport};
+use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{CutCellPressures, Discretisation};
 use warm_start::WarmStart;
 
@@ -22,15 +22,6 @@ pub use conditions::{Conditions, Field, Given};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use warm_start::{NodalFields, WarmStartError};
-
-/// Which linear solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SolverKind {
-    /// Sparse direct factorisation.
-    Direct,
-    /// Krylov method with a multigrid preconditioner.
-    Multigrid,
-}
 
 /// Parameters of a [`FlowSolver`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,14 +131,9 @@ where
     /// [`StokesError::Parameter`] for values out of range.
     pub fn new(params: FlowParams) -> Result<Self, StokesError> {
         check(&params)?;
-        let solver = || -> Box<dyn SaddleSolver<D> + Send> {
-            match params.solver {
-                SolverKind::Direct => Box::new(DirectSolver::default()),
-                SolverKind::Multigrid => Box::new(MultigridSolver::default()),
-            }
-        };
         let method = params.formulation.method()?;
-        Ok(Self { params, solvers: [solver(), solver()], method, discretisation: None, warm_start: None })
+        let solvers = [(); 2].map(|()| params.solver.solver());
+        Ok(Self { params, solvers, method, discretisation: None, warm_start: None })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same

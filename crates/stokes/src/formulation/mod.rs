@@ -15,6 +15,7 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 
+use crate::dimension::in_dimension;
 use crate::error::StokesError;
 use crate::space::{CutCellPressures, Discretisation};
 
@@ -48,13 +49,28 @@ impl Formulation {
         Dim<D>: Space<D>,
     {
         self.check()?;
-        Ok(match *self {
+        Ok(in_dimension(|| self.method_in_2d(), || self.method_in_3d()))
+    }
+
+    fn method_in_2d(&self) -> Arc<dyn Method<2>> {
+        self.checked_method()
+    }
+
+    fn method_in_3d(&self) -> Arc<dyn Method<3>> {
+        self.checked_method()
+    }
+
+    fn checked_method<const D: usize>(&self) -> Arc<dyn Method<D>>
+    where
+        Dim<D>: Space<D>,
+    {
+        match *self {
             Self::RigidDofs { offset, cut_cell_pressures } => {
                 Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
             Self::Unfitted => Arc::new(unfitted::Unfitted),
-        })
+        }
     }
 
     /// # Errors

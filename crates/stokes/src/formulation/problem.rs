@@ -87,6 +87,11 @@ where
         Err(StokesError::Unsupported { what: "stresslets" })
     }
 
+    /// See [`StokesSystem::residual`]. Here so that who calls it does not compile the operators anew.
+    fn residual(&self, system: &StokesSystem<D>, [u, p]: [&[f64]; 2], b: &mut [f64]) {
+        system.residual(u, p, b);
+    }
+
     /// Whether the deviation from the undisturbed flow is smooth enough in time to be extrapolated.
     fn is_smooth_in_time(&self) -> bool;
 
@@ -195,7 +200,8 @@ where
     /// The load of the force `f(x)` per unit of volume, less that of the lift.
     pub fn right_hand_side(&self, lift: &[f64], force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
         let mut b = self.loads(force);
-        self.system.residual(lift, &vec![0.0; self.system.pressure.dim()], &mut b);
+        let at_rest = vec![0.0; self.system.pressure.dim()];
+        self.rigidity.residual(&self.system, [lift, &at_rest], &mut b);
         b
     }
 
@@ -250,7 +256,7 @@ where
     ) -> Result<Vec<Wrench<D>>, StokesError> {
         let space = self.space_with_twists("forces on bodies that are held")?;
         let mut b = self.loads(force);
-        self.system.residual(velocity, pressure, &mut b);
+        self.rigidity.residual(&self.system, [velocity, pressure], &mut b);
         Ok((0..self.bodies.len()).map(|body| -space.wrench(&b, body)).collect())
     }
 
