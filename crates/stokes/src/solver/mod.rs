@@ -1,49 +1,17 @@
 //! The linear solvers behind one trait.
 
 mod direct;
+mod kind;
 mod multigrid;
 
 use gluey_geom::{Dim, Space};
 
-use crate::dimension::in_dimension;
 use crate::error::StokesError;
 use crate::formulation::Problem;
 use crate::operator::StokesSystem;
 
-/// Which linear solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SolverKind {
-    /// Sparse direct factorisation.
-    Direct,
-    /// Krylov method with a multigrid preconditioner.
-    Multigrid,
-}
-
-impl SolverKind {
-    /// A solver of this kind.
-    pub(crate) fn solver<const D: usize>(self) -> Box<dyn SaddleSolver<D> + Send>
-    where
-        Dim<D>: Space<D>,
-    {
-        in_dimension(|| self.in_2d(), || self.in_3d())
-    }
-
-    fn in_2d(self) -> Box<dyn SaddleSolver<2> + Send> {
-        match self {
-            Self::Direct => Box::new(DirectSolver::default()),
-            Self::Multigrid => Box::new(MultigridSolver::default()),
-        }
-    }
-
-    fn in_3d(self) -> Box<dyn SaddleSolver<3> + Send> {
-        match self {
-            Self::Direct => Box::new(DirectSolver::default()),
-            Self::Multigrid => Box::new(MultigridSolver::default()),
-        }
-    }
-}
-
 pub use direct::DirectSolver;
+pub use kind::SolverKind;
 pub use multigrid::MultigridSolver;
 
 /// Effort and residuals of a linear solve.

@@ -1,0 +1,41 @@
+//! The linear solvers by name.
+
+use gluey_geom::{Dim, Space};
+
+use super::SaddleSolver;
+use super::direct::DirectSolver;
+use super::multigrid::MultigridSolver;
+use crate::dimension::in_dimension;
+
+/// Which linear solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolverKind {
+    /// Sparse direct factorisation.
+    Direct,
+    /// Krylov method with a multigrid preconditioner.
+    Multigrid,
+}
+
+impl SolverKind {
+    /// A solver of this kind.
+    pub(crate) fn solver<const D: usize>(self) -> Box<dyn SaddleSolver<D> + Send>
+    where
+        Dim<D>: Space<D>,
+    {
+        in_dimension(|| self.in_2d(), || self.in_3d())
+    }
+
+    fn in_2d(self) -> Box<dyn SaddleSolver<2> + Send> {
+        match self {
+            Self::Direct => Box::new(DirectSolver::default()),
+            Self::Multigrid => Box::new(MultigridSolver::default()),
+        }
+    }
+
+    fn in_3d(self) -> Box<dyn SaddleSolver<3> + Send> {
+        match self {
+            Self::Direct => Box::new(DirectSolver::default()),
+            Self::Multigrid => Box::new(MultigridSolver::default()),
+        }
+    }
+}
