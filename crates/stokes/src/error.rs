@@ -50,6 +50,17 @@ pub enum StokesError {
         /// Share of fluid in the cell.
         share: f64,
     },
+    /// The strain energy of the fluid in a cell and those that follow it is not positive.
+    #[error(
+        "the fluid in cell {cell} at body {} has no positive strain energy: do bodies overlap by more than rounding?",
+        body + 1
+    )]
+    NoPenalty {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// Index of the cell in the mesh.
+        cell: usize,
+    },
     /// Cells of different sizes meet at a surface.
     #[error("the surface of body {} meets cells of different sizes: refine the mesh around it", body + 1)]
     CoarseSurface {

@@ -91,6 +91,10 @@ where
 
     /// The field that carries the data, and its residual with the loads.
     pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+        // The load is that of whole cells.
+        if self.force.is_some() && problem.system.space.is_by_surface() && !problem.bodies.is_empty() {
+            return Err(StokesError::Unsupported { what: "forces per unit of volume around bodies" });
+        }
         let mut lift = problem.lift(self.boundary);
         match self.bodies {
             Given::Wrenches(wrenches) => {

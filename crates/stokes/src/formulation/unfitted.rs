@@ -47,7 +47,7 @@ where
         let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
         let pressure =
             PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
-        let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates);
+        let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
         Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces), Arc::new(*self)))
     }
 }

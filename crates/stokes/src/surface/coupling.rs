@@ -10,6 +10,7 @@ use gluey_linalg::{AffineConstraints, Scalar, Subset};
 use super::aggregates::Aggregates;
 use super::cut_cells::{CutCell, CutCells};
 use super::penalty::penalties;
+use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
 
 /// `[A, -B^T; -B, 0]` of the cut cells.
@@ -50,13 +51,16 @@ where
     Dim<D>: Space<D>,
 {
     /// The operator around `bodies` in a fluid of this viscosity.
+    ///
+    /// # Errors
+    /// [`StokesError::NoPenalty`], see there.
     pub fn new(
         space: &VelocitySpace<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
         cut: CutCells<D>,
         aggregates: &Aggregates,
-    ) -> Self {
+    ) -> Result<Self, StokesError> {
         let discretisation = space.discretisation();
         let (velocity, pressure) = (&discretisation.velocity, &discretisation.pressure);
         let touched = |nodes: &gluey_fem::NodeMap<D>| {
@@ -79,7 +83,7 @@ where
         boundary.sort_unstable();
         boundary.dedup();
         let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
-        let penalties = penalties(discretisation, &cut, aggregates);
+        let penalties = penalties(discretisation, &cut, aggregates)?;
         let medium = (bodies, viscosity);
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
@@ -90,7 +94,7 @@ where
         let mut roots = aggregates.roots.clone();
         roots.sort_unstable();
         roots.dedup();
-        Self {
+        Ok(Self {
             discretisation,
             roots,
             penalties,
@@ -102,7 +106,7 @@ where
             nodes,
             pressures,
             cut,
-        }
+        })
     }
 
     /// Cell and body of each piece.

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
 use super::cut_cells::CutCells;
+use crate::error::StokesError;
 use crate::space::Discretisation;
 
 /// Multiple of the eigenvalue.
@@ -32,11 +33,14 @@ const STEPS: usize = 30;
 const USED_UP: f64 = 1e-10;
 
 /// `beta h / eta` of every cut cell.
+///
+/// # Errors
+/// [`StokesError::NoPenalty`] where the volume left by bodies is not that of a fluid.
 pub fn penalties<const D: usize>(
     discretisation: &Discretisation<D>,
     cut: &CutCells<D>,
     aggregates: &Aggregates,
-) -> Vec<f64> {
+) -> Result<Vec<f64>, StokesError> {
     let mut members: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(0..).collect();
     members.sort_unstable();
     let clusters: Vec<&[(u32, u32)]> = members.chunk_by(|a, b| a.0 == b.0).collect();
@@ -64,9 +68,14 @@ pub fn penalties<const D: usize>(
     let values: Vec<f64> = clusters.par_iter().map(of_cluster).collect();
     let mut penalties = vec![0.0; cut.cells.len()];
     for (cluster, value) in clusters.iter().zip(values) {
+        if value.is_nan() {
+            let first = &cut.cells[cluster[0].1 as usize];
+            let (body, cell) = (first.bodies[0] as usize, first.cell as usize);
+            return Err(StokesError::NoPenalty { body, cell });
+        }
         cluster.iter().for_each(|&(_, k)| penalties[k as usize] = value);
     }
-    penalties
+    Ok(penalties)
 }
 
 /// Place of a cell relative to the root, in cells.

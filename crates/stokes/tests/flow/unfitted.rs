@@ -4,7 +4,9 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
-use gluey_stokes::{Flow, Formulation, Problem, Refinement, SolverKind, StokesError, SystemOperator};
+use gluey_stokes::{
+    Flow, FlowSolver, Formulation, Problem, Refinement, SolverKind, StokesError, SystemOperator,
+};
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{
@@ -183,4 +185,14 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
     let error = refused.unwrap_err();
     assert!(matches!(error, StokesError::CoarseSurface { body: 0 }), "{error:?}");
     assert!(error.to_string().contains("the surface of body 1 meets cells of different sizes"));
+}
+
+/// Its load would be that of whole cells, cut ones too.
+#[test]
+fn a_force_per_volume_around_bodies_is_refused() {
+    let disc = balls(&[Vector::<2>::new(0.5, 0.5)]);
+    let weight = |_: &Vector<2>| Vector::<2>::new(0.0, -1.0);
+    let mut solver = FlowSolver::new(params(Formulation::Unfitted, SolverKind::Direct, 1e-6)).unwrap();
+    let refused = solver.solve_forced(mesh(&bands(6), &disc), &disc, &couette, Some(&weight));
+    assert!(matches!(refused.unwrap_err(), StokesError::Unsupported { .. }));
 }
