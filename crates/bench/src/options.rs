@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use gluey_stokes::{CutCellPressures, Formulation, PaperParams};
+use gluey_stokes::{CutCellPressures, Formulation, Lubrication, PaperParams};
 use serde::Serialize;
 
 use crate::cases::Case;
@@ -65,7 +65,7 @@ impl Options {
                 offset: gluey_stokes::default_offset(dimension),
                 cut_cell_pressures: CutCellPressures::Aggregate,
             },
-            FormulationName::Unfitted => Formulation::Unfitted,
+            FormulationName::Unfitted => Formulation::Unfitted { lubrication: Lubrication::Deficit },
             FormulationName::Paper => Formulation::Paper(PaperParams {
                 viscosity_ratio: self.contrast,
                 ramp: 1.0,

@@ -30,7 +30,9 @@ pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
-pub use names::{Boundary, Formulation, Hydrodynamics, ParticleVelocity, Solver, UnknownName};
+pub use names::{
+    Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, Solver, UnknownName,
+};
 
 use gluey_contact::{ContactParams, Domain, Wall};
 use gluey_geom::Vector;
@@ -177,6 +179,9 @@ pub struct FlowSpec {
     pub hydrodynamics: Hydrodynamics,
     /// How rigidity enters.
     pub formulation: Formulation,
+    /// What acts in films that are too thin for the mesh; when absent, `deficit` in `unfitted` and `none`
+    /// elsewhere.
+    pub lubrication: Option<Lubrication>,
     /// How the equations are solved.
     pub solver: Solver,
     /// Relative tolerance of the residual of a linear solve.
@@ -270,6 +275,7 @@ impl Default for FlowSpec {
         Self {
             hydrodynamics: Hydrodynamics::default(),
             formulation: Formulation::default(),
+            lubrication: None,
             solver: Solver::default(),
             tolerance: 1e-6,
             mesh: MeshSpec::default(),
@@ -373,6 +379,16 @@ impl Case {
             (Hydrodynamics::Stokes, Formulation::Paper) | (Hydrodynamics::PairMobility, _) => stem,
             (Hydrodynamics::Stokes, formulation) => format!("{stem}-{formulation}"),
         }
+    }
+
+    /// What acts in films that are too thin for the mesh.
+    pub fn lubrication(&self) -> Lubrication {
+        let flow = &self.flow;
+        let default = match (flow.hydrodynamics, flow.formulation) {
+            (Hydrodynamics::Stokes, Formulation::Unfitted) => Lubrication::Deficit,
+            _ => Lubrication::None,
+        };
+        flow.lubrication.unwrap_or(default)
     }
 
     /// Whether `paper` makes a single solve, which leaves its multiplier unused.

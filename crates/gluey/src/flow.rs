@@ -20,7 +20,7 @@ use gluey_stokes::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::case::{Case, Formulation, Solver};
+use crate::case::{Case, Formulation, Lubrication, Solver};
 
 pub use estimate::MeshEstimate;
 
@@ -258,7 +258,12 @@ fn flow_params<const D: usize>(case: &Case) -> FlowParams {
             cut_cell_pressures: CutCellPressures::Aggregate,
         },
         Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
-        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted,
+        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted {
+            lubrication: match case.lubrication() {
+                Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
+                Lubrication::None => gluey_stokes::Lubrication::None,
+            },
+        },
     };
     let solver = match flow.solver {
         Solver::Direct => SolverKind::Direct,

@@ -29,6 +29,7 @@
 
 mod dimension;
 mod error;
+mod film;
 mod flow;
 mod formulation;
 mod operator;
@@ -44,7 +45,7 @@ pub use flow::{
     WarmStartError,
 };
 // How rigidity is imposed.
-pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
+pub use formulation::{Formulation, Lubrication, PaperParams, ParticleVelocity, default_offset};
 pub use space::CutCellPressures;
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};

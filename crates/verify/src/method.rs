@@ -1,6 +1,6 @@
 //! The formulations that the book compares.
 
-use gluey_stokes::{FlowParams, Formulation, PaperParams};
+use gluey_stokes::{FlowParams, Formulation, Lubrication, PaperParams};
 
 /// A formulation with the settings that a case has by default.
 #[derive(Debug)]
@@ -25,7 +25,16 @@ pub const METHODS: &[Method] = &[
         refines_films: false,
         formulation: |_| Formulation::Paper(PaperParams::default()),
     },
-    Method { name: "unfitted", refines_films: false, formulation: |_| Formulation::Unfitted },
+    Method {
+        name: "unfitted",
+        refines_films: false,
+        formulation: |_| Formulation::Unfitted { lubrication: Lubrication::Deficit },
+    },
+    Method {
+        name: "unfitted, no lubrication",
+        refines_films: false,
+        formulation: |_| Formulation::Unfitted { lubrication: Lubrication::None },
+    },
 ];
 
 impl Method {

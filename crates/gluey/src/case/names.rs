@@ -88,6 +88,17 @@ named! {
 }
 
 named! {
+    /// What acts in films between particles that are too thin for the mesh.
+    Lubrication, "lubrication" {
+        /// The resistance that the mesh lacks, by lubrication theory.
+        #[default]
+        Deficit = "deficit",
+        /// Nothing beyond what the mesh resolves.
+        None = "none",
+    }
+}
+
+named! {
     /// Who predicts the velocities of the particles.
     Hydrodynamics, "hydrodynamics" {
         /// Finite-element Stokes flow in the box.

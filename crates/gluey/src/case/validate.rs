@@ -5,7 +5,7 @@ use gluey_stokes::StokesError;
 use super::Case;
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
-use super::names::{Hydrodynamics, UnknownName};
+use super::names::{Formulation, Hydrodynamics, Lubrication, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
 use crate::reference::{self, Reference};
 
@@ -198,6 +198,7 @@ fn check_flow(case: &Case, key: &Key) -> Check {
     between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
     check_mesh(case, &key.name("mesh"))?;
     check_paper(case, &key.name("paper"))?;
+    check_lubrication(case, key.name("lubrication"))?;
     let offset = flow.pair_mobility.gap_offset;
     if !(offset >= 0.0 && offset.is_finite()) {
         return out_of_range(offset, "of 0 or more", key.name("pair-mobility").name("gap_offset"));
@@ -206,6 +207,17 @@ fn check_flow(case: &Case, key: &Key) -> Check {
         Hydrodynamics::PairMobility => check_pair_mobility(case, key.name("hydrodynamics")),
         Hydrodynamics::Stokes => Ok(()),
     }
+}
+
+/// Deficits are those of one formulation.
+fn check_lubrication(case: &Case, key: Key) -> Check {
+    let (flow, needed) = (&case.flow, Formulation::Unfitted);
+    if case.lubrication() == Lubrication::None || flow.formulation == needed {
+        return Ok(());
+    }
+    let choice = Lubrication::Deficit.name().to_owned();
+    let needs = format!("flow.formulation = \"{needed}\"");
+    fail(key, Problem::Unfit { choice, needs, found: format!("\"{}\"", flow.formulation) })
 }
 
 fn check_mesh(case: &Case, key: &Key) -> Check {

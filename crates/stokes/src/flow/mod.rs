@@ -215,11 +215,12 @@ where
         };
         let data = Data { lift: &lift, b: &b };
         let multiplier = problem.rigidity.solve(problem, &data, &mut x, &mut solve)?;
-        let pressure = problem.pressure(&x);
+        let mut pressure = problem.pressure_and_films(&x);
         let mut velocity = problem.velocity(&lift, &x);
         let twists = problem.twists(&velocity)?;
         let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
         velocity.truncate(problem.system.space.full_dim());
+        pressure.truncate(problem.system.pressure.dim());
         let flow = Flow {
             discretisation: problem.discretisation().clone(),
             velocity,

@@ -132,6 +132,7 @@ where
         system.space.project(&mut x);
         system.pressure.clear_fixed(&mut guess.pressure);
         x.append(&mut guess.pressure);
+        x.resize(system.dim(), 0.0);
         (x, self.last)
     }
 }

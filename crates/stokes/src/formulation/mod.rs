@@ -36,7 +36,19 @@ pub enum Formulation {
     /// Penalty and Uzawa multiplier of the paper.
     Paper(PaperParams),
     /// Nitsche's conditions on the true surfaces, with aggregated elements.
-    Unfitted,
+    Unfitted {
+        /// Treatment of films that are too thin for the mesh.
+        lubrication: Lubrication,
+    },
+}
+
+/// Treatment of films between bodies that are too thin for the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lubrication {
+    /// None: the mesh sees them as they are, and too weak where they are thinner than a tenth of a cell.
+    None,
+    /// The mesh sees them widened to about a cell; lubrication theory gives the resistance that is missing.
+    Deficit,
 }
 
 impl Formulation {
@@ -69,7 +81,7 @@ impl Formulation {
                 Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
-            Self::Unfitted => Arc::new(unfitted::Unfitted),
+            Self::Unfitted { lubrication } => Arc::new(unfitted::Unfitted { lubrication }),
         }
     }
 
@@ -79,7 +91,7 @@ impl Formulation {
         match self {
             Self::RigidDofs { offset, .. } => rigid_dofs::check(*offset),
             Self::Paper(params) => params.check(),
-            Self::Unfitted => Ok(()),
+            Self::Unfitted { .. } => Ok(()),
         }
     }
 }

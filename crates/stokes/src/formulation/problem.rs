@@ -283,9 +283,16 @@ where
         velocity
     }
 
+    /// The pressure at its nodes, then the forces of films.
+    pub(crate) fn pressure_and_films(&self, x: &[f64]) -> Vec<f64> {
+        let mut pressure = self.pressure(x);
+        pressure.extend_from_slice(self.system.parts(x)[2]);
+        pressure
+    }
+
     /// The pressure at its nodes.
     pub fn pressure(&self, x: &[f64]) -> Vec<f64> {
-        let mut pressure = x[self.system.velocity_dim()..].to_vec();
+        let mut pressure = self.system.parts(x)[1].to_vec();
         self.system.pressure.expand(&mut pressure);
         pressure
     }

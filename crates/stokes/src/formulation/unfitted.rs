@@ -10,10 +10,12 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Matrix, Space, Twist};
 use gluey_levelset::Ball;
 
+use super::Lubrication;
 use super::problem::{
     Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
 };
 use crate::error::StokesError;
+use crate::film::{Film, FilmCoupling, films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
@@ -24,9 +26,15 @@ use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling, first_mom
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
 
-/// The formulation, which has no parameters.
+/// Thickness in cells to which films are widened.
+const FILM_HEIGHT: f64 = 1.0;
+
+/// The formulation.
 #[derive(Clone, Copy, Debug)]
-pub struct Unfitted;
+pub struct Unfitted {
+    /// Treatment of films that are too thin for the mesh.
+    pub lubrication: Lubrication,
+}
 
 impl<const D: usize> Method<D> for Unfitted
 where
@@ -39,6 +47,7 @@ where
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
         check_resolved(discretisation, bodies, |_| true)?;
+        let (films, height) = self.films(discretisation, bodies);
         let cut = CutCells::new(discretisation, bodies);
         let aggregates = Aggregates::new(discretisation, &cut)?;
         let solid = without_fluid(discretisation, &cut);
@@ -48,8 +57,41 @@ where
         let pressure =
             PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
         let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
-        Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces), Arc::new(*self)))
+        let films = (!films.is_empty()).then(|| coupling(&space, films, height, viscosity));
+        Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces, films), Arc::new(*self)))
     }
+}
+
+impl Unfitted {
+    /// The films to be widened, and to what thickness.
+    fn films<const D: usize>(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+    ) -> (Vec<Film<D>>, f64) {
+        let height = FILM_HEIGHT * discretisation.finest_cell_size();
+        match self.lubrication {
+            Lubrication::None => (Vec::new(), height),
+            Lubrication::Deficit => (films(bodies, discretisation.mesh.domain(), height), height),
+        }
+    }
+}
+
+/// The forces of films that the mesh sees widened to `height`.
+fn coupling<const D: usize>(
+    space: &VelocitySpace<D>,
+    films: Vec<Film<D>>,
+    height: f64,
+    viscosity: f64,
+) -> FilmCoupling<D>
+where
+    Dim<D>: Space<D>,
+{
+    let resistances = films.into_iter().map(|film| {
+        let shape = film.shape(height);
+        (film, [shape.resolved::<D>(), shape.deficits::<D>()].map(|r| r * viscosity))
+    });
+    FilmCoupling::new(space, resistances)
 }
 
 /// The nodes with no fluid in the cells around them, each with the body of one of these.

@@ -48,7 +48,9 @@ where
     let discretisation = system.discretisation();
     let split = system.velocity_dim();
     let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
-    let unknowns = Subset::new(split + system.pressure.dim(), |k| match k.checked_sub(split) {
+    let films = split + system.pressure.dim();
+    let unknowns = Subset::new(system.dim(), |k| match k.checked_sub(split) {
+        Some(_) if k >= films => true,
         Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
         None => keeps_velocity(&system.space, k),
     });
@@ -59,7 +61,8 @@ where
         discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.terms(q as usize)));
     };
     let size = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
-    assemble(system, unknowns, forms, &Elements::new(system, size))
+    let films = film_rows(system, &unknowns);
+    assemble(unknowns, forms, &Elements::new(system, size), &films)
 }
 
 /// Assembles the velocity block alone.
@@ -90,7 +93,7 @@ where
     let forms = |cell: usize, local: &mut CellForms| {
         local.set_velocity(&velocity, discretisation.velocity.cell(cell), D);
     };
-    assemble(system, unknowns, forms, elements)
+    assemble(unknowns, forms, elements, &Jagged::default())
 }
 
 fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool
@@ -104,16 +107,17 @@ where
 }
 
 /// Sums up the matrices of the active cells and of the pieces of cut cells, whose local unknowns are given by
-/// `forms`.
+/// `forms`, and the rows of the films' forces.
 fn assemble<const D: usize>(
-    system: &StokesSystem<D>,
     unknowns: Subset,
     forms: impl Fn(usize, &mut CellForms),
     elements: &Elements<'_, D>,
+    films: &Jagged<(u32, f64)>,
 ) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
 {
+    let system = elements.system();
     let numbering = Blocks::new(system, &unknowns);
     let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
     let set_forms = |source: Source, local: &mut CellForms| match source {
@@ -131,12 +135,18 @@ where
             sources.push(source);
         }
     }
+    for row in films.iter() {
+        groups.push(row.iter().map(|term| numbering.of[term.0 as usize] as usize));
+    }
+    let mut films = films.iter();
     let blocks = BlockPattern::new(numbering.first, groups)?;
     let mut of_cells = Reduction::new(unknowns.len(), elements.size());
     let mut of_pieces = Reduction::new(unknowns.len(), SurfaceCoupling::<D>::piece_size());
     let mut sources = sources.into_iter();
     let matrix = blocks.sum(|group, target| {
-        let Some(source) = sources.next() else { return };
+        let Some(source) = sources.next() else {
+            return films.next().into_iter().for_each(|row| add_film(row, blocks.unknowns_of(group), target));
+        };
         set_forms(source, &mut local);
         let reduction = if source.is_piece() { &mut of_pieces } else { &mut of_cells };
         reduction.place(&mut local, blocks.unknowns_of(group));
@@ -148,6 +158,35 @@ where
         }
     });
     Ok(Assembled { unknowns, blocks, matrix })
+}
+
+/// The rows of the films' forces in the kept unknowns, each ending with the force itself.
+fn film_rows<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Jagged<(u32, f64)>
+where
+    Dim<D>: Space<D>,
+{
+    let mut rows = Jagged::default();
+    let Some(films) = &system.films else { return rows };
+    let first = system.dim() - films.dim();
+    for (row, force) in (0..films.dim()).filter_map(|row| Some((row, unknowns.number(first + row)?))) {
+        let (terms, compliance) = films.row(row);
+        let kept = terms.iter().filter_map(|&(k, w)| Some((unknowns.number(k as usize)? as u32, w)));
+        rows.push(kept.chain([(force as u32, compliance)]));
+    }
+    rows
+}
+
+/// Adds the row of a force and its transpose to the matrix of these unknowns.
+fn add_film(row: &[(u32, f64)], unknowns: impl Iterator<Item = usize>, target: &mut [f64]) {
+    let unknowns: Vec<usize> = unknowns.collect();
+    let Some((&(force, compliance), terms)) = row.split_last() else { return };
+    let place = |unknown: u32| unknowns.iter().position(|&k| k == unknown as usize);
+    let Some(force) = place(force) else { return };
+    target[force * unknowns.len() + force] += compliance;
+    for (unknown, weight) in terms.iter().filter_map(|&(k, weight)| Some((place(k)?, weight))) {
+        target[force * unknowns.len() + unknown] += weight;
+        target[unknown * unknowns.len() + force] += weight;
+    }
 }
 
 /// Blocks of the kept unknowns.

@@ -6,12 +6,14 @@
 
 use std::sync::Arc;
 
+use gluey_fem::Evaluator;
 use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_geom::{Dim, Space};
+use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
+use crate::film::{Film, FilmCoupling};
 use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
@@ -31,6 +33,8 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) penalty: Option<Penalty<D>>,
     /// The cells that surfaces cut, where the mesh does not fit the bodies.
     pub(crate) surfaces: Option<Arc<SurfaceCoupling<D>>>,
+    /// The films between bodies that are too thin for the mesh.
+    pub(crate) films: Option<Arc<FilmCoupling<D>>>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
 }
@@ -55,6 +59,7 @@ where
         pressure: PressureSpace<D>,
         viscosity: f64,
         surfaces: SurfaceCoupling<D>,
+        films: Option<FilmCoupling<D>>,
     ) -> Self {
         let is_fluid = |cell: &ActiveCell| surfaces.cut.states[cell.cell as usize] == CellState::Fluid;
         let mut cells = all_cells(space.discretisation(), viscosity);
@@ -66,6 +71,7 @@ where
             cells,
             penalty: None,
             surfaces: Some(Arc::new(surfaces)),
+            films: films.map(Arc::new),
             viscosity,
         }
     }
@@ -84,6 +90,7 @@ where
             cells,
             penalty,
             surfaces: None,
+            films: None,
             viscosity,
         }
     }
@@ -98,9 +105,28 @@ where
         self.viscosity
     }
 
-    /// Length of a vector: reduced velocities, then all pressure nodes.
+    /// Length of a vector: reduced velocities, then all pressure nodes, then the forces of films.
     pub fn dim(&self) -> usize {
-        self.velocity_dim() + self.pressure.dim()
+        self.velocity_dim() + self.pressure.dim() + self.film_dim()
+    }
+
+    /// Length of the films' part of a vector.
+    pub fn film_dim(&self) -> usize {
+        self.films.as_ref().map_or(0, |films| films.dim())
+    }
+
+    /// The parts of a vector: velocities, pressures, forces of films.
+    pub fn parts<'x, T>(&self, x: &'x [T]) -> [&'x [T]; 3] {
+        let (u, rest) = x.split_at(self.velocity_dim());
+        let (p, f) = rest.split_at(self.pressure.dim());
+        [u, p, f]
+    }
+
+    /// The parts of a vector: velocities, pressures, forces of films.
+    pub fn parts_mut<'x, T>(&self, x: &'x mut [T]) -> [&'x mut [T]; 3] {
+        let (u, rest) = x.split_at_mut(self.velocity_dim());
+        let (p, f) = rest.split_at_mut(self.pressure.dim());
+        [u, p, f]
     }
 
     /// Length of the velocity part of a vector.
@@ -109,16 +135,30 @@ where
     }
 
     /// `b -= [A, -B^T; -B, 0] (u, p)` for a nodal velocity field that already fulfils all constraints (it may
-    /// carry boundary values), with the result in reduced form.
+    /// carry boundary values), with the result in reduced form. Pressures may be followed by forces of films,
+    /// which are zero if not.
     pub fn residual(&self, u: &[f64], p: &[f64], b: &mut [f64]) {
         let mut y = vec![0.0; self.dim()];
-        let (yu, yp) = y.split_at_mut(self.velocity_dim());
+        let [yu, yp, yf] = self.parts_mut(&mut y);
+        let (p, f) = p.split_at(self.pressure.dim());
         self.operator.stokes_of_field(u, p, yu, yp, &mut Workspace::default());
         if let Some(surfaces) = &self.surfaces {
             surfaces.add([u, p], [&mut *yu, &mut *yp], &mut SurfaceWorkspace::default());
         }
+        if let Some(films) = &self.films {
+            let at_rest = vec![0.0; films.dim()];
+            let f = if f.is_empty() { &at_rest } else { f };
+            films.add([u, f], [&mut *yu, &mut *yf]);
+            films.subtract_walls(|film| self.wall_velocity(film, u), yf);
+        }
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);
+    }
+
+    /// The velocity of the wall at a film.
+    fn wall_velocity(&self, film: &Film<D>, u: &[f64]) -> Vector<D> {
+        let mesh = &self.discretisation().mesh;
+        Evaluator::new(mesh).motion_at(self.space.nodes(), u, &film.far_point()).velocity
     }
 
     /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal
@@ -137,7 +177,7 @@ where
     /// to sum to zero: where two bodies share cells without a free node the flow between them is not
     /// constrained, and constants would not quite be in the kernel.
     pub fn reduce(&self, y: &mut [f64]) {
-        let (yu, yp) = y.split_at_mut(self.velocity_dim());
+        let [yu, yp, _] = self.parts_mut(y);
         self.space.reduce(yu);
         self.reduce_pressures(yp);
     }
@@ -202,14 +242,18 @@ impl<X: Scalar> Work<X> {
         Dim<D>: Space<D>,
     {
         let Self { pressure, cells, surfaces: work } = self;
-        let (u, p) = x.split_at(system.velocity_dim());
-        let (yu, yp) = y.split_at_mut(system.velocity_dim());
+        let [u, p, f] = system.parts(x);
+        let [yu, yp, yf] = system.parts_mut(y);
         pressure.resize(p.len(), X::ZERO);
         vector::copy(p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, cells);
         if let Some(surfaces) = &system.surfaces {
             surfaces.add([u, pressure], [&mut *yu, &mut *yp], work);
+        }
+        if let Some(films) = &system.films {
+            yf.fill(X::ZERO);
+            films.add([u, f], [&mut *yu, &mut *yf]);
         }
         system.space.clear_held(yu);
         system.reduce_pressures(yp);

@@ -9,7 +9,7 @@ use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 use crate::surface::SurfaceWorkspace;
 
-/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`.
+/// `z_p = -S^-1 r_p`, `z_f = -r_f` for the scaled forces of films, `z_u = V (r_u + B^T z_p - B_f^T z_f)`.
 pub struct BlockTriangular<'a, const D: usize>
 where
     Dim<D>: Space<D>,
@@ -48,8 +48,9 @@ where
 {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
         let Self { system, fluid, cycle, schur, pressure, answer, work, surfaces } = self;
-        let (ru, rp) = r.split_at(system.velocity_dim());
-        let (zu, zp) = z.split_at_mut(system.velocity_dim());
+        let [ru, rp, rf] = system.parts(r);
+        let [zu, zp, zf] = system.parts_mut(z);
+        zf.iter_mut().zip(rf).for_each(|(z, r)| *z = S::from_f64(-r.to_f64()));
         vector::convert(-1.0, rp, pressure);
         system.pressure.remove_mean(pressure);
         schur.apply(&system.pressure, pressure, answer);
@@ -60,7 +61,10 @@ where
         let gradient = |load: &mut [f32]| {
             fluid.gradient(pressure, load, work);
             if let Some(cut) = &system.surfaces {
-                cut.add_narrow([&[], pressure], [load, &mut []], surfaces);
+                cut.add_narrow([&[], pressure], [&mut *load, &mut []], surfaces);
+            }
+            if let Some(films) = &system.films {
+                films.add_loads(zf, load);
             }
         };
         cycle.answer(ru, gradient, zu);

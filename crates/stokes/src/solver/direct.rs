@@ -89,7 +89,7 @@ where
             return Err(StokesError::NotPrepared);
         };
         let mut consistent = b.to_vec();
-        system.pressure.remove_mean(&mut consistent[system.velocity_dim()..]);
+        system.pressure.remove_mean(system.parts_mut(&mut consistent)[1]);
         let mut operator = SystemOperator::new(system);
         let mut substitution = Substitution { system, unknowns, factor, b: &mut self.b, x: &mut self.x };
         self.krylov.set_relative_tolerance(tolerance);
@@ -141,6 +141,6 @@ where
         self.unknowns.gather(r, self.b);
         self.factor.apply(self.b, self.x);
         self.unknowns.scatter(self.x, z);
-        self.system.pressure.remove_mean(&mut z[self.system.velocity_dim()..]);
+        self.system.pressure.remove_mean(self.system.parts_mut(z)[1]);
     }
 }

@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::Formulation;
+
 
 use crate::support::{
     RIGID, SOLVERS, bands, bump, couette, graded, mesh, nodal_error, paper, paper_at_center, params, solve,
@@ -16,7 +16,7 @@ fn couette_flow_is_found<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    for formulation in [RIGID, paper(1e3, 1), Formulation::Unfitted] {
+    for formulation in [RIGID, paper(1e3, 1), UNFITTED] {
         for solver in SOLVERS {
             let mesh = graded::<D>(3 - (D as u8 - 2));
             let start = |x: &Vector<D>| couette(x) + bump(x) * DETOUR;

@@ -40,7 +40,7 @@ where
             region.touched_nodes(&discretisation.velocity, balls)
         }
         // No node is held there: bodies feel the stress on their surfaces.
-        Formulation::Unfitted => Vec::new(),
+        Formulation::Unfitted { .. } => Vec::new(),
     }
 }
 

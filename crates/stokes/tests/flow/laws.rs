@@ -168,7 +168,7 @@ fn a_disc_with_its_true_surface_obeys_the_laws() {
         (5, [2.8e-5, 6.3e-5, 6.8e-5, 6.7e-5, 2.8e-4]),
         (6, [4.5e-6, 4.2e-5, 1.1e-5, 4.6e-5, 8.3e-5]),
     ] {
-        obeys::<2>(Formulation::Unfitted, level, measured);
+        obeys::<2>(UNFITTED, level, measured);
     }
 }
 
@@ -177,6 +177,6 @@ fn a_sphere_with_its_true_surface_obeys_the_laws() {
     for (level, measured) in
         [(4, [5.6e-4, 1.3e-3, 1.3e-3, 1.3e-3, 3.9e-3]), (5, [6.9e-5, 1.4e-4, 1.5e-4, 1.4e-4, 5.1e-4])]
     {
-        obeys::<3>(Formulation::Unfitted, level, measured);
+        obeys::<3>(UNFITTED, level, measured);
     }
 }

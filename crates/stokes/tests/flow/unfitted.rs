@@ -18,7 +18,7 @@ where
     Dim<D>: Space<D>,
 {
     let refinement = Refinement { band: 3.0, ..bands(level) };
-    solve(params(Formulation::Unfitted, solver, 1e-9), mesh(&refinement, balls), balls, &couette)
+    solve(params(UNFITTED, solver, 1e-9), mesh(&refinement, balls), balls, &couette)
 }
 
 /// Shifts of the bodies by parts of a cell, no two of which are reflections of each other.
@@ -86,7 +86,7 @@ where
     let pair =
         [0.3, 0.58].map(|x| Ball::new(Vector::<D>::from_fn(|d, _| if d == 0 { x } else { 0.4 }), 0.13));
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level as u8).unwrap();
-    let problem = Problem::new(mesh, &pair, 1.3, Formulation::Unfitted).unwrap();
+    let problem = Problem::new(mesh, &pair, 1.3, UNFITTED).unwrap();
     let system = &problem.system;
     let mut operator = SystemOperator::new(system);
     let [x, y] = [1, 2].map(|seed| {
@@ -114,7 +114,7 @@ fn solvers_agree<const D: usize>(balls: &[Ball<D>], mesh: &dyn Fn() -> TreeMesh<
 where
     Dim<D>: Space<D>,
 {
-    let twists = |solver| solve(params(Formulation::Unfitted, solver, 1e-9), mesh(), balls, &couette).twists;
+    let twists = |solver| solve(params(UNFITTED, solver, 1e-9), mesh(), balls, &couette).twists;
     let [direct, multigrid]: [Vec<Twist<D>>; 2] = [SolverKind::Direct, SolverKind::Multigrid].map(twists);
     let distance = twist_distance(&direct, &multigrid);
     assert!(distance < tolerance, "{distance:e}");
@@ -141,7 +141,7 @@ where
         let center = Vector::<D>::from_fn(|d, _| if d == 1 { 0.4 } else { x });
         let ball = [Ball::periodic(center, 0.2, period)];
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], periodic, level).unwrap();
-        solve(params(Formulation::Unfitted, solver, 1e-9), mesh, &ball, &couette).twists
+        solve(params(UNFITTED, solver, 1e-9), mesh, &ball, &couette).twists
     };
     let distance = twist_distance(&motion(0.5), &motion(0.0));
     assert!(distance < 1e-7, "{distance:e}");
@@ -181,7 +181,7 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
     let mesh =
         TreeMesh::refine(Aabb::unit(), [1; 2], [false; 2], 7, |lower, _, level| level < 6 || lower[0] > 0.5)
             .unwrap();
-    let refused = try_solve(params(Formulation::Unfitted, SolverKind::Direct, 1e-6), mesh, &disc, &couette);
+    let refused = try_solve(params(UNFITTED, SolverKind::Direct, 1e-6), mesh, &disc, &couette);
     let error = refused.unwrap_err();
     assert!(matches!(error, StokesError::CoarseSurface { body: 0 }), "{error:?}");
     assert!(error.to_string().contains("the surface of body 1 meets cells of different sizes"));
@@ -192,7 +192,7 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
 fn a_force_per_volume_around_bodies_is_refused() {
     let disc = balls(&[Vector::<2>::new(0.5, 0.5)]);
     let weight = |_: &Vector<2>| Vector::<2>::new(0.0, -1.0);
-    let mut solver = FlowSolver::new(params(Formulation::Unfitted, SolverKind::Direct, 1e-6)).unwrap();
+    let mut solver = FlowSolver::new(params(UNFITTED, SolverKind::Direct, 1e-6)).unwrap();
     let refused = solver.solve_forced(mesh(&bands(6), &disc), &disc, &couette, Some(&weight));
     assert!(matches!(refused.unwrap_err(), StokesError::Unsupported { .. }));
 }

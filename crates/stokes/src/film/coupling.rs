@@ -1,0 +1,151 @@
+//! Forces of films on the bodies, implicit in their velocities.
+//!
+//! The relative motion of the two sides of a film has the modes `m = B V` of the twists `V`: the normal
+//! velocity `v.n`, the slip `v_t` with `v = (U_1 + w_1 x r_1) - (U_2 + w_2 x r_2)` at the middle of the film,
+//! and rolling, `((w_1 - w_2) x n)_t + (1/b - 1/a) v_t / 2`, which is how fast the surfaces carry fluid into
+//! the film. All are zero where the two move as one body. With a resistance `R` for each mode the forces are
+//! `-B^T R B V`: symmetric, opposite to each other, and dissipating. For two spheres of any radii they have
+//! the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
+//!
+//! The forces `f` are unknowns beside velocities and pressures, `B V - f / R = 0`, so that nothing grows
+//! where a film closes. They are scaled by `s` with `s^2 (1/R + 1/R_0) = 1`, where `R_0` is about the
+//! resistance that the mesh has: then the Schur complement is about one.
+
+use gluey_geom::{Dim, Space, Vector};
+use gluey_linalg::{Jagged, Scalar};
+
+use super::deficit::Deficits;
+use super::near::Film;
+use crate::space::VelocitySpace;
+
+/// Rows of the films' forces in the Stokes system: `f` and `B V - f / R`, scaled.
+#[derive(Clone, Debug)]
+pub struct FilmCoupling<const D: usize> {
+    /// Films with a resistance, each with the number of its first row.
+    films: Vec<Film<D>>,
+    /// `s B`: entries of reduced velocities, and of nodal ones on walls.
+    rows: Jagged<(u32, f64)>,
+    /// `s^2 / R`.
+    compliances: Vec<f64>,
+    /// `s`.
+    scales: Vec<f64>,
+}
+
+impl<const D: usize> FilmCoupling<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Modes of a film: the normal one, sliding and rolling in each direction across it.
+    pub const MODES: usize = 1 + 2 * (D - 1);
+
+    /// The forces of `films` with their resistances (what the mesh has and what it lacks), on the velocities
+    /// of `space`.
+    pub fn new(space: &VelocitySpace<D>, films: impl IntoIterator<Item = (Film<D>, [Deficits; 2])>) -> Self {
+        let mut new =
+            Self { films: Vec::new(), rows: Jagged::default(), compliances: Vec::new(), scales: Vec::new() };
+        for (film, [resolved, lacking]) in films {
+            new.films.push(film);
+            for (mode, row) in modes(space, &film).into_iter().enumerate() {
+                let [has, lacks] = [resolved, lacking].map(|of| of.of_mode::<D>(mode));
+                let scale = (has * lacks / (has + lacks)).sqrt();
+                new.rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
+                new.compliances.push(has / (has + lacks));
+                new.scales.push(scale);
+            }
+        }
+        new
+    }
+
+    /// The films, with [`FilmCoupling::MODES`] rows each.
+    pub fn films(&self) -> &[Film<D>] {
+        &self.films
+    }
+
+    /// Number of rows.
+    pub fn dim(&self) -> usize {
+        self.scales.len()
+    }
+
+    /// The entries of a row in reduced velocities, and that of its own force.
+    pub fn row(&self, row: usize) -> (&[(u32, f64)], f64) {
+        (&self.rows[row], -self.compliances[row])
+    }
+
+    /// `(y, z) += (B^T f, B x - f / R)`, scaled, for reduced velocities.
+    pub fn add<T: Scalar>(&self, [x, f]: [&[T]; 2], [y, z]: [&mut [T]; 2]) {
+        self.add_loads(f, y);
+        for ((row, compliance), (f, z)) in
+            self.rows.iter().zip(&self.compliances).zip(f.iter().zip(z.iter_mut()))
+        {
+            let motion: f64 = row.iter().map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
+            *z += T::from_f64(motion - compliance * f.to_f64());
+        }
+    }
+
+    /// `y += B^T f`, scaled.
+    pub fn add_loads<S: Scalar, T: Scalar>(&self, f: &[S], y: &mut [T]) {
+        for (row, f) in self.rows.iter().zip(f) {
+            for &(k, weight) in row {
+                y[k as usize] += T::from_f64(weight * f.to_f64());
+            }
+        }
+    }
+
+    /// `z -= B V` for the velocities of walls at the films, which `at` gives by the film.
+    pub fn subtract_walls(&self, at: impl Fn(&Film<D>) -> Vector<D>, z: &mut [f64]) {
+        for (index, film) in self.films.iter().enumerate().filter(|film| film.1.partner.is_wall()) {
+            let velocity = at(film);
+            for mode in 0..Self::MODES {
+                let row = index * Self::MODES + mode;
+                z[row] -= self.scales[row] * wall_motion(film, mode, &velocity);
+            }
+        }
+    }
+}
+
+/// The rows of `B` of a film in reduced velocities.
+fn modes<const D: usize>(space: &VelocitySpace<D>, film: &Film<D>) -> Vec<Vec<(u32, f64)>>
+where
+    Dim<D>: Space<D>,
+{
+    let roll = film.roll_of_slip();
+    let slip = |t: &Vector<D>| row(space, film, t, 1.0, 0.0);
+    let rolling = |t: &Vector<D>| row(space, film, t, roll, 1.0);
+    let tangents = film.tangents();
+    std::iter::once(slip(&film.normal)).chain(tangents.iter().map(slip)).chain(tangents.iter().map(rolling)).collect()
+}
+
+/// The row of `slip v.t + rolling ((w_1 - w_2) x n).t`.
+fn row<const D: usize>(
+    space: &VelocitySpace<D>,
+    film: &Film<D>,
+    t: &Vector<D>,
+    slip: f64,
+    rolling: f64,
+) -> Vec<(u32, f64)>
+where
+    Dim<D>: Space<D>,
+{
+    let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
+    for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+        let Some(body) = film.side(side) else { continue };
+        let first = space.full_dim() + body * Dim::<D>::RIGID;
+        // From the centre to the middle of the film.
+        let arm = film.normal * (sign * film.arm(side));
+        let turn = Dim::<D>::moment(&arm, t) * slip + Dim::<D>::moment(&film.normal, t) * rolling;
+        let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
+        let entries = t.iter().map(|t| slip * t).chain(spins).enumerate();
+        row.extend(entries.map(|(k, weight)| ((first + k) as u32, sign * weight)));
+    }
+    row
+}
+
+/// The share of a wall's velocity in the modes of a film.
+fn wall_motion<const D: usize>(film: &Film<D>, mode: usize, velocity: &Vector<D>) -> f64 {
+    let tangents = film.tangents();
+    match mode {
+        0 => velocity.dot(&film.normal),
+        mode if mode < D => velocity.dot(&tangents[mode - 1]),
+        mode => film.roll_of_slip() * velocity.dot(&tangents[mode - D]),
+    }
+}

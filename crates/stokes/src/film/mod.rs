@@ -1,0 +1,16 @@
+//! Films between bodies, and between bodies and walls, that are thinner than what a mesh resolves.
+//!
+//! A film of thickness `g` in the middle has the profile `H(r) = g + r^2 / A`, with `2/A = 1/a + 1/b` for
+//! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of about one cell both
+//! bodies are cut flat there (`crate::surface`), so that the mesh sees the profile `max(G, H)` and resolves
+//! it at any gap. Removing solid lowers every resistance, so what the mesh then lacks, the *deficit*, is
+//! never negative; lubrication theory gives it ([`deficits`]), as a force between the two surfaces that is
+//! proportional to their relative motion and implicit in their velocities ([`FilmCoupling`]).
+
+mod coupling;
+mod deficit;
+mod near;
+
+pub use coupling::FilmCoupling;
+pub use deficit::{Deficits, FilmShape};
+pub use near::{Film, Partner, films};
