@@ -19,7 +19,7 @@ use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
-use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling, first_moments};
+use crate::surface::{Aggregates, CellState, CutCells, Flats, SurfaceCoupling, first_moments};
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
@@ -38,18 +38,32 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
-        check_resolved(discretisation, bodies, |_| true)?;
-        let cut = CutCells::new(discretisation, bodies);
-        let aggregates = Aggregates::new(discretisation, &cut)?;
-        let solid = without_fluid(discretisation, &cut);
-        let ghosts = aggregates.velocity.clone();
-        let space = VelocitySpace::around_surfaces(discretisation, bodies, &solid, ghosts);
-        let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
-        let pressure =
-            PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
-        let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
-        Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces), Arc::new(*self)))
+        let system = around(discretisation, bodies, &Flats::none(bodies.len()), viscosity)?;
+        Ok((system, Arc::new(*self)))
     }
+}
+
+/// The system around bodies that planes cut flat.
+fn around<const D: usize>(
+    discretisation: &Discretisation<D>,
+    bodies: &[Ball<D>],
+    flats: &Flats<D>,
+    viscosity: f64,
+) -> Result<StokesSystem<D>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    check_resolved(discretisation, bodies, |_| true)?;
+    let cut = CutCells::new(discretisation, bodies, flats);
+    let aggregates = Aggregates::new(discretisation, &cut)?;
+    let solid = without_fluid(discretisation, &cut);
+    let ghosts = aggregates.velocity.clone();
+    let space = VelocitySpace::around_surfaces(discretisation, bodies, &solid, ghosts);
+    let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
+    let pressure =
+        PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
+    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
+    Ok(StokesSystem::around_surfaces(space, pressure, viscosity, surfaces))
 }
 
 /// The nodes with no fluid in the cells around them, each with the body of one of these.
@@ -129,3 +143,6 @@ where
         Ok(Some(Box::new(SurfaceCorrection::new(elements, surfaces, finest)?)))
     }
 }
+
+#[cfg(test)]
+mod tests;
