@@ -30,9 +30,7 @@ pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
-pub use names::{
-    Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, Solver, UnknownName,
-};
+pub use names::{Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, Solver, UnknownName};
 
 use gluey_contact::{ContactParams, Domain, Wall};
 use gluey_geom::Vector;

@@ -54,7 +54,17 @@ where
     let (e, r, o) = (st(&e), st(&r), st(&o));
     println!(
         "{D}D {lub:?} a/h {:.1} g/h {:.3} xi {xi} th {th}: vn {:+.2} +- {:.2} (worst {:.2}) %  rot {:+.4} +- {:.4} ({:.4}) spin {:+.4} +- {:.4} ({:.4}) it {its}",
-        a / h, xi * a / h, e.0, e.1, e.2, r.0, r.1, r.2, o.0, o.1, o.2
+        a / h,
+        xi * a / h,
+        e.0,
+        e.1,
+        e.2,
+        r.0,
+        r.1,
+        r.2,
+        o.0,
+        o.1,
+        o.2
     );
 }
 fn main() {
@@ -63,7 +73,8 @@ fn main() {
     let levels: Vec<u8> = args[2].split(',').map(|x| x.parse().unwrap()).collect();
     let gaps: Vec<f64> = args[3].split(',').map(|x| x.parse().unwrap()).collect();
     let n: u32 = args[4].parse().unwrap();
-    let lubs: Vec<Lubrication> = args[5].chars().map(|c| if c == 'n' { Lubrication::None } else { Lubrication::Deficit }).collect();
+    let lubs: Vec<Lubrication> =
+        args[5].chars().map(|c| if c == 'n' { Lubrication::None } else { Lubrication::Deficit }).collect();
     let th: f64 = args.get(6).map_or(135.0, |x| x.parse().unwrap());
     if dim == "2" {
         let table = pair_2d_velocities().unwrap();
@@ -79,13 +90,18 @@ fn main() {
             }
         }
     } else {
-        let t = sphere_pair_mobility().unwrap();
+        let t = Table::parse(
+            &std::fs::read_to_string("/work/shared/reference/sphere_pair_mobility_unbounded.csv").unwrap(),
+        )
+        .unwrap();
         let col = |n: &str| t.column(n).unwrap().to_vec();
         let (xi, ma, mb, c) = (col("xi"), col("one_minus_A"), col("one_minus_B"), col("C_rot"));
         let a = 0.0125;
         for &level in &levels {
             for &g in &gaps {
-                let k = (0..xi.len()).min_by(|&i, &j| (xi[i] / g).ln().abs().total_cmp(&(xi[j] / g).ln().abs())).unwrap();
+                let k = (0..xi.len())
+                    .min_by(|&i, &j| (xi[i] / g).ln().abs().total_cmp(&(xi[j] / g).ln().abs()))
+                    .unwrap();
                 let g = xi[k];
                 let r = a * (2.0 + g);
                 let (s, co) = (2.0 * th.to_radians()).sin_cos();

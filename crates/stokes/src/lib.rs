@@ -53,9 +53,10 @@ pub use error::{DiagonalError, SmallMatrix, StokesError};
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
-// The parts of the system: unknowns, and where the penalised solid is.
+// The parts of the system: unknowns, where the penalised solid is, planes that cut bodies flat.
 pub use solid::{PointMatrices, SolidRegion};
 pub use space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
+pub use surface::{Flat, Flats};
 // The crates whose types appear in this one.
 pub use {gluey_fem as fem, gluey_geom as geom, gluey_levelset as levelset, gluey_linalg as linalg};
 

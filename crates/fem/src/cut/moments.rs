@@ -1,7 +1,12 @@
-//! Moments of a cell that balls cut.
+//! Moments of a cell that balls cut, whole ones or such as planes cut flat.
 
+use super::corners::HalfSpace;
+use super::flat::FlatInCell;
 use super::rays::{Disc, Ray, for_each_plane, for_each_ray};
+use super::slice::{Line, Slice};
 use crate::element::{gauss, gauss_cube};
+
+use gluey_geom::Vector;
 
 /// Gauss points per direction: their polynomials have degree 4 in each coordinate.
 pub const POINTS: usize = 5;
@@ -41,13 +46,20 @@ pub struct SurfaceMoments<const D: usize> {
 impl<const D: usize> CutMoments<D> {
     /// The moments of a cell that these balls cut.
     pub fn new(balls: &[BallInCell<D>]) -> Self {
+        Self::truncated(balls.iter().map(|ball| (ball, &[][..])))
+    }
+
+    /// The moments of a cell that balls cut which are themselves cut flat: each ball with its flats.
+    pub fn truncated<'a>(
+        balls: impl ExactSizeIterator<Item = (&'a BallInCell<D>, &'a [FlatInCell<D>])>,
+    ) -> Self {
         let mut new = Self {
             volume: gauss_cube::<D>(POINTS).into_iter().map(|point| point.1).collect(),
             surfaces: Vec::with_capacity(balls.len()),
         };
         let rules = Rules::new();
-        for ball in balls {
-            let inside = rules.inside(ball);
+        for (ball, flats) in balls {
+            let inside = rules.inside(ball, flats);
             new.volume.iter_mut().zip(inside.volume).for_each(|(whole, part)| *whole -= part);
             let normal = inside.normal.into_iter().map(|n| n.map(|n| -n)).collect();
             new.surfaces.push(SurfaceMoments { normal, area: inside.area });
@@ -83,50 +95,72 @@ impl Rules {
     }
 
     /// By rays in every direction for the surface; those in the first give the volume too.
-    fn inside<const D: usize>(&self, ball: &BallInCell<D>) -> Inside<D> {
+    fn inside<const D: usize>(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>]) -> Inside<D> {
         let count = POINTS.pow(D as u32);
         let mut inside =
             Inside { volume: vec![0.0; count], normal: vec![[0.0; D]; count], area: vec![0.0; count] };
+        if flats.iter().any(FlatInCell::takes_cell) {
+            return inside;
+        }
+        let matters = |flat: &&FlatInCell<D>| !flat.leaves_cell() && !flat.leaves_ball(ball);
+        let flats: Vec<FlatInCell<D>> = flats.iter().filter(matters).copied().collect();
         for direction in 0..D {
-            self.add_rays(ball, direction, &mut inside);
+            self.add_rays(ball, &flats, direction, &mut inside);
         }
         inside
     }
 
     /// Adds what the rays in a direction tell, plane by plane.
-    fn add_rays<const D: usize>(&self, ball: &BallInCell<D>, direction: usize, inside: &mut Inside<D>) {
+    fn add_rays<const D: usize>(
+        &self,
+        ball: &BallInCell<D>,
+        flats: &[FlatInCell<D>],
+        direction: usize,
+        inside: &mut Inside<D>,
+    ) {
         let [across, height] = [1, 2].map(|shift| (direction + shift) % D);
+        let strides = [direction, across].map(stride);
         let [c, y] = [direction, across].map(|d| ball.center[d]);
+        let lines = |offset: &dyn Fn(&FlatInCell<D>) -> f64| -> Vec<Line> {
+            let normal = |flat: &FlatInCell<D>| [direction, across].map(|d| flat.normal()[d]);
+            flats.iter().map(|flat| Line { normal: normal(flat), offset: offset(flat) }).collect()
+        };
         if D == 2 {
             let disc = Disc { along: c, across: y, radius: ball.radius };
-            let strides = [direction, across].map(stride);
-            return self.plane(disc, ball.radius).add_to(inside, direction, strides, &[(0, 1.0)]);
+            let slice = Slice { disc, lines: lines(&FlatInCell::offset) };
+            return self.plane(&slice, ball.radius).add_to(inside, direction, strides, &[(0, 1.0)]);
         }
-        for_each_plane([c, y, ball.center[height]], ball.radius, &self.angles, |disc, z, width| {
+        let half_spaces: Vec<HalfSpace> =
+            flats.iter().map(|flat| half_space(ball, flat, [direction, across, height])).collect();
+        let center = [c, y, ball.center[height]];
+        for_each_plane((center, ball.radius), &half_spaces, &self.angles, |disc, z, width| {
+            let slice = Slice { disc, lines: lines(&|flat| flat.offset() - flat.normal()[height] * z) };
+            if slice.is_empty() {
+                return;
+            }
             let values = self.lagrange.values(z);
             let layers: Vec<(usize, f64)> =
                 (0..POINTS).map(|k| (k * stride(height), width * values[k])).collect();
-            let strides = [direction, across].map(stride);
-            self.plane(disc, ball.radius).add_to(inside, direction, strides, &layers);
+            self.plane(&slice, ball.radius).add_to(inside, direction, strides, &layers);
         });
     }
 
     /// The moments of a plane of rays through a ball of this radius.
-    fn plane(&self, disc: Disc, ball_radius: f64) -> Plane {
+    fn plane(&self, slice: &Slice, ball_radius: f64) -> Plane {
         let mut plane = Plane::default();
-        for_each_ray(disc, &self.angles, |ray| self.add_ray(disc, ball_radius, ray, &mut plane));
+        for_each_ray(slice, &self.angles, |ray| self.add_ray(slice, ball_radius, ray, &mut plane));
         plane
     }
 
-    fn add_ray(&self, disc: Disc, ball_radius: f64, ray: Ray, plane: &mut Plane) {
+    fn add_ray(&self, slice: &Slice, ball_radius: f64, ray: Ray, plane: &mut Plane) {
+        let Some(ends) = slice.ends(&ray, ball_radius) else { return };
         let across = self.lagrange.values(ray.at).map(|value| value * ray.weight);
-        let ends = [disc.along - ray.half, disc.along + ray.half];
-        let chord = self.chord([ends[0].max(0.0), ends[1].min(1.0)]);
+        let chord = self.chord([ends[0].at.max(0.0), ends[1].at.min(1.0)]);
         add_product(&chord, &across, 1.0, &mut plane.volume);
-        for (end, normal) in ends.into_iter().zip([-1.0, 1.0]).filter(|end| 0.0 < end.0 && end.0 < 1.0) {
-            let along = self.lagrange.values(end);
+        for (end, normal) in ends.into_iter().zip([-1.0, 1.0]).filter(|end| end.0.is_in_cell) {
+            let along = self.lagrange.values(end.at);
             add_product(&along, &across, normal, &mut plane.normal);
-            add_product(&along, &across, ray.half / ball_radius, &mut plane.area);
+            add_product(&along, &across, end.slope, &mut plane.area);
         }
     }
 
@@ -140,6 +174,11 @@ impl Rules {
         }
         sum
     }
+}
+
+/// A flat in coordinates along these axes, relative to the centre of its ball.
+fn half_space<const D: usize>(ball: &BallInCell<D>, flat: &FlatInCell<D>, axes: [usize; 3]) -> HalfSpace {
+    HalfSpace { normal: Vector::<3>::from_fn(|k, _| flat.normal()[axes[k]]), offset: flat.distance(ball) }
 }
 
 /// Distance of neighbouring points along an axis.

@@ -6,7 +6,9 @@
 //! face (`rho cos(theta)` is the distance of a face); how they depend on `phi` changes where a disc begins to
 //! reach a face, like a square root, or an edge.
 
+use super::corners::{self, HalfSpace};
 use super::intervals::{Breakpoint, for_each_point};
+use super::slice::Slice;
 
 /// A disc in a plane of rays: centre along the rays and across them, radius.
 #[derive(Clone, Copy, Debug)]
@@ -30,15 +32,16 @@ pub struct Ray {
     pub weight: f64,
 }
 
-/// The rays through `disc` that lie in the unit interval.
-pub fn for_each_ray(disc: Disc, rule: &[(f64, f64)], mut visit: impl FnMut(Ray)) {
-    let Disc { along, across, radius } = disc;
+/// The rays through the disc of `slice` that lie in the unit interval.
+pub fn for_each_ray(slice: &Slice, rule: &[(f64, f64)], mut visit: impl FnMut(Ray)) {
+    let Disc { along, across, radius } = slice.disc;
     let faces = [0.0, 1.0].map(|face: f64| (face - along).abs());
     let mut breakpoints: Vec<Breakpoint> = Vec::with_capacity(5);
     for distance in faces.into_iter().filter(|&distance| distance < radius) {
         let angle = (distance / radius).acos();
         breakpoints.extend([-angle, angle].map(|at| Breakpoint { at, is_root: false }));
     }
+    breakpoints.extend(slice.corners().into_iter().map(|at| Breakpoint { at, is_root: false }));
     for_each_point(angles(across, radius), &breakpoints, rule, |angle, weight| {
         let (sin, cos) = angle.sin_cos();
         visit(Ray { at: across + radius * sin, half: radius * cos, weight: weight * radius * cos });
@@ -46,10 +49,10 @@ pub fn for_each_ray(disc: Disc, rule: &[(f64, f64)], mut visit: impl FnMut(Ray))
 }
 
 /// Calls `visit(disc, z, width)` for the planes across a ball of the given centre (along the rays, across
-/// them, across the planes) and radius.
+/// them, across the planes) and radius, cut by these flats.
 pub fn for_each_plane(
-    center: [f64; 3],
-    radius: f64,
+    (center, radius): ([f64; 3], f64),
+    flats: &[HalfSpace],
     rule: &[(f64, f64)],
     mut visit: impl FnMut(Disc, f64, f64),
 ) {
@@ -65,6 +68,9 @@ pub fn for_each_plane(
     distances.iter().flatten().for_each(|&face| push(face, true));
     for x in distances[0] {
         distances[1].iter().for_each(|y| push(x.hypot(*y), false));
+    }
+    if !flats.is_empty() {
+        breakpoints.extend(corners::breakpoints(center, radius, flats));
     }
     for_each_point(angles(height, radius), &breakpoints, rule, |angle, weight| {
         let (sin, cos) = angle.sin_cos();

@@ -14,7 +14,6 @@
 use gluey_geom::{Dim, Space, Vector};
 use gluey_linalg::{Jagged, Scalar};
 
-use super::deficit::Deficits;
 use super::near::Film;
 use crate::space::VelocitySpace;
 
@@ -38,22 +37,22 @@ where
     /// Modes of a film: the normal one, sliding and rolling in each direction across it.
     pub const MODES: usize = 1 + 2 * (D - 1);
 
-    /// The forces of `films` with their resistances (what the mesh has and what it lacks), on the velocities
-    /// of `space`.
-    pub fn new(space: &VelocitySpace<D>, films: impl IntoIterator<Item = (Film<D>, [Deficits; 2])>) -> Self {
-        let mut new =
-            Self { films: Vec::new(), rows: Jagged::default(), compliances: Vec::new(), scales: Vec::new() };
-        for (film, [resolved, lacking]) in films {
-            new.films.push(film);
-            for (mode, row) in modes(space, &film).into_iter().enumerate() {
-                let [has, lacks] = [resolved, lacking].map(|of| of.of_mode::<D>(mode));
+    /// The forces of `films` that the mesh sees `height` thick, on the velocities of `space` in a fluid of
+    /// this viscosity.
+    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, height: f64, viscosity: f64) -> Self {
+        let (mut rows, mut compliances, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
+        for film in &films {
+            let shape = film.shape(height);
+            let resistances = [shape.resolved::<D>(), shape.deficits::<D>()];
+            for (mode, row) in modes(space, film).into_iter().enumerate() {
+                let [has, lacks] = resistances.map(|of| viscosity * of.of_mode::<D>(mode));
                 let scale = (has * lacks / (has + lacks)).sqrt();
-                new.rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
-                new.compliances.push(has / (has + lacks));
-                new.scales.push(scale);
+                rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
+                compliances.push(has / (has + lacks));
+                scales.push(scale);
             }
         }
-        new
+        Self { films, rows, compliances, scales }
     }
 
     /// The films, with [`FilmCoupling::MODES`] rows each.
@@ -112,7 +111,10 @@ where
     let slip = |t: &Vector<D>| row(space, film, t, 1.0, 0.0);
     let rolling = |t: &Vector<D>| row(space, film, t, roll, 1.0);
     let tangents = film.tangents();
-    std::iter::once(slip(&film.normal)).chain(tangents.iter().map(slip)).chain(tangents.iter().map(rolling)).collect()
+    std::iter::once(slip(&film.normal))
+        .chain(tangents.iter().map(slip))
+        .chain(tangents.iter().map(rolling))
+        .collect()
 }
 
 /// The row of `slip v.t + rolling ((w_1 - w_2) x n).t`.

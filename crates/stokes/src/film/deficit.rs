@@ -32,15 +32,6 @@ pub struct Deficits {
     pub rolling: f64,
 }
 
-impl std::ops::Mul<f64> for Deficits {
-    type Output = Self;
-
-    fn mul(self, factor: f64) -> Self {
-        let Self { normal, sliding, rolling } = self;
-        Self { normal: normal * factor, sliding: sliding * factor, rolling: rolling * factor }
-    }
-}
-
 impl Deficits {
     /// That to a mode of [`super::FilmCoupling`].
     pub fn of_mode<const D: usize>(&self, mode: usize) -> f64 {

@@ -12,5 +12,4 @@ mod deficit;
 mod near;
 
 pub use coupling::FilmCoupling;
-pub use deficit::{Deficits, FilmShape};
-pub use near::{Film, Partner, films};
+pub use near::{Film, films};

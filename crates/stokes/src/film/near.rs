@@ -153,9 +153,8 @@ fn between<const D: usize>(
     let nearest = first.arm(second.center());
     let images = images(first.period());
     // Of the images of the body itself one of each pair.
-    let is_wanted = move |shift: &Vector<D>| {
-        body != other || shift.iter().find(|x| **x != 0.0).is_some_and(|x| *x > 0.0)
-    };
+    let is_wanted =
+        move |shift: &Vector<D>| body != other || shift.iter().find(|x| **x != 0.0).is_some_and(|x| *x > 0.0);
     images.into_iter().filter(is_wanted).map(move |shift| {
         let arm = nearest + shift;
         let radii = [first, second].map(Body::bounding_radius);
@@ -191,11 +190,7 @@ fn images<const D: usize>(period: &[Option<f64>; D]) -> Vec<Vector<D>> {
 }
 
 /// The films between a body and the walls.
-fn at_walls<const D: usize>(
-    body: &Ball<D>,
-    index: usize,
-    domain: &Aabb<D>,
-) -> impl Iterator<Item = Film<D>> {
+fn at_walls<const D: usize>(body: &Ball<D>, index: usize, domain: &Aabb<D>) -> impl Iterator<Item = Film<D>> {
     let (center, radius) = (*body.center(), body.bounding_radius());
     let is_wall = body.period().map(|period| period.is_none());
     let sides = (0..D).filter(move |&axis| is_wall[axis]).flat_map(|axis| [(axis, false), (axis, true)]);

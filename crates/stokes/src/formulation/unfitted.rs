@@ -15,19 +15,19 @@ use super::problem::{
     Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
 };
 use crate::error::StokesError;
-use crate::film::{Film, FilmCoupling, films};
+use crate::film::{Film, films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
-use crate::surface::{Aggregates, CellState, CutCells, SurfaceCoupling, first_moments};
+use crate::surface::{Aggregates, CellState, CutCells, Flat, Flats, SurfaceCoupling, first_moments};
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
 
 /// Thickness in cells to which films are widened.
-const FILM_HEIGHT: f64 = 1.0;
+const FILM_HEIGHT: f64 = 1.25;
 
 /// The formulation.
 #[derive(Clone, Copy, Debug)]
@@ -46,52 +46,51 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
-        check_resolved(discretisation, bodies, |_| true)?;
-        let (films, height) = self.films(discretisation, bodies);
-        let cut = CutCells::new(discretisation, bodies);
-        let aggregates = Aggregates::new(discretisation, &cut)?;
-        let solid = without_fluid(discretisation, &cut);
-        let ghosts = aggregates.velocity.clone();
-        let space = VelocitySpace::around_surfaces(discretisation, bodies, &solid, ghosts);
-        let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
-        let pressure =
-            PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
-        let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
-        let films = (!films.is_empty()).then(|| coupling(&space, films, height, viscosity));
-        Ok((StokesSystem::around_surfaces(space, pressure, viscosity, surfaces, films), Arc::new(*self)))
-    }
-}
-
-impl Unfitted {
-    /// The films to be widened, and to what thickness.
-    fn films<const D: usize>(
-        &self,
-        discretisation: &Discretisation<D>,
-        bodies: &[Ball<D>],
-    ) -> (Vec<Film<D>>, f64) {
         let height = FILM_HEIGHT * discretisation.finest_cell_size();
-        match self.lubrication {
-            Lubrication::None => (Vec::new(), height),
-            Lubrication::Deficit => (films(bodies, discretisation.mesh.domain(), height), height),
-        }
+        let films = match self.lubrication {
+            Lubrication::None => Vec::new(),
+            Lubrication::Deficit => films(bodies, discretisation.mesh.domain(), height),
+        };
+        let system = around(discretisation, bodies, &flats(&films, bodies.len(), height), viscosity)?;
+        let system = if films.is_empty() { system } else { system.with_films(films, height) };
+        Ok((system, Arc::new(*self)))
     }
 }
 
-/// The forces of films that the mesh sees widened to `height`.
-fn coupling<const D: usize>(
-    space: &VelocitySpace<D>,
-    films: Vec<Film<D>>,
-    height: f64,
+/// The planes that widen films to `height`.
+fn flats<const D: usize>(films: &[Film<D>], body_count: usize, height: f64) -> Flats<D> {
+    let sides = films.iter().flat_map(|film| {
+        let distances = film.flats(height);
+        let side = move |side: usize, sign: f64| {
+            let flat = Flat { normal: film.normal * sign, distance: distances[side] };
+            film.side(side).map(|body| (body, flat))
+        };
+        [side(0, 1.0), side(1, -1.0)].into_iter().flatten()
+    });
+    Flats::grouped(body_count, sides)
+}
+
+/// The system around bodies that planes cut flat.
+fn around<const D: usize>(
+    discretisation: &Discretisation<D>,
+    bodies: &[Ball<D>],
+    flats: &Flats<D>,
     viscosity: f64,
-) -> FilmCoupling<D>
+) -> Result<StokesSystem<D>, StokesError>
 where
     Dim<D>: Space<D>,
 {
-    let resistances = films.into_iter().map(|film| {
-        let shape = film.shape(height);
-        (film, [shape.resolved::<D>(), shape.deficits::<D>()].map(|r| r * viscosity))
-    });
-    FilmCoupling::new(space, resistances)
+    check_resolved(discretisation, bodies, |_| true)?;
+    let cut = CutCells::new(discretisation, bodies, flats);
+    let aggregates = Aggregates::new(discretisation, &cut)?;
+    let solid = without_fluid(discretisation, &cut);
+    let ghosts = aggregates.velocity.clone();
+    let space = VelocitySpace::around_surfaces(discretisation, bodies, &solid, ghosts);
+    let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
+    let pressure =
+        PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
+    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
+    Ok(StokesSystem::around_surfaces(space, pressure, viscosity, surfaces))
 }
 
 /// The nodes with no fluid in the cells around them, each with the body of one of these.
@@ -171,3 +170,6 @@ where
         Ok(Some(Box::new(SurfaceCorrection::new(elements, surfaces, finest)?)))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -59,7 +59,6 @@ where
         pressure: PressureSpace<D>,
         viscosity: f64,
         surfaces: SurfaceCoupling<D>,
-        films: Option<FilmCoupling<D>>,
     ) -> Self {
         let is_fluid = |cell: &ActiveCell| surfaces.cut.states[cell.cell as usize] == CellState::Fluid;
         let mut cells = all_cells(space.discretisation(), viscosity);
@@ -71,9 +70,15 @@ where
             cells,
             penalty: None,
             surfaces: Some(Arc::new(surfaces)),
-            films: films.map(Arc::new),
+            films: None,
             viscosity,
         }
+    }
+
+    /// The same with the forces of `films` that the mesh sees `height` thick.
+    pub(crate) fn with_films(self, films: Vec<Film<D>>, height: f64) -> Self {
+        let films = FilmCoupling::new(&self.space, films, height, self.viscosity);
+        Self { films: Some(Arc::new(films)), ..self }
     }
 
     fn with_penalty(

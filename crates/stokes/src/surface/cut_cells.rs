@@ -1,17 +1,20 @@
 //! Which cells bodies cut, and the moments of those.
 
-use gluey_fem::cut::{BallInCell, CutMoments};
+use gluey_fem::cut::{BallInCell, CutMoments, FlatInCell};
 use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::Jagged;
 use rayon::prelude::*;
 
+use super::flats::Flats;
 use crate::space::Discretisation;
 
 /// A cut cell with at least this share of fluid needs no other to be stable.
 const GOOD_SHARE: f64 = 0.3;
 /// A cell with no more fluid than this is solid: what is left is rounding.
 const LEAST_SHARE: f64 = 1e-12;
+/// A cell with no more of a surface than this, in units of its faces, does not touch it.
+const LEAST_AREA: f64 = 1e-12;
 
 /// What bodies leave of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,18 +66,26 @@ pub struct CutCells<const D: usize> {
 enum Near<const D: usize> {
     None,
     Covered(u32),
-    Cut(Vec<u32>, Vec<BallInCell<D>>),
+    Cut(Vec<Cutting<D>>),
+}
+
+/// A body that cuts a cell, in the coordinates of the cell.
+struct Cutting<const D: usize> {
+    body: u32,
+    ball: BallInCell<D>,
+    flats: Vec<FlatInCell<D>>,
 }
 
 impl<const D: usize> CutCells<D> {
-    /// The cells of a mesh that these bodies cut.
-    pub fn new(discretisation: &Discretisation<D>, bodies: &[Ball<D>]) -> Self {
+    /// The cells of a mesh that these bodies cut, which are cut flat themselves.
+    pub fn new(discretisation: &Discretisation<D>, bodies: &[Ball<D>], flats: &Flats<D>) -> Self {
+        debug_assert_eq!(bodies.len(), flats.body_count());
         let tree = BallTree::new(bodies);
         let count = discretisation.mesh.cell_count();
         let examined: Vec<(CellState, Option<u32>, Option<CutCell<D>>)> = (0..count)
             .into_par_iter()
             .with_min_len(64)
-            .map(|cell| examine(discretisation, &tree, cell))
+            .map(|cell| examine(discretisation, (&tree, flats), cell))
             .collect();
         let mut new = Self {
             states: Vec::with_capacity(count),
@@ -108,26 +119,51 @@ impl<const D: usize> CutCells<D> {
 
 fn examine<const D: usize>(
     discretisation: &Discretisation<D>,
-    tree: &BallTree<'_, D>,
+    bodies: (&BallTree<'_, D>, &Flats<D>),
     cell: usize,
 ) -> (CellState, Option<u32>, Option<CutCell<D>>) {
-    match near(discretisation, tree, cell) {
+    match near(discretisation, bodies, cell) {
         Near::None => (CellState::Fluid, None, None),
         Near::Covered(body) => (CellState::Solid, Some(body), None),
-        Near::Cut(bodies, balls) => {
-            let moments = CutMoments::new(&balls);
+        Near::Cut(cutting) => {
+            let moments = CutMoments::truncated(cutting.iter().map(|cut| (&cut.ball, &cut.flats[..])));
             let state = match moments.fraction() {
-                share if share <= LEAST_SHARE => return (CellState::Solid, Some(bodies[0]), None),
+                share if share <= LEAST_SHARE => return (CellState::Solid, Some(cutting[0].body), None),
                 share if share < GOOD_SHARE => CellState::Bad,
                 _ => CellState::Good,
             };
-            (state, None, Some(CutCell { cell: cell as u32, bodies, balls, moments }))
+            let cut = with_surfaces(cell as u32, cutting, moments);
+            if cut.bodies.is_empty() { (CellState::Fluid, None, None) } else { (state, None, Some(cut)) }
         }
     }
 }
 
-/// Bodies that cut a cell. One that only touches it does not.
-fn near<const D: usize>(discretisation: &Discretisation<D>, tree: &BallTree<'_, D>, cell: usize) -> Near<D> {
+/// The cut cell, without bodies whose flats have taken away what would have cut it.
+fn with_surfaces<const D: usize>(cell: u32, cutting: Vec<Cutting<D>>, moments: CutMoments<D>) -> CutCell<D> {
+    let count = cutting.len();
+    let volume = moments.volume;
+    let mut new = CutCell {
+        cell,
+        bodies: Vec::with_capacity(count),
+        balls: Vec::with_capacity(count),
+        moments: CutMoments { volume, surfaces: Vec::with_capacity(count) },
+    };
+    for (cut, surface) in cutting.into_iter().zip(moments.surfaces) {
+        if cut.flats.is_empty() || surface.area.iter().sum::<f64>() > LEAST_AREA {
+            new.bodies.push(cut.body);
+            new.balls.push(cut.ball);
+            new.moments.surfaces.push(surface);
+        }
+    }
+    new
+}
+
+/// Bodies that cut a cell. One that only touches it does not, unless a flat of it is a face of the cell.
+fn near<const D: usize>(
+    discretisation: &Discretisation<D>,
+    (tree, flats): (&BallTree<'_, D>, &Flats<D>),
+    cell: usize,
+) -> Near<D> {
     let h = discretisation.cell_size(cell);
     let lower = discretisation.mesh.lower_corner(&discretisation.mesh.cells()[cell]);
     let center = lower + Vector::repeat(0.5 * h);
@@ -137,24 +173,24 @@ fn near<const D: usize>(discretisation: &Discretisation<D>, tree: &BallTree<'_, 
         let arm = ball.arm(&center);
         let farthest = arm.map(|x| x.abs() + 0.5 * h).norm();
         let nearest = arm.map(|x| (x.abs() - 0.5 * h).max(0.0)).norm();
-        if farthest <= ball.bounding_radius() {
+        let at = BallInCell {
+            center: std::array::from_fn(|d| 0.5 - arm[d] / h),
+            radius: ball.bounding_radius() / h,
+        };
+        let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h));
+        let flats: Vec<FlatInCell<D>> =
+            in_cell.filter(|flat| !flat.leaves_cell() && !flat.leaves_ball(&at)).collect();
+        if farthest <= ball.bounding_radius() && flats.is_empty() {
             covering = Some(body as u32);
-        } else if nearest < ball.bounding_radius() {
-            let at = BallInCell {
-                center: std::array::from_fn(|d| 0.5 - arm[d] / h),
-                radius: ball.bounding_radius() / h,
-            };
-            cutting.push((body as u32, at));
+        } else if nearest < ball.bounding_radius() && !flats.iter().any(FlatInCell::takes_cell) {
+            cutting.push(Cutting { body: body as u32, ball: at, flats });
         }
         covering.is_some()
     });
-    cutting.sort_unstable_by_key(|cut| cut.0);
+    cutting.sort_unstable_by_key(|cut| cut.body);
     match covering {
         Some(body) => Near::Covered(body),
         None if cutting.is_empty() => Near::None,
-        None => {
-            let (bodies, balls) = cutting.into_iter().unzip();
-            Near::Cut(bodies, balls)
-        }
+        None => Near::Cut(cutting),
     }
 }

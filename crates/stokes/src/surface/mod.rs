@@ -4,10 +4,12 @@
 mod aggregates;
 mod coupling;
 mod cut_cells;
+mod flats;
 mod penalty;
 mod traction;
 
 pub use aggregates::Aggregates;
 pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
+pub use flats::{Flat, Flats};
 pub use traction::first_moments;

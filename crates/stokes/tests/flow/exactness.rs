@@ -2,11 +2,11 @@
 
 use gluey_geom::{Dim, Space, Spin, Twist, Vector};
 use gluey_levelset::Ball;
-
+use gluey_stokes::Formulation;
 
 use crate::support::{
-    RIGID, SOLVERS, bands, bump, couette, graded, mesh, nodal_error, paper, paper_at_center, params, solve,
-    strain_inside, twist_distance,
+    RIGID, SOLVERS, UNFITTED, bands, bump, couette, graded, mesh, nodal_error, paper, paper_at_center,
+    params, solve, strain_inside, twist_distance,
 };
 
 /// Size of the wrong start; tolerances are relative to the residual it leaves.

@@ -14,7 +14,7 @@ use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_stokes::{Conditions, FlowSolver, Formulation, Prepared, SolverKind};
 
-use crate::support::{RIGID, bands, mesh, params};
+use crate::support::{RIGID, UNFITTED, bands, mesh, params};
 
 const RADIUS: f64 = 0.15;
 

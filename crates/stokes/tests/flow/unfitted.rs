@@ -5,12 +5,13 @@ use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 use gluey_stokes::{
-    Flow, FlowSolver, Formulation, Problem, Refinement, SolverKind, StokesError, SystemOperator,
+    Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator,
 };
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{
-    RADIUS, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, try_solve, twist_distance,
+    RADIUS, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, try_solve,
+    twist_distance,
 };
 
 fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>

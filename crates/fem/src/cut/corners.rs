@@ -1,0 +1,87 @@
+//! Heights at which the sections of a ball cut flat change their form.
+//!
+//! Where a corner, in which three of sphere, flats and faces meet, passes through the plane, the moments have
+//! a kink; where a flat begins to cut the disc, at the highest and the lowest point of its edge, they behave
+//! like a square root.
+
+use gluey_geom::Vector;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::intervals::Breakpoint;
+
+/// How far outside the body or the cell a corner may lie, by rounding.
+const SLACK: f64 = 1e-9;
+/// Planes that meet at an angle below this are parallel.
+const PARALLEL: f64 = 1e-12;
+/// Angles nearer than this are one.
+const SAME: f64 = 1e-13;
+
+/// A half-space `n . x <= offset`, coordinates relative to the centre of the ball.
+#[derive(Clone, Copy, Debug)]
+pub struct HalfSpace {
+    /// Unit normal: along the rays, across them, across the planes.
+    pub normal: Vector<3>,
+    /// Distance of its border from the centre.
+    pub offset: f64,
+}
+
+/// The angles of heights at which flats change the sections of a ball of this centre (along the rays, across
+/// them, across the planes) and radius.
+pub fn breakpoints(center: [f64; 3], radius: f64, flats: &[HalfSpace]) -> Vec<Breakpoint> {
+    let mut planes = flats.to_vec();
+    planes.extend(faces(center));
+    let mut corners: Vec<f64> = corners(&planes, flats.len(), radius)
+        .filter(|corner| corner.norm() <= radius + SLACK)
+        .filter(|corner| planes.iter().all(|plane| plane.normal.dot(corner) <= plane.offset + SLACK))
+        .map(|corner| (corner[2] / radius).clamp(-1.0, 1.0).asin())
+        .collect();
+    corners.sort_by(f64::total_cmp);
+    corners.dedup_by(|a, b| (*a - *b).abs() < SAME);
+    let kinks = corners.into_iter().map(|at| Breakpoint { at, is_root: false });
+    let roots = flats.iter().flat_map(|flat| edge_ends(flat, radius));
+    kinks.chain(roots.map(|at| Breakpoint { at, is_root: true })).collect()
+}
+
+/// The faces of the cell along the height.
+fn faces(center: [f64; 3]) -> impl Iterator<Item = HalfSpace> {
+    (0..4).map(move |k| {
+        let (axis, is_upper) = (k / 2, k % 2 == 1);
+        let unit = Vector::<3>::ith(axis, 1.0);
+        match is_upper {
+            true => HalfSpace { normal: unit, offset: 1.0 - center[axis] },
+            false => HalfSpace { normal: -unit, offset: center[axis] },
+        }
+    })
+}
+
+/// The points in which one of the first `flat_count` planes and another meet the sphere or a third plane.
+fn corners(planes: &[HalfSpace], flat_count: usize, radius: f64) -> impl Iterator<Item = Vector<3>> {
+    let pairs = (0..flat_count).flat_map(move |i| (i + 1..planes.len()).map(move |j| (i, j)));
+    let lines = pairs.filter_map(|(i, j)| Some((j, common_line(&planes[i], &planes[j])?)));
+    lines.flat_map(move |(j, (point, direction))| {
+        let half = (radius * radius - point.norm_squared()).sqrt();
+        let on_sphere = [-half, half].map(|s| point + direction * s);
+        let on_plane = planes[j + 1..].iter().map(move |plane| {
+            let s = (plane.offset - plane.normal.dot(&point)) / plane.normal.dot(&direction);
+            point + direction * s
+        });
+        on_sphere.into_iter().chain(on_plane)
+    })
+}
+
+/// The line in which two planes meet: its point nearest to the centre and its direction.
+fn common_line(a: &HalfSpace, b: &HalfSpace) -> Option<(Vector<3>, Vector<3>)> {
+    let cross = a.normal.cross(&b.normal);
+    let sin = cross.norm();
+    let point = (b.normal.cross(&cross) * a.offset + cross.cross(&a.normal) * b.offset) / (sin * sin);
+    (sin > PARALLEL).then(|| (point, cross / sin))
+}
+
+/// The angles of the highest and the lowest point of the edge of a flat.
+fn edge_ends(flat: &HalfSpace, radius: f64) -> impl Iterator<Item = f64> {
+    let from_axis = flat.normal[0].hypot(flat.normal[1]).atan2(flat.normal[2]);
+    let half = (flat.offset / radius).acos();
+    // Angles from the axis, which the edge may pass on its other side.
+    let folded = (half + from_axis).min(2.0 * PI - half - from_axis);
+    [(half - from_axis).abs(), folded].into_iter().map(|angle| FRAC_PI_2 - angle).filter(|at| !at.is_nan())
+}
