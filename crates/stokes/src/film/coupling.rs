@@ -7,9 +7,10 @@
 //! `-B^T R B V`: symmetric, opposite to each other, and dissipating. For two spheres of any radii they have
 //! the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
 //!
-//! The forces `f` are unknowns beside velocities and pressures, `B V - f / R = 0`, so that nothing grows
-//! where a film closes. They are scaled by `s` with `s^2 (1/R + 1/R_0) = 1`, where `R_0` is about the
-//! resistance that the mesh has: then the Schur complement is about one.
+//! The forces `f = R B V` are unknowns beside velocities and pressures, so that nothing grows where a film
+//! closes: `s B V - g = 0` with `f = s g`, `s^2 = R`. The square of `g` is the power that the film dissipates,
+//! and residuals of these rows weigh velocities by what they do there: in a film that nearly closes they are
+//! small. With about the resistance `R_0` that the mesh has, the Schur complement is `1 + R / R_0`.
 
 use gluey_geom::{Dim, Space, Vector};
 use gluey_linalg::{Jagged, Scalar};
@@ -17,15 +18,15 @@ use gluey_linalg::{Jagged, Scalar};
 use super::near::Film;
 use crate::space::VelocitySpace;
 
-/// Rows of the films' forces in the Stokes system: `f` and `B V - f / R`, scaled.
+/// Rows of the films' forces `g` in the Stokes system, `s B V - g`.
 #[derive(Clone, Debug)]
 pub struct FilmCoupling<const D: usize> {
     /// Films with a resistance, each with the number of its first row.
     films: Vec<Film<D>>,
     /// `s B`: entries of reduced velocities, and of nodal ones on walls.
     rows: Jagged<(u32, f64)>,
-    /// `s^2 / R`.
-    compliances: Vec<f64>,
+    /// `R_0 / (R + R_0)`, the inverse of the Schur complement.
+    inverses: Vec<f64>,
     /// `s`.
     scales: Vec<f64>,
 }
@@ -40,19 +41,19 @@ where
     /// The forces of `films` that the mesh sees `height` thick, on the velocities of `space` in a fluid of
     /// this viscosity.
     pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, height: f64, viscosity: f64) -> Self {
-        let (mut rows, mut compliances, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
+        let (mut rows, mut inverses, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
         for film in &films {
             let shape = film.shape(height);
             let resistances = [shape.resolved::<D>(), shape.deficits::<D>()];
             for (mode, row) in modes(space, film).into_iter().enumerate() {
                 let [has, lacks] = resistances.map(|of| viscosity * of.of_mode::<D>(mode));
-                let scale = (has * lacks / (has + lacks)).sqrt();
+                let scale = lacks.sqrt();
                 rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
-                compliances.push(has / (has + lacks));
+                inverses.push(has / (has + lacks));
                 scales.push(scale);
             }
         }
-        Self { films, rows, compliances, scales }
+        Self { films, rows, inverses, scales }
     }
 
     /// The films, with [`FilmCoupling::MODES`] rows each.
@@ -65,32 +66,35 @@ where
         self.scales.len()
     }
 
-    /// The entries of a row in reduced velocities, and that of its own force.
-    pub fn row(&self, row: usize) -> (&[(u32, f64)], f64) {
-        (&self.rows[row], -self.compliances[row])
+    /// The entries of a row in reduced velocities; that of its own force is -1.
+    pub fn row(&self, row: usize) -> &[(u32, f64)] {
+        &self.rows[row]
     }
 
-    /// `(y, z) += (B^T f, B x - f / R)`, scaled, for reduced velocities.
-    pub fn add<T: Scalar>(&self, [x, f]: [&[T]; 2], [y, z]: [&mut [T]; 2]) {
-        self.add_loads(f, y);
-        for ((row, compliance), (f, z)) in
-            self.rows.iter().zip(&self.compliances).zip(f.iter().zip(z.iter_mut()))
-        {
+    /// The inverses of the entries of about the Schur complement.
+    pub fn schur_inverses(&self) -> &[f64] {
+        &self.inverses
+    }
+
+    /// `(y, z) += (s B^T g, s B x - g)` for reduced velocities.
+    pub fn add<T: Scalar>(&self, [x, g]: [&[T]; 2], [y, z]: [&mut [T]; 2]) {
+        self.add_loads(g, y);
+        for (row, (g, z)) in self.rows.iter().zip(g.iter().zip(z)) {
             let motion: f64 = row.iter().map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
-            *z += T::from_f64(motion - compliance * f.to_f64());
+            *z += T::from_f64(motion - g.to_f64());
         }
     }
 
-    /// `y += B^T f`, scaled.
-    pub fn add_loads<S: Scalar, T: Scalar>(&self, f: &[S], y: &mut [T]) {
-        for (row, f) in self.rows.iter().zip(f) {
+    /// `y += s B^T g`.
+    pub fn add_loads<S: Scalar, T: Scalar>(&self, g: &[S], y: &mut [T]) {
+        for (row, g) in self.rows.iter().zip(g) {
             for &(k, weight) in row {
-                y[k as usize] += T::from_f64(weight * f.to_f64());
+                y[k as usize] += T::from_f64(weight * g.to_f64());
             }
         }
     }
 
-    /// `z -= B V` for the velocities of walls at the films, which `at` gives by the film.
+    /// `z -= s B V` for the velocities of walls at the films, which `at` gives by the film.
     pub fn subtract_walls(&self, at: impl Fn(&Film<D>) -> Vector<D>, z: &mut [f64]) {
         for (index, film) in self.films.iter().enumerate().filter(|film| film.1.partner.is_wall()) {
             let velocity = at(film);

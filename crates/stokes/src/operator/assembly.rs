@@ -169,9 +169,9 @@ where
     let Some(films) = &system.films else { return rows };
     let first = system.dim() - films.dim();
     for (row, force) in (0..films.dim()).filter_map(|row| Some((row, unknowns.number(first + row)?))) {
-        let (terms, compliance) = films.row(row);
-        let kept = terms.iter().filter_map(|&(k, w)| Some((unknowns.number(k as usize)? as u32, w)));
-        rows.push(kept.chain([(force as u32, compliance)]));
+        let terms = films.row(row).iter();
+        let kept = terms.filter_map(|&(k, w)| Some((unknowns.number(k as usize)? as u32, w)));
+        rows.push(kept.chain([(force as u32, -1.0)]));
     }
     rows
 }
@@ -179,10 +179,10 @@ where
 /// Adds the row of a force and its transpose to the matrix of these unknowns.
 fn add_film(row: &[(u32, f64)], unknowns: impl Iterator<Item = usize>, target: &mut [f64]) {
     let unknowns: Vec<usize> = unknowns.collect();
-    let Some((&(force, compliance), terms)) = row.split_last() else { return };
+    let Some((&(force, own), terms)) = row.split_last() else { return };
     let place = |unknown: u32| unknowns.iter().position(|&k| k == unknown as usize);
     let Some(force) = place(force) else { return };
-    target[force * unknowns.len() + force] += compliance;
+    target[force * unknowns.len() + force] += own;
     for (unknown, weight) in terms.iter().filter_map(|&(k, weight)| Some((place(k)?, weight))) {
         target[force * unknowns.len() + unknown] += weight;
         target[unknown * unknowns.len() + force] += weight;

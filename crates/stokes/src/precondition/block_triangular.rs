@@ -9,7 +9,7 @@ use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 use crate::surface::SurfaceWorkspace;
 
-/// `z_p = -S^-1 r_p`, `z_f = -r_f` for the scaled forces of films, `z_u = V (r_u + B^T z_p - B_f^T z_f)`.
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures.
 pub struct BlockTriangular<'a, const D: usize>
 where
     Dim<D>: Space<D>,
@@ -50,7 +50,11 @@ where
         let Self { system, fluid, cycle, schur, pressure, answer, work, surfaces } = self;
         let [ru, rp, rf] = system.parts(r);
         let [zu, zp, zf] = system.parts_mut(z);
-        zf.iter_mut().zip(rf).for_each(|(z, r)| *z = S::from_f64(-r.to_f64()));
+        if let Some(films) = &system.films {
+            let inverses = films.schur_inverses();
+            let answers = zf.iter_mut().zip(rf).zip(inverses);
+            answers.for_each(|((z, r), inverse)| *z = S::from_f64(-inverse * r.to_f64()));
+        }
         vector::convert(-1.0, rp, pressure);
         system.pressure.remove_mean(pressure);
         schur.apply(&system.pressure, pressure, answer);
