@@ -243,3 +243,45 @@ fn truncated_bodies_may_lie_across_a_periodic_border() {
     };
     assert!(distance(&motion(0.5), &motion(0.0)) < 1e-9);
 }
+
+/// Largest penalty around two touching bodies with a slab of this width in cells between them.
+fn penalty_around_slab<const D: usize>(
+    level: u8,
+    [middle, normal]: [Vector<D>; 2],
+    radius: f64,
+    width: f64,
+) -> Result<f64, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
+    let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + normal * (side * radius), radius));
+    let distance = radius - 0.5 * width * mesh.size(level);
+    let flats = [1.0, -1.0].map(|side| Some(Flat { normal: normal * side, distance }));
+    let system = around(&Discretisation::new(mesh), &bodies, &flats.into_iter().collect(), 1.0)?;
+    let surfaces = system.surfaces.unwrap();
+    Ok((0..surfaces.cut.cells.len()).map(|place| surfaces.penalty(place)).fold(0.0, f64::max))
+}
+
+/// All cells in the slab between flats that face each other have roots and moderate penalties, whatever its
+/// direction.
+fn slabs_are_resolved<const D: usize>(level: u8, radius: f64, count: usize)
+where
+    Dim<D>: Space<D>,
+{
+    for k in 0..count {
+        let (x, cell) = (k as f64, 0.5f64.powi(level.into()));
+        let normal = Vector::<D>::from_fn(|d, _| [(0.7 * x).cos(), (0.7 * x).sin(), 0.8 - 0.3 * x][d]);
+        let middle = Vector::from_fn(|d, _| 0.5 + 0.3 * cell * (x * (1.0 + d as f64)).sin());
+        for width in [1.0, 1.5] {
+            let largest = penalty_around_slab(level, [middle, normal.normalize()], radius, width).unwrap();
+            assert!(largest < 150.0, "{D}D, {k}: {largest}");
+        }
+    }
+}
+
+#[test]
+fn slabs_between_bodies_are_resolved() {
+    slabs_are_resolved::<2>(6, 0.15, 16);
+    slabs_are_resolved::<3>(4, 0.2, 4);
+}
