@@ -15,7 +15,8 @@
 //! leaves the ball give `n_k dS = -+dA`, its length inside the volume. Rays are parametrised by angles, in
 //! which chords have no square roots, and cut where they begin to miss faces and edges of the cell
 //! (`intervals`). Planes may cut a ball flat: what they leave is convex, and a ray still enters and leaves it
-//! once (`slice`, `corners`). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a ball.
+//! once (`slice`, `corners`). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a
+//! ball.
 
 mod corners;
 mod flat;

@@ -54,7 +54,7 @@ impl Slice {
             // Infinite for a line along the rays, which keeps or drops the whole ray.
             let at = (line.offset - line.normal[1] * ray.at) / slope;
             if line.normal[0] >= 0.0 && at < exit.at {
-                exit = End { at, slope, is_in_cell: 0.0 <= at && at < 1.0 };
+                exit = End { at, slope, is_in_cell: (0.0..1.0).contains(&at) };
             } else if line.normal[0] < 0.0 && -at > entry.at {
                 entry = End { at: -at, slope, is_in_cell: 0.0 < -at && -at <= 1.0 };
             }

@@ -2,6 +2,7 @@
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Vector};
+use gluey_levelset::Body;
 use gluey_linalg::LinOp;
 
 use super::*;
@@ -149,7 +150,7 @@ where
     let mut y = vec![0.0f64; system.dim()];
     SystemOperator::new(system).apply(&x, &mut y);
     let worst = y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-    assert!(worst < 1e-11, "{D}D: {worst:e}");
+    assert!(worst < 1e-9, "{D}D: {worst:e}");
 }
 
 #[test]
@@ -158,29 +159,41 @@ fn constant_pressures_do_no_work_on_truncated_bodies() {
     constants_are_in_the_kernel::<3>();
 }
 
-/// In the middle of a shear, a body that is its own image under a half turn stays where it is; its image in a
-/// mirror across the flow turns as fast.
-fn symmetries_hold<const D: usize>(level: u8, radius: f64)
+/// Mirror images of a body and a shear move as mirror images.
+fn symmetries_hold<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    let center = Vector::repeat(0.5);
-    let turn = |side: f64| Vector::<D>::from_fn(|d, _| [0.8 * side, 0.6, 0.0][d]);
-    let opposite = |side: f64| [(turn(side), 0.7), (-turn(side), 0.7)];
-    let [first, second] = [1.0, -1.0].map(|side| Case::new(level, center, radius, &opposite(side)));
-    let [first, second] = [first, second].map(|case| case.solve(couette).twist);
-    assert!(first.velocity.amax() < 1e-9, "{D}D: {first:?}");
-    assert!(distance(&first, &second) < 1e-9, "{D}D: {first:?} {second:?}");
-    let plain = Case::new(level, center, radius, &[]).solve(couette).twist;
-    // A flatter body turns slower where it lies along the flow: here the effect is small, but it is there.
-    assert!((spin(&first) - spin(&plain)).abs() > 1e-4, "{D}D: {first:?} {plain:?}");
-    assert!((spin(&first) / spin(&plain) - 1.0).abs() < 0.3, "{D}D: {first:?} {plain:?}");
+    let case = general::<D>();
+    let twist = case.solve(couette).twist;
+    for mirrors in 1..1 << D {
+        let sides = Vector::<D>::from_fn(|d, _| if mirrors >> d & 1 == 1 { -1.0 } else { 1.0 });
+        let middle = Vector::repeat(0.5);
+        let center = middle + (case.ball.center() - middle).component_mul(&sides);
+        let flat = |flat: &Flat<D>| Flat { normal: flat.normal.component_mul(&sides), ..*flat };
+        let flats = [case.flats.of(0).iter().map(flat).collect::<Vec<_>>()].into_iter().collect();
+        let ball = Ball::new(center, case.ball.bounding_radius());
+        let image = Case { ball, flats, ..case }.solve(couette).twist;
+        // The image of the shear is the shear or its opposite; spins are axial vectors.
+        let shear = sides[0] * sides[1];
+        let velocity = twist.velocity.component_mul(&sides) * shear;
+        let mut error = (image.velocity - velocity).amax();
+        let [spin, expected] = [&image.spin, &twist.spin].map(Dim::<D>::spin_slice);
+        for (k, (spin, expected)) in spin.iter().zip(expected).enumerate() {
+            let axial = if D == 2 { sides.product() } else { sides.product() * sides[k] };
+            error = error.max((spin - axial * shear * expected).abs());
+        }
+        assert!(error < 1e-9, "{D}D, {sides:?}: {error:e}");
+    }
+    let plain = Case { flats: Flats::none(1), ..case }.solve(couette).twist;
+    let ratio = spin(&twist) / spin(&plain);
+    assert!((0.7..1.3).contains(&ratio) && (ratio - 1.0).abs() > 1e-3, "{D}D: {ratio}");
 }
 
 #[test]
 fn truncated_bodies_keep_the_symmetries_of_a_shear() {
-    symmetries_hold::<2>(5, 0.2);
-    symmetries_hold::<3>(3, 0.3);
+    symmetries_hold::<2>();
+    symmetries_hold::<3>();
 }
 
 /// Planes beyond the ball change no bit.
@@ -233,4 +246,46 @@ fn truncated_bodies_may_lie_across_a_periodic_border() {
         Case { ball, ..case }.solve(is_wall).twist
     };
     assert!(distance(&motion(0.5), &motion(0.0)) < 1e-9);
+}
+
+/// Largest penalty around two touching bodies with a slab of this width in cells between them.
+fn penalty_around_slab<const D: usize>(
+    level: u8,
+    [middle, normal]: [Vector<D>; 2],
+    radius: f64,
+    width: f64,
+) -> Result<f64, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
+    let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + normal * (side * radius), radius));
+    let distance = radius - 0.5 * width * mesh.size(level);
+    let flats = [1.0, -1.0].map(|side| Some(Flat { normal: normal * side, distance }));
+    let system = around(&Discretisation::new(mesh), &bodies, &flats.into_iter().collect(), 1.0)?;
+    let surfaces = system.surfaces.unwrap();
+    Ok((0..surfaces.cut.cells.len()).map(|place| surfaces.penalty(place)).fold(0.0, f64::max))
+}
+
+/// All cells in the slab between flats that face each other have roots and moderate penalties, whatever its
+/// direction.
+fn slabs_are_resolved<const D: usize>(level: u8, radius: f64, count: usize)
+where
+    Dim<D>: Space<D>,
+{
+    for k in 0..count {
+        let (x, cell) = (k as f64, 0.5f64.powi(level.into()));
+        let normal = Vector::<D>::from_fn(|d, _| [(0.7 * x).cos(), (0.7 * x).sin(), 0.8 - 0.3 * x][d]);
+        let middle = Vector::from_fn(|d, _| 0.5 + 0.3 * cell * (x * (1.0 + d as f64)).sin());
+        for width in [1.0, 1.5] {
+            let largest = penalty_around_slab(level, [middle, normal.normalize()], radius, width).unwrap();
+            assert!(largest < 150.0, "{D}D, {k}: {largest}");
+        }
+    }
+}
+
+#[test]
+fn slabs_between_bodies_are_resolved() {
+    slabs_are_resolved::<2>(6, 0.15, 16);
+    slabs_are_resolved::<3>(4, 0.2, 4);
 }

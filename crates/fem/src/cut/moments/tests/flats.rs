@@ -159,7 +159,7 @@ fn flats_may_meet() {
 fn a_cube_is_left<const D: usize>(tolerance: f64) {
     for (center, half) in [(4.0, 2.0), (4.5, 1.5), (4.3, 1.7), (4.1, 1.7), (4.4, 1.3), (4.3 + 1e-12, 1.7)] {
         let plane = |k: usize| {
-            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
             (std::array::from_fn(|d| if d == k / 2 { sign } else { 0.0 }), half)
         };
         let planes: Planes<D> = (0..2 * D).map(plane).collect();
