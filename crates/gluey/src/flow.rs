@@ -12,7 +12,7 @@ use std::time::Instant;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
+use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, ResumeError};
 use gluey_stokes::{
     Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
     SolverKind, StokesError, WarmStartError,
@@ -100,6 +100,8 @@ where
     periods: [Option<f64>; D],
     shear_rate: f64,
     shear_factor: f64,
+    /// Whether lubrication keeps particles apart.
+    keeps_films_open: bool,
     radii: Vec<f64>,
     /// Forces and torques on the particles; empty if there are none.
     wrenches: Vec<Wrench<D>>,
@@ -129,6 +131,7 @@ where
         periods: std::array::from_fn(|axis| case.period(axis)),
         shear_rate: case.shear_rate,
         shear_factor: 1.0,
+        keeps_films_open: case.lubrication() == Lubrication::Deficit,
         radii,
         wrenches: case.wrenches(),
         last: None,
@@ -185,6 +188,21 @@ where
 
     fn set_shear_factor(&mut self, factor: f64) {
         self.shear_factor = factor;
+    }
+
+    fn films(&self, reach: f64) -> Vec<Film<D>> {
+        if !self.keeps_films_open {
+            return Vec::new();
+        }
+        let films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
+        let film = |film: gluey_stokes::Film<D>| Film {
+            first: film.body as usize,
+            second: film.side(1),
+            branch: film.branch(),
+            gap: film.gap,
+            curvature_radius: film.curvature_radius(),
+        };
+        films.into_iter().map(film).collect()
     }
 
     fn statistics(&self) -> FlowStatistics {

@@ -166,6 +166,7 @@ where
         self.tell("flow");
         self.simulation.predict().map_err(StepError::widen)?;
         self.tell("contact");
+        self.simulation.open_films().map_err(StepError::widen)?;
         self.simulation.correct().map_err(StepError::widen)?;
         self.tell("output");
         let start = Instant::now();

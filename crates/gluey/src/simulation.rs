@@ -2,7 +2,7 @@
 
 use gluey_contact::{BodyStep, Contact, ContactError, ContactModel, ContactState, MemoryError};
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
-use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, Integrator, ResumeError, Scheme};
+use gluey_motion::{Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, ResumeError, Scheme};
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
@@ -70,6 +70,16 @@ pub enum StepError<E: std::error::Error + 'static> {
         /// Why.
         source: ContactError,
     },
+    /// A film could not be kept open.
+    #[error("motion failed in step {step} (t = {time})")]
+    Film {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: FilmClosed,
+    },
     /// A velocity is infinite or not a number.
     #[error("the velocity of particle {particle} is not finite in step {step} (t = {time})")]
     NotFinite {
@@ -88,6 +98,7 @@ impl<E: std::error::Error + 'static> StepError<E> {
         match self {
             Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
             Self::Contact { step, time, source } => StepError::Contact { step, time, source },
+            Self::Film { step, time, source } => StepError::Film { step, time, source },
             Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
         }
     }
@@ -172,6 +183,7 @@ where
     /// Does one step.
     pub fn step(&mut self) -> Result<(), StepError<H::Error>> {
         self.predict()?;
+        self.open_films()?;
         self.correct()?;
         self.advance();
         Ok(())
@@ -188,6 +200,17 @@ where
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),
         }
+    }
+
+    /// Corrects the predicted velocities so that films that lubrication keeps open stay open.
+    pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
+        let (step, time) = (self.step, self.time());
+        let reach = self.integrator.film_reach(self.dt, &self.particles, &self.twists);
+        let films = self.hydrodynamics.films(reach);
+        let (integrator, particles, twists) = (&mut self.integrator, &self.particles, &mut self.twists);
+        self.phases
+            .time("motion", || integrator.open_films(self.dt, particles, &films, twists))
+            .map_err(|source| StepError::Film { step, time, source })
     }
 
     /// Corrects the predicted velocities for contact.

@@ -9,9 +9,9 @@
 //!
 //! is taken by the same scheme instead, at the same order: `Phi(g^{n+1}) = Phi(g^n) + c F^n + (dt - c)
 //! F^{n-1}`, and the particles are moved along the line of centres to the gap that this gives. Since `Phi ->
-//! -inf` as `g -> 0`, gaps stay positive for any step. In this scheme `Phi` is the memory `gamma` of the
-//! gluey contact model (Lefebvre 2009, 10.1051/m2an/2008042), of which it is the version at finite gaps: as
-//! the viscosity tends to zero a gap is closed as long as `Phi < 0`.
+//! -inf` as `g -> 0`, gaps stay positive for any step. `Phi` is what the gluey contact model remembers as
+//! `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its limit of a vanishing viscosity a gap is closed as
+//! long as `gamma < 0`. Here that limit is met where a film is thinner than positions resolve.
 //!
 //! Only the shape of `R` matters, not its scale: `R = 1 + s (rho(g) - rho(G))` for `g < G` and one beyond,
 //! with `rho = A/g` for spheres, `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
@@ -33,4 +33,299 @@ pub struct Film<const D: usize> {
     pub gap: f64,
     /// `A`, with `2/A = 1/a + 1/b`; unit: length.
     pub curvature_radius: f64,
+}
+
+/// Films from this many `A` on are not corrected: `G / A`. Far enough for `F` to vary slowly: with the paper's
+/// encounter of two spheres and a fifth of this, the error of reversibility is 16 times as large.
+const REACH: f64 = 1.0;
+/// Films are remembered up to this many times `G`, so that each has a history when it is first corrected.
+const MEMORY_REACH: f64 = 1.5;
+/// The scale `s` of the resistance: about that of two equal spheres.
+const SCALE: f64 = 0.5;
+/// Films are no thinner than this share of `A`, which positions resolve. Where the impulse asks for less it is
+/// remembered, and the film opens when it has been made up for: that is the gluey contact.
+const THINNEST: f64 = 1e-9;
+/// Sweeps at most that open what is left closed then.
+const MOST_OPENINGS: usize = 2000;
+/// Sweeps over the films at most, widest first. Their targets may contradict each other where many particles
+/// are close: what is left then, of the order of the error of the step, is left to the widest.
+const MOST_SWEEPS: usize = 50;
+/// A gap this near to its target, relative to it, is there.
+const TOLERANCE: f64 = 1e-6;
+/// A gap below this share of its target is opened whatever others ask for...
+const LEAST_SHARE: f64 = 0.5;
+/// ... to at least this share of `A`, so that sweeps come to an end.
+const OPENING: f64 = 1e-2;
+
+/// A gap that could not be kept open.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the film between {} would close: its gap of {gap} becomes {left} in a step; take smaller steps", names(*first, *second))]
+pub struct FilmClosed {
+    /// Index of the particle, from 0; messages count from 1.
+    pub first: usize,
+    /// Index of its partner; `None` for a wall.
+    pub second: Option<usize>,
+    /// Gap before the step.
+    pub gap: f64,
+    /// Gap after it.
+    pub left: f64,
+}
+
+fn names(first: usize, second: Option<usize>) -> String {
+    match second {
+        Some(second) => format!("particles {} and {}", first + 1, second + 1),
+        None => format!("particle {} and a wall", first + 1),
+    }
+}
+
+/// The forces in films at the last step.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+pub(crate) struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
+
+/// The force `F` in a film and its impulse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+struct Remembered<const D: usize> {
+    first: usize,
+    second: Option<usize>,
+    branch: Vector<D>,
+    force: f64,
+    /// `Phi` after the step.
+    impulse: f64,
+}
+
+/// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
+pub(crate) struct Step<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub weight: f64,
+    pub history_weight: f64,
+    pub particles: &'a [Particle<D>],
+    /// `u^{n-1}`; empty at the first step.
+    pub history: &'a [Twist<D>],
+}
+
+/// A film with the gap it is to have after the step.
+struct Target<'a, const D: usize> {
+    film: &'a Film<D>,
+    gap: f64,
+    /// Whether it is to have it, or only not to close.
+    is_corrected: bool,
+}
+
+impl<const D: usize> Film<D> {
+    fn thinnest(&self) -> f64 {
+        THINNEST * self.curvature_radius
+    }
+
+    fn reach_of_correction(&self) -> f64 {
+        REACH * self.curvature_radius
+    }
+
+    /// `R(g)`.
+    fn resistance(&self, gap: f64) -> f64 {
+        let rho = |gap: f64| match D {
+            2 => (self.curvature_radius / gap).powf(1.5),
+            _ => self.curvature_radius / gap,
+        };
+        let reach = self.reach_of_correction();
+        if gap < reach { 1.0 + SCALE * (rho(gap) - rho(reach)) } else { 1.0 }
+    }
+
+    /// `Phi(g)`, zero at `G`.
+    fn impulse(&self, gap: f64) -> f64 {
+        let (reach, a) = (self.reach_of_correction(), self.curvature_radius);
+        if gap >= reach {
+            return gap - reach;
+        }
+        let singular = match D {
+            2 => {
+                -2.0 * a.powf(1.5) * (gap.powf(-0.5) - reach.powf(-0.5))
+                    - (a / reach).powf(1.5) * (gap - reach)
+            }
+            _ => a * (gap / reach).ln() - a / reach * (gap - reach),
+        };
+        gap - reach + SCALE * singular
+    }
+
+    /// The gap with this impulse, from the one at the beginning of the step: Newton's method in `ln g`, in
+    /// which the impulse is convex, kept in a bracket.
+    fn gap_of(&self, impulse: f64) -> f64 {
+        let reach = self.reach_of_correction();
+        if impulse >= 0.0 {
+            return reach + impulse;
+        }
+        let (mut lower, mut upper) = (self.thinnest(), reach);
+        if impulse <= self.impulse(lower) {
+            return lower;
+        }
+        let mut gap = self.gap.clamp(lower, upper);
+        for _ in 0..200 {
+            let excess = self.impulse(gap) - impulse;
+            if excess > 0.0 {
+                upper = gap
+            } else {
+                lower = gap
+            }
+            let step = excess / (self.resistance(gap) * gap);
+            if step.abs() <= 1e-14 {
+                break;
+            }
+            let next = gap * (-step).exp();
+            gap = if lower < next && next < upper { next } else { (lower * upper).sqrt() };
+        }
+        gap
+    }
+
+    /// Difference of a vector between the partner and the first; walls have none.
+    fn across(&self, of: impl Fn(usize) -> Vector<D>) -> Vector<D> {
+        self.second.map_or(Vector::zeros(), &of) - of(self.first)
+    }
+}
+
+impl<const D: usize> FilmMemory<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Tells that the flow was reversed.
+    pub fn reverse(&mut self) {
+        self.0.iter_mut().for_each(|film| film.force = -film.force);
+    }
+
+    /// Forgets.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Corrects `twists` so that films have the gaps that their impulses give, and remembers the forces.
+    ///
+    /// # Errors
+    /// [`FilmClosed`] where others leave no room; the memory is as before then.
+    pub fn correct(
+        &mut self,
+        step: &Step<'_, D>,
+        films: &[Film<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), FilmClosed> {
+        let (mut targets, mut memory) = (Vec::new(), Vec::with_capacity(films.len()));
+        for film in films {
+            let Film { first, second, branch, .. } = *film;
+            let gap = film.gap.max(film.thinnest());
+            let rate = |twists: &[Twist<D>]| branch.normalize().dot(&film.across(|k| twists[k].velocity));
+            let force = film.resistance(gap) * rate(twists);
+            let before = self.of(film);
+            let old_force = match (before, step.history) {
+                (_, []) => 0.0,
+                (Some(before), _) => before.force,
+                (None, history) => film.resistance(gap) * rate(history),
+            };
+            let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
+            let start = closed.map_or(film.impulse(gap), |before| before.impulse);
+            let impulse = start + step.weight * force + step.history_weight * old_force;
+            memory.push(Remembered { first, second, branch, force, impulse });
+            let target = film.gap_of(impulse);
+            let is_corrected = gap.min(target) < film.reach_of_correction();
+            targets.push(Target { film, gap: target, is_corrected });
+        }
+        targets.sort_by(|a, b| b.film.gap.total_cmp(&a.film.gap));
+        step.open(&targets, twists)?;
+        self.0 = memory;
+        Ok(())
+    }
+
+    /// What is remembered of a film.
+    fn of(&self, film: &Film<D>) -> Option<&Remembered<D>> {
+        let first = self.0.partition_point(|old| (old.first, old.second) < (film.first, film.second));
+        let same =
+            self.0[first..].iter().take_while(|old| (old.first, old.second) == (film.first, film.second));
+        // Of images across borders, the one in about this direction.
+        same.filter(|old| old.branch.dot(&film.branch) > 0.0).next()
+    }
+}
+
+impl<const D: usize> Step<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// See [`crate::Integrator::film_reach`].
+    pub fn reach(&self, twists: &[Twist<D>]) -> f64 {
+        let radius = self.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
+        let farthest = (0..twists.len()).map(|k| self.shift(k, twists).norm()).fold(0.0, f64::max);
+        // A wall has A = 2 a; two particles approach each other at twice the speed of each.
+        2.0 * radius * REACH * MEMORY_REACH + 2.0 * farthest
+    }
+
+    /// Displacement of a particle.
+    fn shift(&self, k: usize, twists: &[Twist<D>]) -> Vector<D> {
+        let old = self.history.get(k).map_or(Vector::zeros(), |twist| twist.velocity);
+        twists[k].velocity * self.weight + old * self.history_weight
+    }
+
+    /// Moves particles along their lines of centres, pair after pair, until gaps are what they should be.
+    fn open(&self, targets: &[Target<'_, D>], twists: &mut [Twist<D>]) -> Result<(), FilmClosed> {
+        for _ in 0..MOST_SWEEPS {
+            let mut worst = 0.0f64;
+            for target in targets.iter().filter(|target| target.is_corrected) {
+                worst = worst.max(self.move_to(target, twists));
+            }
+            if worst <= TOLERANCE {
+                break;
+            }
+        }
+        for _ in 0..MOST_OPENINGS {
+            let mut is_open = true;
+            for target in targets {
+                let least = LEAST_SHARE * target.gap.min(target.film.reach_of_correction());
+                if self.gap_after(target.film, twists).0 < least {
+                    is_open = false;
+                    let gap = (2.0 * least).max(OPENING * target.film.curvature_radius);
+                    self.move_to(&Target { gap, ..*target }, twists);
+                }
+            }
+            if is_open {
+                return Ok(());
+            }
+        }
+        let closed = targets.iter().find_map(|Target { film, .. }| {
+            let left = self.gap_after(film, twists).0;
+            let Film { first, second, gap, .. } = **film;
+            (left <= 0.0).then_some(FilmClosed { first, second, gap, left })
+        });
+        closed.map_or(Ok(()), Err)
+    }
+
+    /// Gap of a film after the step, and its direction.
+    fn gap_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> (f64, Vector<D>) {
+        let moved = film.branch + film.across(|k| self.shift(k, twists));
+        let distance = film.branch.norm();
+        match film.second {
+            Some(_) => (moved.norm() - distance + film.gap, moved.normalize()),
+            // Along a wall the distance is that along its normal.
+            None => {
+                let n = film.branch / distance;
+                (moved.dot(&n) - distance + film.gap, n)
+            }
+        }
+    }
+
+    /// Brings a film to its gap and returns by how much it was off, relative to that.
+    fn move_to(&self, target: &Target<'_, D>, twists: &mut [Twist<D>]) -> f64 {
+        let Film { first, second, .. } = *target.film;
+        let (gap, n) = self.gap_after(target.film, twists);
+        let velocity = n * ((target.gap - gap) / self.weight);
+        // By their mobilities, which go like the inverse of the radius.
+        let share = second.map_or(1.0, |second| {
+            let [a, b] = [first, second].map(|k| self.particles[k].radius);
+            b / (a + b)
+        });
+        twists[first].velocity -= velocity * share;
+        if let Some(second) = second {
+            twists[second].velocity += velocity * (1.0 - share);
+        }
+        (target.gap - gap).abs() / target.gap
+    }
 }

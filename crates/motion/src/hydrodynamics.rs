@@ -2,6 +2,8 @@
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 
+use crate::Film;
+
 /// Predicts the velocities of particles from their positions, without contact.
 pub trait Hydrodynamics<const D: usize>
 where
@@ -21,6 +23,12 @@ where
 
     /// Sets the factor of the imposed shear rate (1 = as configured, -1 = reversed).
     fn set_shear_factor(&mut self, factor: f64);
+
+    /// The films of the last prediction that lubrication keeps open, with gaps up to `reach`, sorted by
+    /// particles. None where the model lets gaps close.
+    fn films(&self, _reach: f64) -> Vec<Film<D>> {
+        Vec::new()
+    }
 
     /// Size and effort of the last prediction.
     fn statistics(&self) -> FlowStatistics {

@@ -6,6 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
+use crate::films::{Film, FilmClosed, FilmMemory, Step};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,8 @@ where
     history: Vec<Twist<D>>,
     /// Time from the history to now; negative when the flow was reversed since.
     history_age: f64,
+    /// Forces in films at the last step.
+    films: FilmMemory<D>,
 }
 
 impl<const D: usize> Integrator<D>
@@ -74,7 +77,7 @@ where
 {
     /// An integrator without history.
     pub fn new(scheme: Scheme) -> Self {
-        Self { scheme, history: Vec::new(), history_age: 0.0 }
+        Self { scheme, history: Vec::new(), history_age: 0.0, films: FilmMemory::default() }
     }
 
     /// The scheme.
@@ -105,6 +108,37 @@ where
         }
     }
 
+    /// Corrects velocities so that the gaps of `films` after the step are those that their impulses give,
+    /// which are positive; see [`Film`]. To be called once a step, with the films that [`Hydrodynamics`]
+    /// names, sorted by particles.
+    ///
+    /// # Errors
+    /// [`FilmClosed`] where particles are so crowded that none can be given room; take smaller steps then.
+    ///
+    /// [`Hydrodynamics`]: crate::Hydrodynamics
+    pub fn open_films(
+        &mut self,
+        dt: f64,
+        particles: &[Particle<D>],
+        films: &[Film<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), FilmClosed> {
+        let mut memory = std::mem::take(&mut self.films);
+        let corrected = memory.correct(&self.film_step(dt, particles), films, twists);
+        self.films = memory;
+        corrected
+    }
+
+    /// The gap up to which [`Integrator::open_films`] has to know films, before a step with these velocities.
+    pub fn film_reach(&self, dt: f64, particles: &[Particle<D>], twists: &[Twist<D>]) -> f64 {
+        self.film_step(dt, particles).reach(twists)
+    }
+
+    fn film_step<'a>(&'a self, dt: f64, particles: &'a [Particle<D>]) -> Step<'a, D> {
+        let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
+        Step { weight, history_weight, particles, history: &self.history }
+    }
+
     /// Moves and turns the particles over `dt` with the (corrected) velocities `twists` and remembers these.
     ///
     /// Orientations turn at the constant spin `(c w^n + drift)/dt`, so the scheme is the same for both.
@@ -126,6 +160,7 @@ where
     pub fn restart(&mut self) {
         self.history.clear();
         self.history_age = 0.0;
+        self.films.clear();
     }
 
     /// Tells that the flow has been reversed, `u -> -u` at equal positions (Stokes flow under `-shear rate`).
@@ -136,6 +171,7 @@ where
     /// `dt^2 |u'|`, a restart by Euler by `dt^2/2 |u'|`.
     pub fn reverse(&mut self) {
         self.history_age = -self.history_age;
+        self.films.reverse();
         for twist in &mut self.history {
             *twist = -*twist;
         }

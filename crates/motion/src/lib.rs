@@ -26,12 +26,14 @@
 //!
 //! Not for inertia: velocities follow positions at once (Stokes flow), there is no mass and no acceleration.
 
+mod films;
 mod hydrodynamics;
 mod integrator;
 mod linear_flow;
 mod mobility_table;
 mod pair_mobility;
 
+pub use films::{Film, FilmClosed};
 pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};

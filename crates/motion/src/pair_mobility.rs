@@ -6,7 +6,7 @@
 
 use gluey_geom::{Dim, Particle, Space, Twist};
 
-use crate::{Hydrodynamics, LinearFlow, MobilityTable};
+use crate::{Film, Hydrodynamics, LinearFlow, MobilityTable};
 
 /// Why a pair has no velocities.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,12 +43,14 @@ pub struct PairMobility {
     factor: f64,
     offset: f64,
     table: MobilityTable,
+    /// The film between the two at the last prediction.
+    film: Option<Film<3>>,
 }
 
 impl PairMobility {
     /// Two spheres in `flow`, exactly.
     pub fn new(flow: LinearFlow<3>) -> Self {
-        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new() }
+        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new(), film: None }
     }
 
     /// The same with the mobility evaluated at `gap + offset` (`offset` in radii), to imitate a soft solver.
@@ -75,6 +77,9 @@ impl Hydrodynamics<3> for PairMobility {
             return Err(PairMobilityError::NoDirection { distance });
         }
         let n = r / distance;
+        let gap = distance - 2.0 * first.radius;
+        let film = Film { first: 0, second: Some(1), branch: r, gap, curvature_radius: first.radius };
+        self.film = (gap > 0.0 && self.offset == 0.0).then_some(film);
         let mobility = self.table.at(distance / first.radius - 2.0 + self.offset);
 
         let strain = flow.strain_rate() * r;
@@ -93,6 +98,10 @@ impl Hydrodynamics<3> for PairMobility {
 
     fn set_shear_factor(&mut self, factor: f64) {
         self.factor = factor;
+    }
+
+    fn films(&self, reach: f64) -> Vec<Film<3>> {
+        self.film.into_iter().filter(|film| film.gap < reach).collect()
     }
 }
 

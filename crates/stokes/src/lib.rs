@@ -44,6 +44,8 @@ pub use flow::{
     Conditions, Field, Flow, FlowParams, FlowSolver, Given, NodalFields, PhaseTimes, Prepared, Refinement,
     WarmStartError,
 };
+// Near bodies and the films between them.
+pub use film::{Film, Partner, films};
 // How rigidity is imposed.
 pub use formulation::{Formulation, Lubrication, PaperParams, ParticleVelocity, default_offset};
 pub use space::CutCellPressures;

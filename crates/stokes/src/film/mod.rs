@@ -12,4 +12,4 @@ mod deficit;
 mod near;
 
 pub use coupling::FilmCoupling;
-pub use near::{Film, films};
+pub use near::{Film, Partner, films};

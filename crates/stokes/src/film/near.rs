@@ -109,6 +109,12 @@ impl<const D: usize> Film<D> {
         tangents
     }
 
+    /// From the centre of the body to that of its partner, or to the wall.
+    pub fn branch(&self) -> Vector<D> {
+        let beyond = if self.partner.is_wall() { 0.0 } else { self.radii[1] };
+        self.normal * (self.radii[0] + self.gap + beyond)
+    }
+
     /// The point of the wall or the partner's surface that is nearest to the body.
     pub fn far_point(&self) -> Vector<D> {
         self.center + self.normal * (self.radii[0] + self.gap)
@@ -122,7 +128,7 @@ impl<const D: usize> Film<D> {
     }
 }
 
-/// The films thinner than `reach`, by body and then by partner. Walls are the borders of `domain` across
+/// The films thinner than `reach`, by body and then by partner, walls first. Walls are the borders of `domain` across
 /// axes that are not periodic.
 pub fn films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, reach: f64) -> Vec<Film<D>> {
     let tree = BallTree::new(bodies);
@@ -136,10 +142,10 @@ pub fn films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, reach: f64) -
             false
         });
         partners.sort_unstable();
+        films.extend(at_walls(body, index, domain).filter(|film| film.gap < reach));
         for other in partners {
             films.extend(between(bodies, [index, other]).filter(|film| film.gap < reach));
         }
-        films.extend(at_walls(body, index, domain).filter(|film| film.gap < reach));
     }
     films
 }
