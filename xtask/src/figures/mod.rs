@@ -59,7 +59,7 @@ impl Data {
         }
         if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
             notes.push(
-                "Box periodic in *x*; rigid-dofs and exact: Couette flow on all sides, to *t* = 12."
+                "Box periodic in *x*; unfitted and exact: Couette flow on all sides, to *t* = 12."
                     .to_owned(),
             );
         }
@@ -85,7 +85,7 @@ fn stroke(approach: Approach) -> Stroke {
         Approach::GlueyAsPrinted | Approach::GlueyAsPrintedLargeStep => {
             Stroke { color: "#c79a00", width: 1.8, dashes: Some("1.5 1.5 6 1.5") }
         }
-        Approach::GlueyRigidDofs => Stroke { color: "#8a3ea0", width: 1.8, dashes: Some("2 2.5") },
+        Approach::Unfitted => Stroke { color: "#8a3ea0", width: 1.8, dashes: Some("2 2.5") },
     }
 }
 
@@ -100,7 +100,7 @@ pub fn legend(approach: Approach) -> &'static str {
         Approach::None => "no correction",
         Approach::GlueyAsPrinted => "gluey contact as printed",
         Approach::GlueyAsPrintedLargeStep => "gluey contact as printed, twice the time step",
-        Approach::GlueyRigidDofs => "gluey contact, rigid-dofs",
+        Approach::Unfitted => "unfitted, no contact",
     }
 }
 

@@ -39,14 +39,6 @@ pub const KNOWN: &[Known] = &[
         quick: Some("as in the full computation."),
     },
     Known {
-        id: "fig7a-smallest-rigid",
-        full: Some(
-            "the film of 3.4e-3 a is not resolved: cells of a/3.2 let the spheres touch, and finer ones alone do not help \
-             (decision 0006).",
-        ),
-        quick: Some("as in the full computation."),
-    },
-    Known {
         id: "fig9-third-joins",
         full: Some(
             "D23 at t = 30 depends on the mesh, which the paper does not give: 3.4 a at a/h = 1.6, 0.09 a at 3.2, 0.40 a at 6.4, 0.47 a at 12.8; \

@@ -44,9 +44,10 @@ fn write_head(out: &mut String, summary: &Summary) -> std::fmt::Result {
     writeln!(
         out,
         "<h1>Contact problems for particles in a shear flow</h1>\n<p>The figures of Verdon, Lefebvre-Lepot, Lobry and \
-         Laure (2010), computed by gluey {} in {}. Thin grey lines are exact solutions; the dotted line is gluey contact \
-         in the formulation <code>rigid-dofs</code>, all others are in the formulation <code>paper</code>. Lengths are in \
-         units of the box, times in units of 1/shear rate.</p>",
+         Laure (2010), computed by gluey {} in {}. Thin grey lines are exact solutions; the dotted line is the \
+         formulation <code>unfitted</code>, in which lubrication keeps particles apart and no contact acts, as in the exact \
+         solutions; all others are in the formulation <code>paper</code>. Lengths are in units of the box, times in units of \
+         1/shear rate.</p>",
         summary.version,
         duration(summary.wall_s)
     )?;

@@ -34,7 +34,7 @@ impl fmt::Display for CaseName {
 }
 
 /// The ways each case is computed: the paper's three strategies in its formulation, its gluey contact as
-/// printed, and gluey contact in the accurate formulation.
+/// printed, and the accurate formulation, in which lubrication keeps particles apart and no contact acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Approach {
     /// No contact model, formulation `paper`.
@@ -48,8 +48,8 @@ pub enum Approach {
     GlueyAsPrinted,
     /// The same with twice the time step, to see what the time step does; in tables only.
     GlueyAsPrintedLargeStep,
-    /// Gluey contact, formulation `rigid-dofs`.
-    GlueyRigidDofs,
+    /// No contact model, formulation `unfitted` with lubrication.
+    Unfitted,
 }
 
 impl Approach {
@@ -61,7 +61,7 @@ impl Approach {
             Self::Gluey => "gluey",
             Self::GlueyAsPrinted => "gluey-as-printed",
             Self::GlueyAsPrintedLargeStep => "gluey-as-printed-large-step",
-            Self::GlueyRigidDofs => "gluey-rigid-dofs",
+            Self::Unfitted => "unfitted",
         }
     }
 }
@@ -84,10 +84,10 @@ impl RunKey {
     /// A guess at the cost of the run relative to the others; only the order of the runs depends on it.
     fn cost(self) -> u32 {
         match (self.case, self.approach) {
-            (CaseName::Pair3d, Approach::GlueyRigidDofs | Approach::GlueyAsPrintedLargeStep) => 100,
+            (CaseName::Pair3d, Approach::Unfitted | Approach::GlueyAsPrintedLargeStep) => 100,
             (CaseName::Pair3d, _) => 200,
-            (CaseName::Trio2d, Approach::GlueyRigidDofs) => 60,
-            (CaseName::Pair2d, Approach::GlueyRigidDofs) => 50,
+            (CaseName::Trio2d, Approach::Unfitted) => 60,
+            (CaseName::Pair2d, Approach::Unfitted) => 50,
             (CaseName::Trio2d, _) => 15,
             (CaseName::Pair2d, _) => 10,
         }
@@ -163,15 +163,15 @@ impl FigureName {
 
     /// The ways of computing its case that it shows, in the order of its legend.
     pub fn approaches(self) -> Vec<Approach> {
-        use Approach::{Gluey, GlueyAsPrinted, GlueyRigidDofs, Inelastic, None};
+        use Approach::{Gluey, GlueyAsPrinted, Unfitted, Inelastic, None};
         match self {
             Self::Fig4 | Self::Fig8 => Vec::new(),
             Self::Fig5 | Self::Fig6 | Self::Fig7a | Self::Fig7b => {
-                vec![Gluey, GlueyAsPrinted, Inelastic, None, GlueyRigidDofs]
+                vec![Gluey, GlueyAsPrinted, Inelastic, None, Unfitted]
             }
-            Self::Fig9 => vec![Gluey, Inelastic, None, GlueyRigidDofs],
-            Self::Fig10 => vec![Gluey, None, GlueyRigidDofs],
-            Self::Fig11 => vec![Gluey, Inelastic, GlueyRigidDofs],
+            Self::Fig9 => vec![Gluey, Inelastic, None, Unfitted],
+            Self::Fig10 => vec![Gluey, None, Unfitted],
+            Self::Fig11 => vec![Gluey, Inelastic, Unfitted],
         }
     }
 
@@ -236,8 +236,7 @@ pub struct QuickSettings {
     pub cells_per_radius: f64,
     /// The time step is multiplied by this.
     pub step_factor: f64,
-    /// Relative tolerance of the linear solves of `paper`. Those of `rigid-dofs` keep theirs: with 1e-4 its
-    /// spheres, which touch, part with an error of 0.11 in their distance, with 1e-6 of 0.02.
+    /// Relative tolerance of the linear solves of `paper`. Those of `unfitted` keep theirs.
     pub paper_tolerance: f64,
     /// The run ends at this time (units of 1/shear rate) unless the case ends earlier.
     pub latest_end: f64,
@@ -273,7 +272,7 @@ mod tests {
     #[test]
     fn a_single_figure_makes_only_its_own_runs() {
         let names: Vec<String> = runs_for(&[FigureName::Fig11], true).iter().map(|run| run.name()).collect();
-        assert_eq!(names, ["trio-2d-gluey-rigid-dofs", "trio-2d-inelastic", "trio-2d-gluey"]);
+        assert_eq!(names, ["trio-2d-unfitted", "trio-2d-inelastic", "trio-2d-gluey"]);
         assert!(runs_for(&[FigureName::Fig4, FigureName::Fig8], false).is_empty());
     }
 

@@ -13,19 +13,19 @@ use crate::book::{chain, page::duration};
 /// solution.
 pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
     let file = match (key.case, key.approach) {
-        (CaseName::Trio2d, Approach::GlueyRigidDofs) => "trio-2d-couette".to_owned(),
+        (CaseName::Trio2d, Approach::Unfitted) => "trio-2d-couette".to_owned(),
         _ => key.case.to_string(),
     };
     let mut case = Case::load(root.join("data/cases").join(format!("{file}.toml")))?;
     case.name = key.case.to_string();
     case.contact.exact_gap = true;
     case.contact.strategy = match key.approach {
-        Approach::None => Strategy::None,
+        Approach::None | Approach::Unfitted => Strategy::None,
         Approach::Inelastic => Strategy::Inelastic,
         _ => Strategy::Gluey,
     };
     case.flow.formulation = match key.approach {
-        Approach::GlueyRigidDofs => Formulation::RigidDofs,
+        Approach::Unfitted => Formulation::Unfitted,
         _ => Formulation::Paper,
     };
     if matches!(key.approach, Approach::GlueyAsPrinted | Approach::GlueyAsPrintedLargeStep) {

@@ -1,6 +1,6 @@
 //! Settings of a run in words: nobody should have to open a case file to learn it.
 
-use gluey::case::{Boundary, Memory, ParticleVelocity};
+use gluey::case::{Boundary, Lubrication, Memory, ParticleVelocity};
 use gluey::{Case, Formulation, Strategy};
 use serde::Serialize;
 
@@ -57,7 +57,10 @@ fn flow(case: &Case) -> String {
             let offset = case.rigid_offset();
             format!("rigid-dofs, offset {offset} h")
         }
-        Formulation::Unfitted => "unfitted".to_owned(),
+        Formulation::Unfitted => match case.lubrication() {
+            Lubrication::Deficit => "unfitted, lubrication below the cell".to_owned(),
+            Lubrication::None => "unfitted, no lubrication below the cell".to_owned(),
+        },
         Formulation::Paper => {
             let paper = &flow.paper;
             let velocity = match paper.velocity {

@@ -30,7 +30,7 @@ pub fn distances(evidence: &Evidence<'_>) -> Vec<Claim> {
             "pair-2d-gluey-as-printed",
             smallest(Approach::GlueyAsPrinted),
         ),
-        no_overlap("fig5-rigid-no-overlap", "pair-2d-gluey-rigid-dofs", smallest(Approach::GlueyRigidDofs)),
+        no_overlap("fig5-unfitted-no-overlap", "pair-2d-unfitted", smallest(Approach::Unfitted)),
     ]);
     claims.extend(against_the_exact_doublet(evidence));
     claims
@@ -98,7 +98,7 @@ fn as_printed(evidence: &Evidence<'_>) -> Vec<Claim> {
 fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
     let half_turn = |approach| Some(time_to_turn(evidence.run(CASE, approach)?, -PI)? / HALF_TURN_TIME - 1.0);
     let name = "time of half a turn, relative error";
-    let rigid = evidence.run(CASE, Approach::GlueyRigidDofs);
+    let unfitted = evidence.run(CASE, Approach::Unfitted);
     let error = |run: &Trajectory| gap_error(run, evidence.exact(CASE)?, run.end(), f64::INFINITY);
     let band = |limit: f64| Wanted::Between(-limit, limit);
     vec![
@@ -109,15 +109,15 @@ fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
             band(0.04),
         ),
         exact(
-            "fig5-half-turn-rigid",
-            "pair-2d-gluey-rigid-dofs",
-            measured(name, half_turn(Approach::GlueyRigidDofs)),
+            "fig5-half-turn-unfitted",
+            "pair-2d-unfitted",
+            measured(name, half_turn(Approach::Unfitted)),
             band(evidence.limit(0.0047, 0.013)),
         ),
         exact(
-            "fig5-distance-rigid",
-            "pair-2d-gluey-rigid-dofs",
-            measured("largest error of D/a", rigid.and_then(error)),
+            "fig5-distance-unfitted",
+            "pair-2d-unfitted",
+            measured("largest error of D/a", unfitted.and_then(error)),
             Wanted::AtMost(evidence.limit(1.4e-3, 5.7e-3)),
         ),
     ]
@@ -155,9 +155,9 @@ pub fn orbits(evidence: &Evidence<'_>) -> Vec<Claim> {
             Wanted::AtLeast(1.01),
         ),
         exact(
-            "fig6-circle-rigid",
-            "pair-2d-gluey-rigid-dofs",
-            measured(whole, ratio(Approach::GlueyRigidDofs, 0.0)),
+            "fig6-circle-unfitted",
+            "pair-2d-unfitted",
+            measured(whole, ratio(Approach::Unfitted, 0.0)),
             Wanted::AtMost(evidence.limit(1.0006, 1.0026)),
         ),
     ]

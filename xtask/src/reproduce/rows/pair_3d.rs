@@ -24,7 +24,7 @@ pub fn distances(evidence: &Evidence<'_>) -> Vec<Claim> {
             "pair-3d-gluey-as-printed",
             smallest(Approach::GlueyAsPrinted),
         ),
-        no_overlap("fig7a-rigid-no-overlap", "pair-3d-gluey-rigid-dofs", smallest(Approach::GlueyRigidDofs)),
+        no_overlap("fig7a-unfitted-no-overlap", "pair-3d-unfitted", smallest(Approach::Unfitted)),
     ]);
     claims.extend(against_the_exact_encounter(evidence));
     claims
@@ -78,38 +78,38 @@ fn strategies(evidence: &Evidence<'_>) -> Vec<Claim> {
 }
 
 fn against_the_exact_encounter(evidence: &Evidence<'_>) -> Vec<Claim> {
-    let rigid = evidence.run(CASE, Approach::GlueyRigidDofs);
-    let with_exact = rigid.zip(evidence.exact(CASE));
-    let row = |id, what, value, wanted| exact(id, "pair-3d-gluey-rigid-dofs", measured(what, value), wanted);
+    let unfitted = evidence.run(CASE, Approach::Unfitted);
+    let with_exact = unfitted.zip(evidence.exact(CASE));
+    let row = |id, what, value, wanted| exact(id, "pair-3d-unfitted", measured(what, value), wanted);
     vec![
         row(
-            "fig7a-far-rigid",
+            "fig7a-far-unfitted",
             "D(t), largest relative error while D > a",
             with_exact.and_then(|(run, exact)| gap_deviation(run, exact, 1.0)),
             Wanted::AtMost(0.03),
         ),
         row(
-            "fig7a-near-rigid",
+            "fig7a-near-unfitted",
             "D(t)/a, largest error while D < a",
             with_exact.and_then(|(run, exact)| gap_error(run, exact, exact.end(), 1.0)),
             Wanted::AtMost(0.09),
         ),
         row(
-            "fig7a-smallest-rigid",
+            "fig7a-smallest-unfitted",
             "smallest D/a, relative error",
             with_exact.and_then(|(run, exact)| Some(smallest_gap(run)? / smallest_gap(exact)? - 1.0)),
             Wanted::Between(-0.1, 0.1),
         ),
         row(
-            "fig7a-time-rigid",
+            "fig7a-time-unfitted",
             "time of closest approach, relative error",
-            rigid.and_then(|run| Some(closest_approach(run)? / CLOSEST_APPROACH_TIME - 1.0)),
+            unfitted.and_then(|run| Some(closest_approach(run)? / CLOSEST_APPROACH_TIME - 1.0)),
             Wanted::Between(-0.0099, 0.0099),
         ),
         row(
-            "fig7a-reversibility-rigid",
+            "fig7a-reversibility-unfitted",
             REVERSIBILITY,
-            evidence.report(CASE, Approach::GlueyRigidDofs).and_then(|report| report.reversibility_error),
+            evidence.report(CASE, Approach::Unfitted).and_then(|report| report.reversibility_error),
             Wanted::AtMost(evidence.limit(1.08e-3, 5.1e-3)),
         ),
     ]
@@ -156,11 +156,11 @@ pub fn paths(evidence: &Evidence<'_>) -> Vec<Claim> {
             Wanted::AtLeast(0.1),
         ),
         exact(
-            "fig7b-paths-rigid",
-            "pair-3d-gluey-rigid-dofs",
+            "fig7b-paths-unfitted",
+            "pair-3d-unfitted",
             measured(
                 "largest distance of a centre from the exact one, in radii",
-                off_exact(Approach::GlueyRigidDofs),
+                off_exact(Approach::Unfitted),
             ),
             Wanted::AtMost(0.1),
         ),

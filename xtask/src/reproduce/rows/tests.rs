@@ -9,7 +9,7 @@ use gluey_verify::Outcome;
 const RUNS: [(CaseName, f64); 3] =
     [(CaseName::Pair2d, 30.0), (CaseName::Pair3d, 16.8), (CaseName::Trio2d, 12.0)];
 
-/// Data for [`Evidence`] with the exact solutions as if `rigid-dofs` had computed them, with a clock that is
+/// Data for [`Evidence`] with the exact solutions as if `unfitted` had computed them, with a clock that is
 /// `shift` slow.
 struct Exact {
     data: Data,
@@ -20,7 +20,7 @@ impl Exact {
     fn new(shift: f64, planned_end: impl Fn(f64) -> f64) -> Self {
         let mut data = Data::default();
         for (case, end) in RUNS {
-            let key = RunKey { case, approach: Approach::GlueyRigidDofs };
+            let key = RunKey { case, approach: Approach::Unfitted };
             let exact = reference::load(&crate::workspace_root(), case, 30.0).unwrap();
             let mut run = exact.clone();
             run.times.iter_mut().for_each(|t| *t *= 1.0 + shift);
@@ -35,13 +35,13 @@ impl Exact {
         Self { data, reports: BTreeMap::new() }
     }
 
-    /// The rows that compare `rigid-dofs` with the exact solutions, but for the one that is read from a
+    /// The rows that compare `unfitted` with the exact solutions, but for the one that is read from a
     /// report.
     fn rows(&self) -> Vec<Row> {
         let evidence = Evidence { data: &self.data, reports: &self.reports };
         let mut rows = all(&FigureName::ALL, &evidence);
-        rows.retain(|row| row.kind == Kind::Exact && row.run.ends_with("rigid-dofs"));
-        rows.retain(|row| row.id != "fig7a-reversibility-rigid");
+        rows.retain(|row| row.kind == Kind::Exact && row.run.ends_with("unfitted"));
+        rows.retain(|row| row.id != "fig7a-reversibility-unfitted");
         rows
     }
 }
@@ -58,7 +58,7 @@ fn a_clock_ten_percent_slow_is_noticed() {
     let rows = Exact::new(0.1, |end| end).rows();
     // The shape of the orbit and the smallest gap do not know the time, and the doublet's gap varies by 4e-5
     // a only.
-    let timeless = ["fig5-distance-rigid", "fig6-circle-rigid", "fig7a-smallest-rigid"];
+    let timeless = ["fig5-distance-unfitted", "fig6-circle-unfitted", "fig7a-smallest-unfitted"];
     for row in rows.iter().filter(|row| !timeless.contains(&row.id)) {
         assert_eq!(row.outcome, Outcome::No, "{row:#?}");
     }

@@ -53,7 +53,7 @@ pub fn distances(evidence: &Evidence<'_>) -> Vec<Claim> {
         .full_only(),
         no_overlap("fig9-gluey-no-overlap", "trio-2d-gluey", smallest(Approach::Gluey)),
         no_overlap("fig9-inelastic-no-overlap", "trio-2d-inelastic", smallest(Approach::Inelastic)),
-        no_overlap("fig9-rigid-no-overlap", "trio-2d-gluey-rigid-dofs", smallest(Approach::GlueyRigidDofs)),
+        no_overlap("fig9-unfitted-no-overlap", "trio-2d-unfitted", smallest(Approach::Unfitted)),
     ]
 }
 
@@ -115,11 +115,11 @@ pub fn without_correction(evidence: &Evidence<'_>) -> Vec<Claim> {
 
 fn against_the_exact_trio(evidence: &Evidence<'_>) -> Vec<Claim> {
     let off = |until: f64| {
-        let (run, exact) = (evidence.run(CASE, Approach::GlueyRigidDofs)?, evidence.exact(CASE)?);
+        let (run, exact) = (evidence.run(CASE, Approach::Unfitted)?, evidence.exact(CASE)?);
         Some(center_deviation(run, exact, until)? / RADIUS)
     };
     let row = |id, what, until, limit| {
-        exact(id, "trio-2d-gluey-rigid-dofs", measured(what, off(until)), Wanted::AtMost(limit))
+        exact(id, "trio-2d-unfitted", measured(what, off(until)), Wanted::AtMost(limit))
     };
     vec![
         row(
