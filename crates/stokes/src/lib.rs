@@ -45,7 +45,7 @@ pub use flow::{
     WarmStartError,
 };
 // Near bodies and the films between them.
-pub use film::{Film, Partner, films};
+pub use film::{Film, FilmForce, Partner, films};
 // How rigidity is imposed.
 pub use formulation::{Formulation, Lubrication, PaperParams, ParticleVelocity, default_offset};
 pub use space::CutCellPressures;

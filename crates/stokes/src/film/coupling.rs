@@ -12,7 +12,7 @@
 //! and residuals of these rows weigh velocities by what they do there: in a film that nearly closes they are
 //! small. With about the resistance `R_0` that the mesh has, the Schur complement is `1 + R / R_0`.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
 use gluey_linalg::{Jagged, Scalar};
 
 use super::near::Film;
@@ -29,6 +29,31 @@ pub struct FilmCoupling<const D: usize> {
     inverses: Vec<f64>,
     /// `s`.
     scales: Vec<f64>,
+}
+
+/// What a film exerts on its two sides beyond what the mesh resolves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmForce<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The film.
+    pub film: Film<D>,
+    /// Forces and torques on the body and on its partner; none on a wall.
+    pub wrenches: [Wrench<D>; 2],
+}
+
+impl<const D: usize> FilmForce<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The first moment of the forces on a side, `F r` with `r` from its centre to the middle of the film:
+    /// its symmetric part without trace is a share of the stresslet.
+    pub fn moment(&self, side: usize) -> Matrix<D> {
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let arm = self.film.normal * (sign * self.film.arm(side));
+        self.wrenches[side].force * arm.transpose()
+    }
 }
 
 impl<const D: usize> FilmCoupling<D>
@@ -56,9 +81,26 @@ where
         Self { films, rows, inverses, scales }
     }
 
-    /// The films, with [`FilmCoupling::MODES`] rows each.
-    pub fn films(&self) -> &[Film<D>] {
-        &self.films
+    /// What the films exert on the bodies, for the scaled forces `g`.
+    pub fn forces(&self, space: &VelocitySpace<D>, g: &[f64]) -> Vec<FilmForce<D>> {
+        let of_film = |(index, film): (usize, &Film<D>)| {
+            let first = index * Self::MODES;
+            let wrench = |side: usize| {
+                let body = film.side(side)?;
+                let mut load = vec![0.0; Dim::<D>::RIGID];
+                for row in first..first + Self::MODES {
+                    // Of a body and its own image, one side comes first in the row.
+                    let entries = self.rows[row].chunks_exact(Dim::<D>::RIGID).nth(side)?;
+                    load.iter_mut().zip(entries).for_each(|(load, entry)| *load -= entry.1 * g[row]);
+                }
+                Some(space.wrench_of(&load, body))
+            };
+            FilmForce {
+                film: *film,
+                wrenches: [wrench(0).unwrap_or_default(), wrench(1).unwrap_or_default()],
+            }
+        };
+        self.films.iter().enumerate().map(of_film).collect()
     }
 
     /// Number of rows.
@@ -155,3 +197,6 @@ fn wall_motion<const D: usize>(film: &Film<D>, mode: usize, velocity: &Vector<D>
         mode => film.roll_of_slip() * velocity.dot(&tangents[mode - D]),
     }
 }
+
+#[cfg(test)]
+mod tests;

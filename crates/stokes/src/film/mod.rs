@@ -11,5 +11,5 @@ mod coupling;
 mod deficit;
 mod near;
 
-pub use coupling::FilmCoupling;
+pub use coupling::{FilmCoupling, FilmForce};
 pub use near::{Film, Partner, films};

@@ -13,6 +13,7 @@ use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
+use crate::film::FilmForce;
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{CutCellPressures, Discretisation};
@@ -70,6 +71,8 @@ where
     /// Force and torque on each body by something other than the fluid: those given, or those that hold it
     /// at the twist given.
     pub wrenches: Vec<Wrench<D>>,
+    /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
+    pub films: Vec<FilmForce<D>>,
     /// Linear solves made.
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
@@ -228,6 +231,7 @@ where
             multiplier,
             twists,
             wrenches,
+            films: problem.film_forces(&x),
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,
             fine_operator_applications: effort.fine_operator_applications,

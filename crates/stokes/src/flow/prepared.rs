@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use super::conditions::Conditions;
 use super::{Flow, FlowSolver};
 use crate::error::StokesError;
-use crate::formulation::Problem;
+use crate::formulation::{Problem, symmetric_and_traceless};
 
 /// Bodies on a mesh with the linear solvers for them: as many flows as wanted, each from a guess of zero and
 /// none dependent on those before.
@@ -99,6 +99,8 @@ where
     /// 1970, 10.1017/S0022112070000745). A sphere in the strain `E` has `S = (20/3) pi eta a^3 E`. The force
     /// dipole that the body exerts on the fluid is `-S`.
     ///
+    /// What films too thin for the mesh add is not in it: see [`Prepared::film_stresslets`].
+    ///
     /// A force per unit of volume on the fluid next to the body counts as an error of first order in the size
     /// of the cells there.
     ///
@@ -111,6 +113,18 @@ where
         let twists = flow.twists.iter().take(space.body_count());
         twists.enumerate().for_each(|(body, twist)| space.set_twist(&mut velocity, body, twist));
         self.problem.rigidity.stresslets(&self.problem, &velocity, &flow.pressure)
+    }
+
+    /// The share of films that are too thin for the mesh in the stresslet of each body, from
+    /// [`Flow::films`].
+    pub fn film_stresslets(&self, flow: &Flow<D>) -> Vec<Matrix<D>> {
+        let mut sums = vec![Matrix::zeros(); self.problem.bodies.len()];
+        for force in &flow.films {
+            for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
+                sums[body] += symmetric_and_traceless(&force.moment(side));
+            }
+        }
+        sums
     }
 
     /// The mobility matrix: velocities and spins (rows) by forces and torques (columns), `D` numbers and the

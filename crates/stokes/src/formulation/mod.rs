@@ -20,7 +20,7 @@ use crate::error::StokesError;
 use crate::space::{CutCellPressures, Discretisation};
 
 pub use paper::{PaperParams, ParticleVelocity};
-pub use problem::{Data, Method, Problem, check_viscosity};
+pub use problem::{Data, Method, Problem, check_viscosity, symmetric_and_traceless};
 pub use rigid_dofs::default_offset;
 
 /// How rigidity is imposed.

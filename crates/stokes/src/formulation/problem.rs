@@ -13,6 +13,7 @@ use gluey_linalg::vector;
 
 use super::load::add_load;
 use crate::error::StokesError;
+use crate::film::FilmForce;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
@@ -281,6 +282,12 @@ where
         self.system.space.expand(&mut velocity);
         vector::axpy(1.0, lift, &mut velocity);
         velocity
+    }
+
+    /// What films exert on bodies and walls.
+    pub fn film_forces(&self, x: &[f64]) -> Vec<FilmForce<D>> {
+        let system = &self.system;
+        system.films.as_ref().map_or(Vec::new(), |films| films.forces(&system.space, system.parts(x)[2]))
     }
 
     /// The pressure at its nodes, then the forces of films.

@@ -4,9 +4,7 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
-use gluey_stokes::{
-    Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator,
-};
+use gluey_stokes::{Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator};
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{

@@ -46,7 +46,11 @@ where
 
     /// Force and torque on a body in a reduced load.
     pub fn wrench(&self, load: &[f64], body: usize) -> Wrench<D> {
-        let rows = &load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
+        self.wrench_of(&load[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID], body)
+    }
+
+    /// Force and torque on a body from its rows of a reduced load.
+    pub fn wrench_of(&self, rows: &[f64], body: usize) -> Wrench<D> {
         let mut wrench = Wrench::default();
         wrench.force.copy_from_slice(&rows[..D]);
         for k in 0..Dim::<D>::ROT {
