@@ -3,6 +3,7 @@
 pub mod canvas;
 pub mod chart;
 mod gaps;
+mod limit;
 mod setups;
 pub mod text;
 mod trajectories;
@@ -33,6 +34,7 @@ pub fn draw(figure: FigureName, data: &Data) -> Canvas {
     match figure {
         FigureName::Fig4 => setups::two_particles(),
         FigureName::Fig8 => setups::three_particles(),
+        FigureName::Limit => limit::limit(),
         FigureName::Fig5 | FigureName::Fig7a => gaps::pair(figure, data),
         FigureName::Fig9 => gaps::trio(data),
         FigureName::Fig6 | FigureName::Fig7b => trajectories::pair(figure, data),

@@ -22,6 +22,7 @@ pub struct Table {
 /// Title of a figure.
 pub fn title(figure: FigureName) -> &'static str {
     match figure {
+        FigureName::Limit => "Section 2.5: gluey contact as the limit of lubrication",
         FigureName::Fig4 => "Figure 4: set-up, two particles in a shear flow",
         FigureName::Fig5 => "Figure 5: two discs, distance over time",
         FigureName::Fig6 => "Figure 6: two discs, trajectories",
@@ -66,7 +67,7 @@ type Measure = fn(&View<'_>) -> Option<f64>;
 
 fn measures_of(figure: FigureName) -> Vec<(&'static str, Measure)> {
     match figure {
-        FigureName::Fig4 | FigureName::Fig8 => Vec::new(),
+        FigureName::Limit | FigureName::Fig4 | FigureName::Fig8 => Vec::new(),
         FigureName::Fig5 => vec![
             ("smallest D/a", |v| measures::smallest_gap(v.run)),
             ("largest D/a", |v| measures::largest_gap(v.run, (1, 2))),

@@ -103,6 +103,8 @@ impl fmt::Display for RunKey {
 /// The figures of the paper that show its results and set-ups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FigureName {
+    /// Gluey contact as the limit of lubrication (section 2.5, which has no figure).
+    Limit,
     /// Set-up with two particles.
     Fig4,
     /// 2D pair, gap over time.
@@ -125,7 +127,8 @@ pub enum FigureName {
 
 impl FigureName {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
+        Self::Limit,
         Self::Fig4,
         Self::Fig5,
         Self::Fig6,
@@ -140,6 +143,7 @@ impl FigureName {
     /// Name of the figure's files without their extension.
     pub fn as_str(self) -> &'static str {
         match self {
+            Self::Limit => "limit",
             Self::Fig4 => "fig4",
             Self::Fig5 => "fig5",
             Self::Fig6 => "fig6",
@@ -155,7 +159,7 @@ impl FigureName {
     /// The case whose set-up or runs it shows.
     pub fn case(self) -> CaseName {
         match self {
-            Self::Fig4 | Self::Fig5 | Self::Fig6 => CaseName::Pair2d,
+            Self::Limit | Self::Fig4 | Self::Fig5 | Self::Fig6 => CaseName::Pair2d,
             Self::Fig7a | Self::Fig7b => CaseName::Pair3d,
             Self::Fig8 | Self::Fig9 | Self::Fig10 | Self::Fig11 => CaseName::Trio2d,
         }
@@ -165,7 +169,7 @@ impl FigureName {
     pub fn approaches(self) -> Vec<Approach> {
         use Approach::{Gluey, GlueyAsPrinted, Unfitted, Inelastic, None};
         match self {
-            Self::Fig4 | Self::Fig8 => Vec::new(),
+            Self::Limit | Self::Fig4 | Self::Fig8 => Vec::new(),
             Self::Fig5 | Self::Fig6 | Self::Fig7a | Self::Fig7b => {
                 vec![Gluey, GlueyAsPrinted, Inelastic, None, Unfitted]
             }
@@ -203,7 +207,7 @@ impl Serialize for FigureName {
 
 /// `--only` names a figure that does not exist.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no figure `{0}`; the figures are fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11")]
+#[error("there is no figure `{0}`; the figures are limit, fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11")]
 pub struct UnknownFigure(String);
 
 impl FromStr for FigureName {

@@ -75,7 +75,7 @@ pub fn all(figures: &[FigureName], evidence: &Evidence<'_>) -> Vec<Row> {
 
 fn claims(figure: FigureName, evidence: &Evidence<'_>) -> Vec<Claim> {
     match figure {
-        FigureName::Fig4 | FigureName::Fig8 => Vec::new(),
+        FigureName::Limit | FigureName::Fig4 | FigureName::Fig8 => Vec::new(),
         FigureName::Fig5 => pair_2d::distances(evidence),
         FigureName::Fig6 => pair_2d::orbits(evidence),
         FigureName::Fig7a => pair_3d::distances(evidence),
