@@ -5,6 +5,7 @@ mod aggregates;
 mod coupling;
 mod cut_cells;
 mod penalty;
+mod products;
 mod traction;
 
 pub use aggregates::Aggregates;
