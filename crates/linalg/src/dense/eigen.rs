@@ -16,7 +16,7 @@ const INVERSE_STEPS: usize = 2;
 /// Sweeps of Jacobi's method over what is left of the matrix on these vectors, which is nearly diagonal, and
 /// the share of the diagonal below which an entry is let be.
 const SWEEPS: usize = 6;
-const NEGLIGIBLE: f64 = 1e-4;
+const NEGLIGIBLE: f64 = 1e-2;
 
 /// The largest `x.A x / x.B x`, `B` being positive definite, to six digits: Lanczos' method for `B^-1 A` in the
 /// scalar product of `B` (Golub and Van Loan 2013, section 10.1). Directions lose their orthogonality, which
@@ -95,7 +95,7 @@ pub fn lowest_modes(matrix: &mut DenseSymmetric, bound: f64) -> Result<Vec<(f64,
             row.iter_mut().zip(x).for_each(|(sum, x)| *sum += q * x);
         }
     }
-    let rotation = diagonalise(&mut inverse, count);
+    let rotation = diagonalise(&mut inverse, count, 0.5 / bound);
     let mut found: Vec<usize> = (0..count).filter(|&k| inverse[k][k] * bound > 1.0).collect();
     found.sort_by(|&a, &b| inverse[b][b].total_cmp(&inverse[a][a]));
     let mode = |k: usize| {
@@ -131,21 +131,22 @@ fn orthonormalise(x: &mut [[f64; MODES]], count: usize) {
     }
 }
 
-/// Rotates the first `count` unknowns until the matrix is nearly diagonal there; the rows of the result are what
-/// they have become.
-fn diagonalise(a: &mut [[f64; MODES]; MODES], count: usize) -> [[f64; MODES]; MODES] {
+/// Rotates the first `count` unknowns until the matrix is nearly diagonal there, but for unknowns both of which
+/// are below `least` on the diagonal; the rows of the result are what they have become.
+fn diagonalise(a: &mut [[f64; MODES]; MODES], count: usize, least: f64) -> [[f64; MODES]; MODES] {
     let mut rotation = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     for _ in 0..SWEEPS {
         let mut is_diagonal = true;
         for (i, j) in (1..count).flat_map(|i| (0..i).map(move |j| (i, j))) {
             let (entry, ends) = (0.5 * (a[i][j] + a[j][i]), [a[i][i], a[j][j]]);
-            if entry.abs() <= NEGLIGIBLE * (ends[0] * ends[1]).abs().sqrt() {
+            let is_small = entry.powi(2) <= NEGLIGIBLE.powi(2) * (ends[0] * ends[1]).abs();
+            if is_small || ends[0].max(ends[1]) < least {
                 continue;
             }
             is_diagonal = false;
             let ratio = (ends[1] - ends[0]) / (2.0 * entry);
-            let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
-            let cos = 1.0 / tangent.hypot(1.0);
+            let tangent = ratio.signum() / (ratio.abs() + (1.0 + ratio * ratio).sqrt());
+            let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
             let sin = tangent * cos;
             rotate_rows(a, [i, j], [cos, sin]);
             for row in a.iter_mut() {

@@ -215,11 +215,16 @@ impl<const R: usize> WithSimd for Solve<'_, R> {
                 }
             }
         }
-        for row in (GROUP..matrix.dim).rev() {
-            let (before, rest) = x.split_at_mut(group_of(row));
-            let own = rest[row % GROUP];
-            for (x, factor) in before.iter_mut().zip(matrix.row(row)) {
-                (0..R).for_each(|l| x[l] -= factor * own[l]);
+        for first in (GROUP..matrix.dim).step_by(GROUP).rev() {
+            let (before, group) = x.split_at_mut(first);
+            // Rows that a short group lacks count zero times.
+            let own: [[f64; R]; GROUP] = std::array::from_fn(|i| group.get(i).copied().unwrap_or([0.0; R]));
+            let row = |i: usize| &matrix.row((first + i).min(matrix.dim - 1))[..first];
+            let rows = row(0).iter().zip(row(1)).zip(row(2).iter().zip(row(3)));
+            for (x, ((a, b), (c, d))) in before.iter_mut().zip(rows) {
+                (0..R).for_each(|l| {
+                    x[l] -= (a * own[0][l] + b * own[1][l]) + (c * own[2][l] + d * own[3][l]);
+                });
             }
         }
     }
@@ -252,6 +257,13 @@ impl WithSimd for Multiply<'_> {
 /// `sum_k a_k x_k`, in as many partial sums as fill vectors.
 #[inline(always)]
 fn sum_of_products<const R: usize>(a: &[f64], x: &[[f64; R]]) -> [f64; R] {
+    if R >= LANES {
+        let mut sum = [0.0; R];
+        for (a, x) in a.iter().zip(x) {
+            (0..R).for_each(|l| sum[l] += a * x[l]);
+        }
+        return sum;
+    }
     let mut parts = [[0.0; R]; LANES];
     let ((a_full, a_rest), (x_full, x_rest)) = (a.as_chunks::<LANES>(), x.as_chunks::<LANES>());
     for (a, x) in a_full.iter().zip(x_full) {
