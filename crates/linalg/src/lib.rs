@@ -36,7 +36,7 @@ mod subset;
 pub mod vector;
 
 pub use affine::AffineConstraints;
-pub use dense::{BlockError, DenseSymmetric, invert_spd};
+pub use dense::{BlockError, DenseSymmetric, invert_spd, largest_ratio, lowest_modes};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
@@ -45,7 +45,7 @@ pub use jagged::Jagged;
 pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
-pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval};
+pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval, WeakModes};
 pub use sparse::{
     BlockGroups, BlockPattern, LocalTerm, Pattern, Prolongation, SellMatrix, SparseError, SparseMatrix,
     SymmetricBlockMatrix,

@@ -67,9 +67,22 @@ impl DenseSymmetric {
     }
 
     /// Sweeps the first unknowns only: replaces the part of the matrix beyond the first `count` unknowns, on
-    /// which it is positive definite, by the Schur complement; the rest is lost.
+    /// which it is positive definite, by the Schur complement. The rest becomes the factors of
+    /// [`DenseSymmetric::solve`].
     pub fn eliminate(&mut self, count: usize) -> Result<(), BlockError> {
         Arch::new().dispatch(Sweep::<false> { matrix: self, count })
+    }
+
+    /// `x <- A^-1 x` for a matrix whose unknowns have all been eliminated, and `R` vectors side by side.
+    ///
+    /// With the groups `K` on the diagonal of `D`, `A = L D L^T`: `L` is one on the diagonal.
+    pub fn solve<const R: usize>(&self, x: &mut [[f64; R]]) {
+        Arch::new().dispatch(Solve { matrix: self, x });
+    }
+
+    /// `y = A x` by the lower triangle.
+    pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        Arch::new().dispatch(Multiply { matrix: self, x, y });
     }
 
     /// `P^-1` for the group of `size` unknowns from `first` on, with zeros around it.
@@ -141,8 +154,8 @@ impl DenseSymmetric {
     }
 }
 
-/// Sweeps the first `count` unknowns. Unless `BACKWARD`, what becomes of those that have gone is not
-/// computed.
+/// Sweeps the first `count` unknowns. Unless `BACKWARD`, those that have gone keep the factors with which they
+/// went: in the rows of a group `P^-1`, in the rows behind it `A_iK P^-1`.
 struct Sweep<'a, const BACKWARD: bool> {
     matrix: &'a mut DenseSymmetric,
     count: usize,
@@ -163,18 +176,108 @@ impl<const BACKWARD: bool> WithSimd for Sweep<'_, BACKWARD> {
             for row in (start..matrix.dim).filter(|row| !group.contains(row)) {
                 let factors = matrix.factors(row, &inverse);
                 matrix.subtract(simd, row, start / LANES * LANES, &factors);
-                if BACKWARD {
-                    matrix.write_beside(row, first, &factors[..size]);
-                }
+                matrix.write_beside(row, first, &factors[..size]);
             }
-            if BACKWARD {
-                for (i, row) in inverse[..size].iter().enumerate() {
-                    matrix.write_beside(first + i, first, &row.map(|p| -p)[..=i]);
-                }
+            let sign = if BACKWARD { -1.0 } else { 1.0 };
+            for (i, row) in inverse[..size].iter().enumerate() {
+                matrix.write_beside(first + i, first, &row.map(|p| sign * p)[..=i]);
             }
         }
         Ok(())
     }
+}
+
+/// See [`DenseSymmetric::solve`].
+struct Solve<'a, const R: usize> {
+    matrix: &'a DenseSymmetric,
+    x: &'a mut [[f64; R]],
+}
+
+impl<const R: usize> WithSimd for Solve<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { matrix, x } = self;
+        let group_of = |row: usize| row / GROUP * GROUP;
+        for row in GROUP..matrix.dim {
+            let (before, rest) = x.split_at_mut(group_of(row));
+            let sum = sum_of_products(&matrix.row(row)[..before.len()], before);
+            (0..R).for_each(|l| rest[row % GROUP][l] -= sum[l]);
+        }
+        for (k, group) in x.chunks_mut(GROUP).enumerate() {
+            let old: [[f64; R]; GROUP] = std::array::from_fn(|i| group.get(i).copied().unwrap_or([0.0; R]));
+            for i in 0..group.len() {
+                group[i] = [0.0; R];
+                for (j, old) in old[..group.len()].iter().enumerate() {
+                    let factor = matrix.row(k * GROUP + i.max(j))[k * GROUP + i.min(j)];
+                    (0..R).for_each(|l| group[i][l] += factor * old[l]);
+                }
+            }
+        }
+        for first in (GROUP..matrix.dim).step_by(GROUP).rev() {
+            let (before, group) = x.split_at_mut(first);
+            // Rows that a short group lacks count zero times.
+            let own: [[f64; R]; GROUP] = std::array::from_fn(|i| group.get(i).copied().unwrap_or([0.0; R]));
+            let row = |i: usize| &matrix.row((first + i).min(matrix.dim - 1))[..first];
+            let rows = row(0).iter().zip(row(1)).zip(row(2).iter().zip(row(3)));
+            for (x, ((a, b), (c, d))) in before.iter_mut().zip(rows) {
+                (0..R).for_each(|l| {
+                    x[l] -= (a * own[0][l] + b * own[1][l]) + (c * own[2][l] + d * own[3][l]);
+                });
+            }
+        }
+    }
+}
+
+/// See [`DenseSymmetric::multiply`].
+struct Multiply<'a> {
+    matrix: &'a DenseSymmetric,
+    x: &'a [f64],
+    y: &'a mut [f64],
+}
+
+impl WithSimd for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { matrix, x, y } = self;
+        y.fill(0.0);
+        for i in 0..matrix.dim {
+            let row = matrix.row(i);
+            let own = x[i];
+            y[..i].iter_mut().zip(row).for_each(|(y, a)| *y += a * own);
+            let [sum] = sum_of_products(&row[..i], x[..i].as_chunks::<1>().0);
+            y[i] += sum + row[i] * own;
+        }
+    }
+}
+
+/// `sum_k a_k x_k`, in as many partial sums as fill vectors.
+#[inline(always)]
+fn sum_of_products<const R: usize>(a: &[f64], x: &[[f64; R]]) -> [f64; R] {
+    if R >= LANES {
+        let mut sum = [0.0; R];
+        for (a, x) in a.iter().zip(x) {
+            (0..R).for_each(|l| sum[l] += a * x[l]);
+        }
+        return sum;
+    }
+    let mut parts = [[0.0; R]; LANES];
+    let ((a_full, a_rest), (x_full, x_rest)) = (a.as_chunks::<LANES>(), x.as_chunks::<LANES>());
+    for (a, x) in a_full.iter().zip(x_full) {
+        for k in 0..LANES {
+            (0..R).for_each(|l| parts[k][l] += a[k] * x[k][l]);
+        }
+    }
+    for ((a, x), part) in a_rest.iter().zip(x_rest).zip(&mut parts) {
+        (0..R).for_each(|l| part[l] += a * x[l]);
+    }
+    std::array::from_fn(|l| {
+        let pair = |k: usize| parts[k][l] + parts[k + 4][l];
+        (pair(0) + pair(2)) + (pair(1) + pair(3))
+    })
 }
 
 #[cfg(test)]
@@ -231,6 +334,41 @@ mod tests {
                     assert!((product - expected).abs() < 1e-10, "{dim}, {count}: {i} {j} {product}");
                 }
             }
+        }
+    }
+
+    fn solves<const R: usize>(dim: usize) {
+        let (mut factors, a) = random(dim);
+        factors.eliminate(dim).expect("positive definite");
+        let mut x: Vec<[f64; R]> =
+            (0..dim).map(|i| std::array::from_fn(|l| ((i * R + l) as f64).sin())).collect();
+        let b = x.clone();
+        factors.solve(&mut x);
+        for i in 0..dim {
+            for l in 0..R {
+                let product: f64 = (0..dim).map(|k| a[i * dim + k] * x[k][l]).sum();
+                assert!((product - b[i][l]).abs() < 1e-9, "{dim}, {R}: {i} {l} {product} {}", b[i][l]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_left_of_an_elimination_solves() {
+        for dim in [1, 3, 4, 5, 27, 31] {
+            solves::<1>(dim);
+            solves::<16>(dim);
+        }
+    }
+
+    #[test]
+    fn products_with_the_lower_triangle_are_those_with_the_matrix() {
+        let (matrix, a) = random(29);
+        let x: Vec<f64> = (0..29).map(|k| f64::from(k).sin()).collect();
+        let mut y = x.clone();
+        matrix.multiply(&x, &mut y);
+        for (row, y) in a.chunks_exact(29).zip(&y) {
+            let expected: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+            assert!((y - expected).abs() < 1e-12, "{y} {expected}");
         }
     }
 

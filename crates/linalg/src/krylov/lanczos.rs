@@ -65,20 +65,21 @@ fn lanczos<T: Scalar>(
 
 /// A symmetric tridiagonal matrix.
 #[derive(Debug, Default)]
-struct Tridiagonal {
+pub(crate) struct Tridiagonal {
     diagonal: Vec<f64>,
     /// Entry `j` couples rows `j - 1` and `j`; the first is not used.
     coupling: Vec<f64>,
 }
 
 impl Tridiagonal {
-    fn push(&mut self, diagonal: f64, coupling: f64) {
+    /// Appends a row.
+    pub(crate) fn push(&mut self, diagonal: f64, coupling: f64) {
         self.coupling.push(if self.diagonal.is_empty() { 0.0 } else { coupling });
         self.diagonal.push(diagonal);
     }
 
-    /// By bisection on the sign of the pivots of `T - lambda` (Sylvester's law of inertia).
-    fn largest_eigenvalue(&self) -> f64 {
+    /// Zero for no rows. By bisection on the sign of the pivots of `T - lambda` (Sylvester's law of inertia).
+    pub(crate) fn largest_eigenvalue(&self) -> f64 {
         let mut high = self.gershgorin_bound();
         let mut low = self.diagonal.iter().copied().fold(0.0, f64::max);
         for _ in 0..100 {

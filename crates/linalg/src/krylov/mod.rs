@@ -6,6 +6,7 @@ mod gcr;
 mod lanczos;
 
 pub use gcr::{Gcr, GcrParams};
+pub(crate) use lanczos::Tridiagonal;
 pub use lanczos::estimate_lambda_max;
 
 use crate::operator::LinOp;

@@ -1,7 +1,9 @@
 //! Smoothers: they damp the part of an error that a coarser mesh does not see.
 
 mod chebyshev;
+mod modes;
 mod schwarz;
 
 pub use chebyshev::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
+pub use modes::WeakModes;
 pub use schwarz::SchwarzPatches;

@@ -142,7 +142,7 @@ fn triangle_size(n: usize) -> usize {
 }
 
 /// The dense block of `matrix` on some nodes, ascending. `place` is all `u32::MAX` before and after.
-fn block_on<const B: usize>(
+pub(super) fn block_on<const B: usize>(
     matrix: &SymmetricBlockMatrix<B>,
     nodes: &[u32],
     place: &mut [u32],

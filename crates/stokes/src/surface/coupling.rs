@@ -13,6 +13,9 @@ use super::penalty::penalties;
 use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
 
+/// Pressure nodes of a cell, at most.
+const MOST_CORNERS: usize = 8;
+
 /// `[A, -B^T; -B, 0]` of the cut cells.
 #[derive(Clone, Debug)]
 pub struct SurfaceCoupling<const D: usize> {
@@ -32,6 +35,8 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The velocity nodes and the pressure nodes of cut cells.
     nodes: Subset,
     pressures: Subset,
+    /// The pressure functions at the Gauss points of a cell.
+    corner_values: Vec<[f64; MOST_CORNERS]>,
     wide: CutOperator<f64, D>,
     narrow: CutOperator<f32, D>,
 }
@@ -94,8 +99,13 @@ where
         let mut roots = aggregates.roots.clone();
         roots.sort_unstable();
         roots.dedup();
+        let corners = node_count::<D>(1);
+        let corner = |q: usize, x: &[f64; D]| if q < corners { value::<D>(1, q, x) } else { 0.0 };
+        let rule = gauss_cube::<D>(POINTS);
+        let corner_values = rule.iter().map(|(x, _)| std::array::from_fn(|q| corner(q, x))).collect();
         Ok(Self {
             discretisation,
+            corner_values,
             roots,
             penalties,
             wide,
@@ -152,15 +162,16 @@ where
     pub fn for_each_mass(&self, place: usize, mut visit: impl FnMut(usize, usize, f64)) {
         let cell = &self.cut.cells[place];
         let volume = self.discretisation.cell_size(cell.cell as usize).powi(D as i32);
-        let rule = gauss_cube::<D>(POINTS);
         let corners = node_count::<D>(1);
-        let shapes: Vec<Vec<f64>> =
-            rule.iter().map(|(x, _)| (0..corners).map(|q| value::<D>(1, q, x)).collect()).collect();
-        for q in 0..corners {
-            for r in 0..corners {
-                let terms = shapes.iter().zip(&cell.moments.volume);
-                visit(q, r, volume * terms.map(|(shapes, w)| w * shapes[q] * shapes[r]).sum::<f64>());
+        let mut mass = [[0.0; MOST_CORNERS]; MOST_CORNERS];
+        for (shapes, weight) in self.corner_values.iter().zip(&cell.moments.volume) {
+            for (row, shape) in mass.iter_mut().zip(shapes) {
+                let factor = volume * weight * shape;
+                row.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += factor * shape);
             }
+        }
+        for q in 0..corners {
+            (0..corners).for_each(|r| visit(q, r, mass[q][r]));
         }
     }
 

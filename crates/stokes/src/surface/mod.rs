@@ -6,6 +6,7 @@ mod coupling;
 mod cut_cells;
 mod flats;
 mod penalty;
+mod products;
 mod traction;
 
 pub use aggregates::Aggregates;
