@@ -31,7 +31,8 @@ where
         let arm = dir * a * (1.0 + 0.5 * xi);
         let c = Vector::<D>::repeat(0.5) + shift::<D>(k) * h;
         let b = [Ball::new(c - arm, a), Ball::new(c + arm, a)];
-        let rf = Refinement { coarsest: 3, surface: level, band: 3.0, gap_fraction: 0.0, gap_levels: 0 };
+        let ev = |k: &str, d: f64| std::env::var(k).map_or(d, |x| x.parse().unwrap());
+        let rf = Refinement { coarsest: ev("CO", 3.0) as u8, surface: level, band: ev("BAND", 3.0), gap_fraction: 0.0, gap_levels: 0 };
         let mesh = rf.mesh(Aabb::unit(), [1; D], [false; D], &b).unwrap();
         let p = FlowParams {
             formulation: Formulation::Unfitted { lubrication: lub },
@@ -53,7 +54,7 @@ where
     }
     let (e, r, o) = (st(&e), st(&r), st(&o));
     println!(
-        "{D}D {lub:?} a/h {:.1} g/h {:.3} xi {xi} th {th}: vn {:+.2} +- {:.2} (worst {:.2}) %  rot {:+.4} +- {:.4} ({:.4}) spin {:+.4} +- {:.4} ({:.4}) it {its}",
+        "{D}D {lub:?} a/h {:.1} g/h {:.3} xi {xi} th {th}: vn {:+.3} +- {:.3} (worst {:.2}) %  rot {:+.4} +- {:.4} ({:.4}) spin {:+.4} +- {:.4} ({:.4}) it {its} {:.2e} {:.2e}",
         a / h,
         xi * a / h,
         e.0,
