@@ -16,7 +16,7 @@ const INVERSE_STEPS: usize = 2;
 /// Sweeps of Jacobi's method over what is left of the matrix on these vectors, which is nearly diagonal, and
 /// the share of the diagonal below which an entry is let be.
 const SWEEPS: usize = 6;
-const NEGLIGIBLE: f64 = 1e-2;
+const NEGLIGIBLE: f64 = 1e-3;
 
 /// The largest `x.A x / x.B x`, `B` being positive definite, to six digits: Lanczos' method for `B^-1 A` in the
 /// scalar product of `B` (Golub and Van Loan 2013, section 10.1). Directions lose their orthogonality, which
