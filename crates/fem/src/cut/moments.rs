@@ -11,7 +11,7 @@ use gluey_geom::Vector;
 /// Gauss points per direction: their polynomials have degree 4 in each coordinate.
 pub const POINTS: usize = 5;
 /// Points of the rule on the parts of an angle.
-const RULE: usize = 6;
+const RULE: usize = 8;
 
 /// A ball in coordinates in which the cell is the unit cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
