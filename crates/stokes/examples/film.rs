@@ -54,18 +54,8 @@ where
     }
     let (e, r, o) = (st(&e), st(&r), st(&o));
     println!(
-        "{D}D {lub:?} a/h {:.1} g/h {:.3} xi {xi} th {th}: vn {:+.3} +- {:.3} (worst {:.2}) %  rot {:+.4} +- {:.4} ({:.4}) spin {:+.4} +- {:.4} ({:.4}) it {its} {:.2e} {:.2e}",
-        a / h,
-        xi * a / h,
-        e.0,
-        e.1,
-        e.2,
-        r.0,
-        r.1,
-        r.2,
-        o.0,
-        o.1,
-        o.2
+        "{D}D {lub:?} a/h {:.1} g/h {:.3} xi {xi} th {th}: vn {:+.3} +- {:.3} (worst {:.2}) %  rot {:+.1e} +- {:.1e} spin {:+.1e} +- {:.1e} it {its}",
+        a / h, xi * a / h, e.0, e.1, e.2, r.0, r.1, o.0, o.1
     );
 }
 fn main() {
