@@ -89,7 +89,7 @@ fn on_the_way_back() {
 fn with_the_finite_element_flow() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");
     for solver in [Solver::Direct, Solver::Multigrid] {
-        for formulation in [Formulation::Paper, Formulation::RigidDofs] {
+        for formulation in [Formulation::Paper, Formulation::RigidDofs, Formulation::Unfitted] {
             let mut case = Case::load(file).expect("a case");
             case.time.end = 5.0 * case.time.step;
             case.flow.mesh.cells_per_radius = Some(3.2);

@@ -203,7 +203,10 @@ pub struct MeshSpec {
     /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when
     /// absent, what [`default_cells_per_radius`] gives.
     pub cells_per_radius: Option<f64>,
-    /// Cells are at least `2^-coarsest_level` of the box.
+    /// Root cells of the tree along the shortest edge of the box, at least. Cells are halves of halves of
+    /// these: with 3 instead of 1 they may have 2/3 of the size.
+    pub root_cells: u32,
+    /// Cells are at most `2^-coarsest_level` of a root cell.
     pub coarsest_level: u32,
     /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
     /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
@@ -286,7 +289,7 @@ impl Default for FlowSpec {
 
 impl Default for MeshSpec {
     fn default() -> Self {
-        Self { cells_per_radius: None, coarsest_level: 3, band: 2.0 }
+        Self { cells_per_radius: None, root_cells: 1, coarsest_level: 3, band: 2.0 }
     }
 }
 

@@ -21,9 +21,10 @@ const FRAME_HEIGHT: f64 = 210.0;
 const STEP: f64 = 0.005;
 /// Gap at the beginning, in radii.
 const FIRST_GAP: f64 = 0.5;
-/// The films, `s`, with their colours from light to dark.
+/// The films, `s`, with their colours from light to dark. With smaller ones gaps fall below what positions
+/// resolve.
 const FILMS: [(f64, &str); 4] =
-    [(0.1, "#a9cdb8"), (0.03, "#6db08b"), (0.01, "#3a9566"), (0.003, "#1b7f4d")];
+    [(0.2, "#a9cdb8"), (0.1, "#6db08b"), (0.05, "#3a9566"), (0.025, "#1b7f4d")];
 const GLUEY: Stroke = Stroke { color: "#0b4f9e", width: 1.8, dashes: Some("9 4") };
 
 /// Gap and memory over time, in radii.
@@ -57,9 +58,9 @@ pub fn limit() -> Canvas {
         marks: Vec::new(),
     };
     let mut gaps = chart("*D*/*a*", [0.0, 0.5], curves(|run| &run.gap));
-    gaps.notes = vec!["Two spheres pushed together, then pulled apart: *u** = cos *t*.".to_owned()];
+    gaps.notes = vec!["Two spheres that approach at the velocity cos *t*, but for film or contact.".to_owned()];
     gaps.x.label.clear();
-    let memories = chart("*s* ln(*D*/*a*), and *γ*", [-0.6, 0.0], curves(|run| &run.memory));
+    let memories = chart("*s* ln *D*/*a*,  *γ*", [-0.6, 0.0], curves(|run| &run.memory));
     stack(&[gaps, memories], |_| FRAME_HEIGHT)
 }
 
@@ -138,7 +139,7 @@ mod tests {
             let apart = |(own, other): (&(f64, f64), &(f64, f64))| (own.1 - other.1).abs();
             let differences = run.gap.iter().zip(&gluey.gap).chain(run.memory.iter().zip(&gluey.memory));
             let difference = differences.map(apart).fold(0.0, f64::max);
-            assert!(difference < 0.6 * last && difference < 5.0 * s * (1.0 / s).ln(), "{s}: {difference}");
+            assert!(difference < 0.8 * last && difference < 5.0 * s * (1.0 / s).ln(), "{s}: {difference}");
             last = difference;
         }
     }

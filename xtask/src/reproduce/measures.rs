@@ -71,7 +71,18 @@ pub fn closest_approach(run: &Trajectory) -> Option<f64> {
     let smallest = gap.iter().copied().reduce(f64::min)?;
     let near = |value: &f64| *value <= smallest.max(0.0) + CONTACT_BAND;
     let (first, last) = (gap.iter().position(near)?, gap.iter().rposition(near)?);
-    Some(0.5 * (run.times[first] + run.times[last]))
+    match first == last && smallest > 0.0 {
+        true => bottom(run, gap, first),
+        false => Some(0.5 * (run.times[first] + run.times[last])),
+    }
+}
+
+/// Where the parabola through the logarithm of the gap at a time and the two around it is lowest.
+fn bottom(run: &Trajectory, gap: &[f64], lowest: usize) -> Option<f64> {
+    let around = gap.get(lowest.checked_sub(1)?..lowest + 2)?;
+    let [before, at, after] = [0, 1, 2].map(|k| around[k].ln());
+    let step = run.times[lowest + 1] - run.times[lowest];
+    Some(run.times[lowest] + 0.5 * step * (before - after) / (before - 2.0 * at + after))
 }
 
 /// Largest relative difference of the gap of particles 1 and 2 from `exact` while the exact gap is at least

@@ -5,7 +5,7 @@ use gluey_stokes::default_offset;
 use super::{Case, Formulation};
 
 /// Largest number of root cells along the shortest edge of the box.
-const MOST_ROOTS: u32 = 16;
+pub(super) const MOST_ROOTS: u32 = 16;
 
 /// A mesh has at most `2^18` cells along an axis: [`gluey_fem::TreeMesh`] refuses more.
 pub(super) const FINEST_LEVEL: u32 = 18;
@@ -29,9 +29,9 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 }
 
 impl Case {
-    /// Numbers of equal cubes that fill the box along each axis, as few as possible: the root cells of the
-    /// mesh. `None` if it takes more than 16 of them along the shortest edge, or more than a tree can number
-    /// along the longest.
+    /// Numbers of equal cubes that fill the box along each axis, as few as possible but no fewer than
+    /// [`super::MeshSpec::root_cells`] along the shortest edge: the root cells of the mesh. `None` if it takes
+    /// more than 16 of them there, or more than a tree can number along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let edges = self.edges();
         let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);
@@ -41,7 +41,7 @@ impl Case {
             let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count && count <= most;
             exact.map(|count| whole(count).then(|| count.round() as u32)).collect()
         };
-        (1..=MOST_ROOTS).find_map(counts)
+        (self.flow.mesh.root_cells..=MOST_ROOTS).find_map(counts)
     }
 
     /// Edge of the root cells; `None` for a box that is not made of cubes.

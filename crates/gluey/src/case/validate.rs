@@ -5,6 +5,7 @@ use gluey_stokes::StokesError;
 use super::Case;
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
+use super::mesh::MOST_ROOTS;
 use super::names::{Formulation, Hydrodynamics, Lubrication, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
 use crate::reference::{self, Reference};
@@ -70,6 +71,11 @@ fn check_domain(case: &Case, key: &Key) -> Check {
             let problem = Problem::EmptyBox { axis: AXES[d], lower: lower[d], upper: upper[d] };
             return fail(key.name("upper"), problem);
         }
+    }
+    let roots = case.flow.mesh.root_cells;
+    if !(1..=MOST_ROOTS).contains(&roots) {
+        let key = Key::default().name("flow").name("mesh").name("root_cells");
+        return out_of_range(f64::from(roots), &format!("from 1 to {MOST_ROOTS}"), key);
     }
     match case.flow.hydrodynamics {
         Hydrodynamics::Stokes if case.root_cells().is_none() => {

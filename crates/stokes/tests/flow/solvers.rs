@@ -6,7 +6,7 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Flow, FlowSolver, Formulation, SolverKind};
 
 use crate::support::{
-    RIGID, SOLVERS, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
+    RIGID, UNFITTED, SOLVERS, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
     resolved_gaps, solve, twist_distance,
 };
 
@@ -133,7 +133,7 @@ fn runs_repeat<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKi
 where
     Dim<D>: Space<D>,
 {
-    for formulation in [RIGID, paper(1e3, 2)] {
+    for formulation in [RIGID, paper(1e3, 2), UNFITTED] {
         for &solver in solvers {
             let run = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -112,13 +112,13 @@ fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig5-half-turn-unfitted",
             "pair-2d-unfitted",
             measured(name, half_turn(Approach::Unfitted)),
-            band(evidence.limit(0.0047, 0.013)),
+            band(evidence.limit(3.9e-4, 1.6e-3)),
         ),
         exact(
             "fig5-distance-unfitted",
             "pair-2d-unfitted",
             measured("largest error of D/a", unfitted.and_then(error)),
-            Wanted::AtMost(evidence.limit(1.4e-3, 5.7e-3)),
+            Wanted::AtMost(evidence.limit(1.7e-7, 1.7e-6)),
         ),
     ]
 }
@@ -158,7 +158,7 @@ pub fn orbits(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig6-circle-unfitted",
             "pair-2d-unfitted",
             measured(whole, ratio(Approach::Unfitted, 0.0)),
-            Wanted::AtMost(evidence.limit(1.0006, 1.0026)),
+            Wanted::AtMost(evidence.limit(1.00008, 1.0002)),
         ),
     ]
 }

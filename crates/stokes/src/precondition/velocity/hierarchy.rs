@@ -6,8 +6,8 @@ use gluey_fem::Interpolation;
 
 use crate::space::Discretisation;
 
-/// Depth of the coarsest mesh.
-const COARSEST_LEVEL: u8 = 2;
+/// Cells of the coarsest mesh along the shortest edge of the box, at most, unless it has more roots.
+const COARSEST_CELLS: u32 = 4;
 
 /// The meshes of the levels, coarsest first.
 pub struct Hierarchy<const D: usize> {
@@ -27,7 +27,7 @@ impl<const D: usize> Hierarchy<D> {
     /// The meshes below `finest`. What was the same in the hierarchy `before` is taken from there.
     pub fn new(finest: &Discretisation<D>, before: Self) -> Self {
         let depth = finest.mesh.max_level();
-        let mut meshes: Vec<Discretisation<D>> = (COARSEST_LEVEL.min(depth)..depth)
+        let mut meshes: Vec<Discretisation<D>> = (coarsest_level(finest).min(depth)..depth)
             .map(|level| {
                 let is_kept = |mesh: &&Discretisation<D>| {
                     mesh.mesh.max_level() == level && mesh.mesh.is_coarsening_of(&finest.mesh)
@@ -49,4 +49,10 @@ impl<const D: usize> Hierarchy<D> {
         });
         Self { transfers: transfers.collect(), meshes }
     }
+}
+
+/// Depth of the coarsest mesh.
+fn coarsest_level<const D: usize>(finest: &Discretisation<D>) -> u8 {
+    let roots = finest.mesh.roots().into_iter().min().unwrap_or(1);
+    (COARSEST_CELLS / roots).max(1).ilog2() as u8
 }
