@@ -5,6 +5,7 @@ mod aggregates;
 mod coupling;
 mod cut_cells;
 mod flats;
+mod load;
 mod penalty;
 mod traction;
 
@@ -12,4 +13,5 @@ pub use aggregates::Aggregates;
 pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
 pub use flats::{Flat, Flats};
+pub use load::{add_load_of_cut_cells, forces_on_bodies};
 pub use traction::first_moments;
