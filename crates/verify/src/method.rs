@@ -9,33 +9,48 @@ pub struct Method {
     pub name: &'static str,
     /// Whether cells in narrow films are smaller by default in 2D.
     pub refines_films: bool,
+    /// Whether it is right for films that no cell resolves.
+    pub lubricates: bool,
+    /// Whether bodies can be held at given twists.
+    pub holds_bodies: bool,
     /// The formulation in a number of dimensions.
     pub formulation: fn(usize) -> Formulation,
 }
 
 /// All of them. Another one is a line here; its limits are lines of `limits.csv`.
-pub const METHODS: &[Method] = &[
+pub const FILM_METHODS: &[Method] = &[
     Method {
         name: "rigid-dofs",
         refines_films: true,
+        lubricates: false,
+        holds_bodies: true,
         formulation: |d| FlowParams::for_dimension(d).formulation,
     },
     Method {
         name: "paper",
         refines_films: false,
+        lubricates: false,
+        holds_bodies: false,
         formulation: |_| Formulation::Paper(PaperParams::default()),
     },
     Method {
         name: "unfitted",
         refines_films: false,
+        lubricates: true,
+        holds_bodies: true,
         formulation: |_| Formulation::Unfitted { lubrication: Lubrication::Deficit },
     },
     Method {
-        name: "unfitted, no lubrication",
+        name: "unfitted-bare",
         refines_films: false,
+        lubricates: false,
+        holds_bodies: true,
         formulation: |_| Formulation::Unfitted { lubrication: Lubrication::None },
     },
 ];
+
+/// Those that differ in more than thin films: what chapters without any compare.
+pub const METHODS: &[Method] = FILM_METHODS.split_at(3).0;
 
 impl Method {
     /// Parameters of its flows in `D` dimensions, in a fluid of viscosity one, by the usual solver.
