@@ -2,7 +2,7 @@
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
-use gluey_levelset::Ball;
+use gluey_levelset::{Ball, LevelSet};
 use gluey_linalg::{LinOp, vector};
 use gluey_stokes::{
     Conditions, Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator,
@@ -10,8 +10,8 @@ use gluey_stokes::{
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{
-    RADIUS, RIGID, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, try_solve,
-    twist_distance,
+    RADIUS, RIGID, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, strain_inside,
+    try_solve, twist_distance,
 };
 
 fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>
@@ -186,6 +186,28 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
     let error = refused.unwrap_err();
     assert!(matches!(error, StokesError::CoarseSurface { body: 0 }), "{error:?}");
     assert!(error.to_string().contains("the surface of body 1 meets cells of different sizes"));
+}
+
+/// The flow continues beyond surfaces; bodies are drawn as they move.
+fn bodies_are_rigid_in_pictures<const D: usize>(level: u8, kind: SolverKind)
+where
+    Dim<D>: Space<D>,
+{
+    let ball = [Ball::new(Vector::<D>::from_fn(|d, _| 0.47 + 0.06 * d as f64), 0.21)];
+    let flow = flow(&ball, level, kind);
+    let drawn = Flow { velocity: flow.velocity_with_bodies(&ball), ..flow.clone() };
+    let [before, after] = [&flow, &drawn].map(|flow| strain_inside(flow, &ball, 0.0));
+    assert!(before > 1e-3 && after < 1e-14, "{before:e} {after:e}");
+    let nodes = &flow.discretisation.velocity;
+    let is_fluid = |n: &usize| ball[0].value(&nodes.point(*n)) < 0.0;
+    let same = |n: usize| drawn.velocity[n * D..][..D] == flow.velocity[n * D..][..D];
+    assert!((0..nodes.node_count()).filter(is_fluid).all(same));
+}
+
+#[test]
+fn bodies_are_rigid_where_a_flow_is_drawn() {
+    bodies_are_rigid_in_pictures::<2>(5, SolverKind::Direct);
+    bodies_are_rigid_in_pictures::<3>(4, SolverKind::Multigrid);
 }
 
 /// Bodies of which two have a thin film between them and one a thin film at the wall.
