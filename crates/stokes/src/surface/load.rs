@@ -116,7 +116,7 @@ mod tests {
 
     /// For `f = x_0^2 e_0 + w x r` the force is `|B| (c_0^2 + a^2 / (D + 2))`, the torque `|B| w a^2` times
     /// 1/2 in 2D and 2/5 in 3D.
-    fn integrals_over_bodies_are_exact<const D: usize>(volume: f64, gyration: f64)
+    fn integrals_over_bodies<const D: usize>(volume: f64, gyration: f64)
     where
         Dim<D>: Space<D>,
     {
@@ -135,14 +135,17 @@ mod tests {
         let volume = volume * radius.powi(D as i32);
         let mut exact = Vector::zeros();
         exact[0] = volume * (center[0].powi(2) + radius.powi(2) / (D + 2) as f64);
-        assert!((found.force - exact).norm() < 1e-12, "{D}D: {:?} {exact:?}", found.force);
+        assert!((found.force - exact).norm() < 1e-9 * volume, "{D}D: {:?} {exact:?}", found.force);
         let missing = found.torque - spin * (volume * gyration * radius.powi(2));
-        assert!(Dim::<D>::spin_slice(&missing).iter().all(|t| t.abs() < 1e-12), "{D}D: {missing:?}");
+        assert!(
+            Dim::<D>::spin_slice(&missing).iter().all(|t| t.abs() < 1e-9 * volume * radius),
+            "{D}D: {missing:?}"
+        );
     }
 
     #[test]
-    fn forces_and_torques_on_bodies_are_exact() {
-        integrals_over_bodies_are_exact::<2>(PI, 0.5);
-        integrals_over_bodies_are_exact::<3>(4.0 / 3.0 * PI, 0.4);
+    fn forces_and_torques_on_bodies_are_as_exact_as_the_moments() {
+        integrals_over_bodies::<2>(PI, 0.5);
+        integrals_over_bodies::<3>(4.0 / 3.0 * PI, 0.4);
     }
 }

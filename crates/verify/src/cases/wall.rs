@@ -25,7 +25,7 @@ struct Place {
     torque: f64,
 }
 
-const PLACES: [Place; 4] = [
+static PLACES: [Place; 4] = [
     Place { alpha: 1.0, force: 1.5675, torque: 1.0998 },
     Place { alpha: 0.5, force: 2.1514, torque: 1.3877 },
     Place { alpha: 0.3, force: 2.6475, torque: 1.7012 },
@@ -80,7 +80,7 @@ fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
     for method in FILM_METHODS.iter().filter(|method| method.holds_bodies) {
         for &(cells, count) in meshes(extent) {
-            for place in &PLACES {
+            for place in places(method) {
                 tasks.extend((0..count).map(|k| {
                     let at = [cells, place.gap(), k as f64];
                     Task::new(method.name, &at, move || measure(method, cells, place, k))
@@ -89,6 +89,11 @@ fn tasks(extent: Extent) -> Vec<Task> {
         }
     }
     tasks
+}
+
+/// The thinnest film, which no mesh here resolves, is asked only of what lubricates.
+fn places(method: &Method) -> &'static [Place] {
+    if method.lubricates { &PLACES } else { &PLACES[..PLACES.len() - 1] }
 }
 
 fn measure(method: &Method, cells: f64, place: &Place, position: usize) -> Result<Vec<f64>, VerifyError> {
@@ -125,7 +130,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in FILM_METHODS.iter().filter(|method| method.holds_bodies) {
         for cells in table.steps("a/h", method.name, &[]) {
-            for gap in PLACES.iter().map(Place::gap) {
+            for gap in places(method).iter().map(Place::gap) {
                 for measure in &CASE.measures[..3] {
                     let name = format!("{measure}, a/h = {cells}, gap {gap:.3} a");
                     let at = [("a/h", cells), ("gap", gap)];
