@@ -153,13 +153,13 @@ fn plot(tables: &Tables) -> Plot {
 mod tests {
     use super::*;
 
-    /// At small fractions `K = 1 - 1.7601 phi^(1/3) + phi - 1.5593 phi^2` is the inverse of the drag (Sangani
-    /// and Acrivos 1982), and `4 pi / (-ln(phi)/2 - 0.738 + phi)` the drag of discs.
+    /// Powers of `phi^(1/3)` in the inverse of the drag of spheres (Sangani and Acrivos 1982,
+    /// 10.1016/0301-9322(82)90047-7), and `4 pi / (-ln(phi)/2 - 0.738 + phi)`, the drag of discs.
     #[test]
     fn dilute_lattices_have_the_drag_of_their_expansions() {
-        let phi: f64 = 0.064;
-        let sphere = 1.0 / (1.0 - 1.7601 * phi.cbrt() + phi - 1.5593 * phi * phi);
-        assert!((exact(3, phi).unwrap() / sphere - 1.0).abs() < 3e-3, "{sphere}");
+        let powers = [(0, 1.0), (1, -1.7601), (3, 1.0), (6, -1.5593), (8, 3.9799), (10, -3.0734)];
+        let inverse: f64 = powers.iter().map(|&(power, weight)| weight * 0.4f64.powi(power)).sum();
+        assert!((exact(3, 0.064).unwrap() * inverse - 1.0).abs() < 1e-3, "{inverse}");
         let disc = |phi: f64| 4.0 * PI / (-0.5 * phi.ln() - 0.738 + phi);
         assert!((exact(2, 0.01).unwrap() / disc(0.01) - 1.0).abs() < 1e-3, "{}", disc(0.01));
     }
