@@ -55,7 +55,7 @@ pub fn main() -> Result<(), StokesError> {
     let ratio = RADIUS / HALF_WIDTH;
     let (stokes, duct) = (1.0, 1.0 - 1.9033 * ratio);
     println!("cells per radius  unbounded  error     duct    error");
-    for (level, allowed) in [(6, 0.03), (7, 0.02)] {
+    for (level, allowed) in [(6, 0.003), (7, 0.003)] {
         let [free, slowed] = velocities(level)?;
         let errors = [free / stokes - 1.0, slowed / duct - 1.0];
         let cells = RADIUS * 2f64.powi(level.into());

@@ -118,6 +118,21 @@ reference_table!(
     "pair2d_velocities.csv"
 );
 reference_table!(
+    /// Two equal discs in unbounded fluid, by gap: `xi, n, t_F, t_T, r_F, r_T`.
+    pair_2d_resistance,
+    "pair2d_resistance.csv"
+);
+reference_table!(
+    /// Drag of a square lattice of fixed discs: `phi, gap_over_a, drag_F_over_muU`.
+    square_lattice,
+    "lattice_square2d.csv"
+);
+reference_table!(
+    /// Drag of a simple cubic lattice of fixed spheres: `phi, gap_over_a, K, relchange_K`.
+    simple_cubic_lattice,
+    "lattice_sc3d.csv"
+);
+reference_table!(
     /// Two spheres that meet in unbounded shear: `t, D_over_a, theta, x1, y1, x2, y2, omega_z`.
     pair_3d_trajectory_unbounded,
     "pair3d_trajectory_unbounded.csv"

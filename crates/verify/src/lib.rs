@@ -33,7 +33,7 @@ mod verdict;
 pub use case::{CPU_TIME, Case, Extent, Row, Table, Tables, Task, VerifyError};
 pub use cases::CASES;
 pub use limits::{Judged, Limit, LimitError, judge, limits, proposal};
-pub use method::{METHODS, Method};
+pub use method::{FILM_METHODS, METHODS, Method};
 pub use number::{Kind, Number};
 pub use plot::{Curve, Plot};
 pub use verdict::{Outcome, Wanted};

@@ -1,8 +1,9 @@
 //! Errors of a flow in the fluid, and the stresslet of a body from the boundary data around it.
 
 use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
-use gluey_levelset::{Ball, LevelSet};
+use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::Flow;
+use gluey_stokes::fem::cut::{BallInCell, CutMoments, POINTS};
 use gluey_stokes::fem::element::{gauss_cube, gradient, node_count, value};
 use gluey_testkit::exact::StokesSolution;
 
@@ -95,6 +96,43 @@ where
 {
     let nodes = flow.discretisation.pressure.cell(cell).iter().enumerate();
     nodes.map(|(i, &n)| flow.pressure[n as usize] * value::<D>(1, i, at)).sum()
+}
+
+/// The integral of the velocity over the fluid around one body, which repeats where the box is periodic, over
+/// the volume of the box.
+pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, [ball]: &[Ball<D>; 1]) -> Vector<D>
+where
+    Dim<D>: Space<D>,
+{
+    let mesh = &flow.discretisation.mesh;
+    let points = gauss_cube::<D>(POINTS);
+    let of_cell = |(index, cell)| {
+        let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
+        let volume = CutMoments::new(&in_cell(ball, &lower, h)).volume;
+        let sum: Vector<D> =
+            points.iter().zip(&volume).map(|((at, _), weight)| velocity_at(flow, index, at) * *weight).sum();
+        sum * h.powi(D as i32)
+    };
+    mesh.cells().iter().enumerate().map(of_cell).sum::<Vector<D>>() / mesh.domain().extent().product()
+}
+
+/// The images of a ball that cut or cover a cell, in its coordinates.
+fn in_cell<const D: usize>(ball: &Ball<D>, lower: &Vector<D>, h: f64) -> Vec<BallInCell<D>> {
+    let middle = lower + Vector::repeat(0.5 * h);
+    let count = 3usize.pow(D as u32);
+    let images = (0..count).map(|k| {
+        let arm = Vector::<D>::from_fn(|d, _| {
+            let step = (k / 3usize.pow(d as u32) % 3) as f64 - 1.0;
+            middle[d] - ball.center()[d] + ball.period()[d].map_or(0.0, |period| step * period)
+        });
+        (arm.map(|x| (x.abs() - 0.5 * h).max(0.0)).norm(), arm)
+    });
+    let near = images.filter(|(distance, _)| *distance < ball.bounding_radius());
+    let in_cell = |(_, arm): (f64, Vector<D>)| BallInCell {
+        center: std::array::from_fn(|d| 0.5 - arm[d] / h),
+        radius: ball.bounding_radius() / h,
+    };
+    near.map(in_cell).collect()
 }
 
 /// A box of equal cells.
@@ -217,6 +255,17 @@ mod tests {
         let rest = lattice.without_net_flux(|x| x * 0.3 + Vector::repeat(1.0));
         let rest = rest(&Vector::repeat(0.7)) - Vector::repeat(1.0);
         assert!(rest.amax() < 1e-12, "the expansion is gone: {rest:?}");
+    }
+
+    /// Of a ball across the border, some of whose cells two images cut.
+    #[test]
+    fn cells_know_all_images_of_a_ball() {
+        let ball = Ball::periodic(Vector::<2>::new(0.03, 0.4), 0.48, [Some(1.0); 2]);
+        let h = 0.125;
+        let cells = (0..64).map(|k| Vector::<2>::new((k % 8) as f64, (k / 8) as f64) * h);
+        let fluid: f64 = cells.map(|lower| CutMoments::new(&in_cell(&ball, &lower, h)).fraction()).sum();
+        let exact = 1.0 - std::f64::consts::PI * 0.48 * 0.48;
+        assert!((fluid * h * h - exact).abs() < 1e-12, "{} {exact}", fluid * h * h);
     }
 
     #[test]

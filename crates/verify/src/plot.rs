@@ -1,6 +1,6 @@
 //! Pictures as data: errors over what they depend on, both axes logarithmic.
 
-use crate::method::METHODS;
+use crate::method::FILM_METHODS;
 
 /// A picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,13 +35,13 @@ impl Plot {
         points: impl Fn(&'static str, usize) -> Vec<(f64, f64)>,
     ) -> Self {
         let curve = |color: usize, dashes: usize| Curve {
-            label: format!("{}, {}", METHODS[color].name, things[dashes]),
+            label: format!("{}, {}", FILM_METHODS[color].name, things[dashes]),
             color,
             dashes,
-            points: points(METHODS[color].name, dashes),
+            points: points(FILM_METHODS[color].name, dashes),
         };
         let of_method = |color: usize| (0..things.len()).map(move |thing| (color, thing));
-        let curves = (0..METHODS.len()).flat_map(of_method).map(|(color, thing)| curve(color, thing));
+        let curves = (0..FILM_METHODS.len()).flat_map(of_method).map(|(color, thing)| curve(color, thing));
         Self { x, y, curves: curves.filter(|curve| curve.points.iter().any(|p| p.1.is_finite())).collect() }
     }
 }

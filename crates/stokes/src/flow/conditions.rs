@@ -11,7 +11,8 @@ pub type Field<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 /// What drives a flow.
 ///
 /// Wrenches are those that something other than the fluid exerts on the bodies (weight, contact, a hand that
-/// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the nodes inside.
+/// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the bodies: on the
+/// nodes inside in `rigid-dofs` and `paper`, on the body as the mesh sees it in `unfitted`.
 #[derive(Clone, Copy)]
 pub struct Conditions<'a, const D: usize>
 where
@@ -91,10 +92,6 @@ where
 
     /// The field that carries the data, and its residual with the loads.
     pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
-        // The load is that of whole cells.
-        if self.force.is_some() && problem.system.space.is_by_surface() && !problem.bodies.is_empty() {
-            return Err(StokesError::Unsupported { what: "forces per unit of volume around bodies" });
-        }
         let mut lift = problem.lift(self.boundary);
         match self.bodies {
             Given::Wrenches(wrenches) => {

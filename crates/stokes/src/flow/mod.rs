@@ -10,13 +10,13 @@ use std::time::Instant;
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
-use gluey_levelset::Ball;
+use gluey_levelset::{Ball, Body};
 
 use crate::error::StokesError;
 use crate::film::FilmForce;
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, default_offset};
+use crate::formulation::{Data, Formulation, Lubrication, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
-use crate::space::{CutCellPressures, Discretisation};
+use crate::space::{CutCellPressures, Discretisation, solid_nodes};
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given};
@@ -39,13 +39,12 @@ pub struct FlowParams {
 }
 
 impl FlowParams {
-    /// The usual choice in 2D or 3D: a fluid of viscosity one, rigid nodes, the direct solver in 2D and
-    /// multigrid in 3D, to 1e-6.
+    /// The usual choice in 2D or 3D: a fluid of viscosity one, true surfaces with lubrication below the cell,
+    /// the direct solver in 2D and multigrid in 3D, to 1e-6.
     pub fn for_dimension(dimension: usize) -> Self {
-        let offset = default_offset(dimension);
         Self {
             viscosity: 1.0,
-            formulation: Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate },
+            formulation: Formulation::Unfitted { lubrication: Lubrication::Deficit },
             solver: if dimension == 2 { SolverKind::Direct } else { SolverKind::Multigrid },
             tolerance: 1e-6,
         }
@@ -60,7 +59,7 @@ where
 {
     /// Mesh and nodes.
     pub discretisation: Discretisation<D>,
-    /// Nodal velocities, `D` interleaved components.
+    /// Nodal velocities, `D` interleaved components; inside bodies see [`Flow::velocity_with_bodies`].
     pub velocity: Vec<f64>,
     /// Pressure at the pressure nodes; its mean over the nodes is zero.
     pub pressure: Vec<f64>,
@@ -81,6 +80,25 @@ where
     pub fine_operator_applications: f64,
     /// Where the time went.
     pub times: PhaseTimes,
+}
+
+impl<const D: usize> Flow<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The nodal velocities with the motion of the `bodies`, those of the flow, at all nodes inside these: for
+    /// pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
+    /// velocity of the fluid in the cells that surfaces cut.
+    pub fn velocity_with_bodies(&self, bodies: &[Ball<D>]) -> Vec<f64> {
+        let Discretisation { mesh, velocity: nodes, .. } = &self.discretisation;
+        let mut velocity = self.velocity.clone();
+        for (node, body) in solid_nodes(mesh, nodes, bodies, 0.0).into_iter().enumerate() {
+            let Some(body) = body.map(|body| body as usize) else { continue };
+            let motion = self.twists[body].velocity_at(&bodies[body].arm(&nodes.point(node)));
+            velocity[node * D..][..D].copy_from_slice(motion.as_slice());
+        }
+        velocity
+    }
 }
 
 /// Seconds of wall time in the phases of a prediction.

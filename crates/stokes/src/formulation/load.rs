@@ -9,9 +9,10 @@ use crate::space::Discretisation;
 /// elements resolve for others.
 const FORCE_POINTS: usize = 4;
 
-/// `b += int f . v` for the nodal velocities `v`.
+/// `b += int f . v` over the cells that are whole, for the nodal velocities `v`.
 pub fn add_load<const D: usize>(
     discretisation: &Discretisation<D>,
+    is_whole: impl Fn(usize) -> bool,
     force: &dyn Fn(&Vector<D>) -> Vector<D>,
     b: &mut [f64],
 ) {
@@ -19,7 +20,8 @@ pub fn add_load<const D: usize>(
     let nodes_per_cell = discretisation.velocity.nodes_per_cell();
     let shapes: Vec<Vec<f64>> =
         rule.iter().map(|(x, _)| (0..nodes_per_cell).map(|i| value::<D>(2, i, x)).collect()).collect();
-    for (index, cell) in discretisation.mesh.cells().iter().enumerate() {
+    let cells = discretisation.mesh.cells().iter().enumerate();
+    for (index, cell) in cells.filter(|&(index, _)| is_whole(index)) {
         let (lower, h) = (discretisation.mesh.lower_corner(cell), discretisation.cell_size(index));
         for ((at, weight), shapes) in rule.iter().zip(&shapes) {
             let load = force(&(lower + Vector::from_fn(|d, _| h * at[d]))) * (weight * h.powi(D as i32));

@@ -18,6 +18,7 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace};
+use crate::surface::{CellState, CutCells, add_load_of_cut_cells, forces_on_bodies};
 
 /// A formulation with what it keeps from mesh to mesh.
 pub trait Method<const D: usize>: Send + Sync
@@ -209,11 +210,30 @@ where
     /// The load of the force `f(x)` per unit of volume.
     fn loads(&self, force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
         let mut b = vec![0.0; self.system.dim()];
-        if let Some(force) = force {
-            add_load(self.discretisation(), force, &mut b);
-            self.system.reduce(&mut b);
+        match (force, &self.system.surfaces) {
+            (None, _) => {}
+            (Some(force), None) => {
+                add_load(self.discretisation(), |_| true, force, &mut b);
+                self.system.reduce(&mut b);
+            }
+            (Some(force), Some(surfaces)) => self.add_loads_around_surfaces(&surfaces.cut, force, &mut b),
         }
         b
+    }
+
+    /// The load on the fluid in whole cells and in cut ones, and on the bodies.
+    fn add_loads_around_surfaces(
+        &self,
+        cut: &CutCells<D>,
+        force: &dyn Fn(&Vector<D>) -> Vector<D>,
+        b: &mut [f64],
+    ) {
+        let discretisation = self.discretisation();
+        add_load(discretisation, |cell| cut.states[cell] == CellState::Fluid, force, b);
+        add_load_of_cut_cells(discretisation, cut, force, b);
+        self.system.reduce(b);
+        let forces = forces_on_bodies(discretisation, cut, force, self.bodies.len());
+        forces.iter().enumerate().for_each(|(body, wrench)| self.system.space.add_wrench(b, body, wrench));
     }
 
     /// Adds the loads of forces and torques on the bodies to a reduced right-hand side; no entries stand for

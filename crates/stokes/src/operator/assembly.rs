@@ -65,13 +65,19 @@ where
     assemble(unknowns, forms, &Elements::new(system, size), &films)
 }
 
-/// Assembles the velocity block alone.
+/// Assembles the velocity block alone. Where nothing fixes a constant velocity, one node is left out.
 pub fn assemble_viscous<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
 {
     let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
-    assemble_viscous_on(&elements, |_| true)
+    let space = &system.space;
+    let loose = if space.is_anchored() {
+        None
+    } else {
+        (0..space.nodes().node_count()).find(|&node| space.is_free(node))
+    };
+    assemble_viscous_on(&elements, |node| Some(node) != loose)
 }
 
 /// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all

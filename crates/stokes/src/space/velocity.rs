@@ -121,6 +121,12 @@ where
         &self.discretisation
     }
 
+    /// Whether anything fixes a constant velocity: a wall, or bodies that are held.
+    pub fn is_anchored(&self) -> bool {
+        let holds_nodes = self.holds_twists && !self.rigid.is_empty();
+        self.by_surface || holds_nodes || !self.boundary.is_empty()
+    }
+
     /// Number of bodies, active or not.
     pub fn body_count(&self) -> usize {
         self.fit.len()

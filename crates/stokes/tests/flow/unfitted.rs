@@ -1,15 +1,17 @@
 //! The unfitted formulation against the reference data, at walls, across periodic borders, at contact.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
-use gluey_levelset::Ball;
+use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, LevelSet};
 use gluey_linalg::{LinOp, vector};
-use gluey_stokes::{Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator};
+use gluey_stokes::{
+    Conditions, Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator,
+};
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{
-    RADIUS, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, try_solve,
-    twist_distance,
+    RADIUS, RIGID, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, strain_inside,
+    try_solve, twist_distance,
 };
 
 fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>
@@ -186,12 +188,108 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
     assert!(error.to_string().contains("the surface of body 1 meets cells of different sizes"));
 }
 
-/// Its load would be that of whole cells, cut ones too.
+/// The flow continues beyond surfaces; bodies are drawn as they move.
+fn bodies_are_rigid_in_pictures<const D: usize>(level: u8, kind: SolverKind)
+where
+    Dim<D>: Space<D>,
+{
+    let ball = [Ball::new(Vector::<D>::from_fn(|d, _| 0.47 + 0.06 * d as f64), 0.21)];
+    let flow = flow(&ball, level, kind);
+    let drawn = Flow { velocity: flow.velocity_with_bodies(&ball), ..flow.clone() };
+    let [before, after] = [&flow, &drawn].map(|flow| strain_inside(flow, &ball, 0.0));
+    assert!(before > 1e-3 && after < 1e-14, "{before:e} {after:e}");
+    let nodes = &flow.discretisation.velocity;
+    let is_fluid = |n: &usize| ball[0].value(&nodes.point(*n)) < 0.0;
+    let same = |n: usize| drawn.velocity[n * D..][..D] == flow.velocity[n * D..][..D];
+    assert!((0..nodes.node_count()).filter(is_fluid).all(same));
+}
+
 #[test]
-fn a_force_per_volume_around_bodies_is_refused() {
-    let disc = balls(&[Vector::<2>::new(0.5, 0.5)]);
-    let weight = |_: &Vector<2>| Vector::<2>::new(0.0, -1.0);
-    let mut solver = FlowSolver::new(params(UNFITTED, SolverKind::Direct, 1e-6)).unwrap();
-    let refused = solver.solve_forced(mesh(&bands(6), &disc), &disc, &couette, Some(&weight));
-    assert!(matches!(refused.unwrap_err(), StokesError::Unsupported { .. }));
+fn bodies_are_rigid_where_a_flow_is_drawn() {
+    bodies_are_rigid_in_pictures::<2>(5, SolverKind::Direct);
+    bodies_are_rigid_in_pictures::<3>(4, SolverKind::Multigrid);
+}
+
+/// Bodies of which two have a thin film between them and one a thin film at the wall.
+fn crowd<const D: usize>() -> Vec<Ball<D>> {
+    let at = |x: f64, y: f64| Vector::<D>::from_fn(|d, _| if d == 1 { y } else { x });
+    let mut apart = at(0.3, 0.6);
+    apart[0] += 0.302;
+    [at(0.3, 0.6), apart, at(0.55, 0.16)].map(|center| Ball::new(center, 0.15)).to_vec()
+}
+
+/// The flow around free bodies in a box at rest.
+fn at_rest<const D: usize>(
+    level: u8,
+    force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
+    wrenches: &[Wrench<D>],
+) -> Vec<Twist<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let kind = if D == 2 { SolverKind::Direct } else { SolverKind::Multigrid };
+    let conditions = Conditions::at_rest().with_force(force).with_wrenches(wrenches);
+    let bodies = crowd::<D>();
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
+    let mut solver = FlowSolver::new(params(UNFITTED, kind, 1e-10)).unwrap();
+    solver.solve_under(mesh, &bodies, &conditions).unwrap().twists
+}
+
+/// A pressure balances a force with a potential: to rounding where the potential is linear, to the error of
+/// the pressure where it is quadratic. The same force along one axis that grows along the other stirs.
+fn a_pressure_balances<const D: usize>(level: u8, [linear, quadratic]: [f64; 2])
+where
+    Dim<D>: Space<D>,
+{
+    let rest = vec![Twist::default(); 3];
+    let distance =
+        |force: &dyn Fn(&Vector<D>) -> Vector<D>| twist_distance(&at_rest(level, Some(force), &[]), &rest);
+    let along = |f: f64| Vector::<D>::from_fn(|d, _| if d == 0 { f } else { 0.0 });
+    let uniform = distance(&|_| Vector::<D>::from_fn(|d, _| 1.0 - 0.4 * d as f64));
+    assert!(uniform < linear, "{D}D: {uniform:e}");
+    let growing = distance(&|x| along(x[0]));
+    assert!(growing < quadratic, "{D}D: {growing:e}");
+    let stirred = distance(&|x| along(x[1]));
+    assert!(stirred > 100.0 * growing, "{D}D: {stirred:e} {growing:e}");
+}
+
+#[test]
+fn nothing_moves_under_a_force_with_a_potential() {
+    a_pressure_balances::<2>(5, [1e-12, 1e-5]);
+    a_pressure_balances::<3>(4, [1e-9, 1e-4]);
+}
+
+/// Weight sinks alike with and without buoyancy.
+#[test]
+fn a_uniform_force_adds_nothing_to_wrenches() {
+    let wrench = |f: f64| Wrench { force: Vector::<2>::new(f, -1.0), torque: Spin::<2>::new(0.1 * f) };
+    let wrenches = [0.2, -0.3, 0.1].map(wrench);
+    let buoyed = at_rest::<2>(5, Some(&|_| Vector::<2>::new(0.3, 1.0)), &wrenches);
+    let distance = twist_distance(&buoyed, &at_rest::<2>(5, None, &wrenches));
+    assert!(distance < 1e-12 && buoyed[0].velocity.norm() > 1e-3, "{distance:e} {buoyed:?}");
+}
+
+/// What holds bodies at rest is the opposite of the force on the fluid and them, as far as walls do not carry
+/// it: all of it between periodic borders.
+fn holding_takes_the_whole_force<const D: usize>(level: u8, kind: SolverKind)
+where
+    Dim<D>: Space<D>,
+{
+    let ball = Ball::periodic(Vector::<D>::repeat(0.1), 0.3, [Some(1.0); D]);
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [true; D], level).unwrap();
+    let force = |_: &Vector<D>| Vector::<D>::from_fn(|d, _| 1.0 - 0.4 * d as f64);
+    let still = [Twist::default()];
+    let conditions = Conditions::at_rest().with_force(Some(&force)).with_twists(&still);
+    for formulation in [UNFITTED, RIGID] {
+        let mut solver = FlowSolver::new(params(formulation, kind, 1e-10)).unwrap();
+        let held = solver.solve_under(mesh.clone(), &[ball], &conditions).unwrap().wrenches[0];
+        assert!((held.force + force(&Vector::zeros())).norm() < 1e-8, "{formulation:?}: {held:?}");
+    }
+}
+
+#[test]
+fn a_body_that_is_held_carries_the_force_on_a_periodic_box() {
+    holding_takes_the_whole_force::<2>(4, SolverKind::Direct);
+    holding_takes_the_whole_force::<2>(4, SolverKind::Multigrid);
+    holding_takes_the_whole_force::<3>(4, SolverKind::Multigrid);
 }

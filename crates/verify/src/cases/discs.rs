@@ -1,11 +1,13 @@
 //! Two discs in the box over gap, angle and position of the lattice.
 
+use std::f64::consts::PI;
+
 use gluey_geom::Vector;
 use gluey_stokes::Refinement;
-use gluey_testkit::reference::pair_2d_velocities;
+use gluey_testkit::reference::{pair_2d_resistance, pair_2d_velocities};
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::{FILM_METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
 use crate::set_up::{PairMotion, RADIUS, couette, level, mean_and_scatter, mesh, pair, shift, solve};
@@ -14,10 +16,11 @@ use crate::statistics::rms;
 const POSITIONS: usize = 8;
 /// Gaps in radii.
 const GAPS: [f64; 4] = [1.0, 0.2, 0.1, 0.05];
-/// Normal speed at 45 degrees and a gap of 0.05 radii, which the table does not have: the force that holds
-/// the pair (speed times the resistance of unbounded discs) and `xi^1.5` over the speed are both nearly
-/// linear in the gap; interpolated, they give 1.14740e-3 and 1.14759e-3.
-const SPEED_AT_FIVE_HUNDREDTHS: f64 = 1.1475e-3;
+/// Gaps of films that no mesh here resolves.
+const FILMS: [f64; 3] = [1e-2, 1e-3, 1e-4];
+/// Gaps of all of these with a rotation of the line in the table.
+const GAPS_ALONG: [f64; 3] = [1.0, 0.2, 0.1];
+const FILM_ALONG: [f64; 1] = [1e-2];
 /// Angle at which the shear presses the pair together, degrees.
 const PRESSED: f64 = 135.0;
 
@@ -27,7 +30,8 @@ pub const CASE: Case = Case {
     title: "Two discs",
     text: "Two free discs of radius 0.05 around the centre of the unit box with u = (y - 1/2, 0) on all sides, at 8 places in \
            their cells, against body-fitted finite elements (data/reference/pair2d_velocities.csv; speed to 2e-6, the rest to \
-           1e-8; the speed at a gap of 0.05 a is interpolated, to 2e-4). With the line of centres at 135 degrees: relative \
+           1e-8; at gaps of 0.05, 1e-3 and 1e-4 a the speed is the force that holds the pair, interpolated, over the resistance of \
+           unbounded discs, data/reference/pair2d_resistance.csv: to 2e-4). With the line of centres at 135 degrees: relative \
            error of the speed of approach. At 0 degrees: errors of the rotation of the line and of the spin, in units of \
            the shear rate. Cells are of equal size at the surfaces and in the gap, where not said otherwise; refined films are \
            what cases of rigid-dofs have by default.",
@@ -48,7 +52,7 @@ fn cells_per_radius(extent: Extent) -> &'static [f64] {
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
-    for method in METHODS {
+    for method in FILM_METHODS {
         for &cells in cells_per_radius(extent) {
             tasks.extend(of_mesh(method, cells, false));
         }
@@ -60,14 +64,25 @@ fn tasks(extent: Extent) -> Vec<Task> {
 }
 
 fn of_mesh(method: &'static Method, cells: f64, refined: bool) -> Vec<Task> {
-    let pressed = GAPS.iter().map(|&gap| (gap, PRESSED));
-    let level = GAPS[..3].iter().map(|&gap| (gap, 0.0));
+    let pressed = pressed_gaps(method).map(|gap| (gap, PRESSED));
+    let level = level_gaps(method).map(|gap| (gap, 0.0));
     let places = pressed.chain(level).flat_map(|(gap, angle)| (0..POSITIONS).map(move |k| (gap, angle, k)));
     let task = |(gap, angle, k)| {
         let at = [f64::from(u8::from(refined)), cells, gap, angle, k as f64];
         Task::new(method.name, &at, move || measure(method, &at))
     };
     places.map(task).collect()
+}
+
+/// Gaps at which the pair is pressed together.
+fn pressed_gaps(method: &Method) -> impl Iterator<Item = f64> + use<> {
+    GAPS.into_iter().chain(FILMS.into_iter().take(if method.lubricates { FILMS.len() } else { 0 }))
+}
+
+/// Gaps at which the pair lies along the flow.
+fn level_gaps(method: &Method) -> impl Iterator<Item = f64> + use<> {
+    let films = if method.lubricates { FILM_ALONG.len() } else { 0 };
+    GAPS_ALONG.into_iter().chain(FILM_ALONG.into_iter().take(films))
 }
 
 fn measure(
@@ -101,26 +116,52 @@ fn exact(gap: f64, angle: f64) -> Result<PairMotion, VerifyError> {
             line_rotation: table.column("rot")?[row],
             spin: table.column("omega1")?[row],
         }),
-        None if gap == 0.05 && angle == PRESSED => {
-            Ok(PairMotion { normal_speed: -SPEED_AT_FIVE_HUNDREDTHS, line_rotation: -0.5, spin: -0.5 })
+        None if angle == PRESSED && gap <= 0.2 => {
+            let normal_speed = -holding_force(gap)? / normal_resistance(gap)? * RADIUS;
+            Ok(PairMotion { normal_speed, line_rotation: -0.5, spin: -0.5 })
         }
         None => Err(VerifyError::NoReference(format!("a gap of {gap} radii at {angle} degrees"))),
     }
 }
 
+/// The force that holds a pair at 45 degrees, in units of the radius, viscosity and shear rate: smooth in the
+/// gap. By the parabola through those at 0.2, 0.1 and 0.01 radii.
+fn holding_force(gap: f64) -> Result<f64, VerifyError> {
+    let force =
+        |gap| Ok::<_, VerifyError>(-exact(gap, PRESSED)?.normal_speed / RADIUS * normal_resistance(gap)?);
+    let [x0, x1, x2] = [0.2, 0.1, 0.01];
+    let [f0, f1, f2] = [force(x0)?, force(x1)?, force(x2)?];
+    let (first, second) = ((f1 - f0) / (x1 - x0), (f2 - f1) / (x2 - x1));
+    Ok(f0 + (gap - x0) * (first + (gap - x1) * (second - first) / (x2 - x0)))
+}
+
+/// Normal resistance of unbounded discs; below the table `(3 pi/2) xi^-1.5 (1 + c xi)` through its end.
+fn normal_resistance(gap: f64) -> Result<f64, VerifyError> {
+    let table = pair_2d_resistance()?;
+    let (gaps, resistances) = (table.column("xi")?, table.column("n")?);
+    let at = |wanted: f64| gaps.iter().position(|&gap| gap == wanted).map(|row| resistances[row]);
+    let leading = |gap: f64| 1.5 * PI * gap.powf(-1.5);
+    let end = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let below = at(end).filter(|_| gap < end);
+    let extrapolated = below.map(|last| leading(gap) * (1.0 + (last / leading(end) - 1.0) * gap / end));
+    at(gap)
+        .or(extrapolated)
+        .ok_or_else(|| VerifyError::NoReference(format!("the resistance at a gap of {gap} radii")))
+}
+
 fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
-    for method in METHODS {
+    for method in FILM_METHODS {
         for refined in [0.0, 1.0] {
             for cells in table.steps("a/h", method.name, &[("refined film", refined)]) {
                 let mesh = if refined == 0.0 { "" } else { ", refined film" };
                 for (measure, angle, gaps) in [
-                    ("approach", PRESSED, &GAPS[..]),
-                    ("line rotation", 0.0, &GAPS[..3]),
-                    ("spin", 0.0, &GAPS[..3]),
+                    ("approach", PRESSED, pressed_gaps(method).collect::<Vec<_>>()),
+                    ("line rotation", 0.0, level_gaps(method).collect()),
+                    ("spin", 0.0, level_gaps(method).collect()),
                 ] {
-                    for &gap in gaps {
+                    for gap in gaps {
                         let at = [("refined film", refined), ("a/h", cells), ("gap", gap), ("angle", angle)];
                         let name = format!("{measure}, a/h = {cells}{mesh}, gap {gap} a");
                         numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
@@ -138,7 +179,8 @@ fn plot(tables: &Tables) -> Plot {
     let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8", "*a*/*h* = 25.6"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {
         let at = |gap| [("refined film", 0.0), ("a/h", cells[thing]), ("gap", gap), ("angle", PRESSED)];
-        GAPS.map(|gap| (gap, rms(&table.values("approach", method, &at(gap))))).to_vec()
+        let gaps = GAPS.into_iter().chain(FILMS);
+        gaps.map(|gap| (gap, rms(&table.values("approach", method, &at(gap))))).collect()
     })
 }
 
@@ -146,15 +188,19 @@ fn plot(tables: &Tables) -> Plot {
 mod tests {
     use super::*;
 
+    /// At 0.05 radii both the force and `xi^1.5` over the speed are nearly linear in the gap, which gives
+    /// 1.14740e-3 and 1.14759e-3; at contact the speed is 2.2175 a xi^1.5.
     #[test]
-    fn the_interpolated_speed_lies_between_its_neighbours_on_a_smooth_curve() {
-        let force = |gap: f64| gap.powf(1.5) / exact(gap, PRESSED).unwrap().normal_speed;
-        let between = force(0.1) + (force(0.2) - force(0.1)) * (0.05 - 0.1) / 0.1;
-        assert!((force(0.05) / between - 1.0).abs() < 3e-3, "{} {between}", force(0.05));
+    fn interpolated_speeds_agree_with_what_else_is_known() {
+        let speed = |gap| -exact(gap, PRESSED).unwrap().normal_speed;
+        assert!((speed(0.05) / 1.1475e-3 - 1.0).abs() < 2e-4, "{}", speed(0.05));
+        let limit = speed(1e-4) / (RADIUS * 1e-6);
+        assert!((limit / 2.2175 - 1.0).abs() < 2e-4, "{limit}");
     }
 
     #[test]
     fn what_the_reference_does_not_have_is_an_error() {
+        assert!(matches!(exact(0.15, PRESSED), Err(VerifyError::NoReference(_))));
         assert!(matches!(exact(0.3, PRESSED), Err(VerifyError::NoReference(_))));
         assert!(matches!(exact(0.05, 0.0), Err(VerifyError::NoReference(_))));
     }

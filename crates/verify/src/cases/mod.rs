@@ -6,10 +6,12 @@ mod discs;
 mod doublet;
 mod exact_flows;
 mod integrator;
+mod lattices;
 mod linear_flow;
 mod manufactured;
 mod spheres;
 mod symmetry;
+mod wall;
 
 use crate::case::Case;
 
@@ -22,6 +24,8 @@ pub const CASES: &[Case] = &[
     linear_flow::DISC,
     linear_flow::SPHERE,
     spheres::CASE,
+    wall::CASE,
+    lattices::CASE,
     integrator::CASE,
     doublet::CASE,
     symmetry::CASE,

@@ -2,6 +2,7 @@
 
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
+use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::TreeMesh;
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
@@ -14,16 +15,19 @@ use crate::statistics::largest;
 /// Relative tolerances of the solver.
 const TOLERANCES: [f64; 3] = [1e-6, 1e-8, 1e-10];
 /// Names of the operations, by their number in the table.
-const OPERATIONS: [&str; 2] = ["translation by cells", "quarter turn"];
+const OPERATIONS: [&str; 3] = ["translation by cells", "quarter turn", "reciprocity"];
+/// The last of them, for what holds bodies.
+const RECIPROCITY: f64 = 2.0;
 
 /// The chapter.
 pub const CASE: Case = Case {
     name: "symmetry",
-    title: "Translation by whole cells, quarter turns",
+    title: "Translation by whole cells, quarter turns, reciprocity",
     text: "Two free bodies of radius 0.1 in shear on a uniform mesh of the unit box (a/h = 3.2 in 2D, 1.6 in 3D). Moved by three cells along a period \
            of the box, or turned with the flow by 90 degrees, they must move as before: largest difference of a velocity or, \
            times the radius, a spin, relative to the radius times the shear rate. It may be as large as the solver's tolerance \
-           makes it; the direct solver of 2D knows no tolerance.",
+           makes it; the direct solver of 2D knows no tolerance. Reciprocity: the resistance matrix of two bodies of radii 0.1 and \
+           0.15 at a gap of 0.01 radii is symmetric, largest difference over the largest entry.",
     keys: &["dimension", "operation", "tolerance"],
     measures: &["difference"],
     tasks,
@@ -39,6 +43,8 @@ fn tasks(_: Extent) -> Vec<Task> {
         for tolerance in TOLERANCES {
             tasks.extend(of_dimension::<2>(method, 5, tolerance));
             tasks.extend(of_dimension::<3>(method, 4, tolerance));
+            tasks.extend(of_pair::<2>(method, 5, tolerance));
+            tasks.extend(of_pair::<3>(method, 4, tolerance));
         }
     }
     tasks
@@ -53,6 +59,32 @@ where
         Task::new(method.name, &at(0.0), move || Ok(vec![translation::<D>(method, level, tolerance)?])),
         Task::new(method.name, &at(1.0), move || Ok(vec![quarter_turn::<D>(method, level, tolerance)?])),
     ]
+}
+
+fn of_pair<const D: usize>(method: &'static Method, level: u8, tolerance: f64) -> Option<Task>
+where
+    Dim<D>: Space<D>,
+{
+    let at = [D as f64, RECIPROCITY, tolerance];
+    let work = move || Ok(vec![asymmetry::<D>(method, level, tolerance)?]);
+    method.holds_bodies.then(|| Task::new(method.name, &at, work))
+}
+
+/// Largest difference of the resistance matrix of two unequal bodies from its transpose, over its largest
+/// entry.
+fn asymmetry<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    let [first, second] = centers::<D>();
+    let line = (second - first).normalize();
+    let radii = [RADIUS, 1.5 * RADIUS];
+    let distance = radii[0] + radii[1] + 0.01 * RADIUS;
+    let balls = [Ball::new(first, radii[0]), Ball::new(first + line * distance, radii[1])];
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level)?;
+    let mut solver = FlowSolver::new(method.params::<D>(tolerance))?;
+    let resistance = solver.prepared(mesh, &balls)?.resistance()?;
+    Ok((&resistance - resistance.transpose()).amax() / resistance.amax())
 }
 
 /// Two bodies in general position.
@@ -135,7 +167,8 @@ fn numbers(tables: &Tables) -> Vec<Number> {
         for (operation, name) in OPERATIONS.iter().enumerate() {
             let at =
                 [("dimension", dimension), ("operation", operation as f64), ("tolerance", TOLERANCES[2])];
-            numbers.extend(METHODS.iter().map(|method| {
+            let methods = METHODS.iter().filter(|m| m.holds_bodies || operation as f64 != RECIPROCITY);
+            numbers.extend(methods.map(|method| {
                 let value = largest(&table.values("difference", method.name, &at));
                 Number::new(Kind::Size, format!("{name}, {dimension}D, tolerance 1e-10"), method.name, value)
             }));
