@@ -272,7 +272,10 @@ fn names_that_are_not_known() {
     refused_line(6, "boundary = \"periodc\"", &["domain.boundary", "did you mean \"periodic\"?"]);
     refused_line(21, "hydrodynamics = \"navier\"", &["flow.hydrodynamics", "\"stokes\", \"pair-mobility\""]);
     let lubricated = with_line(22, "formulation = \"paper\"\nlubrication = \"deficit\"");
-    refused(&lubricated, &["case.toml:23:", "\"deficit\" needs flow.formulation = \"unfitted\"", "has \"paper\""]);
+    refused(
+        &lubricated,
+        &["case.toml:23:", "\"deficit\" needs flow.formulation = \"unfitted\"", "has \"paper\""],
+    );
     let roots = with_line(26, "root_cells = 17");
     refused(&roots, &["case.toml:26:", "flow.mesh.root_cells = 17", "a number from 1 to 16"]);
     let solver = with_line(20, "[flow]\nsolver = \"cg\"");

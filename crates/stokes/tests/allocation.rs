@@ -5,7 +5,8 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::Preconditioner;
 use gluey_stokes::{
-    FlowParams, Formulation, MultigridSolver, PaperParams, Problem, Refinement, SaddleSolver, SolveReport,
+    CutCellPressures, Formulation, MultigridSolver, PaperParams, Problem, Refinement, SaddleSolver,
+    SolveReport,
 };
 use gluey_testkit::allocation::{CountingAllocator, count_in_all_threads};
 

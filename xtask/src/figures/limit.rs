@@ -23,8 +23,7 @@ const STEP: f64 = 0.005;
 const FIRST_GAP: f64 = 0.5;
 /// The films, `s`, with their colours from light to dark. With smaller ones gaps fall below what positions
 /// resolve.
-const FILMS: [(f64, &str); 4] =
-    [(0.2, "#a9cdb8"), (0.1, "#6db08b"), (0.05, "#3a9566"), (0.025, "#1b7f4d")];
+const FILMS: [(f64, &str); 4] = [(0.2, "#a9cdb8"), (0.1, "#6db08b"), (0.05, "#3a9566"), (0.025, "#1b7f4d")];
 const GLUEY: Stroke = Stroke { color: "#0b4f9e", width: 1.8, dashes: Some("9 4") };
 
 /// Gap and memory over time, in radii.
@@ -49,7 +48,13 @@ pub fn limit() -> Canvas {
         };
         runs.iter().map(curve).collect()
     };
-    let axis = |label: &str, min: f64, max: f64, tick: f64| Axis { label: label.to_owned(), min, max, tick, log: false };
+    let axis = |label: &str, min: f64, max: f64, tick: f64| Axis {
+        label: label.to_owned(),
+        min,
+        max,
+        tick,
+        log: false,
+    };
     let chart = |label: &str, [min, max]: [f64; 2], curves: Vec<Curve>| Chart {
         x: axis("*t*", 0.0, 3.2, 0.5),
         y: axis(label, min, max, 0.1),
@@ -58,7 +63,8 @@ pub fn limit() -> Canvas {
         marks: Vec::new(),
     };
     let mut gaps = chart("*D*/*a*", [0.0, 0.5], curves(|run| &run.gap));
-    gaps.notes = vec!["Two spheres that approach at the velocity cos *t*, but for film or contact.".to_owned()];
+    gaps.notes =
+        vec!["Two spheres that approach at the velocity cos *t*, but for film or contact.".to_owned()];
     gaps.x.label.clear();
     let memories = chart("*s* ln *D*/*a*,  *γ*", [-0.6, 0.0], curves(|run| &run.memory));
     stack(&[gaps, memories], |_| FRAME_HEIGHT)
@@ -97,7 +103,8 @@ fn lubricated(s: f64) -> Option<Run> {
 /// With gluey contact; `None` if that fails.
 fn gluey() -> Option<Run> {
     let (mut particles, mut integrator) = (pair(), Integrator::new(Scheme::AdamsBashforth2));
-    let params = ContactParams { exact_gap: true, gamma_update: GammaUpdate::Consistent, ..Default::default() };
+    let params =
+        ContactParams { exact_gap: true, gamma_update: GammaUpdate::Consistent, ..Default::default() };
     let mut contact = PairContact::new(params);
     let mut run = Run { gap: Vec::new(), memory: Vec::new() };
     for t in steps() {

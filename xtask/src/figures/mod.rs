@@ -61,8 +61,7 @@ impl Data {
         }
         if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
             notes.push(
-                "Box periodic in *x*; unfitted and exact: Couette flow on all sides, to *t* = 12."
-                    .to_owned(),
+                "Box periodic in *x*; unfitted and exact: Couette flow on all sides, to *t* = 12.".to_owned(),
             );
         }
         let missing: Vec<&str> = figure

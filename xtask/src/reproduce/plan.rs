@@ -167,7 +167,7 @@ impl FigureName {
 
     /// The ways of computing its case that it shows, in the order of its legend.
     pub fn approaches(self) -> Vec<Approach> {
-        use Approach::{Gluey, GlueyAsPrinted, Unfitted, Inelastic, None};
+        use Approach::{Gluey, GlueyAsPrinted, Inelastic, None, Unfitted};
         match self {
             Self::Limit | Self::Fig4 | Self::Fig8 => Vec::new(),
             Self::Fig5 | Self::Fig6 | Self::Fig7a | Self::Fig7b => {
@@ -207,7 +207,9 @@ impl Serialize for FigureName {
 
 /// `--only` names a figure that does not exist.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no figure `{0}`; the figures are limit, fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11")]
+#[error(
+    "there is no figure `{0}`; the figures are limit, fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11"
+)]
 pub struct UnknownFigure(String);
 
 impl FromStr for FigureName {

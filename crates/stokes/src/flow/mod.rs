@@ -16,7 +16,7 @@ use crate::error::StokesError;
 use crate::film::FilmForce;
 use crate::formulation::{Data, Formulation, Lubrication, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
-use crate::space::{CutCellPressures, Discretisation, solid_nodes};
+use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given};

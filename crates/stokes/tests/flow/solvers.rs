@@ -6,7 +6,7 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Flow, FlowSolver, Formulation, SolverKind};
 
 use crate::support::{
-    RIGID, UNFITTED, SOLVERS, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
+    RIGID, SOLVERS, UNFITTED, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
     resolved_gaps, solve, twist_distance,
 };
 

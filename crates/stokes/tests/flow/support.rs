@@ -14,9 +14,8 @@ use gluey_testkit::exact::StokesSolution;
 pub const RADIUS: f64 = 0.05;
 /// Both linear solvers.
 pub const SOLVERS: [SolverKind; 2] = [SolverKind::Direct, SolverKind::Multigrid];
-/// `unfitted` as cases have it by default, and with films as the mesh sees them.
+/// `unfitted` as cases have it by default.
 pub const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
-pub const UNLUBRICATED: Formulation = Formulation::Unfitted { lubrication: Lubrication::None };
 /// `rigid-dofs` with the offset that cases have by default in 2D. In 3D the default is -0.2, chosen on one
 /// encounter of two spheres; `tests/accuracy.rs` at the root measures what cases get there.
 pub const RIGID: Formulation =
