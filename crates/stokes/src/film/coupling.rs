@@ -63,12 +63,12 @@ where
     /// Modes of a film: the normal one, sliding and rolling in each direction across it.
     pub const MODES: usize = 1 + 2 * (D - 1);
 
-    /// The forces of `films` that the mesh sees `height` thick, on the velocities of `space` in a fluid of
-    /// this viscosity.
-    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, height: f64, viscosity: f64) -> Self {
+    /// The forces of `films` that are widened on cells of this size, on the velocities of `space` in a fluid
+    /// of this viscosity.
+    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, cell_size: f64, viscosity: f64) -> Self {
         let (mut rows, mut inverses, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
         for film in &films {
-            let shape = film.shape(height);
+            let shape = film.shape(film.height(cell_size));
             let resistances = [shape.resolved::<D>(), shape.deficits::<D>()];
             for (mode, row) in modes(space, film).into_iter().enumerate() {
                 let [has, lacks] = resistances.map(|of| viscosity * of.of_mode::<D>(mode));

@@ -12,4 +12,4 @@ mod deficit;
 mod near;
 
 pub use coupling::{FilmCoupling, FilmForce};
-pub use near::{Film, Partner, films};
+pub use near::{Film, Partner, films, thin_films};

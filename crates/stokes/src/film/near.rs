@@ -5,6 +5,10 @@ use gluey_levelset::{Ball, BallTree, Body};
 
 use super::deficit::FilmShape;
 
+/// Thickness in cells to which films between bodies are widened.
+const BETWEEN_BODIES: f64 = 1.25;
+/// The same at walls, on which faces of cells lie: there the mesh resolves thinner ones.
+const AT_WALLS: f64 = 0.4;
 /// Films thinner than this share of their `A`, also where bodies overlap, resist like one of this thickness.
 const THINNEST: f64 = 1e-9;
 
@@ -70,6 +74,11 @@ impl<const D: usize> Film<D> {
         of_smaller * 0.5 * (1.0 + ratio)
     }
 
+    /// The thickness to which it is widened on cells of this size.
+    pub fn height(&self, cell_size: f64) -> f64 {
+        cell_size * if self.partner.is_wall() { AT_WALLS } else { BETWEEN_BODIES }
+    }
+
     /// The body on a side, the first or its partner; `None` for a wall.
     pub fn side(&self, side: usize) -> Option<usize> {
         match (side, self.partner) {
@@ -126,6 +135,13 @@ impl<const D: usize> Film<D> {
         let depth = (height - self.gap).max(0.0) * self.curvature_radius();
         self.radii.map(|radius| radius - depth / (2.0 * radius))
     }
+}
+
+/// The films that are widened on cells of this size.
+pub fn thin_films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, cell_size: f64) -> Vec<Film<D>> {
+    let mut films = films(bodies, domain, AT_WALLS.max(BETWEEN_BODIES) * cell_size);
+    films.retain(|film| film.gap < film.height(cell_size));
+    films
 }
 
 /// The films thinner than `reach`, by body and then by partner, walls first. Walls are the borders of `domain` across

@@ -15,7 +15,7 @@ use super::problem::{
     Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
 };
 use crate::error::StokesError;
-use crate::film::{Film, films};
+use crate::film::{Film, thin_films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
@@ -25,9 +25,6 @@ use crate::surface::{Aggregates, CellState, CutCells, Flat, Flats, SurfaceCoupli
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
-
-/// Thickness in cells to which films are widened.
-const FILM_HEIGHT: f64 = 1.25;
 
 /// The formulation.
 #[derive(Clone, Copy, Debug)]
@@ -46,21 +43,21 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
-        let height = FILM_HEIGHT * discretisation.finest_cell_size();
+        let cell_size = discretisation.finest_cell_size();
         let films = match self.lubrication {
             Lubrication::None => Vec::new(),
-            Lubrication::Deficit => films(bodies, discretisation.mesh.domain(), height),
+            Lubrication::Deficit => thin_films(bodies, discretisation.mesh.domain(), cell_size),
         };
-        let system = around(discretisation, bodies, &flats(&films, bodies.len(), height), viscosity)?;
-        let system = if films.is_empty() { system } else { system.with_films(films, height) };
+        let system = around(discretisation, bodies, &flats(&films, bodies.len(), cell_size), viscosity)?;
+        let system = if films.is_empty() { system } else { system.with_films(films, cell_size) };
         Ok((system, Arc::new(*self)))
     }
 }
 
-/// The planes that widen films to `height`.
-fn flats<const D: usize>(films: &[Film<D>], body_count: usize, height: f64) -> Flats<D> {
+/// The planes that widen films on cells of this size.
+fn flats<const D: usize>(films: &[Film<D>], body_count: usize, cell_size: f64) -> Flats<D> {
     let sides = films.iter().flat_map(|film| {
-        let distances = film.flats(height);
+        let distances = film.flats(film.height(cell_size));
         let side = move |side: usize, sign: f64| {
             let flat = Flat { normal: film.normal * sign, distance: distances[side] };
             film.side(side).map(|body| (body, flat))

@@ -75,9 +75,9 @@ where
         }
     }
 
-    /// The same with the forces of `films` that the mesh sees `height` thick.
-    pub(crate) fn with_films(self, films: Vec<Film<D>>, height: f64) -> Self {
-        let films = FilmCoupling::new(&self.space, films, height, self.viscosity);
+    /// The same with the forces of `films` that are widened on cells of this size.
+    pub(crate) fn with_films(self, films: Vec<Film<D>>, cell_size: f64) -> Self {
+        let films = FilmCoupling::new(&self.space, films, cell_size, self.viscosity);
         Self { films: Some(Arc::new(films)), ..self }
     }
 

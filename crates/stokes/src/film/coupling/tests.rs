@@ -5,7 +5,7 @@ use gluey_geom::{Aabb, Spin, Twist};
 use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
-use super::super::films;
+use super::super::thin_films;
 use super::*;
 use crate::space::Discretisation;
 
@@ -26,22 +26,22 @@ where
     VelocitySpace::around_surfaces(&discretisation, bodies, &nowhere, Vec::new())
 }
 
-fn coupling<const D: usize>(bodies: &[Ball<D>], height: f64) -> (VelocitySpace<D>, FilmCoupling<D>)
+fn coupling<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> (VelocitySpace<D>, FilmCoupling<D>)
 where
     Dim<D>: Space<D>,
 {
     let space = space_of(bodies);
-    let films = films(bodies, &Aabb::unit(), height);
-    let coupling = FilmCoupling::new(&space, films, height, 1.0);
+    let films = thin_films(bodies, &Aabb::unit(), cell_size);
+    let coupling = FilmCoupling::new(&space, films, cell_size, 1.0);
     (space, coupling)
 }
 
 /// `s B V` for twists.
-fn motions<const D: usize>(bodies: &[Ball<D>], height: f64, twists: &[Twist<D>]) -> Vec<f64>
+fn motions<const D: usize>(bodies: &[Ball<D>], cell_size: f64, twists: &[Twist<D>]) -> Vec<f64>
 where
     Dim<D>: Space<D>,
 {
-    let (space, coupling) = coupling(bodies, height);
+    let (space, coupling) = coupling(bodies, cell_size);
     let (mut x, mut z) = (vec![0.0; space.dim()], vec![0.0; coupling.dim()]);
     twists.iter().enumerate().for_each(|(body, twist)| space.set_twist(&mut x, body, twist));
     let at_rest = vec![0.0; coupling.dim()];
@@ -62,16 +62,16 @@ fn moving_as_one_is_free<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    let (bodies, height) = (pair::<D>([0.07, 0.11], 0.004), 0.02);
+    let (bodies, cell_size) = (pair::<D>([0.07, 0.11], 0.004), 0.02);
     let velocity = Vector::<D>::from_fn(|d, _| 0.4 - 0.3 * d as f64);
     let rigid = bodies.map(|body| Twist {
         velocity: velocity + Dim::<D>::cross_spin(&spin::<D>(), body.center()),
         spin: spin::<D>(),
     });
     let size =
-        motions(&bodies, height, &[rigid[0], Twist::default()]).iter().map(|m| m.abs()).fold(0.0, f64::max);
+        motions(&bodies, cell_size, &[rigid[0], Twist::default()]).iter().map(|m| m.abs()).fold(0.0, f64::max);
     assert!(size > 0.1);
-    let motions = motions(&bodies, height, &rigid);
+    let motions = motions(&bodies, cell_size, &rigid);
     assert_eq!(motions.len(), FilmCoupling::<D>::MODES);
     assert!(motions.iter().all(|m| m.abs() < 1e-12 * size), "{motions:?}");
 }
@@ -83,7 +83,7 @@ fn a_pair_that_moves_as_one_has_no_force() {
 }
 
 /// `B^T R B` in `(U_1, w_1, U_2, w_2)`.
-fn resistance<const D: usize>(bodies: &[Ball<D>], height: f64) -> DMatrix<f64>
+fn resistance<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> DMatrix<f64>
 where
     Dim<D>: Space<D>,
 {
@@ -96,7 +96,7 @@ where
                 Some(k) => twists[body].spin[k] = 1.0,
                 None => twists[body].velocity[k] = 1.0,
             }
-            motions(bodies, height, &twists)
+            motions(bodies, cell_size, &twists)
         })
         .collect();
     let rows = DMatrix::from_fn(columns[0].len(), count, |i, j| columns[j][i]);
