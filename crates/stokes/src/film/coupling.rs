@@ -14,7 +14,9 @@
 
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
 use gluey_linalg::{Jagged, Scalar};
+use nalgebra::Matrix2;
 
+use super::deficit::Deficits;
 use super::near::Film;
 use crate::space::VelocitySpace;
 
@@ -23,6 +25,8 @@ use crate::space::VelocitySpace;
 pub struct FilmCoupling<const D: usize> {
     /// Films with a resistance, each with the number of its first row.
     films: Vec<Film<D>>,
+    /// Their modes.
+    modes: Vec<Vec<Mode<D>>>,
     /// `s B`: entries of reduced velocities, and of nodal ones on walls.
     rows: Jagged<(u32, f64)>,
     /// `R_0 / (R + R_0)`, the inverse of the Schur complement.
@@ -67,18 +71,19 @@ where
     /// of this viscosity.
     pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, cell_size: f64, viscosity: f64) -> Self {
         let (mut rows, mut inverses, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
+        let mut kinds = Vec::with_capacity(films.len());
         for film in &films {
             let shape = film.shape(film.height(cell_size));
-            let resistances = [shape.resolved::<D>(), shape.deficits::<D>()];
-            for (mode, row) in modes(space, film).into_iter().enumerate() {
-                let [has, lacks] = resistances.map(|of| viscosity * of.of_mode::<D>(mode));
-                let scale = lacks.sqrt();
-                rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
-                inverses.push(has / (has + lacks));
+            let modes = modes::<D>(film, &shape.resolved::<D>(), &shape.deficits::<D>());
+            for mode in &modes {
+                let scale = (viscosity * mode.lacks).sqrt();
+                rows.push(mode.row(space, film).into_iter().map(|(k, weight)| (k, scale * weight)));
+                inverses.push(mode.has / (mode.has + mode.lacks));
                 scales.push(scale);
             }
+            kinds.push(modes);
         }
-        Self { films, rows, inverses, scales }
+        Self { films, modes: kinds, rows, inverses, scales }
     }
 
     /// What the films exert on the bodies, for the scaled forces `g`.
@@ -140,61 +145,77 @@ where
     pub fn subtract_walls(&self, at: impl Fn(&Film<D>) -> Vector<D>, z: &mut [f64]) {
         for (index, film) in self.films.iter().enumerate().filter(|film| film.1.partner.is_wall()) {
             let velocity = at(film);
-            for mode in 0..Self::MODES {
-                let row = index * Self::MODES + mode;
-                z[row] -= self.scales[row] * wall_motion(film, mode, &velocity);
+            for (k, mode) in self.modes[index].iter().enumerate() {
+                let row = index * Self::MODES + k;
+                z[row] -= self.scales[row] * mode.slip * velocity.dot(&mode.direction);
             }
         }
     }
 }
 
-/// The rows of `B` of a film in reduced velocities.
-fn modes<const D: usize>(space: &VelocitySpace<D>, film: &Film<D>) -> Vec<Vec<(u32, f64)>>
-where
-    Dim<D>: Space<D>,
-{
-    let roll = film.roll_of_slip();
-    let slip = |t: &Vector<D>| row(space, film, t, 1.0, 0.0);
-    let rolling = |t: &Vector<D>| row(space, film, t, roll, 1.0);
-    let tangents = film.tangents();
-    std::iter::once(slip(&film.normal))
-        .chain(tangents.iter().map(slip))
-        .chain(tangents.iter().map(rolling))
-        .collect()
-}
-
-/// The row of `slip v.t + rolling ((w_1 - w_2) x n).t`.
-fn row<const D: usize>(
-    space: &VelocitySpace<D>,
-    film: &Film<D>,
-    t: &Vector<D>,
+/// A mode of the relative motion of the two sides of a film: `slip v.t + turning ((w_1 - w_2) x n).t` in a
+/// direction `t`.
+#[derive(Clone, Copy, Debug)]
+struct Mode<const D: usize> {
+    direction: Vector<D>,
     slip: f64,
-    rolling: f64,
-) -> Vec<(u32, f64)>
-where
-    Dim<D>: Space<D>,
-{
-    let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
-    for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-        let Some(body) = film.side(side) else { continue };
-        let first = space.full_dim() + body * Dim::<D>::RIGID;
-        // From the centre to the middle of the film.
-        let arm = film.normal * (sign * film.arm(side));
-        let turn = Dim::<D>::moment(&arm, t) * slip + Dim::<D>::moment(&film.normal, t) * rolling;
-        let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
-        let entries = t.iter().map(|t| slip * t).chain(spins).enumerate();
-        row.extend(entries.map(|(k, weight)| ((first + k) as u32, sign * weight)));
-    }
-    row
+    turning: f64,
+    /// About the resistance that the mesh has, and that which it lacks.
+    has: f64,
+    lacks: f64,
 }
 
-/// The share of a wall's velocity in the modes of a film.
-fn wall_motion<const D: usize>(film: &Film<D>, mode: usize, velocity: &Vector<D>) -> f64 {
+/// The modes of a film: in each direction across it the two of slip and rolling in which the resistance is
+/// diagonal.
+fn modes<const D: usize>(film: &Film<D>, has: &Deficits, lacks: &Deficits) -> Vec<Mode<D>> {
+    let normal =
+        Mode { direction: film.normal, slip: 1.0, turning: 0.0, has: has.normal, lacks: lacks.normal };
+    let roll = film.roll_of_slip();
+    // In slip and in rolling times a length, which have a common unit: w = m - roll v.
+    let length = film.curvature_radius();
+    let [spin, cross, rolling] = lacks.rolling;
+    let form = Matrix2::new(
+        lacks.sliding + roll * roll * spin,
+        -roll * (cross + spin) / length,
+        -roll * (cross + spin) / length,
+        (spin + 2.0 * cross + rolling) / (length * length),
+    );
+    let eigen = form.symmetric_eigen();
+    let has = [has.sliding, has.rolling[2] / (length * length)];
+    let across = |direction: Vector<D>, k: usize| {
+        let [slip, turning] = [0, 1].map(|i| eigen.eigenvectors[(i, k)]);
+        Mode {
+            direction,
+            slip: slip + turning * length * roll,
+            turning: turning * length,
+            has: has[0] * slip * slip + has[1] * turning * turning,
+            lacks: eigen.eigenvalues[k].max(0.0),
+        }
+    };
     let tangents = film.tangents();
-    match mode {
-        0 => velocity.dot(&film.normal),
-        mode if mode < D => velocity.dot(&tangents[mode - 1]),
-        mode => film.roll_of_slip() * velocity.dot(&tangents[mode - D]),
+    let tangential = tangents.iter().flat_map(|&t| [0, 1].map(|k| across(t, k)));
+    std::iter::once(normal).chain(tangential).collect()
+}
+
+impl<const D: usize> Mode<D> {
+    /// Its row in reduced velocities.
+    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>) -> Vec<(u32, f64)>
+    where
+        Dim<D>: Space<D>,
+    {
+        let (t, n) = (&self.direction, &film.normal);
+        let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let Some(body) = film.side(side) else { continue };
+            let first = space.full_dim() + body * Dim::<D>::RIGID;
+            // From the centre to the middle of the film.
+            let arm = n * (sign * film.arm(side));
+            let turn = Dim::<D>::moment(&arm, t) * self.slip + Dim::<D>::moment(n, t) * self.turning;
+            let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
+            let entries = t.iter().map(|t| self.slip * t).chain(spins).enumerate();
+            row.extend(entries.map(|(k, weight)| ((first + k) as u32, sign * weight)));
+        }
+        row
     }
 }
 

@@ -1,4 +1,9 @@
 //! Resistance of a film below what the mesh resolves.
+//!
+//! Two surfaces in relative motion drive Reynolds' equation `div(H^3 grad p) / (12 eta) = f x` along the
+//! direction `x` of the motion. In the film `f = m`, the rolling: curved surfaces carry fluid into it. The mesh
+//! sees flat surfaces for `r < edge`, which carry nothing but tilt with their bodies: there `f = w`, the
+//! relative spin. So what it sees is a quadratic form in `w` and `m`.
 
 use std::f64::consts::PI;
 
@@ -6,6 +11,11 @@ use gluey_fem::element::gauss;
 
 /// Points of the rule for what lies outside a flat.
 const RULE: usize = 12;
+/// Steps from far outside a flat to its edge, and how far out in logarithms of the radius they begin.
+const STEPS: usize = 100;
+const FAR: f64 = 4.0;
+/// Edges nearer than this to the middle, over the width of the film, do not count.
+const NEAREST: f64 = 1e-2;
 
 /// A film of thickness `gap` that the mesh sees as one of thickness `height`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,34 +30,22 @@ pub struct FilmShape {
     pub logarithm: f64,
 }
 
-/// Resistances for unit viscosity, per unit length in 2D: to the relative velocity along the line of centres
-/// and across it, and to rolling.
+/// Resistances for unit viscosity, per unit length in 2D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deficits {
-    /// Force per velocity.
+    /// To the relative velocity along the line of centres: force per velocity.
     pub normal: f64,
-    /// Force per velocity.
+    /// To that across it.
     pub sliding: f64,
-    /// Torque per relative spin.
-    pub rolling: f64,
-}
-
-impl Deficits {
-    /// That to a mode of [`super::FilmCoupling`].
-    pub fn of_mode<const D: usize>(&self, mode: usize) -> f64 {
-        match mode {
-            0 => self.normal,
-            mode if mode < D => self.sliding,
-            _ => self.rolling,
-        }
-    }
+    /// To relative spin and rolling, torque per spin: factors of `w^2`, `2 w m`, `m^2`.
+    pub rolling: [f64; 3],
 }
 
 impl FilmShape {
     /// What the mesh lacks.
     pub fn deficits<const D: usize>(&self) -> Deficits {
         if self.gap >= self.height {
-            return Deficits { normal: 0.0, sliding: 0.0, rolling: 0.0 };
+            return Deficits { normal: 0.0, sliding: 0.0, rolling: [0.0; 3] };
         }
         match D {
             2 => self.of_discs(),
@@ -65,7 +63,7 @@ impl FilmShape {
                 Deficits {
                     normal: 1.5 * PI * (cubic + 1.7 * plain),
                     sliding: PI * plain + 2.2,
-                    rolling: PI * radius * radius * (plain + 1.0),
+                    rolling: [0.0, 0.0, PI * radius * radius * (plain + 1.0)],
                 }
             }
             _ => {
@@ -76,7 +74,7 @@ impl FilmShape {
                 Deficits {
                     normal: 6.0 * PI * radius * (squeezed + 0.5 + 0.225 * logarithm),
                     sliding: PI * radius * (logarithm + 3.0),
-                    rolling: 0.6 * PI * radius.powi(3) * (logarithm + 3.0),
+                    rolling: [0.0, 0.0, 0.6 * PI * radius.powi(3) * (logarithm + 3.0)],
                 }
             }
         }
@@ -90,7 +88,7 @@ impl FilmShape {
         Deficits {
             normal: 6.0 * PI * radius * (0.25 * radius / gap * (1.0 - t).powi(3) + logarithm * third),
             sliding: PI * radius * first,
-            rolling: 0.6 * PI * radius.powi(3) * first,
+            rolling: rolling_of_spheres(t).map(|r| PI * radius.powi(3) * r),
         }
     }
 
@@ -110,18 +108,72 @@ impl FilmShape {
         }
     }
 
-    /// `12 (A/2)^2 (I_1 - I_2^2 / I_3)` with `I_k = int H^-k dx`, for the film less that which the mesh sees.
-    fn rolling_of_discs(&self, edge: f64, y: f64) -> f64 {
+    /// `12 (int F^2 H^-3 - (int F H^-3)^2 / int H^-3)` with `F = int f x`, for the film less that which the
+    /// mesh sees.
+    fn rolling_of_discs(&self, edge: f64, y: f64) -> [f64; 3] {
         let Self { gap, height, radius, .. } = *self;
-        let whole = [PI, 0.5 * PI, 0.375 * PI];
-        let outside = outside(y);
         let scale = |k: i32| (radius * gap).sqrt() / gap.powi(k);
-        let film = |parts: [f64; 3]| [1, 2, 3].map(|k| scale(k) * parts[k as usize - 1]);
-        let seen = film(outside);
-        let seen = [1, 2, 3].map(|k| seen[k as usize - 1] + 2.0 * edge / height.powi(k));
-        let resistance = |i: [f64; 3]| 3.0 * radius * radius * (i[0] - i[1] * i[1] / i[2]);
-        resistance(film(whole)) - resistance(seen)
+        let beyond = outside(y);
+        let parts = [1, 2, 3].map(|k| scale(k) * beyond[k as usize - 1]);
+        let whole = [PI, 0.5 * PI, 0.375 * PI];
+        let film = [1, 2, 3].map(|k| scale(k) * whole[k as usize - 1]);
+        let form = |[squares, firsts, ones]: [f64; 3]| 12.0 * (squares - firsts * firsts / ones);
+        // Beyond the edge F = e + m A H / 2.
+        let integrals = |e: f64, m: f64, [one, two, three]: [f64; 3]| {
+            let c = 0.5 * m * radius;
+            [e * e * three + 2.0 * e * c * two + c * c * one, e * three + c * two, three]
+        };
+        let lacking = |w: f64, m: f64| {
+            let e = 0.5 * (w - m) * edge * edge - 0.5 * m * radius * gap;
+            let [squares, firsts, ones] = integrals(e, m, parts);
+            let flat = edge / height.powi(3);
+            let squares = squares + 0.1 * (w * edge * edge).powi(2) * flat;
+            let seen = [squares, firsts + w * edge * edge * flat / 3.0, ones + 2.0 * flat];
+            form(integrals(-0.5 * m * radius * gap, m, film)) - form(seen)
+        };
+        let (spin, rolling) = (lacking(1.0, 0.0), lacking(0.0, 1.0));
+        [spin, 0.5 * (lacking(1.0, 1.0) - spin - rolling), rolling]
     }
+}
+
+/// The same for spheres over `pi A^3`, with `t` the gap over the height.
+///
+/// The pressure is `p(r) x / r`. In the film it is `-6/5 m A r / H^2`; on the flat `a r + 3/2 w r^3 / G^3`, and
+/// beyond its edge `-6/5 m A r / H^2 + b h` with the decaying solution `h` of Reynolds' equation without `f`.
+/// `a` and `b` make pressure and flux continuous; `q = -r h'/h` and `s = int h r^2 dr / (h r^3)` there.
+fn rolling_of_spheres(t: f64) -> [f64; 3] {
+    let depth = 1.0 - t;
+    let (square, cube) = (depth * depth, depth.powi(3));
+    let [q, s] = decay(((1.0 - t) / t).sqrt());
+    let share = cube / (1.0 + q);
+    [
+        -share * (3.5 + 0.5 * q) / 4.0,
+        0.5 * (-0.3 * square + share * (1.2 - 3.0 * s)),
+        0.6 * (-t.ln() - depth) + share * 4.8 * s,
+    ]
+}
+
+/// `q` and `s` where `r^2 = y^2 A g`, from far away inwards: `dq/d ln y = q^2 - 6 y^2/(1 + y^2) q - 1`,
+/// `ds/d ln y = (q - 3) s - 1`.
+fn decay(y: f64) -> [f64; 2] {
+    let slope = |log: f64, [q, s]: [f64; 2]| {
+        let square = (2.0 * log).exp();
+        [q * q - 6.0 * square / (1.0 + square) * q - 1.0, (q - 3.0) * s - 1.0]
+    };
+    let (start, end) = (y.max(1.0).ln() + FAR, y.max(NEAREST).ln());
+    let step = (end - start) / STEPS as f64;
+    let mut state = [3.0 + 10f64.sqrt(), 0.1f64.sqrt()];
+    for k in 0..STEPS {
+        let log = start + k as f64 * step;
+        let moved = |by: f64, slope: [f64; 2]| [state[0] + by * slope[0], state[1] + by * slope[1]];
+        let first = slope(log, state);
+        let second = slope(log + 0.5 * step, moved(0.5 * step, first));
+        let third = slope(log + 0.5 * step, moved(0.5 * step, second));
+        let fourth = slope(log + step, moved(step, third));
+        let mean = [0, 1].map(|k| (first[k] + 2.0 * second[k] + 2.0 * third[k] + fourth[k]) / 6.0);
+        state = moved(step, mean);
+    }
+    state
 }
 
 /// `2 int_y^inf (1 + s^2)^-k ds` for `k` from 1 to 3.

@@ -68,8 +68,10 @@ where
         velocity: velocity + Dim::<D>::cross_spin(&spin::<D>(), body.center()),
         spin: spin::<D>(),
     });
-    let size =
-        motions(&bodies, cell_size, &[rigid[0], Twist::default()]).iter().map(|m| m.abs()).fold(0.0, f64::max);
+    let size = motions(&bodies, cell_size, &[rigid[0], Twist::default()])
+        .iter()
+        .map(|m| m.abs())
+        .fold(0.0, f64::max);
     assert!(size > 0.1);
     let motions = motions(&bodies, cell_size, &rigid);
     assert_eq!(motions.len(), FilmCoupling::<D>::MODES);
