@@ -78,7 +78,9 @@ pub enum StokesError {
         bodies: usize,
     },
     /// The formulation of rigidity cannot answer this.
-    #[error("{what} are not available in this formulation of rigidity; `rigid-dofs` has them")]
+    #[error(
+        "{what} are not available in this formulation of rigidity; `rigid-dofs` and `unfitted` have them"
+    )]
     Unsupported {
         /// What was asked for.
         what: &'static str,

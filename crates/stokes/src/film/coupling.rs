@@ -1,11 +1,11 @@
 //! Forces of films on the bodies, implicit in their velocities.
 //!
-//! The relative motion of the two sides of a film has the modes `m = B V` of the twists `V`: the normal
-//! velocity `v.n`, the slip `v_t` with `v = (U_1 + w_1 x r_1) - (U_2 + w_2 x r_2)` at the middle of the film,
-//! and rolling, `((w_1 - w_2) x n)_t + (1/b - 1/a) v_t / 2`, which is how fast the surfaces carry fluid into
-//! the film. All are zero where the two move as one body. With a resistance `R` for each mode the forces are
-//! `-B^T R B V`: symmetric, opposite to each other, and dissipating. For two spheres of any radii they have
-//! the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
+//! The relative motion of the two sides of a film is `B V` for the twists `V`: the velocity `v.n` along the
+//! normal, the slip `v_t`, with `v = (U_1 + w_1 x r_1) - (U_2 + w_2 x r_2)` in the middle of the film, the
+//! spin `w = ((w_1 - w_2) x n)_t` and rolling, `m = w + (1/b - 1/a) v_t / 2`, which is how fast the surfaces
+//! carry fluid into the film. All are zero where the two move as one body. With a resistance `R` for each the
+//! forces are `-B^T R B V`: symmetric, opposite to each other, and dissipating. For two spheres of any radii
+//! they have the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
 //!
 //! The forces `f = R B V` are unknowns beside velocities and pressures, so that nothing grows where a film
 //! closes: `s B V - g = 0` with `f = s g`, `s^2 = R`. The square of `g` is the power that the film dissipates,
@@ -27,7 +27,7 @@ pub struct FilmCoupling<const D: usize> {
     films: Vec<Film<D>>,
     /// Their modes.
     modes: Vec<Vec<Mode<D>>>,
-    /// `s B`: entries of reduced velocities, and of nodal ones on walls.
+    /// `s B`: entries of reduced velocities.
     rows: Jagged<(u32, f64)>,
     /// `R_0 / (R + R_0)`, the inverse of the Schur complement.
     inverses: Vec<f64>,

@@ -1,7 +1,7 @@
 //! Films between bodies, and between bodies and walls, that are thinner than what a mesh resolves.
 //!
 //! A film of thickness `g` in the middle has the profile `H(r) = g + r^2 / A`, with `2/A = 1/a + 1/b` for
-//! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of about one cell both
+//! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of 1.25 cells (0.4 at walls) both
 //! bodies are cut flat there (`crate::surface`), so that the mesh sees the profile `max(G, H)` and resolves
 //! it at any gap. Removing solid lowers every resistance, so what the mesh then lacks, the *deficit*, is
 //! never negative; lubrication theory gives it ([`deficits`]), as a force between the two surfaces that is
