@@ -36,13 +36,15 @@ mod subset;
 pub mod vector;
 
 pub use affine::AffineConstraints;
-pub use dense::{BlockError, DenseSymmetric, invert_spd, largest_ratio, lowest_modes};
+pub use dense::{BlockError, DenseSymmetric, invert_spd};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
 };
 pub use jagged::Jagged;
-pub use krylov::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max};
+pub use krylov::{
+    Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max, largest_ratio, lowest_modes,
+};
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
 pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval, WeakModes};

@@ -35,15 +35,15 @@ pub struct Film<const D: usize> {
     pub curvature_radius: f64,
 }
 
-/// Films from this many `A` on are not corrected: `G / A`. Far enough for `F` to vary slowly: with the paper's
-/// encounter of two spheres and a fifth of this, the error of reversibility is 16 times as large.
+/// Films from this many `A` on are not corrected: `G / A`. Far enough for `F` to vary slowly: with the
+/// paper's encounter of two spheres and a fifth of this, the error of reversibility is 16 times as large.
 const REACH: f64 = 1.0;
 /// Films are remembered up to this many times `G`, so that each has a history when it is first corrected.
 const MEMORY_REACH: f64 = 1.5;
 /// The scale `s` of the resistance: about that of two equal spheres.
 const SCALE: f64 = 0.5;
-/// Films are no thinner than this share of `A`, which positions resolve. Where the impulse asks for less it is
-/// remembered, and the film opens when it has been made up for: that is the gluey contact.
+/// Films are no thinner than this share of `A`, which positions resolve. Where the impulse asks for less it
+/// is remembered, and the film opens when it has been made up for: that is the gluey contact.
 const THINNEST: f64 = 1e-9;
 /// Sweeps at most that open what is left closed then.
 const MOST_OPENINGS: usize = 2000;

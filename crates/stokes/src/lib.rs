@@ -44,9 +44,9 @@ pub use flow::{
     WarmStartError,
 };
 // Near bodies and the films between them.
-pub use film::{Film, FilmForce, Partner, films};
+pub use film::{Film, FilmForce, Lubrication, Partner, films};
 // How rigidity is imposed.
-pub use formulation::{Formulation, Lubrication, PaperParams, ParticleVelocity, default_offset};
+pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
 pub use space::CutCellPressures;
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};

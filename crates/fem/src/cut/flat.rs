@@ -1,6 +1,6 @@
 //! Planes that cut a ball flat, as a cell sees them.
 
-use super::moments::BallInCell;
+use super::ball::BallInCell;
 
 /// A plane this near to all of a face of the cell lies in the face. On either side of the face, cells agree.
 const ON_FACE: f64 = 1e-9;

@@ -18,12 +18,15 @@
 //! once (`slice`, `corners`). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a
 //! ball.
 
+mod ball;
 mod corners;
+mod disc;
 mod flat;
 mod intervals;
 mod moments;
 mod rays;
 mod slice;
 
+pub use ball::BallInCell;
 pub use flat::FlatInCell;
-pub use moments::{BallInCell, CutMoments, POINTS, SurfaceMoments};
+pub use moments::{CutMoments, POINTS, SurfaceMoments};

@@ -1,8 +1,10 @@
 //! Moments of a cell that balls cut, whole ones or such as planes cut flat.
 
+use super::ball::BallInCell;
 use super::corners::HalfSpace;
+use super::disc::{Disc, Ray};
 use super::flat::FlatInCell;
-use super::rays::{Disc, Ray, for_each_plane, for_each_ray};
+use super::rays::{for_each_plane, for_each_ray};
 use super::slice::{Line, Slice};
 use crate::element::{gauss, gauss_cube};
 
@@ -12,15 +14,6 @@ use gluey_geom::Vector;
 pub const POINTS: usize = 5;
 /// Points of the rule on the parts of an angle.
 const RULE: usize = 8;
-
-/// A ball in coordinates in which the cell is the unit cube.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BallInCell<const D: usize> {
-    /// Centre.
-    pub center: [f64; D],
-    /// Radius.
-    pub radius: f64,
-}
 
 /// Integrals of the Lagrange polynomials of a cell's Gauss points over what balls leave of it and over their
 /// surfaces, in units in which the cell is the unit cube. Points are numbered with x fastest.

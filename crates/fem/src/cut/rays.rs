@@ -7,30 +7,9 @@
 //! reach a face, like a square root, or an edge.
 
 use super::corners::{self, HalfSpace};
+use super::disc::{Disc, Ray};
 use super::intervals::{Breakpoint, for_each_point};
 use super::slice::Slice;
-
-/// A disc in a plane of rays: centre along the rays and across them, radius.
-#[derive(Clone, Copy, Debug)]
-pub struct Disc {
-    /// Coordinate of the centre along the rays.
-    pub along: f64,
-    /// Coordinate of the centre across the rays.
-    pub across: f64,
-    /// Radius.
-    pub radius: f64,
-}
-
-/// A ray through a disc.
-#[derive(Clone, Copy, Debug)]
-pub struct Ray {
-    /// Its coordinate across.
-    pub at: f64,
-    /// Half the length of its chord.
-    pub half: f64,
-    /// Width of the strip it stands for.
-    pub weight: f64,
-}
 
 /// The rays through the disc of `slice` that lie in the unit interval.
 pub fn for_each_ray(slice: &Slice, rule: &[(f64, f64)], mut visit: impl FnMut(Ray)) {

@@ -4,7 +4,7 @@
 //! first exit, each on the ball or on a flat. The moments of a plane change their form at the rays through
 //! corners, where two of circle, lines and faces meet.
 
-use super::rays::{Disc, Ray};
+use super::disc::{Disc, Ray};
 
 /// How far outside the section a corner may lie, by rounding.
 const SLACK: f64 = 1e-9;

@@ -30,8 +30,8 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 
 impl Case {
     /// Numbers of equal cubes that fill the box along each axis, as few as possible but no fewer than
-    /// [`super::MeshSpec::root_cells`] along the shortest edge: the root cells of the mesh. `None` if it takes
-    /// more than 16 of them there, or more than a tree can number along the longest.
+    /// [`super::MeshSpec::root_cells`] along the shortest edge: the root cells of the mesh. `None` if it
+    /// takes more than 16 of them there, or more than a tree can number along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let edges = self.edges();
         let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);

@@ -154,8 +154,8 @@ impl DenseSymmetric {
     }
 }
 
-/// Sweeps the first `count` unknowns. Unless `BACKWARD`, those that have gone keep the factors with which they
-/// went: in the rows of a group `P^-1`, in the rows behind it `A_iK P^-1`.
+/// Sweeps the first `count` unknowns. Unless `BACKWARD`, those that have gone keep the factors with which
+/// they went: in the rows of a group `P^-1`, in the rows behind it `A_iK P^-1`.
 struct Sweep<'a, const BACKWARD: bool> {
     matrix: &'a mut DenseSymmetric,
     count: usize,

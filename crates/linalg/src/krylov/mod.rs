@@ -2,11 +2,12 @@
 //! share.
 
 mod basis;
+mod eigen;
 mod gcr;
 mod lanczos;
 
+pub use eigen::{largest_ratio, lowest_modes};
 pub use gcr::{Gcr, GcrParams};
-pub(crate) use lanczos::Tridiagonal;
 pub use lanczos::estimate_lambda_max;
 
 use crate::operator::LinOp;

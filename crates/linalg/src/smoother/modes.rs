@@ -2,8 +2,8 @@
 //!
 //! The block of a matrix on a patch, scaled by its diagonal `D`, has few eigenvalues far below one, and only
 //! these modes need more than the diagonal. With the eigenvectors `q` of `D^-1/2 A_c D^-1/2 q = lambda q` for
-//! `lambda` below a bound, `w = D^-1/2 q`, the restriction `R_c` to a patch and the inverse number `W` of patches
-//! a node belongs to,
+//! `lambda` below a bound, `w = D^-1/2 q`, the restriction `R_c` to a patch and the inverse number `W` of
+//! patches a node belongs to,
 //!
 //! `z = omega D^-1 r + W sum R_c^T sum_w w (1/lambda - omega) w.R_c r`,
 //!
@@ -11,8 +11,9 @@
 
 use rayon::prelude::*;
 
-use crate::dense::{BlockError, DenseSymmetric, lowest_modes};
+use crate::dense::{BlockError, DenseSymmetric};
 use crate::jagged::Jagged;
+use crate::krylov::lowest_modes;
 use crate::smoother::schwarz::block_on;
 use crate::sparse::SymmetricBlockMatrix;
 

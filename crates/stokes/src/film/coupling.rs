@@ -8,9 +8,10 @@
 //! they have the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
 //!
 //! The forces `f = R B V` are unknowns beside velocities and pressures, so that nothing grows where a film
-//! closes: `s B V - g = 0` with `f = s g`, `s^2 = R`. The square of `g` is the power that the film dissipates,
-//! and residuals of these rows weigh velocities by what they do there: in a film that nearly closes they are
-//! small. With about the resistance `R_0` that the mesh has, the Schur complement is `1 + R / R_0`.
+//! closes: `s B V - g = 0` with `f = s g`, `s^2 = R`. The square of `g` is the power that the film
+//! dissipates, and residuals of these rows weigh velocities by what they do there: in a film that nearly
+//! closes they are small. With about the resistance `R_0` that the mesh has, the Schur complement is
+//! `1 + R / R_0`.
 
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
 use gluey_linalg::{Jagged, Scalar};

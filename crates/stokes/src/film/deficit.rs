@@ -1,8 +1,8 @@
 //! Resistance of a film below what the mesh resolves.
 //!
 //! Two surfaces in relative motion drive Reynolds' equation `div(H^3 grad p) / (12 eta) = f x` along the
-//! direction `x` of the motion. In the film `f = m`, the rolling: curved surfaces carry fluid into it. The mesh
-//! sees flat surfaces for `r < edge`, which carry nothing but tilt with their bodies: there `f = w`, the
+//! direction `x` of the motion. In the film `f = m`, the rolling: curved surfaces carry fluid into it. The
+//! mesh sees flat surfaces for `r < edge`, which carry nothing but tilt with their bodies: there `f = w`, the
 //! relative spin. So what it sees is a quadratic form in `w` and `m`.
 
 use std::f64::consts::PI;
@@ -138,9 +138,9 @@ impl FilmShape {
 
 /// The same for spheres over `pi A^3`, with `t` the gap over the height.
 ///
-/// The pressure is `p(r) x / r`. In the film it is `-6/5 m A r / H^2`; on the flat `a r + 3/2 w r^3 / G^3`, and
-/// beyond its edge `-6/5 m A r / H^2 + b h` with the decaying solution `h` of Reynolds' equation without `f`.
-/// `a` and `b` make pressure and flux continuous; `q = -r h'/h` and `s = int h r^2 dr / (h r^3)` there.
+/// The pressure is `p(r) x / r`. In the film it is `-6/5 m A r / H^2`; on the flat `a r + 3/2 w r^3 / G^3`,
+/// and beyond its edge `-6/5 m A r / H^2 + b h` with the decaying solution `h` of Reynolds' equation without
+/// `f`. `a` and `b` make pressure and flux continuous; `q = -r h'/h` and `s = int h r^2 dr / (h r^3)` there.
 fn rolling_of_spheres(t: f64) -> [f64; 3] {
     let depth = 1.0 - t;
     let (square, cube) = (depth * depth, depth.powi(3));

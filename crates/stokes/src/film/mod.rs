@@ -1,11 +1,12 @@
 //! Films between bodies, and between bodies and walls, that are thinner than what a mesh resolves.
 //!
 //! A film of thickness `g` in the middle has the profile `H(r) = g + r^2 / A`, with `2/A = 1/a + 1/b` for
-//! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of 1.25 cells (0.4 at walls) both
-//! bodies are cut flat there (`crate::surface`), so that the mesh sees the profile `max(G, H)` and resolves
-//! it at any gap. Removing solid lowers every resistance, so what the mesh then lacks, the *deficit*, is
-//! never negative; lubrication theory gives it ([`deficits`]), as a force between the two surfaces that is
-//! proportional to their relative motion and implicit in their velocities ([`FilmCoupling`]).
+//! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of 1.25 cells (0.4 at
+//! walls) both bodies are cut flat there (`crate::surface`), so that the mesh sees the profile `max(G, H)`
+//! and resolves it at any gap. Removing solid lowers every resistance, so what the mesh then lacks, the
+//! *deficit*, is never negative; lubrication theory gives it ([`deficits`]), as a force between the two
+//! surfaces that is proportional to their relative motion and implicit in their velocities
+//! ([`FilmCoupling`]).
 
 mod coupling;
 mod deficit;
@@ -13,3 +14,12 @@ mod near;
 
 pub use coupling::{FilmCoupling, FilmForce};
 pub use near::{Film, Partner, films, thin_films};
+
+/// Treatment of films between bodies that are too thin for the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lubrication {
+    /// None: the mesh sees them as they are, and too weak where they are thinner than a tenth of a cell.
+    None,
+    /// The mesh sees them widened to about a cell; lubrication theory gives the resistance that is missing.
+    Deficit,
+}

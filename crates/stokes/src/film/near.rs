@@ -144,8 +144,8 @@ pub fn thin_films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, cell_siz
     films
 }
 
-/// The films thinner than `reach`, by body and then by partner, walls first. Walls are the borders of `domain` across
-/// axes that are not periodic.
+/// The films thinner than `reach`, by body and then by partner, walls first. Walls are the borders of
+/// `domain` across axes that are not periodic.
 pub fn films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, reach: f64) -> Vec<Film<D>> {
     let tree = BallTree::new(bodies);
     let mut films = Vec::new();

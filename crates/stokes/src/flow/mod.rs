@@ -13,8 +13,8 @@ use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 
 use crate::error::StokesError;
-use crate::film::FilmForce;
-use crate::formulation::{Data, Formulation, Lubrication, Method, Problem, check_viscosity};
+use crate::film::{FilmForce, Lubrication};
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
@@ -86,8 +86,8 @@ impl<const D: usize> Flow<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The nodal velocities with the motion of the `bodies`, those of the flow, at all nodes inside these: for
-    /// pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
+    /// The nodal velocities with the motion of the `bodies`, those of the flow, at all nodes inside these:
+    /// for pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
     /// velocity of the fluid in the cells that surfaces cut.
     pub fn velocity_with_bodies(&self, bodies: &[Ball<D>]) -> Vec<f64> {
         let Discretisation { mesh, velocity: nodes, .. } = &self.discretisation;

@@ -17,6 +17,7 @@ use gluey_levelset::Ball;
 
 use crate::dimension::in_dimension;
 use crate::error::StokesError;
+use crate::film::Lubrication;
 use crate::space::{CutCellPressures, Discretisation};
 
 pub use paper::{PaperParams, ParticleVelocity};
@@ -40,15 +41,6 @@ pub enum Formulation {
         /// Treatment of films that are too thin for the mesh.
         lubrication: Lubrication,
     },
-}
-
-/// Treatment of films between bodies that are too thin for the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lubrication {
-    /// None: the mesh sees them as they are, and too weak where they are thinner than a tenth of a cell.
-    None,
-    /// The mesh sees them widened to about a cell; lubrication theory gives the resistance that is missing.
-    Deficit,
 }
 
 impl Formulation {

@@ -10,12 +10,11 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Matrix, Space, Twist};
 use gluey_levelset::Ball;
 
-use super::Lubrication;
 use super::problem::{
     Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
 };
 use crate::error::StokesError;
-use crate::film::{Film, thin_films};
+use crate::film::{Film, Lubrication, thin_films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;

@@ -112,13 +112,13 @@ fn against_the_exact_doublet(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig5-half-turn-unfitted",
             "pair-2d-unfitted",
             measured(name, half_turn(Approach::Unfitted)),
-            band(evidence.limit(3.9e-4, 1.6e-3)),
+            band(evidence.limit(3.9e-4, 3.4e-4)),
         ),
         exact(
             "fig5-distance-unfitted",
             "pair-2d-unfitted",
             measured("largest error of D/a", unfitted.and_then(error)),
-            Wanted::AtMost(evidence.limit(1.7e-7, 1.7e-6)),
+            Wanted::AtMost(evidence.limit(1.7e-7, 1.2e-7)),
         ),
     ]
 }

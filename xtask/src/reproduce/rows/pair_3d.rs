@@ -92,7 +92,7 @@ fn against_the_exact_encounter(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig7a-near-unfitted",
             "D(t)/a, largest error while D < 0.2 a",
             with_exact.and_then(|(run, exact)| gap_error(run, exact, exact.end(), 0.2)),
-            Wanted::AtMost(evidence.limit(0.0025, 0.0075)),
+            Wanted::AtMost(evidence.limit(0.0025, 0.007)),
         ),
         row(
             "fig7a-smallest-unfitted",
@@ -110,7 +110,7 @@ fn against_the_exact_encounter(evidence: &Evidence<'_>) -> Vec<Claim> {
             "fig7a-reversibility-unfitted",
             REVERSIBILITY,
             evidence.report(CASE, Approach::Unfitted).and_then(|report| report.reversibility_error),
-            Wanted::AtMost(evidence.limit(3e-4, 3e-3)),
+            Wanted::AtMost(evidence.limit(3e-4, 8.5e-4)),
         ),
     ]
 }
@@ -162,7 +162,7 @@ pub fn paths(evidence: &Evidence<'_>) -> Vec<Claim> {
                 "largest distance of a centre from the exact one, in radii",
                 off_exact(Approach::Unfitted),
             ),
-            Wanted::AtMost(evidence.limit(0.0057, 0.0171)),
+            Wanted::AtMost(evidence.limit(0.0057, 0.015)),
         ),
     ]
 }

@@ -55,8 +55,8 @@ fn discs_lack_what_lubrication_theory_integrates() {
     }
 }
 
-/// The power of Reynolds' equation in a film around an axis for `f = w` up to `edge` and `m` beyond, by finite
-/// volumes for `p = u(r) x / r` between circles whose radii grow by a factor.
+/// The power of Reynolds' equation in a film around an axis for `f = w` up to `edge` and `m` beyond, by
+/// finite volumes for `p = u(r) x / r` between circles whose radii grow by a factor.
 fn power(h: impl Fn(f64) -> f64, edge: f64, [w, m]: [f64; 2]) -> f64 {
     let count = 6000;
     let radius = |k: f64| edge * (1e-3f64).powf(1.0 - 2.0 * k / count as f64);

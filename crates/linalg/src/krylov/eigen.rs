@@ -1,8 +1,7 @@
 //! A few eigenvalues of dense symmetric matrices of some tens of rows.
 
-use super::cholesky::BlockError;
-use super::sweep::DenseSymmetric;
-use crate::krylov::Tridiagonal;
+use super::lanczos::Tridiagonal;
+use crate::dense::{BlockError, DenseSymmetric};
 
 /// Lanczos steps for the largest eigenvalue, at most, and how many there are between two looks at it.
 const STEPS: usize = 48;
@@ -18,9 +17,9 @@ const INVERSE_STEPS: usize = 2;
 const SWEEPS: usize = 6;
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// The largest `x.A x / x.B x`, `B` being positive definite, to six digits: Lanczos' method for `B^-1 A` in the
-/// scalar product of `B` (Golub and Van Loan 2013, section 10.1). Directions lose their orthogonality, which
-/// repeats eigenvalues and adds none. `B` is overwritten.
+/// The largest `x.A x / x.B x`, `B` being positive definite, to six digits: Lanczos' method for `B^-1 A` in
+/// the scalar product of `B` (Golub and Van Loan 2013, section 10.1). Directions lose their orthogonality,
+/// which repeats eigenvalues and adds none. `B` is overwritten.
 ///
 /// # Errors
 /// If `B` is not positive definite.
@@ -73,8 +72,8 @@ pub fn largest_ratio(above: &DenseSymmetric, below: &mut DenseSymmetric) -> Resu
 }
 
 /// The modes of a positive definite matrix with eigenvalues below `bound`, lowest first, at most sixteen:
-/// eigenvalues and vectors of length one. By inverse iteration: those next to the bound are rough. The matrix is
-/// overwritten.
+/// eigenvalues and vectors of length one. By inverse iteration: those next to the bound are rough. The matrix
+/// is overwritten.
 ///
 /// # Errors
 /// If the matrix is not positive definite.
@@ -131,8 +130,8 @@ fn orthonormalise(x: &mut [[f64; MODES]], count: usize) {
     }
 }
 
-/// Rotates the first `count` unknowns until the matrix is nearly diagonal there, but for unknowns both of which
-/// are below `least` on the diagonal; the rows of the result are what they have become.
+/// Rotates the first `count` unknowns until the matrix is nearly diagonal there, but for unknowns both of
+/// which are below `least` on the diagonal; the rows of the result are what they have become.
 fn diagonalise(a: &mut [[f64; MODES]; MODES], count: usize, least: f64) -> [[f64; MODES]; MODES] {
     let mut rotation = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     for _ in 0..SWEEPS {
