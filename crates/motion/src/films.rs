@@ -243,7 +243,7 @@ where
         let same =
             self.0[first..].iter().take_while(|old| (old.first, old.second) == (film.first, film.second));
         // Of images across borders, the one in about this direction.
-        same.filter(|old| old.branch.dot(&film.branch) > 0.0).next()
+        same.find(|old| old.branch.dot(&film.branch) > 0.0)
     }
 }
 

@@ -1,5 +1,8 @@
 use super::*;
 
+/// A number that belongs to a thickness.
+type Functional<'a> = dyn Fn(&dyn Fn(f64) -> f64) -> f64 + 'a;
+
 /// Trapezoidal rule on `[-1e3, 1e3]` in a variable that crowds points in the middle.
 fn integral(f: impl Fn(f64) -> f64) -> f64 {
     let count = 400_000;
@@ -26,7 +29,7 @@ fn discs_lack_what_lubrication_theory_integrates() {
     for (gap, height) in [(1e-3, 0.1), (0.02, 0.1), (0.08, 0.1), (1e-4, 0.3)] {
         let shape = shape(gap, height);
         let found = shape.deficits::<2>();
-        let lacks = |of: &dyn Fn(&dyn Fn(f64) -> f64) -> f64| {
+        let lacks = |of: &Functional<'_>| {
             let [film, seen] = profiles(shape);
             of(&film) - of(&seen)
         };
@@ -105,7 +108,7 @@ fn spheres_lack_what_lubrication_theory_integrates() {
     for (gap, height) in [(1e-3, 0.1), (0.02, 0.1), (0.08, 0.1), (1e-4, 0.3)] {
         let shape = shape(gap, height);
         let found = shape.deficits::<3>();
-        let lacks = |of: &dyn Fn(&dyn Fn(f64) -> f64) -> f64| {
+        let lacks = |of: &Functional<'_>| {
             let [film, seen] = profiles(shape);
             of(&film) - of(&seen)
         };
