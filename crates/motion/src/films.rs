@@ -240,7 +240,7 @@ where
     /// What is remembered of a film.
     fn of(&self, film: &Film<D>) -> Option<&Remembered<D>> {
         let first = self.0.partition_point(|old| (old.first, old.second) < (film.first, film.second));
-        let same =
+        let mut same =
             self.0[first..].iter().take_while(|old| (old.first, old.second) == (film.first, film.second));
         // Of images across borders, the one in about this direction.
         same.find(|old| old.branch.dot(&film.branch) > 0.0)
