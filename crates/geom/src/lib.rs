@@ -12,10 +12,12 @@
 //! ```
 
 mod aabb;
+mod lattice;
 mod motion;
 mod space;
 
 pub use aabb::Aabb;
+pub use lattice::Lattice;
 pub use motion::{Particle, Pose, Twist, Wrench};
 pub use space::{Dim, Rotation, Space, Spin, Stored};
 
