@@ -25,33 +25,35 @@ pub struct HalfSpace {
     pub offset: f64,
 }
 
-/// The angles of heights at which flats change the sections of a ball of this centre (along the rays, across
-/// them, across the planes) and radius.
-pub fn breakpoints(center: [f64; 3], radius: f64, flats: &[HalfSpace]) -> Vec<Breakpoint> {
+/// The angles of heights at which the sections of a ball of this radius change, which flats cut and which lies
+/// in a cell with these faces along the height.
+pub fn breakpoints(radius: f64, flats: &[HalfSpace], faces: &[HalfSpace; 4]) -> Vec<Breakpoint> {
     let mut planes = flats.to_vec();
-    planes.extend(faces(center));
+    planes.extend(faces);
+    let is_corner = |corner: &Vector<3>| {
+        let is_inside = |plane: &HalfSpace| plane.normal.dot(corner) <= plane.offset + SLACK;
+        corner.norm() <= radius + SLACK && planes.iter().all(is_inside)
+    };
     let mut corners: Vec<f64> = corners(&planes, flats.len(), radius)
-        .filter(|corner| corner.norm() <= radius + SLACK)
-        .filter(|corner| planes.iter().all(|plane| plane.normal.dot(corner) <= plane.offset + SLACK))
+        .filter(is_corner)
+        .chain(ends_of_edges(faces, radius))
         .map(|corner| (corner[2] / radius).clamp(-1.0, 1.0).asin())
         .collect();
     corners.sort_by(f64::total_cmp);
     corners.dedup_by(|a, b| (*a - *b).abs() < SAME);
     let kinks = corners.into_iter().map(|at| Breakpoint { at, is_root: false });
-    let roots = flats.iter().flat_map(|flat| edge_ends(flat, radius));
+    let roots = planes.iter().flat_map(|plane| ends_of_section(plane, radius));
     kinks.chain(roots.map(|at| Breakpoint { at, is_root: true })).collect()
 }
 
-/// The faces of the cell along the height.
-fn faces(center: [f64; 3]) -> impl Iterator<Item = HalfSpace> {
-    (0..4).map(move |k| {
-        let (axis, is_upper) = (k / 2, k % 2 == 1);
-        let unit = Vector::<3>::ith(axis, 1.0);
-        match is_upper {
-            true => HalfSpace { normal: unit, offset: 1.0 - center[axis] },
-            false => HalfSpace { normal: -unit, offset: center[axis] },
-        }
-    })
+/// The points in which the edges of a cell along the height meet the sphere.
+fn ends_of_edges(faces: &[HalfSpace; 4], radius: f64) -> impl Iterator<Item = Vector<3>> {
+    let edges = (0..4).filter_map(move |k| common_line(&faces[k / 2], &faces[2 + k % 2]));
+    let ends = move |(point, direction): (Vector<3>, Vector<3>)| {
+        let half = (radius * radius - point.norm_squared()).sqrt();
+        [-half, half].into_iter().filter(|half| half.is_finite()).map(move |s| point + direction * s)
+    };
+    edges.flat_map(ends)
 }
 
 /// The points in which one of the first `flat_count` planes and another meet the sphere or a third plane.
@@ -77,8 +79,8 @@ fn common_line(a: &HalfSpace, b: &HalfSpace) -> Option<(Vector<3>, Vector<3>)> {
     (sin > PARALLEL).then(|| (point, cross / sin))
 }
 
-/// The angles of the highest and the lowest point of the edge of a flat.
-fn edge_ends(flat: &HalfSpace, radius: f64) -> impl Iterator<Item = f64> {
+/// The angles of the highest and the lowest point of the circle in which a plane meets the sphere.
+fn ends_of_section(flat: &HalfSpace, radius: f64) -> impl Iterator<Item = f64> {
     let from_axis = flat.normal[0].hypot(flat.normal[1]).atan2(flat.normal[2]);
     let half = (flat.offset / radius).acos();
     // Angles from the axis, which the edge may pass on its other side.

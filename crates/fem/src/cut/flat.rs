@@ -5,8 +5,8 @@ use super::ball::BallInCell;
 /// A plane this near to all of a face of the cell lies in the face. On either side of the face, cells agree.
 const ON_FACE: f64 = 1e-9;
 
-/// A half-space `n . x <= offset` that a body does not leave, in coordinates in which the cell is the unit
-/// cube.
+/// A half-space `m . x <= offset` that a body does not leave, in coordinates in which the cell is the unit
+/// cube. Where the cell is sheared by `A`, `m = A^T n` for the unit normal `n`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlatInCell<const D: usize> {
     normal: [f64; D],
@@ -14,7 +14,7 @@ pub struct FlatInCell<const D: usize> {
 }
 
 impl<const D: usize> FlatInCell<D> {
-    /// The half-space with this unit normal; one whose border is a face of the cell but for rounding ends
+    /// The half-space with this `m`, the unit normal if the cell is a cube; one whose border is a face of the cell but for rounding ends
     /// there, so that the surface belongs to one of two neighbours.
     pub fn new(normal: [f64; D], offset: f64) -> Self {
         let new = Self { normal, offset };
@@ -23,28 +23,33 @@ impl<const D: usize> FlatInCell<D> {
             let rest = || (0..D).filter(move |&e| e != axis).map(|e| normal[e]);
             let middle = normal[axis] * face + 0.5 * rest().sum::<f64>() - offset;
             let spread = 0.5 * rest().map(f64::abs).sum::<f64>();
-            let sign = normal[axis].signum();
             (middle.abs() + spread <= ON_FACE).then(|| Self {
-                normal: std::array::from_fn(|d| if d == axis { sign } else { 0.0 }),
-                offset: sign * face,
+                normal: std::array::from_fn(|d| if d == axis { normal[axis] } else { 0.0 }),
+                offset: normal[axis] * face,
             })
         };
         (0..2 * D).find_map(on_face).unwrap_or(new)
     }
 
-    /// Unit normal, out of the body.
+    /// `m`, out of the body.
     pub fn normal(&self) -> &[f64; D] {
         &self.normal
     }
 
-    /// Value of `n . x` on the border.
+    /// The same half-space of a cube.
+    pub(super) fn in_3d(&self) -> FlatInCell<3> {
+        let normal = std::array::from_fn(|d| self.normal.get(d).copied().unwrap_or(0.0));
+        FlatInCell { normal, offset: self.offset }
+    }
+
+    /// Value of `m . x` on the border.
     pub fn offset(&self) -> f64 {
         self.offset
     }
 
     /// Distance of the border from the centre of a ball, negative if the centre is cut away.
     pub fn distance(&self, ball: &BallInCell<D>) -> f64 {
-        self.offset - self.normal.iter().zip(&ball.center).map(|(n, c)| n * c).sum::<f64>()
+        self.offset - self.normal.iter().zip(&ball.center).map(|(m, c)| m * c).sum::<f64>()
     }
 
     /// Whether the cell lies inside.

@@ -22,6 +22,7 @@ mod ball;
 mod corners;
 mod disc;
 mod flat;
+mod frame;
 mod intervals;
 mod moments;
 mod rays;

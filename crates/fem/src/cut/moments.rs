@@ -2,13 +2,12 @@
 
 use super::ball::BallInCell;
 use super::corners::HalfSpace;
-use super::disc::{Disc, Ray};
+use super::disc::Ray;
 use super::flat::FlatInCell;
+use super::frame::Frame;
 use super::rays::{for_each_plane, for_each_ray};
 use super::slice::{Line, Slice};
 use crate::element::{gauss, gauss_cube};
-
-use gluey_geom::Vector;
 
 /// Gauss points per direction: their polynomials have degree 4 in each coordinate.
 pub const POINTS: usize = 5;
@@ -46,15 +45,24 @@ impl<const D: usize> CutMoments<D> {
     pub fn truncated<'a>(
         balls: impl ExactSizeIterator<Item = (&'a BallInCell<D>, &'a [FlatInCell<D>])>,
     ) -> Self {
+        Self::sheared(0.0, balls)
+    }
+
+    /// The same for a cell that is sheared: a point of the unit cube has the place `x + shear y e_1`. Normals
+    /// and areas are those of the sheared cell, in which balls are round.
+    pub fn sheared<'a>(
+        shear: f64,
+        balls: impl ExactSizeIterator<Item = (&'a BallInCell<D>, &'a [FlatInCell<D>])>,
+    ) -> Self {
         let mut new = Self {
             volume: gauss_cube::<D>(POINTS).into_iter().map(|point| point.1).collect(),
             surfaces: Vec::with_capacity(balls.len()),
         };
-        let rules = Rules::new();
+        let rules = Rules::new(shear);
         for (ball, flats) in balls {
             let inside = rules.inside(ball, flats);
             new.volume.iter_mut().zip(inside.volume).for_each(|(whole, part)| *whole -= part);
-            let normal = inside.normal.into_iter().map(|n| n.map(|n| -n)).collect();
+            let normal = inside.normal.into_iter().map(|n| sheared_normal(shear, n).map(|n| -n)).collect();
             new.surfaces.push(SurfaceMoments { normal, area: inside.area });
         }
         new
@@ -66,7 +74,14 @@ impl<const D: usize> CutMoments<D> {
     }
 }
 
-/// Integrals over the part of a ball in a cell, and over its surface there with the normal out of the ball.
+/// `n dS` of a surface element from `N dS'` in coordinates of the cell (Nanson's formula).
+fn sheared_normal<const D: usize>(shear: f64, mut normal: [f64; D]) -> [f64; D] {
+    normal[1] -= shear * normal[0];
+    normal
+}
+
+/// Integrals over the part of a ball in a cell, and over its surface there with the normal out of the ball,
+/// in coordinates of the cell.
 struct Inside<const D: usize> {
     volume: Vec<f64>,
     normal: Vec<[f64; D]>,
@@ -75,6 +90,8 @@ struct Inside<const D: usize> {
 
 /// The one-dimensional rules that integrals are made of.
 struct Rules {
+    /// Shear of the cell.
+    shear: f64,
     /// On parts of angles.
     angles: Vec<(f64, f64)>,
     /// Along chords: exact for the polynomials.
@@ -83,8 +100,8 @@ struct Rules {
 }
 
 impl Rules {
-    fn new() -> Self {
-        Self { angles: gauss(RULE), chords: gauss(POINTS.div_ceil(2)), lagrange: Lagrange::new() }
+    fn new(shear: f64) -> Self {
+        Self { shear, angles: gauss(RULE), chords: gauss(POINTS.div_ceil(2)), lagrange: Lagrange::new() }
     }
 
     /// By rays in every direction for the surface; those in the first give the volume too.
@@ -111,22 +128,27 @@ impl Rules {
         direction: usize,
         inside: &mut Inside<D>,
     ) {
-        let [across, height] = [1, 2].map(|shift| (direction + shift) % D);
+        let frame = Frame::new::<D>(self.shear, direction);
+        let [_, across, height] = frame.axes;
         let strides = [direction, across].map(stride);
-        let [c, y] = [direction, across].map(|d| ball.center[d]);
+        let center = ball.center[direction];
         let lines = |offset: &dyn Fn(&FlatInCell<D>) -> f64| -> Vec<Line> {
-            let normal = |flat: &FlatInCell<D>| [direction, across].map(|d| flat.normal()[d]);
-            flats.iter().map(|flat| Line { normal: normal(flat), offset: offset(flat) }).collect()
+            let line = |flat: &FlatInCell<D>| Line {
+                normal: [direction, across].map(|d| flat.normal()[d]),
+                slope: raised(self.shear, flat.normal(), direction),
+                offset: offset(flat),
+            };
+            flats.iter().map(line).collect()
         };
         if D == 2 {
-            let disc = Disc { along: c, across: y, radius: ball.radius };
-            let slice = Slice { disc, lines: lines(&FlatInCell::offset) };
-            return self.plane(&slice, ball.radius).add_to(inside, direction, strides, &[(0, 1.0)]);
+            let slice = Slice { disc: frame.section(ball, 0.0).0, lines: lines(&FlatInCell::offset) };
+            let plane = self.plane(&slice, (center, ball.radius));
+            return plane.add_to(inside, direction, strides, &[(0, 1.0)]);
         }
+        let in_3d = BallInCell::<3> { center: std::array::from_fn(|d| ball.center[d]), radius: ball.radius };
         let half_spaces: Vec<HalfSpace> =
-            flats.iter().map(|flat| half_space(ball, flat, [direction, across, height])).collect();
-        let center = [c, y, ball.center[height]];
-        for_each_plane((center, ball.radius), &half_spaces, &self.angles, |disc, z, width| {
+            flats.iter().map(|flat| frame.half_space(&in_3d, &flat.in_3d())).collect();
+        for_each_plane(&in_3d, &frame, &half_spaces, &self.angles, |disc, z, width| {
             let slice = Slice { disc, lines: lines(&|flat| flat.offset() - flat.normal()[height] * z) };
             if slice.is_empty() {
                 return;
@@ -134,19 +156,19 @@ impl Rules {
             let values = self.lagrange.values(z);
             let layers: Vec<(usize, f64)> =
                 (0..POINTS).map(|k| (k * stride(height), width * values[k])).collect();
-            self.plane(&slice, ball.radius).add_to(inside, direction, strides, &layers);
+            self.plane(&slice, (center, ball.radius)).add_to(inside, direction, strides, &layers);
         });
     }
 
-    /// The moments of a plane of rays through a ball of this radius.
-    fn plane(&self, slice: &Slice, ball_radius: f64) -> Plane {
+    /// The moments of a plane of rays through a ball with this radius and centre along the rays.
+    fn plane(&self, slice: &Slice, ball: (f64, f64)) -> Plane {
         let mut plane = Plane::default();
-        for_each_ray(slice, &self.angles, |ray| self.add_ray(slice, ball_radius, ray, &mut plane));
+        for_each_ray(slice, &self.angles, |ray| self.add_ray(slice, ball, ray, &mut plane));
         plane
     }
 
-    fn add_ray(&self, slice: &Slice, ball_radius: f64, ray: Ray, plane: &mut Plane) {
-        let Some(ends) = slice.ends(&ray, ball_radius) else { return };
+    fn add_ray(&self, slice: &Slice, ball: (f64, f64), ray: Ray, plane: &mut Plane) {
+        let Some(ends) = slice.ends(&ray, ball) else { return };
         let across = self.lagrange.values(ray.at).map(|value| value * ray.weight);
         let chord = self.chord([ends[0].at.max(0.0), ends[1].at.min(1.0)]);
         add_product(&chord, &across, 1.0, &mut plane.volume);
@@ -169,9 +191,14 @@ impl Rules {
     }
 }
 
-/// A flat in coordinates along these axes, relative to the centre of its ball.
-fn half_space<const D: usize>(ball: &BallInCell<D>, flat: &FlatInCell<D>, axes: [usize; 3]) -> HalfSpace {
-    HalfSpace { normal: Vector::<3>::from_fn(|k, _| flat.normal()[axes[k]]), offset: flat.distance(ball) }
+/// A component of `A^-1 n = A^-1 A^-T m`.
+fn raised<const D: usize>(shear: f64, m: &[f64; D], component: usize) -> f64 {
+    let second = m[1] - shear * m[0];
+    match component {
+        0 => m[0] - shear * second,
+        1 => second,
+        _ => m[component],
+    }
 }
 
 /// Distance of neighbouring points along an axis.

@@ -3,6 +3,10 @@
 //! What planes leave of a ball is convex, so that a ray is inside between two ends: the last entry and the
 //! first exit, each on the ball or on a flat. The moments of a plane change their form at the rays through
 //! corners, where two of circle, lines and faces meet.
+//!
+//! A surface element `dS` with the normal `n` is seen along an axis `d` of the cell as
+//! `dA = +-N_d dS'`, with the normal `N` and the element `dS'` in coordinates of the cell; and
+//! `dS = sum_d (A^-1 n)_d N_d dS'` for the shear `A` of the cell.
 
 use super::disc::{Disc, Ray};
 
@@ -17,6 +21,8 @@ const SAME: f64 = 1e-13;
 pub struct Line {
     /// Components along the rays and across them.
     pub normal: [f64; 2],
+    /// Component along the rays of `A^-1 n`.
+    pub slope: f64,
     /// Where the half-plane ends.
     pub offset: f64,
 }
@@ -35,28 +41,30 @@ pub struct Slice {
 pub struct End {
     /// Coordinate along the ray.
     pub at: f64,
-    /// Size of the component along the ray of the normal there.
+    /// Component along the ray of `A^-1 n` there, to the outside.
     pub slope: f64,
     /// Whether this piece of surface belongs to the cell.
     pub is_in_cell: bool,
 }
 
 impl Slice {
-    /// The ends of a ray through a ball of this radius, if it meets what the flats leave.
+    /// The ends of a ray through a ball with this radius and centre along the rays, if it meets what the
+    /// flats leave.
     ///
     /// A flat on a face of the cell belongs to the cell on its outer side, where the fluid is.
-    pub fn ends(&self, ray: &Ray, ball_radius: f64) -> Option<[End; 2]> {
-        let slope = ray.half / ball_radius;
-        let on_ball = |at: f64| End { at, slope, is_in_cell: 0.0 < at && at < 1.0 };
-        let [mut entry, mut exit] = [self.disc.along - ray.half, self.disc.along + ray.half].map(on_ball);
+    pub fn ends(&self, ray: &Ray, (center, radius): (f64, f64)) -> Option<[End; 2]> {
+        let on_ball = |sign: f64| {
+            let at = ray.middle + sign * ray.half;
+            End { at, slope: sign * (at - center) / radius, is_in_cell: 0.0 < at && at < 1.0 }
+        };
+        let [mut entry, mut exit] = [-1.0, 1.0].map(on_ball);
         for line in &self.lines {
-            let slope = line.normal[0].abs();
             // Infinite for a line along the rays, which keeps or drops the whole ray.
-            let at = (line.offset - line.normal[1] * ray.at) / slope;
+            let at = (line.offset - line.normal[1] * ray.at) / line.normal[0].abs();
             if line.normal[0] >= 0.0 && at < exit.at {
-                exit = End { at, slope, is_in_cell: (0.0..1.0).contains(&at) };
+                exit = End { at, slope: line.slope, is_in_cell: (0.0..1.0).contains(&at) };
             } else if line.normal[0] < 0.0 && -at > entry.at {
-                entry = End { at: -at, slope, is_in_cell: 0.0 < -at && -at <= 1.0 };
+                entry = End { at: -at, slope: -line.slope, is_in_cell: 0.0 < -at && -at <= 1.0 };
             }
         }
         (entry.at <= exit.at).then_some([entry, exit])
@@ -81,37 +89,62 @@ impl Slice {
         angles
     }
 
-    /// Distance of a line from the centre, positive if the centre is inside. Infinite for a flat parallel to
-    /// the plane.
+    /// The angles of the rays whose chords end on the faces they stand on.
+    pub fn ends_on_faces(&self) -> impl Iterator<Item = f64> {
+        FACES.iter().flat_map(|face| self.ends_on_line(face)).filter(|angle| !angle.is_nan()).map(folded)
+    }
+
+    /// Normal of a line in coordinates in which the section is round.
+    fn round_normal(&self, line: &Line) -> [f64; 2] {
+        let (Disc { widths, lean, .. }, [x, y]) = (self.disc, line.normal);
+        [x * widths[0], x * lean + y * widths[1]]
+    }
+
+    /// Distance of a line from the centre in the round section, positive if the centre is inside. Infinite
+    /// for a flat parallel to the plane.
     fn distance(&self, line: &Line) -> f64 {
-        let [x, y] = line.normal;
-        (line.offset - x * self.disc.along - y * self.disc.across) / x.hypot(y)
+        let ([x, y], [u, v]) = (line.normal, self.round_normal(line));
+        (line.offset - x * self.disc.along - y * self.disc.across) / u.hypot(v)
+    }
+
+    /// The angles on the round section where a line cuts it; not numbers if it does not.
+    fn ends_on_line(&self, line: &Line) -> [f64; 2] {
+        let [u, v] = self.round_normal(line);
+        let half = (self.distance(line) / self.disc.radius).acos();
+        [v.atan2(u) - half, v.atan2(u) + half]
     }
 
     fn corners_on_circle(&self, line: &Line) -> impl Iterator<Item = f64> {
-        let radius = self.disc.radius;
-        let middle = line.normal[1].atan2(line.normal[0]);
-        let half = (self.distance(line) / radius).acos();
-        [middle - half, middle + half].into_iter().filter_map(move |angle| {
+        let Disc { along, across, radius, widths, lean } = self.disc;
+        self.ends_on_line(line).into_iter().filter_map(move |angle| {
             let arm = [radius * angle.cos(), radius * angle.sin()];
-            self.angle([self.disc.along + arm[0], self.disc.across + arm[1]])
-                .map(|_| arm[1].atan2(arm[0].abs()))
+            let point = [along + lean * arm[1] + widths[0] * arm[0], across + widths[1] * arm[1]];
+            self.angle(point).map(|_| folded(angle))
         })
     }
 
     /// The angle of the ray through a point of the section.
     fn angle(&self, [x, y]: [f64; 2]) -> Option<f64> {
-        let Disc { along, across, radius } = self.disc;
+        let Disc { along, across, radius, widths, lean } = self.disc;
         let is_inside = |line: &Line| line.normal[0] * x + line.normal[1] * y <= line.offset + SLACK;
+        let second = (y - across) / widths[1];
+        let first = (x - along - lean * second) / widths[0];
         let is_corner =
-            (x - along).hypot(y - across) <= radius + SLACK && FACES.iter().chain(&self.lines).all(is_inside);
-        is_corner.then(|| ((y - across) / radius).clamp(-1.0, 1.0).asin())
+            first.hypot(second) <= radius + SLACK && FACES.iter().chain(&self.lines).all(is_inside);
+        is_corner.then(|| (second / radius).clamp(-1.0, 1.0).asin())
     }
 }
 
+/// The angle of the ray through a point of the round section.
+fn folded(angle: f64) -> f64 {
+    angle.sin().atan2(angle.cos().abs())
+}
+
 /// The faces of the cell that rays stand on.
-const FACES: [Line; 2] =
-    [Line { normal: [-1.0, 0.0], offset: 0.0 }, Line { normal: [1.0, 0.0], offset: 1.0 }];
+const FACES: [Line; 2] = [
+    Line { normal: [-1.0, 0.0], slope: -1.0, offset: 0.0 },
+    Line { normal: [1.0, 0.0], slope: 1.0, offset: 1.0 },
+];
 
 /// Where two lines meet.
 fn meet(a: &Line, b: &Line) -> Option<[f64; 2]> {

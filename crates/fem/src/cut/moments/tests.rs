@@ -3,9 +3,11 @@
 use super::*;
 
 use gluey_linalg::vector::fill_pseudo_random;
+use gluey_geom::Vector;
 use std::f64::consts::PI;
 
 mod flats;
+mod shear;
 
 /// A polynomial of degree 4 in each coordinate, and its derivatives.
 struct Polynomial<const D: usize> {
@@ -62,7 +64,7 @@ fn balls<const D: usize>(count: u64) -> Vec<BallInCell<D>> {
 /// Largest error of `int_{K cap B} d_k f = int_{K cap dB} n_k f + int_{F_k1 cap B} f - int_{F_k0 cap B} f` in
 /// a square, for a random polynomial.
 fn error_in_a_square(seed: u64, ball: &BallInCell<2>, flats: &[FlatInCell<2>]) -> f64 {
-    let rules = Rules::new();
+    let rules = Rules::new(0.0);
     let f = Polynomial::<2>::random(seed + 77);
     let inside = rules.inside(ball, flats);
     let error = |k: usize| {
@@ -99,7 +101,7 @@ fn chord_of_edge(ball: &BallInCell<2>, flats: &[FlatInCell<2>], axis: usize, fac
 
 /// The same in a cube.
 fn error_in_a_cube(seed: u64, ball: &BallInCell<3>, flats: &[FlatInCell<3>]) -> f64 {
-    let rules = Rules::new();
+    let rules = Rules::new(0.0);
     let f = Polynomial::<3>::random(seed + 77);
     let inside = rules.inside(ball, flats);
     let error = |k: usize| {
