@@ -1,6 +1,6 @@
 //! Level sets of discs and spheres.
 
-use gluey_geom::Vector;
+use gluey_geom::{Lattice, Vector};
 
 /// A signed distance: positive inside, negative outside.
 pub trait LevelSet<const D: usize> {
@@ -10,39 +10,53 @@ pub trait LevelSet<const D: usize> {
 
 /// A rigid body immersed in the fluid.
 pub trait Body<const D: usize>: LevelSet<D> {
-    /// Displacement from the body's reference point to `x` (to the nearest periodic image).
+    /// Displacement from the body's reference point to `x` (to the nearest periodic image). In a tilted
+    /// lattice `x` is a place in the box without tilt, the displacement one in space.
     fn arm(&self, x: &Vector<D>) -> Vector<D>;
     /// Radius of the smallest ball around the reference point that holds the body.
     fn bounding_radius(&self) -> f64;
 }
 
 /// A disc or sphere, repeated with a period where the box is periodic.
+///
+/// Images may slide along each other: with the tilt of a [`Lattice`] places are those in the box without tilt
+/// that shears into space, see [`Lattice::to_box`], and balls are round in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball<const D: usize> {
     center: Vector<D>,
     radius: f64,
-    period: [Option<f64>; D],
+    lattice: Lattice<D>,
 }
 
 impl<const D: usize> Ball<D> {
     /// A single ball.
     pub fn new(center: Vector<D>, radius: f64) -> Self {
-        Self { center, radius, period: [None; D] }
+        Self { center, radius, lattice: Lattice::default() }
     }
 
     /// A ball repeated with the given period in some directions.
     pub fn periodic(center: Vector<D>, radius: f64, period: [Option<f64>; D]) -> Self {
-        Self { center, radius, period }
+        Self { center, radius, lattice: Lattice::new(period) }
     }
 
-    /// Centre.
+    /// A ball repeated by a lattice, with its centre in the box without tilt.
+    pub fn in_lattice(center: Vector<D>, radius: f64, lattice: Lattice<D>) -> Self {
+        Self { center, radius, lattice }
+    }
+
+    /// Centre, in the box without tilt.
     pub fn center(&self) -> &Vector<D> {
         &self.center
     }
 
     /// Period along each axis, where there is one.
     pub fn period(&self) -> &[Option<f64>; D] {
-        &self.period
+        self.lattice.periods()
+    }
+
+    /// The translations that repeat it.
+    pub fn lattice(&self) -> &Lattice<D> {
+        &self.lattice
     }
 }
 
@@ -55,7 +69,13 @@ impl<const D: usize> LevelSet<D> for Ball<D> {
 impl<const D: usize> Body<D> for Ball<D> {
     fn arm(&self, x: &Vector<D>) -> Vector<D> {
         let arm = x - self.center;
-        Vector::from_fn(|d, _| nearest_image(arm[d], self.period[d]))
+        let shear = self.lattice.shear();
+        if shear == 0.0 {
+            return Vector::from_fn(|d, _| nearest_image(arm[d], self.period()[d]));
+        }
+        let mut arm = Vector::from_fn(|d, _| if d == 0 { arm[d] } else { nearest_image(arm[d], self.period()[d]) });
+        arm[0] = nearest_image(arm[0] + shear * arm[1], self.period()[0]);
+        arm
     }
 
     fn bounding_radius(&self) -> f64 {
@@ -89,6 +109,17 @@ mod tests {
         assert!((ball.value(&x) - 0.02).abs() < 1e-14);
         assert!((ball.arm(&x)[0] + 0.03).abs() < 1e-14);
         assert!(ball.value(&Vector::<2>::new(0.02, 0.99)) < -0.4);
+    }
+
+    #[test]
+    fn a_sheared_ball_is_seen_across_all_borders() {
+        let lattice = Lattice::<3>::new([Some(1.0); 3]).tilted(0.4);
+        let (place, at) = (Vector::<3>::new(0.9, 0.97, 0.01), Vector::<3>::new(0.2, 0.02, 0.97));
+        let ball = Ball::in_lattice(lattice.to_box(&place, 0.0), 0.1, lattice);
+        let arm = ball.arm(&lattice.to_box(&at, 0.0));
+        assert!((arm - lattice.nearest(&(at - place)).0).norm() < 1e-15);
+        // Up by 0.05 across a border whose image is 0.4 further along x.
+        assert!((arm - Vector::<3>::new(-0.3, 0.05, -0.04)).norm() < 1e-14, "{arm:?}");
     }
 
     #[test]

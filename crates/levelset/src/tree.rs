@@ -42,6 +42,8 @@ pub struct BallTree<'a, const D: usize> {
     nodes: Vec<Node<D>>,
     /// The period all balls have along an axis, or that there is none; `None` where they differ.
     periods: [Option<Option<f64>>; D],
+    /// Distances in space are no less than this share of those in the box without tilt.
+    shortest: f64,
     /// Size of the coordinates.
     scale: f64,
 }
@@ -69,6 +71,7 @@ impl<'a, const D: usize> BallTree<'a, D> {
             order: (0..balls.len() as u32).collect(),
             nodes: Vec::new(),
             periods: std::array::from_fn(common),
+            shortest: balls.iter().map(|ball| shortest(ball.lattice().shear())).fold(1.0, f64::min),
             scale: balls.iter().map(|ball| ball.center().amax() + ball.bounding_radius()).fold(0.0, f64::max),
         };
         if !balls.is_empty() {
@@ -154,7 +157,7 @@ impl<'a, const D: usize> BallTree<'a, D> {
             }
             None => 0.0,
         };
-        node.largest_radius - (0..D).map(|d| outside(d).powi(2)).sum::<f64>().sqrt()
+        node.largest_radius - self.shortest * (0..D).map(|d| outside(d).powi(2)).sum::<f64>().sqrt()
     }
 
     fn slack(&self, x: &Vector<D>) -> f64 {
@@ -227,10 +230,16 @@ impl<'a, const D: usize> BallTree<'a, D> {
     }
 }
 
+/// The smallest singular value of a shear: that of `[1, g; 0, 1]`.
+fn shortest(shear: f64) -> f64 {
+    (1.0 + 0.25 * shear * shear).sqrt() - 0.5 * shear.abs()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ball::nearest;
+    use gluey_geom::Lattice;
     use gluey_testkit::packing::Packing;
     use rand::{Rng, RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -287,7 +296,8 @@ mod tests {
                     true => 0.125 * size,
                     false => 0.2 * size * 10f64.powf(-random.random_range(0.0..decades)),
                 };
-                balls.push(Ball::periodic(center, radius, period));
+                let tilt = if trial % 3 == 0 { 0.0 } else { size * random.random_range(-0.6..0.6) };
+                balls.push(Ball::in_lattice(center, radius, Lattice::new(period).tilted(tilt)));
                 if random.random_range(0..8) == 0 {
                     balls.push(balls[random.random_range(0..balls.len())]);
                 }

@@ -10,6 +10,9 @@
 //! so 153 multiplications apply the viscous matrix of a 3D cell, in place of 6561 for its entries, and a
 //! change of basis costs four operations per line of three nodes: `A_0 = u_0 + 4 u_1 + u_2`,
 //! `A_1 = u_0 - u_2`, `A_2 = u_1 - A_0 / 6` are `a_l / c_l`.
+//!
+//! Where cells are sheared, derivatives in space are `d_2 - g d_1` in the second direction and as they were in the
+//! others. Strains are still few Legendre products, whose mass is diagonal: 400 multiplications.
 
 use gluey_linalg::Scalar;
 
@@ -41,6 +44,12 @@ pub(super) struct Coefficients<T> {
     cross: [[[T; 3]; 2]; 2],
     /// Of the divergence, by the degree of the pressure in the direction of the component.
     divergence: [T; 2],
+    /// Shear `g` of the cells.
+    shear: T,
+    /// Mass of the products.
+    mass: Vec<T>,
+    /// Derivatives: `c_{l+1} P_{l+1}' = slope[l] c_l P_l`.
+    slope: [T; 2],
 }
 
 /// Unknowns of one component.
@@ -78,7 +87,17 @@ impl<T: Scalar> Coefficients<T> {
             cross: [0, 1]
                 .map(|i| [0, 1].map(|j| [0, 1, 2].map(|t| T::from_f64(lowered(i) * lowered(j) * third(t))))),
             divergence: [0, 1].map(|k| T::from_f64(divergence(k))),
+            shear: T::ZERO,
+            mass: (0..nodes::<D>())
+                .map(|k| T::from_f64(multi_index::<D>(k, 3).into_iter().map(mass).product()))
+                .collect(),
+            slope: [0, 1].map(|l| T::from_f64(DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l])),
         }
+    }
+
+    /// The matrices of cells that are sheared.
+    pub(super) fn sheared(self, shear: f64) -> Self {
+        Self { shear: T::from_f64(shear), ..self }
     }
 
     /// `r = K u`.
@@ -88,6 +107,9 @@ impl<T: Scalar> Coefficients<T> {
         u: &[V; UNKNOWNS],
         r: &mut [V; UNKNOWNS],
     ) {
+        if self.shear != T::ZERO {
+            return self.sheared_viscous::<V, D>(u, r);
+        }
         let n = nodes::<D>();
         for ((r, u), &diagonal) in r[..D * n].iter_mut().zip(&u[..D * n]).zip(&self.diagonal[..D * n]) {
             *r = u.mul(V::splat(diagonal));
@@ -96,6 +118,79 @@ impl<T: Scalar> Coefficients<T> {
         if D == 3 {
             self.cross::<V, D, 0, 2>(u, r);
             self.cross::<V, D, 1, 2>(u, r);
+        }
+    }
+
+    /// `r = K u` in sheared cells: `sum_{a<b} 4 eps_ab^2 + sum_a 2 eps_aa^2`, with twice the strain for `a < b`.
+    #[inline(always)]
+    fn sheared_viscous<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        u: &[V; UNKNOWNS],
+        r: &mut [V; UNKNOWNS],
+    ) {
+        let n = nodes::<D>();
+        let (mass, two) = (&self.mass[..n], T::ONE + T::ONE);
+        r[..D * n].fill(V::splat(T::ZERO));
+        for b in 0..D {
+            for a in 0..=b {
+                let mut strain = [V::splat(T::ZERO); 27];
+                self.add_derivative::<V, D>(b, &u[a * n..], &mut strain);
+                if a < b {
+                    self.add_derivative::<V, D>(a, &u[b * n..], &mut strain);
+                }
+                let factor = if a == b { two } else { T::ONE };
+                for (strain, &mass) in strain.iter_mut().zip(mass) {
+                    *strain = strain.mul(V::splat(mass * factor));
+                }
+                self.add_transposed::<V, D>(b, &strain, &mut r[a * n..]);
+                if a < b {
+                    self.add_transposed::<V, D>(a, &strain, &mut r[b * n..]);
+                }
+            }
+        }
+    }
+
+    /// Directions and factors of a derivative in space.
+    #[inline(always)]
+    fn directions(&self, direction: usize) -> [(usize, T); 2] {
+        [(direction, T::ONE), (0, if direction == 1 { T::ZERO - self.shear } else { T::ZERO })]
+    }
+
+    /// Adds the derivative in space of a component.
+    #[inline(always)]
+    fn add_derivative<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        direction: usize,
+        u: &[V],
+        sum: &mut [V; 27],
+    ) {
+        for (d, factor) in self.directions(direction).into_iter().take(if direction == 1 { 2 } else { 1 }) {
+            for k in 0..nodes::<D>() {
+                let degree = k / stride(d) % 3;
+                if degree < 2 {
+                    let slope = V::splat(self.slope[degree] * factor);
+                    sum[k] = u[k + stride(d)].mul_add(slope, sum[k]);
+                }
+            }
+        }
+    }
+
+    /// The transpose of [`Coefficients::add_derivative`].
+    #[inline(always)]
+    fn add_transposed<V: Lanes<Scalar = T>, const D: usize>(
+        &self,
+        direction: usize,
+        strain: &[V; 27],
+        r: &mut [V],
+    ) {
+        for (d, factor) in self.directions(direction).into_iter().take(if direction == 1 { 2 } else { 1 }) {
+            for k in 0..nodes::<D>() {
+                let degree = k / stride(d) % 3;
+                if degree < 2 {
+                    let slope = V::splat(self.slope[degree] * factor);
+                    r[k + stride(d)] = strain[k].mul_add(slope, r[k + stride(d)]);
+                }
+            }
         }
     }
 
@@ -158,6 +253,14 @@ impl<T: Scalar> Coefficients<T> {
                 let degrees = (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2 & 1);
                 visit(corner, b * nodes::<D>() + degrees + stride(b), factors[corner >> b & 1]);
             }
+        }
+        if self.shear == T::ZERO {
+            return;
+        }
+        let leaning = self.divergence.map(|factor| V::splat(T::ZERO - self.shear * factor));
+        for corner in 0..1 << D {
+            let degrees = (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2 & 1);
+            visit(corner, nodes::<D>() + degrees + stride(0), leaning[corner & 1]);
         }
     }
 }

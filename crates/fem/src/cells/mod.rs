@@ -140,6 +140,14 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
         new
     }
 
+    /// The operator in cells that are sheared: a point of the unit cube has the place `x + shear y e_1`. Not
+    /// for viscosities that vary in a cell.
+    #[must_use]
+    pub fn sheared(self, shear: f64) -> Self {
+        debug_assert!(shear == 0.0 || self.points.is_empty(), "viscosities in sheared cells are uniform");
+        Self { coefficients: self.coefficients.sheared(shear), ..self }
+    }
+
     fn push_chunk(
         &mut self,
         chunk: usize,

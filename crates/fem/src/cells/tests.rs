@@ -16,9 +16,16 @@ struct Case<const D: usize> {
     eta: Vec<Vec<f64>>,
     rigid_nodes: Vec<RigidNode<f64, D>>,
     quadrature: usize,
+    shear: f64,
 }
 
 impl<const D: usize> Case<D> {
+    /// In sheared cells, where no viscosity varies.
+    fn sheared(shear: f64) -> Self {
+        let case = Self::new(3);
+        Self { eta: vec![Vec::new(); case.scales.len()], shear, ..case }
+    }
+
     fn new(quadrature: usize) -> Self {
         let finest = if D == 2 { 6 } else { 4 };
         let center = Vector::<D>::repeat(0.42);
@@ -48,6 +55,7 @@ impl<const D: usize> Case<D> {
             velocity,
             pressure,
             quadrature,
+            shear: 0.0,
         }
     }
 
@@ -58,11 +66,12 @@ impl<const D: usize> Case<D> {
             .zip(&self.eta)
             .map(|(&(cell, viscous, divergence), points)| CellData { cell, viscous, divergence, points });
         CellOperator::new(&self.chunks, &self.velocity, cells, self.quadrature, &self.rigid_nodes, 3)
+            .sheared(self.shear)
     }
 
     /// `(y, q)` by dense element matrices, with all maps written out.
     fn dense(&self, x: &[f64], p: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let reference = ReferenceMatrices::<D>::new();
+        let reference = ReferenceMatrices::<D>::sheared(self.shear);
         let (n, m) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::PRESSURE);
         let nodal = self.velocity.node_count() * D;
         let twist = CellOperator::<f64, D>::TWIST;
@@ -133,8 +142,8 @@ fn distance<T: CellScalar>(a: &[T], b: &[f64]) -> f64 {
 }
 
 fn equals_the_dense_matrices<T: CellScalar, const D: usize>() {
-    for quadrature in QUADRATURE {
-        let case = Case::<D>::new(quadrature);
+    for case in QUADRATURE.map(Case::<D>::new).into_iter().chain([Case::sheared(-0.37)]) {
+        let (quadrature, shear) = (case.quadrature, case.shear);
         let operator = case.operator::<T>();
         assert!(
             case.chunks.count() > 1 && !case.velocity.constraints().is_empty() && case.rigid_nodes.len() > 10
@@ -147,7 +156,7 @@ fn equals_the_dense_matrices<T: CellScalar, const D: usize>() {
         operator.stokes(&x, &p, &mut y, &mut q, &mut work);
         let scale = want_y.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let tolerance = 50.0 * T::EPSILON * scale;
-        assert!(distance(&y, &want_y) < tolerance, "{D} {quadrature} {}", distance(&y, &want_y) / scale);
+        assert!(distance(&y, &want_y) < tolerance, "{D} {quadrature} {shear} {}", distance(&y, &want_y) / scale);
         assert!(distance(&q, &want_q) < tolerance);
         let mut gradient = vec![T::ONE; x.len()];
         operator.viscous(&x, &mut y, &mut work);
@@ -189,8 +198,7 @@ fn results_have_the_same_bits_for_any_number_of_threads() {
     same_bits::<3>();
 }
 
-fn kernels_agree<T: CellScalar, const D: usize>() {
-    let case = Case::<D>::new(4);
+fn kernels_agree<T: CellScalar, const D: usize>(case: &Case<D>) {
     let operator = case.operator::<T>();
     let (x, p) = (cast(&wave(operator.velocity_dim(), 0.9)), cast(&wave(operator.pressure_dim(), 0.4)));
     let portable = sweep::with(&operator, &x, &p, &|input, output, buffers| {
@@ -213,8 +221,10 @@ fn kernels_agree<T: CellScalar, const D: usize>() {
 
 #[test]
 fn vector_and_portable_kernels_agree() {
-    kernels_agree::<f32, 2>();
-    kernels_agree::<f64, 2>();
-    kernels_agree::<f32, 3>();
-    kernels_agree::<f64, 3>();
+    for (case_2d, case_3d) in [(Case::new(4), Case::new(4)), (Case::sheared(0.4), Case::sheared(0.4))] {
+        kernels_agree::<f32, 2>(&case_2d);
+        kernels_agree::<f64, 2>(&case_2d);
+        kernels_agree::<f32, 3>(&case_3d);
+        kernels_agree::<f64, 3>(&case_3d);
+    }
 }

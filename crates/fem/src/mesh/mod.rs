@@ -3,4 +3,4 @@
 mod tree;
 
 pub(crate) use tree::{COORD_BITS, offsets};
-pub use tree::{Cell, MeshError, TreeMesh};
+pub use tree::{Cell, MeshError, TreeMesh, half_diagonal};

@@ -64,9 +64,13 @@ pub enum MeshError {
 }
 
 /// The leaves of a balanced 2^D-tree over a box.
+///
+/// The box may be sheared: what stands at `x` in the box is at `x + shear (y - y_lower) e_1` in space. Places
+/// (corners of cells, nodes) are given in the box.
 #[derive(Clone, Debug)]
 pub struct TreeMesh<const D: usize> {
     domain: Aabb<D>,
+    shear: f64,
     roots: [u32; D],
     periodic: [bool; D],
     max_level: u8,
@@ -102,6 +106,7 @@ impl<const D: usize> TreeMesh<D> {
         check_box(&domain, &roots, max_level)?;
         let mut mesh = Self {
             domain,
+            shear: 0.0,
             roots,
             periodic,
             max_level,
@@ -120,6 +125,22 @@ impl<const D: usize> TreeMesh<D> {
         Ok(mesh)
     }
 
+    /// The same tree in a box with this shear.
+    #[must_use]
+    pub fn sheared(self, shear: f64) -> Self {
+        Self { shear, ..self }
+    }
+
+    /// Shear of the box.
+    pub fn shear(&self) -> f64 {
+        self.shear
+    }
+
+    /// Distance in space from the centre of a cell of this edge length to its farthest corner.
+    pub fn half_diagonal(&self, size: f64) -> f64 {
+        half_diagonal::<D>(size, self.shear)
+    }
+
     /// The same tree cut at `max_level`: finer cells are merged into their ancestors.
     pub fn coarsened(&self, max_level: u8) -> Self {
         let max_level = max_level.min(self.max_level);
@@ -136,8 +157,8 @@ impl<const D: usize> TreeMesh<D> {
 
     /// Whether it is [`TreeMesh::coarsened`] from `fine`.
     pub fn is_coarsening_of(&self, fine: &Self) -> bool {
-        let same_box =
-            self.domain == fine.domain && self.roots == fine.roots && self.periodic == fine.periodic;
+        let same_box = (self.domain, self.shear, self.roots, self.periodic)
+            == (fine.domain, fine.shear, fine.roots, fine.periodic);
         let refined = fine.refined.get(..usize::from(self.max_level));
         same_box && self.max_level <= fine.max_level && refined == Some(self.refined.as_slice())
     }
@@ -259,6 +280,11 @@ impl<const D: usize> TreeMesh<D> {
         self.index = leaves.iter().enumerate().map(|(i, c)| (*c, i as u32)).collect();
         self.leaves = leaves;
     }
+}
+
+/// Distance from the centre to the farthest corner of a cube that is sheared.
+pub fn half_diagonal<const D: usize>(size: f64, shear: f64) -> f64 {
+    0.5 * size * ((1.0 + shear.abs()).powi(2) + (D - 1) as f64).sqrt()
 }
 
 /// Meshes of the same box with the same cells and finest lattice.

@@ -142,10 +142,11 @@ where
         }
     }
 
-    /// `z -= s B V` for the velocities of walls at the films, which `at` gives by the film.
-    pub fn subtract_walls(&self, at: impl Fn(&Film<D>) -> Vector<D>, z: &mut [f64]) {
-        for (index, film) in self.films.iter().enumerate().filter(|film| film.1.partner.is_wall()) {
-            let velocity = at(film);
+    /// `z -= s B V` for what the velocities of the partners are beside those of bodies: those of walls, or of
+    /// the image of a body in a flow that is not periodic. `at` gives them by the film.
+    pub fn subtract_partners(&self, at: impl Fn(&Film<D>) -> Option<Vector<D>>, z: &mut [f64]) {
+        let known = self.films.iter().enumerate().filter_map(|(index, film)| Some((index, at(film)?)));
+        for (index, velocity) in known {
             for (k, mode) in self.modes[index].iter().enumerate() {
                 let row = index * Self::MODES + k;
                 z[row] -= self.scales[row] * mode.slip * velocity.dot(&mode.direction);

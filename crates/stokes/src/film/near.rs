@@ -1,6 +1,6 @@
 //! Which bodies are near to each other or to a wall.
 
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Lattice, Vector};
 use gluey_levelset::{Ball, BallTree, Body};
 
 use super::deficit::FilmShape;
@@ -173,12 +173,12 @@ fn between<const D: usize>(
 ) -> impl Iterator<Item = Film<D>> + '_ {
     let (first, second) = (&bodies[body], &bodies[other]);
     let nearest = first.arm(second.center());
-    let images = images(first.period());
+    let lattice = first.lattice().reduced();
     // Of the images of the body itself one of each pair.
     let is_wanted =
-        move |shift: &Vector<D>| body != other || shift.iter().find(|x| **x != 0.0).is_some_and(|x| *x > 0.0);
-    images.into_iter().filter(is_wanted).map(move |shift| {
-        let arm = nearest + shift;
+        move |image: &[i32; D]| body != other || image.iter().find(|k| **k != 0).is_some_and(|k| *k > 0);
+    images(&lattice).into_iter().filter(is_wanted).map(move |image| {
+        let arm = nearest + lattice.shift(&image);
         let radii = [first, second].map(Body::bounding_radius);
         let distance = arm.norm();
         Film {
@@ -192,23 +192,21 @@ fn between<const D: usize>(
     })
 }
 
-/// Shifts of the images next to a body and zero.
-fn images<const D: usize>(period: &[Option<f64>; D]) -> Vec<Vector<D>> {
-    let mut shifts = vec![Vector::zeros()];
-    for (axis, length) in period.iter().enumerate() {
-        let Some(length) = length else { continue };
-        let shifted = |by: f64| {
-            move |shift: &Vector<D>| {
-                let mut shift = *shift;
-                shift[axis] += by;
-                shift
+/// The images next to a body, and itself first.
+fn images<const D: usize>(lattice: &Lattice<D>) -> Vec<[i32; D]> {
+    let mut images = vec![[0; D]];
+    for axis in (0..D).filter(|&axis| lattice.periods()[axis].is_some()) {
+        let shifted = |by: i32| {
+            move |image: &[i32; D]| {
+                let mut image = *image;
+                image[axis] += by;
+                image
             }
         };
-        let sides: Vec<_> =
-            shifts.iter().map(shifted(-length)).chain(shifts.iter().map(shifted(*length))).collect();
-        shifts.extend(sides);
+        let sides: Vec<_> = images.iter().map(shifted(-1)).chain(images.iter().map(shifted(1))).collect();
+        images.extend(sides);
     }
-    shifts
+    images
 }
 
 /// The films between a body and the walls.

@@ -1,6 +1,6 @@
 //! What drives a flow: boundary, forces, and of the bodies either wrenches or twists.
 
-use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 
 use crate::error::StokesError;
 use crate::formulation::Problem;
@@ -23,6 +23,9 @@ where
     pub boundary: Field<'a, D>,
     /// Force per unit of volume, on fluid and bodies alike.
     pub force: Option<Field<'a, D>>,
+    /// Strain of a linear flow that velocities, spins and pressures are relative to, see
+    /// [`Conditions::in_linear_flow`]; zero for none.
+    pub strain: Matrix<D>,
     /// What is known of the bodies.
     pub bodies: Given<'a, D>,
 }
@@ -45,7 +48,17 @@ where
 {
     /// Free bodies without forces in a flow with this velocity on the boundary.
     pub fn boundary(boundary: Field<'a, D>) -> Self {
-        Self { boundary, force: None, bodies: Given::Wrenches(&[]) }
+        Self { boundary, force: None, strain: Matrix::zeros(), bodies: Given::Wrenches(&[]) }
+    }
+
+    /// Free bodies without forces in the linear flow `G x`, whose trace is zero, in a box that is periodic in
+    /// all directions.
+    ///
+    /// Velocity and pressure are those of the deviation `u - G x`, which is periodic and whose mean over fluid
+    /// and bodies is zero; so are velocities and spins of bodies, given or found: relative to the undisturbed
+    /// flow at the centre of the body. Forces, torques and stresslets are those of the whole flow.
+    pub fn in_linear_flow(gradient: &Matrix<D>) -> Self {
+        Self { strain: (gradient + gradient.transpose()) * 0.5, ..Self::at_rest() }
     }
 
     /// Free bodies without forces in a box at rest, where nothing moves.
@@ -81,7 +94,7 @@ where
         match self.bodies {
             Given::Wrenches([]) => Ok(vec![Wrench::default(); problem.bodies.len()]),
             Given::Wrenches(wrenches) => Ok(wrenches.to_vec()),
-            Given::Twists(_) => problem.wrenches(velocity, pressure, self.force),
+            Given::Twists(_) => problem.wrenches(velocity, pressure, self.force, &self.strain),
         }
     }
 
@@ -96,12 +109,14 @@ where
         match self.bodies {
             Given::Wrenches(wrenches) => {
                 let mut b = problem.right_hand_side(&lift, self.force);
+                problem.add_strain(&self.strain, &mut b)?;
                 problem.add_wrenches(wrenches, &mut b)?;
                 Ok((lift, b))
             }
             Given::Twists(twists) => {
                 problem.set_twists(twists, &mut lift)?;
                 let mut b = problem.right_hand_side(&lift, self.force);
+                problem.add_strain(&self.strain, &mut b)?;
                 problem.system.space.clear_held(&mut b);
                 Ok((lift, b))
             }

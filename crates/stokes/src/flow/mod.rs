@@ -1,6 +1,7 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
 mod conditions;
+mod mean;
 mod prepared;
 mod refinement;
 mod warm_start;
@@ -9,7 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 
 use crate::error::StokesError;
@@ -70,6 +71,8 @@ where
     /// Force and torque on each body by something other than the fluid: those given, or those that hold it
     /// at the twist given.
     pub wrenches: Vec<Wrench<D>>,
+    /// Strain of the linear flow that velocities, spins and pressures are relative to; zero for none.
+    pub strain: Matrix<D>,
     /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
     pub films: Vec<FilmForce<D>>,
     /// Linear solves made.
@@ -238,6 +241,9 @@ where
         let multiplier = problem.rigidity.solve(problem, &data, &mut x, &mut solve)?;
         let mut pressure = problem.pressure_and_films(&x);
         let mut velocity = problem.velocity(&lift, &x);
+        if !problem.system.space.is_anchored() {
+            mean::remove_mean(problem, &mut velocity);
+        }
         let twists = problem.twists(&velocity)?;
         let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
         velocity.truncate(problem.system.space.full_dim());
@@ -249,6 +255,7 @@ where
             multiplier,
             twists,
             wrenches,
+            strain: conditions.strain,
             films: problem.film_forces(&x),
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,

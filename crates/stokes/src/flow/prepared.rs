@@ -112,7 +112,7 @@ where
         velocity.resize(space.dim(), 0.0);
         let twists = flow.twists.iter().take(space.body_count());
         twists.enumerate().for_each(|(body, twist)| space.set_twist(&mut velocity, body, twist));
-        self.problem.rigidity.stresslets(&self.problem, &velocity, &flow.pressure)
+        self.problem.rigidity.stresslets(&self.problem, [&velocity, &flow.pressure], &flow.strain)
     }
 
     /// The share of films that are too thin for the mesh in the stresslet of each body, from

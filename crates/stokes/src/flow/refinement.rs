@@ -1,6 +1,6 @@
 //! Meshes refined near bodies and in the gaps between them.
 
-use gluey_fem::{MeshError, TreeMesh};
+use gluey_fem::{MeshError, TreeMesh, half_diagonal};
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, BallTree, Body, LevelSet};
 
@@ -30,7 +30,7 @@ impl Refinement {
         Self { coarsest: surface.min(3), surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
     }
 
-    /// The mesh of `domain` around `bodies`.
+    /// The mesh of `domain` around `bodies`, sheared like the lattice that repeats these.
     ///
     /// # Errors
     /// [`MeshError`] as [`TreeMesh::refine`].
@@ -43,6 +43,7 @@ impl Refinement {
     ) -> Result<TreeMesh<D>, MeshError> {
         let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
         let deepest = self.surface.saturating_add(gap_levels);
+        let shear = bodies.first().map_or(0.0, |body| body.lattice().shear());
         let bodies = &BallTree::new(bodies);
         let mesh = TreeMesh::refine(domain, roots, periodic, deepest, |lower, h, level| {
             let center = lower + Vector::repeat(0.5 * h);
@@ -50,6 +51,7 @@ impl Refinement {
                 || (level < self.surface && self.is_near_surface(&center, h, bodies))
                 || (level >= self.surface && self.is_in_gap(&center, h, bodies))
         })?;
+        let mesh = mesh.sheared(shear);
         let used = mesh.cells().iter().map(|c| c.level).max().unwrap_or(0);
         Ok(if used < deepest { mesh.coarsened(used) } else { mesh })
     }
@@ -57,9 +59,12 @@ impl Refinement {
     /// Whether a cell of size `h` comes closer to a body than the band of its children.
     fn is_near_surface<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
         let band = self.band * 0.5 * h;
-        bodies.any_within(center, ENOUGH * (band + half_diagonal::<D>(h)), |body| {
+        let shear = shear_of(bodies);
+        bodies.any_within(center, ENOUGH * (band + half_diagonal::<D>(h, shear)), |body| {
             let body = &bodies.balls()[body];
-            let outside = body.arm(center).map(|x| (x.abs() - 0.5 * h).max(0.0)).norm();
+            let half = |d: usize| 0.5 * h * if d == 0 { 1.0 + shear.abs() } else { 1.0 };
+            let arm = body.arm(center);
+            let outside = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half(d)).max(0.0)).norm();
             outside < body.bounding_radius() + band
         })
     }
@@ -67,7 +72,7 @@ impl Refinement {
     /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two
     /// surfaces is their distance from each other there, for points between them and not far inside.
     fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
-        let reach = half_diagonal::<D>(h);
+        let reach = half_diagonal::<D>(h, shear_of(bodies));
         // What a gap that is too narrow for the cell leaves of either distance.
         let farthest = h / self.gap_fraction + 2.0 * reach;
         let mut near: Vec<f64> = Vec::new();
@@ -89,9 +94,9 @@ impl Refinement {
     }
 }
 
-/// Distance from the centre of a cell to its corners.
-fn half_diagonal<const D: usize>(h: f64) -> f64 {
-    0.5 * h * (D as f64).sqrt()
+/// Shear of the box that bodies are in.
+fn shear_of<const D: usize>(bodies: &BallTree<'_, D>) -> f64 {
+    bodies.balls().first().map_or(0.0, |body| body.lattice().shear())
 }
 
 #[cfg(test)]
@@ -110,7 +115,7 @@ mod tests {
             let alpha = ball.value(&(lower + Vector::repeat(0.5 * h)));
             deepest = deepest.max(alpha);
             let (near, far) =
-                (alpha >= -1.5 * mesh.size(5), alpha < -1.5 * mesh.size(5) - 4.0 * half_diagonal::<D>(h));
+                (alpha >= -1.5 * mesh.size(5), alpha < -1.5 * mesh.size(5) - 4.0 * half_diagonal::<D>(h, 0.0));
             assert!(!near || cell.level == 5, "level {} at {alpha}", cell.level);
             assert!(!far || cell.level < 5, "level {} at {alpha}", cell.level);
         }

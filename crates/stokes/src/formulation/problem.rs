@@ -18,7 +18,7 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace};
-use crate::surface::{CellState, CutCells, add_load_of_cut_cells, forces_on_bodies};
+use crate::surface::{CellState, CutCells, add_load_of_cut_cells, forces_on_bodies, load_of_strain};
 
 /// A formulation with what it keeps from mesh to mesh.
 pub trait Method<const D: usize>: Send + Sync
@@ -76,15 +76,16 @@ where
         Ok(())
     }
 
-    /// The stresslet of each body, see [`crate::Prepared::stresslets`], in nodal velocities and pressures.
+    /// The stresslet of each body, see [`crate::Prepared::stresslets`], in nodal velocities and pressures
+    /// relative to a linear flow with the strain `undisturbed`.
     ///
     /// # Errors
     /// [`StokesError::Unsupported`] where the formulation has no forces on nodes of bodies.
     fn stresslets(
         &self,
         _problem: &Problem<D>,
-        _velocity: &[f64],
-        _pressure: &[f64],
+        _fields: [&[f64]; 2],
+        _undisturbed: &Matrix<D>,
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         Err(StokesError::Unsupported { what: "stresslets" })
     }
@@ -236,6 +237,36 @@ where
         forces.iter().enumerate().for_each(|(body, wrench)| self.system.space.add_wrench(b, body, wrench));
     }
 
+    /// Adds the load of a linear flow with this strain, relative to which velocities are, to a reduced
+    /// right-hand side: that of the bodies, which do not strain.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] unless all bodies are coupled to the fluid through their surfaces.
+    pub fn add_strain(&self, strain: &Matrix<D>, b: &mut [f64]) -> Result<(), StokesError> {
+        if strain.amax() == 0.0 || self.bodies.is_empty() {
+            return Ok(());
+        }
+        let Some(surfaces) = &self.system.surfaces else {
+            return Err(StokesError::Unsupported { what: "a linear flow far away" });
+        };
+        let (discretisation, viscosity) = (self.discretisation(), self.system.viscosity());
+        let load = load_of_strain(discretisation, surfaces, viscosity, strain, self.bodies.len());
+        let mut sum = vec![0.0; self.system.dim()];
+        let nodal = self.system.space.full_dim();
+        let [u, p, f] = self.system.parts_mut(&mut sum);
+        u[..nodal].copy_from_slice(&load.velocity);
+        p.copy_from_slice(&load.pressure);
+        if let Some(films) = &self.system.films {
+            films.subtract_partners(|film| (!film.partner.is_wall()).then(|| strain * film.branch()), f);
+            vector::scale(-1.0, f);
+        }
+        self.system.reduce(&mut sum);
+        let wrenches = load.wrenches.iter().enumerate();
+        wrenches.for_each(|(body, wrench)| self.system.space.add_wrench(&mut sum, body, wrench));
+        vector::axpy(1.0, &sum, b);
+        Ok(())
+    }
+
     /// Adds the loads of forces and torques on the bodies to a reduced right-hand side; no entries stand for
     /// none on any.
     ///
@@ -274,9 +305,11 @@ where
         velocity: &[f64],
         pressure: &[f64],
         force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
+        strain: &Matrix<D>,
     ) -> Result<Vec<Wrench<D>>, StokesError> {
         let space = self.space_with_twists("forces on bodies that are held")?;
         let mut b = self.loads(force);
+        self.add_strain(strain, &mut b)?;
         self.rigidity.residual(&self.system, [velocity, pressure], &mut b);
         Ok((0..self.bodies.len()).map(|body| -space.wrench(&b, body)).collect())
     }

@@ -84,8 +84,8 @@ where
     fn stresslets(
         &self,
         problem: &Problem<D>,
-        velocity: &[f64],
-        pressure: &[f64],
+        [velocity, pressure]: [&[f64]; 2],
+        _: &Matrix<D>,
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         let Problem { system, bodies, .. } = problem;
         let (space, nodes) = (&system.space, system.space.nodes());

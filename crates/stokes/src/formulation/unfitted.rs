@@ -126,12 +126,12 @@ where
     fn stresslets(
         &self,
         problem: &Problem<D>,
-        velocity: &[f64],
-        pressure: &[f64],
+        fields: [&[f64]; 2],
+        undisturbed: &Matrix<D>,
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         let Problem { system, bodies, .. } = problem;
         let Some(surfaces) = &system.surfaces else { return Ok(Vec::new()) };
-        let fields = [velocity, pressure];
+        let fields = (fields, undisturbed);
         let moments = first_moments(surfaces, &system.space, bodies, system.viscosity(), fields);
         Ok(moments.iter().map(symmetric_and_traceless).collect())
     }

@@ -40,7 +40,7 @@ pub struct Assembled {
 }
 
 /// Assembles the whole Stokes matrix `[A, -B^T; -B, 0]`. One pressure is left out, since pressures are
-/// defined up to a constant.
+/// defined up to a constant, and one node where velocities are.
 pub fn assemble_stokes<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
@@ -49,10 +49,11 @@ where
     let split = system.velocity_dim();
     let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
     let films = split + system.pressure.dim();
+    let loose = loose_node(&system.space);
     let unknowns = Subset::new(system.dim(), |k| match k.checked_sub(split) {
         Some(_) if k >= films => true,
         Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
-        None => keeps_velocity(&system.space, k),
+        None => keeps_velocity(&system.space, k) && Some(k / D) != loose,
     });
     let velocity = velocity_expansion(&system.space).restricted_to(&unknowns, 0);
     let pressure = pressure_expansion(&system.pressure).restricted_to(&unknowns, split);
@@ -71,13 +72,17 @@ where
     Dim<D>: Space<D>,
 {
     let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
-    let space = &system.space;
-    let loose = if space.is_anchored() {
-        None
-    } else {
-        (0..space.nodes().node_count()).find(|&node| space.is_free(node))
-    };
+    let loose = loose_node(&system.space);
     assemble_viscous_on(&elements, |node| Some(node) != loose)
+}
+
+/// A node that is left out where nothing fixes a constant velocity.
+fn loose_node<const D: usize>(space: &VelocitySpace<D>) -> Option<usize>
+where
+    Dim<D>: Space<D>,
+{
+    let first = || (0..space.nodes().node_count()).find(|&node| space.is_free(node));
+    if space.is_anchored() { None } else { first() }
 }
 
 /// Assembles the diagonal block of the velocities at the free nodes for which `keep` holds, and of all

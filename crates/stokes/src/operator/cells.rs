@@ -18,7 +18,7 @@ where
     Dim<D>: Space<D>,
 {
     let nodes = &discretisation.velocity;
-    let viscous = ReferenceMatrices::<D>::new().viscous;
+    let viscous = discretisation.reference().viscous;
     let n = ReferenceMatrices::<D>::VELOCITY;
     let mut nodal = vec![0.0; nodes.node_count() * D];
     for (cell, scale, own) in cells {
@@ -51,4 +51,5 @@ where
     let quadrature = penalty.map_or(1, |p| p.stress.quadrature());
     let ties = space.ties();
     CellOperator::new(&discretisation.chunks, space.nodes(), data, quadrature, &ties, space.body_count())
+        .sheared(discretisation.mesh.shear())
 }

@@ -70,7 +70,7 @@ where
     Dim<D>: Space<D>,
 {
     let nodal = nodal_diagonal(space, cells, smoothed)?;
-    let twists = twist_blocks(space, cells, &ReferenceMatrices::new())?;
+    let twists = twist_blocks(space, cells, &space.discretisation().reference())?;
     Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
 }
 
@@ -113,7 +113,7 @@ where
     for (node, body, matrix) in space.rigid_rows() {
         rows[node as usize] = Some((body as usize, matrix));
     }
-    let viscous = nalgebra::DMatrix::from_row_slice(n, n, reference.viscous);
+    let viscous = nalgebra::DMatrix::from_row_slice(n, n, &reference.viscous);
     let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
     for cell in cells {
         let nodes = discretisation.velocity.cell(cell.cell as usize);

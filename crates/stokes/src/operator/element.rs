@@ -71,7 +71,7 @@ where
         let discretisation = system.discretisation();
         let mut new = Self {
             system,
-            reference: ReferenceMatrices::new(),
+            reference: discretisation.reference(),
             size,
             viscous: system.cells.iter().map(|cell| cell.viscous).collect(),
             additional: vec![None; system.cells.len()],

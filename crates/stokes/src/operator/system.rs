@@ -154,7 +154,8 @@ where
             let at_rest = vec![0.0; films.dim()];
             let f = if f.is_empty() { &at_rest } else { f };
             films.add([u, f], [&mut *yu, &mut *yf]);
-            films.subtract_walls(|film| self.wall_velocity(film, u), yf);
+            let at_wall = |film: &Film<D>| film.partner.is_wall().then(|| self.wall_velocity(film, u));
+            films.subtract_partners(at_wall, yf);
         }
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::{Chunks, NodeMap, TreeMesh};
+use gluey_fem::{Chunks, NodeMap, ReferenceMatrices, TreeMesh};
 
 /// A mesh with the nodes of the Q2-Q1 pair. Cheap to clone: clones share all of it.
 #[derive(Clone, Debug)]
@@ -29,6 +29,11 @@ impl<const D: usize> Discretisation<D> {
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.
     pub fn dof_count(&self) -> usize {
         self.velocity.node_count() * D + self.pressure.node_count()
+    }
+
+    /// The element matrices of its cells, which are sheared like the box.
+    pub fn reference(&self) -> ReferenceMatrices<D> {
+        ReferenceMatrices::sheared(self.mesh.shear())
     }
 
     /// Edge length of the smallest cells.

@@ -124,7 +124,8 @@ where
     /// Whether anything fixes a constant velocity: a wall, or bodies that are held.
     pub fn is_anchored(&self) -> bool {
         let holds_nodes = self.holds_twists && !self.rigid.is_empty();
-        self.by_surface || holds_nodes || !self.boundary.is_empty()
+        let holds_bodies = self.by_surface && self.holds_twists && !self.radius.is_empty();
+        holds_bodies || holds_nodes || !self.boundary.is_empty()
     }
 
     /// Number of bodies, active or not.

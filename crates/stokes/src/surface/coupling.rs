@@ -8,7 +8,7 @@ use gluey_levelset::{Ball, Body};
 use gluey_linalg::{AffineConstraints, Scalar, Subset};
 
 use super::aggregates::Aggregates;
-use super::cut_cells::{CutCell, CutCells};
+use super::cut_cells::{CutCell, CutCells, in_space};
 use super::penalty::penalties;
 use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
@@ -92,8 +92,9 @@ where
         let medium = (bodies, viscosity);
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
-        let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
-        let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts);
+        let shear = discretisation.mesh.shear();
+        let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
+        let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
         drop(data);
         let discretisation = discretisation.clone();
         let mut roots = aggregates.roots.clone();
@@ -284,12 +285,13 @@ where
         let (place, surface) = (place as usize, surface as usize);
         let cell = &self.cut.cells[place];
         let h = self.discretisation.cell_size(cell.cell as usize);
+        let shear = self.discretisation.mesh.shear();
         let (body, ball) = (cell.bodies[surface], &cell.balls[surface]);
         CutPiece {
             nodes: &self.nodes[place],
             pressures: &self.pressures[place],
             body,
-            origin: ball.center.map(|x| -x / ball.radius),
+            origin: (-in_space(shear, &ball.center) / ball.radius).into(),
             edge: h / self.bodies[body as usize].bounding_radius(),
             viscous: self.viscosity * h.powi(D as i32 - 2),
             pressure: h / self.viscosity,

@@ -126,7 +126,8 @@ fn examine<const D: usize>(
         Near::None => (CellState::Fluid, None, None),
         Near::Covered(body) => (CellState::Solid, Some(body), None),
         Near::Cut(cutting) => {
-            let moments = CutMoments::truncated(cutting.iter().map(|cut| (&cut.ball, &cut.flats[..])));
+            let shear = discretisation.mesh.shear();
+            let moments = CutMoments::sheared(shear, cutting.iter().map(|cut| (&cut.ball, &cut.flats[..])));
             let state = match moments.fraction() {
                 share if share <= LEAST_SHARE => return (CellState::Solid, Some(cutting[0].body), None),
                 share if share < GOOD_SHARE => CellState::Bad,
@@ -149,7 +150,7 @@ fn with_surfaces<const D: usize>(cell: u32, cutting: Vec<Cutting<D>>, moments: C
         moments: CutMoments { volume, surfaces: Vec::with_capacity(count) },
     };
     for (cut, surface) in cutting.into_iter().zip(moments.surfaces) {
-        if cut.flats.is_empty() || surface.area.iter().sum::<f64>() > LEAST_AREA {
+        if surface.area.iter().sum::<f64>() > LEAST_AREA {
             new.bodies.push(cut.body);
             new.balls.push(cut.ball);
             new.moments.surfaces.push(surface);
@@ -158,26 +159,52 @@ fn with_surfaces<const D: usize>(cell: u32, cutting: Vec<Cutting<D>>, moments: C
     new
 }
 
+/// A displacement in a cell, in units of its edge: in its coordinates.
+pub fn in_cell<const D: usize>(shear: f64, arm: &Vector<D>) -> Vector<D> {
+    let mut place = *arm;
+    place[0] -= shear * arm[1];
+    place
+}
+
+/// A displacement in coordinates of a cell: in space, in units of its edge.
+pub fn in_space<const D: usize>(shear: f64, place: &[f64; D]) -> Vector<D> {
+    let mut arm = Vector::from(*place);
+    arm[0] += shear * place[1];
+    arm
+}
+
+/// The least and the largest distance of the points of a cell of edge `h` from one that its centre is at `arm`
+/// from. The least may be that of a box around a sheared cell.
+fn distances<const D: usize>(arm: &Vector<D>, h: f64, shear: f64) -> [f64; 2] {
+    let half = Vector::<D>::from_fn(|d, _| 0.5 * h * if d == 0 { 1.0 + shear.abs() } else { 1.0 });
+    let nearest = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half[d]).max(0.0)).norm();
+    let corner = |k: usize| -> f64 {
+        let side = std::array::from_fn(|d| if k >> d & 1 == 1 { 0.5 * h } else { -0.5 * h });
+        (arm + in_space(shear, &side)).norm()
+    };
+    [nearest, (0..1 << D).map(corner).fold(0.0, f64::max)]
+}
+
 /// Bodies that cut a cell. One that only touches it does not, unless a flat of it is a face of the cell.
 fn near<const D: usize>(
     discretisation: &Discretisation<D>,
     (tree, flats): (&BallTree<'_, D>, &Flats<D>),
     cell: usize,
 ) -> Near<D> {
-    let h = discretisation.cell_size(cell);
-    let lower = discretisation.mesh.lower_corner(&discretisation.mesh.cells()[cell]);
-    let center = lower + Vector::repeat(0.5 * h);
+    let (mesh, h) = (&discretisation.mesh, discretisation.cell_size(cell));
+    let shear = mesh.shear();
+    let center = mesh.lower_corner(&mesh.cells()[cell]) + Vector::repeat(0.5 * h);
     let (mut covering, mut cutting) = (None, Vec::new());
-    tree.any_within(&center, 0.5 * h * (D as f64).sqrt(), |body| {
+    tree.any_within(&center, mesh.half_diagonal(h), |body| {
         let ball = &tree.balls()[body];
         let arm = ball.arm(&center);
-        let farthest = arm.map(|x| x.abs() + 0.5 * h).norm();
-        let nearest = arm.map(|x| (x.abs() - 0.5 * h).max(0.0)).norm();
+        let [nearest, farthest] = distances(&arm, h, shear);
+        let in_cell = in_cell(shear, &(arm / h));
         let at = BallInCell {
-            center: std::array::from_fn(|d| 0.5 - arm[d] / h),
+            center: std::array::from_fn(|d| 0.5 - in_cell[d]),
             radius: ball.bounding_radius() / h,
         };
-        let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h));
+        let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h, shear));
         let flats: Vec<FlatInCell<D>> =
             in_cell.filter(|flat| !flat.leaves_cell() && !flat.leaves_ball(&at)).collect();
         if farthest <= ball.bounding_radius() && flats.is_empty() {

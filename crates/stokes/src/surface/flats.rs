@@ -18,10 +18,12 @@ pub struct Flat<const D: usize> {
 }
 
 impl<const D: usize> Flat<D> {
-    /// The plane in the coordinates of a cell of this edge length, in which its ball is `ball`.
-    pub fn in_cell(&self, ball: &BallInCell<D>, edge: f64) -> FlatInCell<D> {
+    /// The plane in the coordinates of a cell of this edge length and shear, in which its ball is `ball`.
+    pub fn in_cell(&self, ball: &BallInCell<D>, edge: f64, shear: f64) -> FlatInCell<D> {
+        let mut normal = self.normal;
+        normal[1] += shear * normal[0];
         let center = Vector::<D>::from(ball.center);
-        FlatInCell::new(self.normal.into(), self.distance / edge + self.normal.dot(&center))
+        FlatInCell::new(normal.into(), self.distance / edge + normal.dot(&center))
     }
 }
 

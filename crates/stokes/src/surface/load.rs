@@ -7,7 +7,7 @@ use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss, gauss_cube, node_count, value};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 
-use super::cut_cells::{CutCell, CutCells};
+use super::cut_cells::{CutCell, CutCells, in_space};
 use crate::space::Discretisation;
 
 /// Gauss points on the way from the centre of a body to its surface.
@@ -55,7 +55,8 @@ where
         for ((&body, ball), surface) in of.bodies.iter().zip(&of.balls).zip(&of.moments.surfaces) {
             let center = lower + Vector::from(ball.center) * h;
             for ((at, _), normal) in points.iter().zip(&surface.normal) {
-                let arm = (Vector::from(*at) - Vector::from(ball.center)) * h;
+                let place: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
+                let arm = in_space(discretisation.mesh.shear(), &place) * h;
                 // The normal of the moments points into the body.
                 let flux = -arm.dot(&Vector::from(*normal)) * h.powi(D as i32 - 1);
                 let sum = along_ray(&ray, &arm, |arm| in_box(center + arm));

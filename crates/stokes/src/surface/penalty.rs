@@ -58,6 +58,8 @@ pub fn penalties<const D: usize>(
             volume.add(lines, &moments.volume);
             moments.surfaces.iter().for_each(|part| surface.add(lines, &part.area));
         }
+        let shear = discretisation.mesh.shear();
+        let [volume, surface] = [volume.sheared(shear), surface.sheared(shear)];
         // int 4 eps:eps on the surface to int 2 eps:eps in the volume.
         eigenvalue(&surface, &volume).map(|ratio| FACTOR * 2.0 * ratio)
     };

@@ -84,6 +84,28 @@ impl<const D: usize> Products<D> {
         }
     }
 
+    /// The same with derivatives in space, `d_1 - shear d_0` instead of `d_1`, where cells are sheared.
+    #[must_use]
+    pub fn sheared(mut self, shear: f64) -> Self {
+        if shear == 0.0 {
+            return self;
+        }
+        let (n, straight) = (node_count::<D>(2), self.planes[0][0].clone());
+        let (crossed, mut second) = (self.planes[1][0].clone(), self.planes[1][1].clone());
+        let place = |i: usize, j: usize| self.first[i] + self.second[j];
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let mixed = crossed[place(i, j)] + crossed[place(j, i)];
+            second[place(i, j)] += shear * (shear * straight[place(i, j)] - mixed);
+        }
+        self.planes[1][1] = second;
+        for a in 1..D {
+            let along = if a == 1 { straight.clone() } else { self.planes[a][0].clone() };
+            let to = if a == 1 { 0 } else { 1 };
+            self.planes[a][to].iter_mut().zip(along).for_each(|(sum, along)| *sum -= shear * along);
+        }
+        self
+    }
+
     /// `int d_a phi_i d_b phi_j` for `b <= a`.
     #[inline]
     pub fn of(&self, [a, b]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
@@ -115,13 +137,17 @@ mod tests {
     use super::*;
     use gluey_fem::element::{gauss_cube, gradient};
 
-    fn are_sums_over_the_points<const D: usize>(offset: [f64; D]) {
+    fn are_sums_over_the_points<const D: usize>(offset: [f64; D], shear: f64) {
         let rule = gauss_cube::<D>(POINTS);
         let weights: Vec<f64> = (0..rule.len()).map(|q| (3.0 * q as f64).sin()).collect();
         let mut products = Products::zeros();
         products.add(&Lines::new(offset), &weights);
-        let slope =
-            |node: usize, x: &[f64; D]| gradient::<D>(2, node, &std::array::from_fn(|d| x[d] + offset[d]));
+        let products = products.sheared(shear);
+        let slope = |node: usize, x: &[f64; D]| {
+            let mut slope = gradient::<D>(2, node, &std::array::from_fn(|d| x[d] + offset[d]));
+            slope[1] -= shear * slope[0];
+            slope
+        };
         for (a, b) in (0..D).flat_map(|a| (0..=a).map(move |b| (a, b))) {
             for (i, j) in [(0, 1), (4, 4), (2, 7), (node_count::<D>(2) - 1, 3)] {
                 let terms = rule.iter().zip(&weights).map(|((x, _), w)| w * slope(i, x)[a] * slope(j, x)[b]);
@@ -136,7 +162,9 @@ mod tests {
 
     #[test]
     fn products_are_sums_over_the_points() {
-        are_sums_over_the_points::<2>([0.0, -1.0]);
-        are_sums_over_the_points::<3>([0.0, 1.0, -2.0]);
+        for shear in [0.0, -0.4] {
+            are_sums_over_the_points::<2>([0.0, -1.0], shear);
+            are_sums_over_the_points::<3>([0.0, 1.0, -2.0], shear);
+        }
     }
 }

@@ -6,6 +6,7 @@ use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_levelset::{Ball, Body};
 
 use super::coupling::SurfaceCoupling;
+use super::cut_cells::in_space;
 use crate::space::{Discretisation, VelocitySpace};
 
 /// A field at a point of a cut cell, and the weights there.
@@ -24,10 +25,14 @@ struct Shapes<const D: usize> {
 }
 
 impl<const D: usize> Shapes<D> {
-    fn new() -> Self {
+    fn new(shear: f64) -> Self {
         let points: Vec<[f64; D]> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.0).collect();
+        let in_space = |mut slope: [f64; D]| {
+            slope[1] -= shear * slope[0];
+            slope
+        };
         let of_velocity = |x: &[f64; D]| {
-            (0..node_count::<D>(2)).map(|i| (value::<D>(2, i, x), gradient::<D>(2, i, x))).collect()
+            (0..node_count::<D>(2)).map(|i| (value::<D>(2, i, x), in_space(gradient::<D>(2, i, x)))).collect()
         };
         let of_pressure = |x: &[f64; D]| (0..node_count::<D>(1)).map(|i| value::<D>(1, i, x)).collect();
         Self {
@@ -59,32 +64,35 @@ impl<const D: usize> Shapes<D> {
 }
 
 /// `int_G t r` for the traction `t = sigma n` on each body, `n` out of it, and the arm `r` from its centre,
-/// of a nodal field with all constraints fulfilled and the pressures at all nodes. The traction is the one
-/// that balances the forces: with the penalty in it.
+/// of a nodal field with all constraints fulfilled and the pressures at all nodes, relative to a linear flow
+/// with this strain. The traction is the one that balances the forces: with the penalty in it.
 pub fn first_moments<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
     space: &VelocitySpace<D>,
     bodies: &[Ball<D>],
     viscosity: f64,
-    [velocity, pressure]: [&[f64]; 2],
+    ([velocity, pressure], undisturbed): ([&[f64]; 2], &Matrix<D>),
 ) -> Vec<Matrix<D>>
 where
     Dim<D>: Space<D>,
 {
     let discretisation = space.discretisation();
-    let shapes = Shapes::<D>::new();
+    let shear = discretisation.mesh.shear();
+    let shapes = Shapes::<D>::new(shear);
     let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
-    for (place, cut) in surfaces.cut.cells.iter().enumerate() {
+    for (index, cut) in surfaces.cut.cells.iter().enumerate() {
         let cell = cut.cell as usize;
         let h = discretisation.cell_size(cell);
         let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
         for (q, at) in shapes.points.iter().enumerate() {
-            let sample = shapes.sample(discretisation, cell, q, [velocity, pressure]);
+            let mut sample = shapes.sample(discretisation, cell, q, [velocity, pressure]);
+            sample.strain += undisturbed * (2.0 * h);
             for ((&body, ball), surface) in cut.bodies.iter().zip(&cut.balls).zip(&cut.moments.surfaces) {
-                let arm = Vector::<D>::from_fn(|d, _| h * (at[d] - ball.center[d]));
-                let motion = space.twist(velocity, body as usize).velocity_at(&arm);
+                let place: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
+                let arm = in_space(shear, &place) * h;
+                let motion = space.twist(velocity, body as usize).velocity_at(&arm) - undisturbed * arm;
                 let normal = Vector::<D>::from_column_slice(&surface.normal[q]);
-                let penalty = surfaces.penalty(place) * surface.area[q];
+                let penalty = surfaces.penalty(index) * surface.area[q];
                 let viscous = (sample.velocity - motion) * penalty - sample.strain * normal;
                 let traction = viscous * stress + normal * (area * sample.pressure);
                 debug_assert!((ball.radius * h - bodies[body as usize].bounding_radius()).abs() < 1e-9);

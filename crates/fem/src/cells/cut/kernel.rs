@@ -67,6 +67,8 @@ pub(super) struct Pieces<'a, V: Lanes> {
     pub step: usize,
     /// `h / eta`.
     pub pressure: V,
+    /// Shear of the cells.
+    pub shear: V,
     /// Arm of the lower corner in radii of the ball, and the edge of the cell in radii.
     pub origin: [V; MOST],
     /// See `origin`.
@@ -261,11 +263,17 @@ impl<V: Lanes> Planes<V> {
                     point.gradient[c][d] = dot(shape, &field[1 + d][line]);
                 }
                 point.gradient[c][D - 1] = dot(slope, &field[0][line]);
+                // In space.
+                let along = point.gradient[c][0].mul(pieces.shear);
+                point.gradient[c][1] = point.gradient[c][1].sub(along);
             }
             point.p = dot(&shapes.pressure[q], &self.pressure[line]).mul(pieces.pressure);
             let arm = pieces.arm::<D>(shapes, line, q);
             let moments = pieces.at::<D>(line + POINTS.pow(D as u32 - 1) * q);
-            let tested = point.tested::<D>(&moments, &arm, twist);
+            let mut tested = point.tested::<D>(&moments, &arm, twist);
+            for gradient in &mut tested.gradient[..D] {
+                gradient[0] = gradient[0].sub(gradient[1].mul(pieces.shear));
+            }
             for c in 0..D {
                 for l in 0..NODES {
                     let [shape, slope] = [shape[l], slope[l]].map(V::splat);
@@ -301,6 +309,9 @@ impl<V: Lanes> Pieces<'_, V> {
             let at = if d == D - 1 { last } else { index[d] };
             arm[d] = self.edge.mul_add(V::splat(shapes.points[at]), self.origin[d]);
         }
+        let second = if D == 2 { last } else { index[1] };
+        let leaning = self.edge.mul(V::splat(shapes.points[second]));
+        arm[0] = leaning.mul_add(self.shear, arm[0]);
         arm
     }
 

@@ -59,6 +59,8 @@ pub struct CutOperator<T, const D: usize> {
     pressure_terms: Jagged<u32>,
     twist_terms: Jagged<u32>,
     piece_count: usize,
+    /// Shear of the cells.
+    shear: T,
 }
 
 impl<T: CellScalar, const D: usize> CutOperator<T, D> {
@@ -88,6 +90,7 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
             pressure_terms: Jagged::default(),
             twist_terms: Jagged::default(),
             piece_count,
+            shear: T::ZERO,
         };
         for (k, piece) in pieces.enumerate() {
             new.set(k, &piece);
@@ -97,6 +100,12 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
         new.pressure_terms = new.terms(corners, pressure_count);
         new.twist_terms = new.terms(Self::PLACES - 1..Self::PLACES, body_count);
         new
+    }
+
+    /// The operator in cells that are sheared: a point of the unit cube has the place `x + shear y e_1`.
+    #[must_use]
+    pub fn sheared(self, shear: f64) -> Self {
+        Self { shear: T::from_f64(shear), ..self }
     }
 
     fn set(&mut self, piece: usize, data: &CutPiece<'_, D>) {
@@ -213,6 +222,7 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
                 moments: &moments[first..],
                 step: GROUP,
                 pressure: at(0),
+                shear: V::splat(self.shear),
                 edge: at(1),
                 origin: std::array::from_fn(|d| if d < D { at(2 + d) } else { V::splat(T::ZERO) }),
             };
@@ -259,6 +269,7 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
             pressure_terms: Jagged::default(),
             twist_terms: Jagged::default(),
             piece_count: GROUP,
+            shear: self.shear,
         }
     }
 }

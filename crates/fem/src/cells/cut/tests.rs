@@ -10,24 +10,28 @@ use crate::element::{gauss_cube, gradient, node_count, value};
 const EDGE: f64 = 0.31;
 const VISCOUS: f64 = 1.7;
 const PRESSURE: f64 = 0.4;
+/// Shears of the cells.
+const SHEARS: [f64; 2] = [0.0, 0.43];
 
 fn origin<const D: usize>() -> [f64; D] {
     std::array::from_fn(|d| -0.9 + 0.2 * d as f64)
 }
 
-/// The moments of the unit cube and a ball that matches origin and edge, with a penalty of 20.
-fn moments<const D: usize>() -> (CutMoments<D>, Vec<f64>) {
-    let ball = BallInCell { center: origin::<D>().map(|x| -x / EDGE), radius: 1.0 / EDGE };
-    let moments = CutMoments::new(&[ball]);
+/// The moments of a cell and a ball that matches origin and edge, with a penalty of 20.
+fn moments<const D: usize>(shear: f64) -> (CutMoments<D>, Vec<f64>) {
+    let mut center = origin::<D>().map(|x| -x / EDGE);
+    center[0] -= shear * center[1];
+    let ball = BallInCell { center, radius: 1.0 / EDGE };
+    let moments = CutMoments::sheared(shear, [(&ball, &[][..])].into_iter());
     let penalty = moments.surfaces[0].area.iter().map(|area| 20.0 * area).collect();
     (moments, penalty)
 }
 
 /// An operator with `count` equal pieces on nodes of their own.
-fn operator<T: crate::cells::CellScalar, const D: usize>(count: usize) -> CutOperator<T, D> {
+fn operator<T: crate::cells::CellScalar, const D: usize>(shear: f64, count: usize) -> CutOperator<T, D> {
     let (n, m) = (node_count::<D>(2), node_count::<D>(1));
     let nodes: Vec<u32> = (0..(count * n) as u32).collect();
-    let (moments, penalty) = moments::<D>();
+    let (moments, penalty) = moments::<D>(shear);
     let piece = |k: usize| CutPiece {
         nodes: &nodes[k * n..][..n],
         pressures: &nodes[k * m..][..m],
@@ -41,7 +45,7 @@ fn operator<T: crate::cells::CellScalar, const D: usize>(count: usize) -> CutOpe
         penalty: &penalty,
     };
     let pieces: Vec<CutPiece<'_, D>> = (0..count).map(piece).collect();
-    CutOperator::new(pieces.into_iter(), [count * n, count * m, count])
+    CutOperator::new(pieces.into_iter(), [count * n, count * m, count]).sheared(shear)
 }
 
 /// The velocity, twice the strain, the motion of the ball and the pressure at a point.
@@ -51,11 +55,12 @@ struct Fields<const D: usize> {
     p: f64,
 }
 
-fn fields<const D: usize>(x: &[f64], at: &[f64; D]) -> Fields<D> {
+fn fields<const D: usize>(shear: f64, x: &[f64], at: &[f64; D]) -> Fields<D> {
     let (n, m) = (node_count::<D>(2), node_count::<D>(1));
     let mut fields = Fields { jump: [0.0; D], strain: [[0.0; D]; D], p: 0.0 };
     for i in 0..n {
-        let (shape, slope) = (value::<D>(2, i, at), gradient::<D>(2, i, at));
+        let (shape, mut slope) = (value::<D>(2, i, at), gradient::<D>(2, i, at));
+        slope[1] -= shear * slope[0];
         for c in 0..D {
             fields.jump[c] += shape * x[i * D + c];
             for d in 0..D {
@@ -64,7 +69,8 @@ fn fields<const D: usize>(x: &[f64], at: &[f64; D]) -> Fields<D> {
             }
         }
     }
-    let r: [f64; D] = std::array::from_fn(|d| origin::<D>()[d] + EDGE * at[d]);
+    let mut r: [f64; D] = std::array::from_fn(|d| origin::<D>()[d] + EDGE * at[d]);
+    r[0] += EDGE * shear * at[1];
     let twist = &x[n * D + m..];
     for c in 0..D {
         let (i, j) = ((c + 1) % 3, (c + 2) % 3);
@@ -79,11 +85,11 @@ fn fields<const D: usize>(x: &[f64], at: &[f64; D]) -> Fields<D> {
 }
 
 /// `(v, q)^T K (u, p)` by the forms as they are written.
-fn form<const D: usize>(u: &[f64], v: &[f64]) -> f64 {
-    let (moments, penalty) = moments::<D>();
+fn form<const D: usize>(shear: f64, u: &[f64], v: &[f64]) -> f64 {
+    let (moments, penalty) = moments::<D>(shear);
     let mut sum = 0.0;
     for (q, (at, _)) in gauss_cube::<D>(POINTS).iter().enumerate() {
-        let (u, v) = (fields::<D>(u, at), fields::<D>(v, at));
+        let (u, v) = (fields::<D>(shear, u, at), fields::<D>(shear, v, at));
         let (volume, normal) = (moments.volume[q], moments.surfaces[0].normal[q]);
         let [mut viscous, mut coupling] = [0.0; 2];
         for c in 0..D {
@@ -112,30 +118,32 @@ fn matrix<const D: usize>(operator: &CutOperator<f64, D>, piece: usize) -> Vec<f
     matrix
 }
 
-fn the_kernel_takes_the_forms<const D: usize>() {
+fn the_kernel_takes_the_forms<const D: usize>(shear: f64) {
     let size = slots::<D>();
-    let matrix = matrix(&operator::<f64, D>(3), 2);
+    let matrix = matrix(&operator::<f64, D>(shear, 3), 2);
     let asymmetry = (0..size * size).map(|k| (matrix[k] - matrix[k % size * size + k / size]).abs());
     assert!(asymmetry.fold(0.0, f64::max) < 1e-12);
     for seed in 0..4 {
         let (u, v) = (random(size, seed), random(size, 10 + seed));
         let product = |row: usize| (0..size).map(|k| matrix[row * size + k] * u[k]).sum::<f64>();
         let found: f64 = (0..size).map(|row| v[row] * product(row)).sum();
-        let expected = form::<D>(&u, &v);
+        let expected = form::<D>(shear, &u, &v);
         assert!((found - expected).abs() < 1e-11 * expected.abs().max(1.0), "{found} {expected}");
     }
 }
 
 #[test]
 fn the_kernel_takes_the_forms_as_they_are_written() {
-    the_kernel_takes_the_forms::<2>();
-    the_kernel_takes_the_forms::<3>();
+    for shear in SHEARS {
+        the_kernel_takes_the_forms::<2>(shear);
+        the_kernel_takes_the_forms::<3>(shear);
+    }
 }
 
 /// The sweep over more pieces than lanes is the matrix of each.
 fn pieces_are_independent<const D: usize>() {
     let (count, n, m, w) = (19, node_count::<D>(2) * D, node_count::<D>(1), twist_len::<D>());
-    let operator = operator::<f64, D>(count);
+    let operator = operator::<f64, D>(SHEARS[1], count);
     let (x, p) = (random(count * (n + w), 1), random(count * m, 2));
     let (mut y, mut q) = (vec![1.0; x.len()], vec![1.0; p.len()]);
     operator.add([&x, &p], [&mut y, &mut q], &mut Vec::new());
@@ -160,7 +168,7 @@ fn a_sweep_adds_what_the_matrices_give() {
 }
 
 fn kernels_agree<T: crate::cells::CellScalar, const D: usize>(tolerance: f64) {
-    let operator = operator::<T, D>(16);
+    let operator = operator::<T, D>(SHEARS[1], 16);
     let x: Vec<T> = random(slots::<D>() * 16, 3).into_iter().map(T::from_f64).collect();
     let (mut portable, mut chosen) = (x.clone(), x.clone());
     operator.run::<Portable<T>>(0, &x, &mut portable);

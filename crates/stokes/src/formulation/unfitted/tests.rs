@@ -126,7 +126,7 @@ where
         let u = Vector::<D>::from_column_slice(&found.velocity[n * D..][..D]);
         assert!((u - exact(&nodes.point(n))).amax() < 1e-9);
     }
-    let wrench = found.problem.wrenches(&found.velocity, &found.pressure, None).unwrap()[0];
+    let wrench = found.problem.wrenches(&found.velocity, &found.pressure, None, &Matrix::zeros()).unwrap()[0];
     assert!(wrench.force.amax() < 1e-9, "{D}D: {wrench:?}");
 }
 

@@ -183,8 +183,8 @@ mod tests {
         let mut schur = CellSchur::<D>::new().unwrap();
         let (eta, h) = (40.0, 0.25f64);
         let stiffness = h.powi(D as i32 - 2);
-        let solid = ReferenceMatrices::<D>::new().viscous.iter().map(|k| (eta - 1.0) * stiffness * k);
-        let own: Vec<f64> = solid.collect();
+        let fluid = ReferenceMatrices::<D>::new().viscous;
+        let own: Vec<f64> = fluid.iter().map(|k| (eta - 1.0) * stiffness * k).collect();
         let found = schur.of(stiffness, h.powi(D as i32 - 1), &own).unwrap();
         for (a, b) in found.iter().zip(&schur.unit) {
             assert!((a - h.powi(D as i32) / eta * b).abs() < 1e-9);
@@ -197,7 +197,7 @@ mod tests {
         Dim<D>: Space<D>,
     {
         let schur = CellSchur::<D>::new().unwrap().unit;
-        let mass = ReferenceMatrices::<D>::new().pressure_mass;
+        let mass = &*ReferenceMatrices::<D>::new().pressure_mass;
         let m = ReferenceMatrices::<D>::PRESSURE;
         let factor = mass_factor(&schur, mass);
         assert!((&factor - factor.transpose()).amax() < 1e-12);

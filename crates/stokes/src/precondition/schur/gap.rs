@@ -139,7 +139,7 @@ where
     fn block(&self, gap: Gap, cells: &[(u32, u32)], mass: &SparseMatrix) -> Result<Block, StokesError> {
         let (n, m) = (gap.velocities.len(), gap.pressures.len());
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, m));
-        let reference = ReferenceMatrices::<D>::new();
+        let reference = self.system.discretisation().reference();
         for cell in cells_of(cells, &gap.velocities) {
             let cell = &self.system.cells[cell as usize];
             self.add_cell(cell, &reference, &gap, &mut a, &mut b);

@@ -144,7 +144,7 @@ where
     let discretisation = system.discretisation();
     let n = ReferenceMatrices::<D>::VELOCITY;
     let m = ReferenceMatrices::<D>::PRESSURE;
-    let reference = ReferenceMatrices::<D>::new();
+    let reference = discretisation.reference();
     let cells = elements.cells().iter().enumerate().map(|(index, cell)| {
         let (scale, own) = elements.viscous(index);
         (cell, scale, own)

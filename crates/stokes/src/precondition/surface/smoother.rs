@@ -69,7 +69,7 @@ where
         let mut diagonal = diagonal(elements, surfaces, &blocks.positions, &matrix)?;
         let mut operator = ViscousOperator::new(system);
         let largest = SAFETY * estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
-        let in_fluid = cell_lambda_max::<D>();
+        let in_fluid = cell_lambda_max::<D>(&system.discretisation().reference());
         let interval = SpectralInterval { lower: in_fluid / RATIO, upper: largest.max(in_fluid) };
         let chebyshev = Chebyshev::new(operator.dim(), DEGREE, interval);
         operator.take_applications();

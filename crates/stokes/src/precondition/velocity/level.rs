@@ -91,7 +91,7 @@ where
         if !smooths_twists || space.holds_twists() {
             diagonal.hold_twists();
         }
-        let lambda_max = cell_lambda_max::<D>();
+        let lambda_max = cell_lambda_max::<D>(&space.discretisation().reference());
         Ok(Self {
             near_bodies: NearBodies::new(space, &cells, &diagonal, lambda_max),
             operator: CountedOperator::new(space, &cells, cell_count, None),
@@ -198,9 +198,9 @@ fn restrict_load<const D: usize>(
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
 /// that of sums over cells: `x^T K_c x <= lambda x^T D_c x` on each. On uniform meshes it is a few percent
 /// too large.
-pub fn cell_lambda_max<const D: usize>() -> f64 {
+pub fn cell_lambda_max<const D: usize>(reference: &ReferenceMatrices<D>) -> f64 {
     let n = ReferenceMatrices::<D>::VELOCITY;
-    let viscous = ReferenceMatrices::<D>::new().viscous;
+    let viscous = &reference.viscous;
     let scale = |i: usize| viscous[i * (n + 1)].sqrt();
     let scaled = nalgebra::DMatrix::from_fn(n, n, |i, j| viscous[i * n + j] / (scale(i) * scale(j)));
     scaled.symmetric_eigenvalues().max()
