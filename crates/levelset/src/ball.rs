@@ -49,6 +49,38 @@ impl<const D: usize> Ball<D> {
         &self.center
     }
 
+    /// Calls `visit(arm)` for all images whose surface is no farther than `reach` from a place in the box, with
+    /// the displacements from their centres.
+    pub fn for_each_image(&self, x: &Vector<D>, reach: f64, mut visit: impl FnMut(&Vector<D>)) {
+        let (nearest, farthest) = (self.arm(x), self.radius + reach);
+        let mut visit_near = |arm: &Vector<D>| {
+            if arm.norm() <= farthest {
+                visit(arm);
+            }
+        };
+        let periods = || self.period().iter().flatten().copied();
+        if periods().all(|period| 2.0 * farthest < period) {
+            return visit_near(&nearest);
+        }
+        let lattice = self.lattice.reduced();
+        let count = |d: usize| self.period()[d].map_or(0, |period| (farthest / period).ceil() as i32 + 1);
+        let mut image: [i32; D] = std::array::from_fn(|d| -count(d));
+        loop {
+            visit_near(&(nearest + lattice.shift(&image)));
+            let Some(d) = (0..D).find(|&d| image[d] < count(d)) else { return };
+            image[d] += 1;
+            (0..d).for_each(|lower| image[lower] = -count(lower));
+        }
+    }
+
+    /// An image of a displacement in the box: the one within half a period along each axis, in space.
+    fn image_of(&self, arm: &Vector<D>) -> Vector<D> {
+        let mut image =
+            Vector::from_fn(|d, _| if d == 0 { arm[d] } else { nearest_image(arm[d], self.period()[d]) });
+        image[0] = nearest_image(image[0] + self.lattice.shear() * image[1], self.period()[0]);
+        image
+    }
+
     /// Period along each axis, where there is one.
     pub fn period(&self) -> &[Option<f64>; D] {
         self.lattice.periods()
@@ -73,9 +105,15 @@ impl<const D: usize> Body<D> for Ball<D> {
         if shear == 0.0 {
             return Vector::from_fn(|d, _| nearest_image(arm[d], self.period()[d]));
         }
-        let mut arm = Vector::from_fn(|d, _| if d == 0 { arm[d] } else { nearest_image(arm[d], self.period()[d]) });
-        arm[0] = nearest_image(arm[0] + shear * arm[1], self.period()[0]);
-        arm
+        let short = self.image_of(&arm);
+        // Across y the image on the other side may be nearer, since it is elsewhere along x.
+        let mut other = short;
+        if let Some(height) = self.period()[1] {
+            let side = 1f64.copysign(short[1]);
+            other[1] -= side * height;
+            other[0] = nearest_image(other[0] - side * self.lattice.tilt(), self.period()[0]);
+        }
+        if other.norm_squared() < short.norm_squared() { other } else { short }
     }
 
     fn bounding_radius(&self) -> f64 {
@@ -120,6 +158,31 @@ mod tests {
         assert!((arm - lattice.nearest(&(at - place)).0).norm() < 1e-15);
         // Up by 0.05 across a border whose image is 0.4 further along x.
         assert!((arm - Vector::<3>::new(-0.3, 0.05, -0.04)).norm() < 1e-14, "{arm:?}");
+    }
+
+    /// The nearest image, and all that are near, of a loop over many.
+    #[test]
+    fn images_are_those_of_a_loop() {
+        for trial in 0..400u32 {
+            let number = |k: u32| f64::from((trial * 7919 + k * 104_729) % 1000) / 1000.0;
+            let lattice = Lattice::<2>::new([Some(1.0), Some(0.8)]).tilted(number(1) - 0.5);
+            let center = Vector::<2>::new(number(2), number(3));
+            let x = Vector::<2>::new(number(4), number(5));
+            let ball = Ball::in_lattice(center, 0.1, lattice);
+            let arm = lattice.from_box(&x, 0.0) - lattice.from_box(&center, 0.0);
+            let images = (-4..=4).flat_map(|i| (-4..=4).map(move |j| [i, j]));
+            let mut norms: Vec<f64> = images.map(|image| (arm + lattice.shift(&image)).norm()).collect();
+            norms.sort_by(f64::total_cmp);
+            assert!((ball.arm(&x).norm() - norms[0]).abs() < 1e-14);
+            for reach in [0.05, 0.3, 0.9] {
+                let mut found = Vec::new();
+                ball.for_each_image(&x, reach, |arm| found.push(arm.norm()));
+                found.sort_by(f64::total_cmp);
+                let near: Vec<f64> = norms.iter().copied().take_while(|norm| *norm <= 0.1 + reach).collect();
+                assert_eq!(found.len(), near.len());
+                assert!(found.iter().zip(&near).all(|(a, b)| (a - b).abs() < 1e-13));
+            }
+        }
     }
 
     #[test]

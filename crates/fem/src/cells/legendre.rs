@@ -48,8 +48,9 @@ pub(super) struct Coefficients<T> {
     shear: T,
     /// Mass of the products.
     mass: Vec<T>,
-    /// Derivatives: `c_{l+1} P_{l+1}' = slope[l] c_l P_l`.
-    slope: [T; 2],
+    /// Derivatives in space along each axis: product that gets, product that gives, factor. In a table, for
+    /// loops that are unrolled in all kernels take minutes to compile.
+    derivatives: Vec<Vec<(u8, u8, T)>>,
 }
 
 /// Unknowns of one component.
@@ -91,13 +92,24 @@ impl<T: Scalar> Coefficients<T> {
             mass: (0..nodes::<D>())
                 .map(|k| T::from_f64(multi_index::<D>(k, 3).into_iter().map(mass).product()))
                 .collect(),
-            slope: [0, 1].map(|l| T::from_f64(DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l])),
+            derivatives: Vec::new(),
         }
     }
 
     /// The matrices of cells that are sheared.
-    pub(super) fn sheared(self, shear: f64) -> Self {
-        Self { shear: T::from_f64(shear), ..self }
+    pub(super) fn sheared<const D: usize>(self, shear: f64) -> Self {
+        // c_{l+1} P_{l+1}' = slope c_l P_l.
+        let slope = |l: usize| DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l];
+        let along = |d: usize, factor: f64| {
+            let places = (0..nodes::<D>()).filter(move |k| k / stride(d) % 3 < 2);
+            let entry = move |k: usize| {
+                (k as u8, (k + stride(d)) as u8, T::from_f64(factor * slope(k / stride(d) % 3)))
+            };
+            places.map(entry).collect::<Vec<_>>()
+        };
+        let mut derivatives: Vec<_> = (0..D).map(|d| along(d, 1.0)).collect();
+        derivatives[1].extend(along(0, -shear));
+        Self { shear: T::from_f64(shear), derivatives, ..self }
     }
 
     /// `r = K u`.
@@ -150,12 +162,6 @@ impl<T: Scalar> Coefficients<T> {
         }
     }
 
-    /// Directions and factors of a derivative in space.
-    #[inline(always)]
-    fn directions(&self, direction: usize) -> [(usize, T); 2] {
-        [(direction, T::ONE), (0, if direction == 1 { T::ZERO - self.shear } else { T::ZERO })]
-    }
-
     /// Adds the derivative in space of a component.
     #[inline(always)]
     fn add_derivative<V: Lanes<Scalar = T>, const D: usize>(
@@ -164,14 +170,8 @@ impl<T: Scalar> Coefficients<T> {
         u: &[V],
         sum: &mut [V; 27],
     ) {
-        for (d, factor) in self.directions(direction).into_iter().take(if direction == 1 { 2 } else { 1 }) {
-            for k in 0..nodes::<D>() {
-                let degree = k / stride(d) % 3;
-                if degree < 2 {
-                    let slope = V::splat(self.slope[degree] * factor);
-                    sum[k] = u[k + stride(d)].mul_add(slope, sum[k]);
-                }
-            }
+        for &(to, from, slope) in &self.derivatives[direction] {
+            sum[to as usize] = u[from as usize].mul_add(V::splat(slope), sum[to as usize]);
         }
     }
 
@@ -183,14 +183,8 @@ impl<T: Scalar> Coefficients<T> {
         strain: &[V; 27],
         r: &mut [V],
     ) {
-        for (d, factor) in self.directions(direction).into_iter().take(if direction == 1 { 2 } else { 1 }) {
-            for k in 0..nodes::<D>() {
-                let degree = k / stride(d) % 3;
-                if degree < 2 {
-                    let slope = V::splat(self.slope[degree] * factor);
-                    r[k + stride(d)] = strain[k].mul_add(slope, r[k + stride(d)]);
-                }
-            }
+        for &(from, to, slope) in &self.derivatives[direction] {
+            r[to as usize] = strain[from as usize].mul_add(V::splat(slope), r[to as usize]);
         }
     }
 

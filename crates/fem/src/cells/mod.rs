@@ -145,7 +145,7 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     #[must_use]
     pub fn sheared(self, shear: f64) -> Self {
         debug_assert!(shear == 0.0 || self.points.is_empty(), "viscosities in sheared cells are uniform");
-        Self { coefficients: self.coefficients.sheared(shear), ..self }
+        Self { coefficients: self.coefficients.sheared::<D>(shear), ..self }
     }
 
     fn push_chunk(

@@ -63,9 +63,12 @@ impl Refinement {
         bodies.any_within(center, ENOUGH * (band + half_diagonal::<D>(h, shear)), |body| {
             let body = &bodies.balls()[body];
             let half = |d: usize| 0.5 * h * if d == 0 { 1.0 + shear.abs() } else { 1.0 };
-            let arm = body.arm(center);
-            let outside = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half(d)).max(0.0)).norm();
-            outside < body.bounding_radius() + band
+            let mut is_near = false;
+            body.for_each_image(center, ENOUGH * (band + half_diagonal::<D>(h, shear)), |arm| {
+                let outside = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half(d)).max(0.0)).norm();
+                is_near |= outside < body.bounding_radius() + band;
+            });
+            is_near
         })
     }
 

@@ -197,24 +197,26 @@ fn near<const D: usize>(
     let (mut covering, mut cutting) = (None, Vec::new());
     tree.any_within(&center, mesh.half_diagonal(h), |body| {
         let ball = &tree.balls()[body];
-        let arm = ball.arm(&center);
-        let [nearest, farthest] = distances(&arm, h, shear);
-        let in_cell = in_cell(shear, &(arm / h));
-        let at = BallInCell {
-            center: std::array::from_fn(|d| 0.5 - in_cell[d]),
-            radius: ball.bounding_radius() / h,
-        };
-        let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h, shear));
-        let flats: Vec<FlatInCell<D>> =
-            in_cell.filter(|flat| !flat.leaves_cell() && !flat.leaves_ball(&at)).collect();
-        if farthest <= ball.bounding_radius() && flats.is_empty() {
-            covering = Some(body as u32);
-        } else if nearest < ball.bounding_radius() && !flats.iter().any(FlatInCell::takes_cell) {
-            cutting.push(Cutting { body: body as u32, ball: at, flats });
-        }
+        ball.for_each_image(&center, mesh.half_diagonal(h), |arm| {
+            let [nearest, farthest] = distances(arm, h, shear);
+            let in_cell = in_cell(shear, &(arm / h));
+            let at = BallInCell {
+                center: std::array::from_fn(|d| 0.5 - in_cell[d]),
+                radius: ball.bounding_radius() / h,
+            };
+            let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h, shear));
+            let flats: Vec<FlatInCell<D>> =
+                in_cell.filter(|flat| !flat.leaves_cell() && !flat.leaves_ball(&at)).collect();
+            if farthest <= ball.bounding_radius() && flats.is_empty() {
+                covering = Some(body as u32);
+            } else if nearest < ball.bounding_radius() && !flats.iter().any(FlatInCell::takes_cell) {
+                cutting.push(Cutting { body: body as u32, ball: at, flats });
+            }
+        });
         covering.is_some()
     });
-    cutting.sort_unstable_by_key(|cut| cut.body);
+    // Images of one body keep their order.
+    cutting.sort_by_key(|cut| cut.body);
     match covering {
         Some(body) => Near::Covered(body),
         None if cutting.is_empty() => Near::None,
