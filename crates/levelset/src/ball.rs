@@ -44,6 +44,13 @@ impl<const D: usize> Ball<D> {
         Self { center, radius, lattice }
     }
 
+    /// A ball at a place in space, repeated by a lattice of any tilt, for a box whose lower border across `y` is
+    /// at `origin`. The tilt is reduced to half a period at most, which changes nothing but the box.
+    pub fn in_space(place: &Vector<D>, radius: f64, lattice: &Lattice<D>, origin: f64) -> Self {
+        let lattice = lattice.reduced();
+        Self { center: lattice.to_box(place, origin), radius, lattice }
+    }
+
     /// Centre, in the box without tilt.
     pub fn center(&self) -> &Vector<D> {
         &self.center

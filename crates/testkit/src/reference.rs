@@ -133,6 +133,22 @@ reference_table!(
     "lattice_sc3d.csv"
 );
 reference_table!(
+    /// A square lattice of free discs in shear, by the strain of the cell: `phi, strain, eta_r, N1, omega`.
+    sheared_square_lattice,
+    "sheared_square2d.csv"
+);
+reference_table!(
+    /// A simple cubic lattice of free spheres in shear, by the strain of the cell: `phi, strain, eta_r, N1, N2,
+    /// omega_z`.
+    sheared_simple_cubic_lattice,
+    "sheared_sc3d.csv"
+);
+reference_table!(
+    /// Cells of several free discs in shear: `cell, strain, radius, x, y, u, v, omega, eta_r, N1`, a row a disc.
+    cells_of_discs,
+    "cells2d.csv"
+);
+reference_table!(
     /// Two spheres that meet in unbounded shear: `t, D_over_a, theta, x1, y1, x2, y2, omega_z`.
     pair_3d_trajectory_unbounded,
     "pair3d_trajectory_unbounded.csv"

@@ -156,7 +156,11 @@ fn equals_the_dense_matrices<T: CellScalar, const D: usize>() {
         operator.stokes(&x, &p, &mut y, &mut q, &mut work);
         let scale = want_y.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let tolerance = 50.0 * T::EPSILON * scale;
-        assert!(distance(&y, &want_y) < tolerance, "{D} {quadrature} {shear} {}", distance(&y, &want_y) / scale);
+        assert!(
+            distance(&y, &want_y) < tolerance,
+            "{D} {quadrature} {shear} {}",
+            distance(&y, &want_y) / scale
+        );
         assert!(distance(&q, &want_q) < tolerance);
         let mut gradient = vec![T::ONE; x.len()];
         operator.viscous(&x, &mut y, &mut work);

@@ -165,7 +165,8 @@ mod tests {
             [-x[1], factor * (x[0] + shear * x[1]), 0.0][k % D]
         };
         for (energy, factor) in energy.iter_mut().zip([1.0, -1.0]) {
-            let row = |i: usize| -> f64 { (0..n).map(|j| reference.viscous[i * n + j] * motion(j, factor)).sum() };
+            let row =
+                |i: usize| -> f64 { (0..n).map(|j| reference.viscous[i * n + j] * motion(j, factor)).sum() };
             *energy = (0..n).map(|i| motion(i, factor) * row(i)).sum();
         }
         // 2 eps:eps of u = (-y, -x) is 4.

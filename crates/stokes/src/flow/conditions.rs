@@ -28,6 +28,8 @@ where
     pub strain: Matrix<D>,
     /// What is known of the bodies.
     pub bodies: Given<'a, D>,
+    /// Whether [`crate::Flow::stress`] is wanted; `unfitted` only.
+    pub stress: bool,
 }
 
 /// What is known of the bodies, one entry each in their order; the other follows from the flow.
@@ -48,7 +50,7 @@ where
 {
     /// Free bodies without forces in a flow with this velocity on the boundary.
     pub fn boundary(boundary: Field<'a, D>) -> Self {
-        Self { boundary, force: None, strain: Matrix::zeros(), bodies: Given::Wrenches(&[]) }
+        Self { boundary, force: None, strain: Matrix::zeros(), bodies: Given::Wrenches(&[]), stress: false }
     }
 
     /// Free bodies without forces in the linear flow `G x`, whose trace is zero, in a box that is periodic in
@@ -70,6 +72,12 @@ where
     #[must_use]
     pub fn with_force(self, force: Option<Field<'a, D>>) -> Self {
         Self { force, ..self }
+    }
+
+    /// The same with the stress of the suspension.
+    #[must_use]
+    pub fn with_stress(self) -> Self {
+        Self { stress: true, ..self }
     }
 
     /// The same with forces and torques on the bodies, which are free.

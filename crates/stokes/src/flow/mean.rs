@@ -1,10 +1,12 @@
 //! The mean velocity, where nothing fixes it.
 
+use gluey_fem::NodeMap;
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, multi_index, node_count, value};
 use gluey_geom::{Dim, Space, Vector};
 
 use crate::formulation::Problem;
+use crate::space::Discretisation;
 use crate::surface::{CellState, CutCells};
 
 /// Takes from a velocity (nodal values, then twists) its mean over fluid and bodies.
@@ -14,14 +16,15 @@ where
 {
     let Some(surfaces) = &problem.system.surfaces else { return };
     let space = &problem.system.space;
-    let weights = weights(problem, &surfaces.cut);
+    let discretisation = problem.discretisation();
+    let weights = fluid_weights(discretisation, &discretisation.velocity, &surfaces.cut);
     let (mut volume, mut sum) = (weights.iter().sum::<f64>(), Vector::<D>::zeros());
     for (weight, u) in weights.iter().zip(velocity.chunks_exact(D)) {
         sum += Vector::<D>::from_column_slice(u) * *weight;
     }
     // The bodies take what the fluid leaves of the box, in proportion to their volumes.
     let bodies = || problem.bodies.iter().map(gluey_levelset::Body::bounding_radius);
-    let rest = problem.discretisation().mesh.domain().extent().product() - volume;
+    let rest = discretisation.mesh.domain().extent().product() - volume;
     let all: f64 = bodies().map(|radius| radius.powi(D as i32)).sum();
     for (body, radius) in bodies().enumerate() {
         let share = rest * radius.powi(D as i32) / all;
@@ -40,21 +43,28 @@ where
     }
 }
 
-/// Integrals of the velocity functions over the fluid.
-fn weights<const D: usize>(problem: &Problem<D>, cut: &CutCells<D>) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
-    let discretisation = problem.discretisation();
-    let nodes = &discretisation.velocity;
+/// The mean of a nodal field for the integrals of its functions.
+pub fn mean_of(weights: &[f64], values: &[f64]) -> f64 {
+    weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>()
+        / weights.iter().sum::<f64>()
+}
+
+/// Integrals over the fluid of the functions of degree 1 or 2.
+pub fn fluid_weights<const D: usize>(
+    discretisation: &Discretisation<D>,
+    nodes: &NodeMap<D>,
+    cut: &CutCells<D>,
+) -> Vec<f64> {
+    let degree = nodes.degree();
     let mut weights = vec![0.0; nodes.node_count()];
-    let simpson = [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0];
-    let of_cube: Vec<f64> = (0..node_count::<D>(2))
-        .map(|i| multi_index::<D>(i, 3).into_iter().map(|k| simpson[k]).product())
+    let on_line: &[f64] = if degree == 2 { &[1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0] } else { &[0.5, 0.5] };
+    let count = node_count::<D>(degree);
+    let of_cube: Vec<f64> = (0..count)
+        .map(|i| multi_index::<D>(i, degree + 1).into_iter().map(|k| on_line[k]).product())
         .collect();
     let shapes: Vec<Vec<f64>> = gauss_cube::<D>(POINTS)
         .iter()
-        .map(|(x, _)| (0..node_count::<D>(2)).map(|i| value::<D>(2, i, x)).collect())
+        .map(|(x, _)| (0..count).map(|i| value::<D>(degree, i, x)).collect())
         .collect();
     for cell in 0..nodes.cell_count() {
         let volume = discretisation.cell_size(cell).powi(D as i32);

@@ -4,6 +4,7 @@ mod conditions;
 mod mean;
 mod prepared;
 mod refinement;
+mod stress;
 mod warm_start;
 
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use gluey_levelset::{Ball, Body};
 
 use crate::error::StokesError;
 use crate::film::{FilmForce, Lubrication};
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, symmetric};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
@@ -23,6 +24,7 @@ use warm_start::WarmStart;
 pub use conditions::{Conditions, Field, Given};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
+pub use stress::Stress;
 pub use warm_start::{NodalFields, WarmStartError};
 
 /// Parameters of a [`FlowSolver`].
@@ -73,6 +75,8 @@ where
     pub wrenches: Vec<Wrench<D>>,
     /// Strain of the linear flow that velocities, spins and pressures are relative to; zero for none.
     pub strain: Matrix<D>,
+    /// Stress of the suspension, where [`Conditions::with_stress`] asked for it.
+    pub stress: Option<Stress<D>>,
     /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
     pub films: Vec<FilmForce<D>>,
     /// Linear solves made.
@@ -246,6 +250,8 @@ where
         }
         let twists = problem.twists(&velocity)?;
         let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
+        let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], &x));
+        let stress = stress.transpose()?;
         velocity.truncate(problem.system.space.full_dim());
         pressure.truncate(problem.system.pressure.dim());
         let flow = Flow {
@@ -256,6 +262,7 @@ where
             twists,
             wrenches,
             strain: conditions.strain,
+            stress,
             films: problem.film_forces(&x),
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,
@@ -322,6 +329,48 @@ where
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }
     }
+}
+
+/// The stress of a flow: its velocity, nodal and of bodies, and pressure, and the reduced vector.
+fn stress_of<const D: usize>(
+    problem: &Problem<D>,
+    conditions: &Conditions<'_, D>,
+    [velocity, pressure]: [&[f64]; 2],
+    x: &[f64],
+) -> Result<Stress<D>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    if problem.system.surfaces.is_none() {
+        return Err(StokesError::Unsupported { what: "stresses of suspensions" });
+    }
+    let mut pressure = pressure[..problem.system.pressure.dim()].to_vec();
+    let mean = stress::mean_pressure(problem, &pressure);
+    pressure.iter_mut().for_each(|p| *p -= mean);
+    let fields = [velocity, &pressure[..]];
+    let moments = problem.rigidity.first_moments(problem, fields, &conditions.strain)?;
+    let of_films = problem.system.parts(x)[2].iter().map(|g| g * g).sum::<f64>();
+    let dissipation = stress::dissipation(problem, velocity, &conditions.strain);
+    Ok(Stress {
+        moments: moments.iter().map(symmetric).collect(),
+        of_films: film_moments(&problem.film_forces(x), problem.bodies.len()).iter().map(symmetric).collect(),
+        dissipation: dissipation + of_films,
+        dissipation_of_films: of_films,
+    })
+}
+
+/// The first moments of the forces of films on each body.
+fn film_moments<const D: usize>(films: &[FilmForce<D>], body_count: usize) -> Vec<Matrix<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let mut sums = vec![Matrix::zeros(); body_count];
+    for force in films {
+        for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
+            sums[body] += force.moment(side);
+        }
+    }
+    sums
 }
 
 fn check(params: &FlowParams) -> Result<(), StokesError> {

@@ -13,7 +13,7 @@ use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
 use super::conditions::Conditions;
-use super::{Flow, FlowSolver};
+use super::{Flow, FlowSolver, film_moments};
 use crate::error::StokesError;
 use crate::formulation::{Problem, symmetric_and_traceless};
 
@@ -107,24 +107,24 @@ where
     /// # Errors
     /// [`StokesError::Unsupported`] in a formulation without rigid nodes.
     pub fn stresslets(&self, flow: &Flow<D>) -> Result<Vec<Matrix<D>>, StokesError> {
+        let moments = self.first_moments(flow)?;
+        Ok(moments.iter().map(symmetric_and_traceless).collect())
+    }
+
+    fn first_moments(&self, flow: &Flow<D>) -> Result<Vec<Matrix<D>>, StokesError> {
         let space = &self.problem.system.space;
         let mut velocity = flow.velocity.clone();
         velocity.resize(space.dim(), 0.0);
         let twists = flow.twists.iter().take(space.body_count());
         twists.enumerate().for_each(|(body, twist)| space.set_twist(&mut velocity, body, twist));
-        self.problem.rigidity.stresslets(&self.problem, [&velocity, &flow.pressure], &flow.strain)
+        self.problem.rigidity.first_moments(&self.problem, [&velocity, &flow.pressure], &flow.strain)
     }
 
     /// The share of films that are too thin for the mesh in the stresslet of each body, from
     /// [`Flow::films`].
     pub fn film_stresslets(&self, flow: &Flow<D>) -> Vec<Matrix<D>> {
-        let mut sums = vec![Matrix::zeros(); self.problem.bodies.len()];
-        for force in &flow.films {
-            for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
-                sums[body] += symmetric_and_traceless(&force.moment(side));
-            }
-        }
-        sums
+        let moments = film_moments(&flow.films, self.problem.bodies.len());
+        moments.iter().map(symmetric_and_traceless).collect()
     }
 
     /// The mobility matrix: velocities and spins (rows) by forces and torques (columns), `D` numbers and the

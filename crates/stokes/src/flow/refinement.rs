@@ -117,8 +117,10 @@ mod tests {
             let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
             let alpha = ball.value(&(lower + Vector::repeat(0.5 * h)));
             deepest = deepest.max(alpha);
-            let (near, far) =
-                (alpha >= -1.5 * mesh.size(5), alpha < -1.5 * mesh.size(5) - 4.0 * half_diagonal::<D>(h, 0.0));
+            let (near, far) = (
+                alpha >= -1.5 * mesh.size(5),
+                alpha < -1.5 * mesh.size(5) - 4.0 * half_diagonal::<D>(h, 0.0),
+            );
             assert!(!near || cell.level == 5, "level {} at {alpha}", cell.level);
             assert!(!far || cell.level < 5, "level {} at {alpha}", cell.level);
         }

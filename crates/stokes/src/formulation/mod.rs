@@ -21,7 +21,7 @@ use crate::film::Lubrication;
 use crate::space::{CutCellPressures, Discretisation};
 
 pub use paper::{PaperParams, ParticleVelocity};
-pub use problem::{Data, Method, Problem, check_viscosity, symmetric_and_traceless};
+pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
 pub use rigid_dofs::default_offset;
 
 /// How rigidity is imposed.

@@ -76,12 +76,12 @@ where
         Ok(())
     }
 
-    /// The stresslet of each body, see [`crate::Prepared::stresslets`], in nodal velocities and pressures
+    /// The first moment `int (sigma.n) r dA` of the tractions on each body, in nodal velocities and pressures
     /// relative to a linear flow with the strain `undisturbed`.
     ///
     /// # Errors
     /// [`StokesError::Unsupported`] where the formulation has no forces on nodes of bodies.
-    fn stresslets(
+    fn first_moments(
         &self,
         _problem: &Problem<D>,
         _fields: [&[f64]; 2],
@@ -383,9 +383,14 @@ where
     twist
 }
 
+/// The symmetric part of a first moment of forces.
+pub fn symmetric<const D: usize>(moment: &Matrix<D>) -> Matrix<D> {
+    (moment + moment.transpose()) * 0.5
+}
+
 /// The part of a first moment of forces that is a stresslet.
 pub fn symmetric_and_traceless<const D: usize>(moment: &Matrix<D>) -> Matrix<D> {
-    let symmetric = (moment + moment.transpose()) * 0.5;
+    let symmetric = symmetric(moment);
     symmetric - Matrix::identity() * (symmetric.trace() / D as f64)
 }
 

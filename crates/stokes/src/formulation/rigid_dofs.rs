@@ -6,9 +6,7 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 
-use super::problem::{
-    Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
-};
+use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
@@ -81,7 +79,7 @@ where
     }
 
     /// By virtual work: the forces of the fluid on the rigid nodes, `S = sum_n f_n r_n`.
-    fn stresslets(
+    fn first_moments(
         &self,
         problem: &Problem<D>,
         [velocity, pressure]: [&[f64]; 2],
@@ -97,7 +95,7 @@ where
                 moments[body] += Vector::<D>::from_column_slice(force) * arm.transpose();
             }
         }
-        Ok(moments.iter().map(symmetric_and_traceless).collect())
+        Ok(moments)
     }
 
     /// Nodes change sides from step to step.

@@ -10,9 +10,7 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Matrix, Space, Twist};
 use gluey_levelset::Ball;
 
-use super::problem::{
-    Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved, symmetric_and_traceless,
-};
+use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::film::{Film, Lubrication, thin_films};
 use crate::operator::{Elements, StokesSystem};
@@ -123,7 +121,7 @@ where
     }
 
     /// From the tractions on the true surface.
-    fn stresslets(
+    fn first_moments(
         &self,
         problem: &Problem<D>,
         fields: [&[f64]; 2],
@@ -132,8 +130,7 @@ where
         let Problem { system, bodies, .. } = problem;
         let Some(surfaces) = &system.surfaces else { return Ok(Vec::new()) };
         let fields = (fields, undisturbed);
-        let moments = first_moments(surfaces, &system.space, bodies, system.viscosity(), fields);
-        Ok(moments.iter().map(symmetric_and_traceless).collect())
+        Ok(first_moments(surfaces, &system.space, bodies, system.viscosity(), fields))
     }
 
     /// Aggregates change from step to step, but what they change is small.

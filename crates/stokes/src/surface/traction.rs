@@ -4,9 +4,10 @@ use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, gradient, node_count, value};
 use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_levelset::{Ball, Body};
+use rayon::prelude::*;
 
 use super::coupling::SurfaceCoupling;
-use super::cut_cells::in_space;
+use super::cut_cells::{CutCell, in_space};
 use crate::space::{Discretisation, VelocitySpace};
 
 /// A field at a point of a cut cell, and the weights there.
@@ -79,15 +80,16 @@ where
     let discretisation = space.discretisation();
     let shear = discretisation.mesh.shear();
     let shapes = Shapes::<D>::new(shear);
-    let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
-    for (index, cut) in surfaces.cut.cells.iter().enumerate() {
+    let of_cell = |(index, cut): (usize, &CutCell<D>)| -> Vec<Matrix<D>> {
+        let mut moments = vec![Matrix::<D>::zeros(); cut.bodies.len()];
         let cell = cut.cell as usize;
         let h = discretisation.cell_size(cell);
         let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
         for (q, at) in shapes.points.iter().enumerate() {
             let mut sample = shapes.sample(discretisation, cell, q, [velocity, pressure]);
             sample.strain += undisturbed * (2.0 * h);
-            for ((&body, ball), surface) in cut.bodies.iter().zip(&cut.balls).zip(&cut.moments.surfaces) {
+            let surfaces_of_cell = cut.balls.iter().zip(&cut.moments.surfaces).zip(&mut moments);
+            for (&body, ((ball, surface), moment)) in cut.bodies.iter().zip(surfaces_of_cell) {
                 let place: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
                 let arm = in_space(shear, &place) * h;
                 let motion = space.twist(velocity, body as usize).velocity_at(&arm) - undisturbed * arm;
@@ -96,9 +98,16 @@ where
                 let viscous = (sample.velocity - motion) * penalty - sample.strain * normal;
                 let traction = viscous * stress + normal * (area * sample.pressure);
                 debug_assert!((ball.radius * h - bodies[body as usize].bounding_radius()).abs() < 1e-9);
-                moments[body as usize] += traction * arm.transpose();
+                *moment += traction * arm.transpose();
             }
         }
+        moments
+    };
+    let cells: Vec<Vec<Matrix<D>>> =
+        surfaces.cut.cells.par_iter().enumerate().with_min_len(16).map(of_cell).collect();
+    let mut moments = vec![Matrix::<D>::zeros(); bodies.len()];
+    for (cut, of_cell) in surfaces.cut.cells.iter().zip(cells) {
+        cut.bodies.iter().zip(of_cell).for_each(|(&body, moment)| moments[body as usize] += moment);
     }
     moments
 }

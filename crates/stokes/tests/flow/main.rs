@@ -14,6 +14,7 @@ mod operators;
 mod orders;
 mod pairs;
 mod penalised;
+mod sheared;
 mod single;
 mod solvers;
 mod support;

@@ -2,8 +2,8 @@
 
 use super::*;
 
-use gluey_linalg::vector::fill_pseudo_random;
 use gluey_geom::Vector;
+use gluey_linalg::vector::fill_pseudo_random;
 use std::f64::consts::PI;
 
 mod flats;
