@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use gluey_geom::Vector;
 
-use crate::lattice::sort_by_key;
+use crate::grid::sort_by_key;
 use crate::rows::{GROUND, Row};
 
 /// A connected component of the contact network.

@@ -13,7 +13,7 @@ use crate::{Contact, ContactError, Domain, Partner};
 /// The contacts of one instant, with what they join.
 ///
 /// Forces of a step act along the normals of its beginning: [`ContactNetwork::stress`] is exact with the
-/// positions the step was given, and off by `O(dt)` with those after it.
+/// positions (and the tilt) the step was given, and off by `O(dt)` with those after it.
 ///
 /// ```
 /// use gluey_contact::{Contact, ContactNetwork, Domain, PairKey};
@@ -151,7 +151,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
     /// The connected components: particles that touch each other directly or by way of others. Walls join
     /// nothing.
     pub fn clusters(&self) -> Clusters<D> {
-        Clusters::of(self.contacts, self.positions.len())
+        Clusters::of(self.contacts, self.positions.len(), &self.domain.lattice)
     }
 
     /// Writes a table, one row per contact, as comma-separated values with a header:

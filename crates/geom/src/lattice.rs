@@ -69,6 +69,12 @@ impl<const D: usize> Lattice<D> {
         Self { tilt: self.periods[0].map_or(0.0, |length| shortest(self.tilt, length).0), ..self }
     }
 
+    /// By how many periods in `x` the tilt exceeds that of [`Lattice::reduced`], where the image `[i, j]` of
+    /// this lattice has the name `[i + j turns, j]`.
+    pub fn turns(&self) -> i32 {
+        self.periods[0].map_or(0, |length| -shortest(self.tilt, length).1)
+    }
+
     /// Whether any direction has a period.
     pub fn is_periodic(&self) -> bool {
         self.periods.iter().any(Option::is_some)
@@ -152,6 +158,15 @@ mod tests {
         assert!(nearest[0].abs() <= 0.5 && nearest[1].abs() <= 0.75 && nearest[2] == 7.0);
         let (same, _) = lattice.reduced().nearest(&arm);
         assert!((same - nearest).norm() < 1e-14 && lattice.reduced().tilt().abs() <= 0.5);
+    }
+
+    #[test]
+    fn images_of_the_reduced_lattice_have_other_names() {
+        for tilt in [3.4, -1.3, 0.2] {
+            let lattice = Lattice::<2>::new([Some(1.0), Some(1.5)]).tilted(tilt);
+            let shift = lattice.reduced().shift(&[2 - 3 * lattice.turns(), -3]);
+            assert!((shift - lattice.shift(&[2, -3])).norm() < 1e-14, "{tilt}");
+        }
     }
 
     #[test]

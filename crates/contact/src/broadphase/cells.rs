@@ -4,7 +4,7 @@
 use gluey_geom::Vector;
 
 use super::{Broadphase, meet};
-use crate::lattice::{Lattice, sort_by_key};
+use crate::grid::{Grid, sort_by_key};
 
 /// Cells for every ball at most, so that a sparse cloud needs no more memory than a dense one.
 const CELLS_PER_BALL: usize = 2;
@@ -27,12 +27,12 @@ pub struct CellList {
 }
 
 impl CellList {
-    fn bin<const D: usize>(&mut self, lattice: &Lattice<D>, centers: &[Vector<D>], radii: &[f64]) {
+    fn bin<const D: usize>(&mut self, grid: &Grid<D>, centers: &[Vector<D>], radii: &[f64]) {
         self.cells.clear();
-        self.cells.extend(centers.iter().map(|x| lattice.cell(x) as u32));
+        self.cells.extend(centers.iter().map(|x| grid.cell(x) as u32));
         let cells = &self.cells;
         let count = centers.len();
-        sort_by_key(count, lattice.cell_count(), |i| cells[i] as usize, &mut self.starts, &mut self.members);
+        sort_by_key(count, grid.cell_count(), |i| cells[i] as usize, &mut self.starts, &mut self.members);
         self.balls.clear();
         self.balls.extend(self.members.iter().map(|&i| {
             let (x, radius) = (&centers[i as usize], radii[i as usize]);
@@ -41,12 +41,12 @@ impl CellList {
     }
 
     /// Finds the pairs, in the order of the members. Each member looks for those behind it.
-    fn find<const D: usize>(&mut self, lattice: &Lattice<D>, asker_count: usize) {
+    fn find<const D: usize>(&mut self, grid: &Grid<D>, asker_count: usize) {
         let Self { starts, members, balls, found, .. } = self;
         found.clear();
         for (place, (&i, ball)) in members.iter().zip(balls.iter()).enumerate() {
             let x = Vector::<D>::from_fn(|d, _| ball[d]);
-            lattice.for_each_row(&x, |row| {
+            grid.for_each_row(&x, |row| {
                 let end = starts[row.end] as usize;
                 let range = (starts[row.start] as usize).max(place + 1).min(end)..end;
                 for (&j, other) in members[range.clone()].iter().zip(&balls[range]) {
@@ -74,9 +74,9 @@ impl<const D: usize> Broadphase<D> for CellList {
             return;
         }
         let largest = radii.iter().copied().fold(0.0, f64::max);
-        let lattice = Lattice::over(centers, 2.0 * largest, CELLS_PER_BALL * centers.len());
-        self.bin(&lattice, centers, radii);
-        self.find(&lattice, asker_count);
+        let grid = Grid::over(centers, 2.0 * largest, CELLS_PER_BALL * centers.len());
+        self.bin(&grid, centers, radii);
+        self.find(&grid, asker_count);
         let Self { found, starts, members: order, .. } = self;
         sort_by_key(found.len(), asker_count, |k| found[k].0 as usize, starts, order);
         pairs.extend(order.iter().map(|&k| found[k as usize]));

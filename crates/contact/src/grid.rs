@@ -1,25 +1,25 @@
-//! A lattice of cells over a cloud of points, and sorting by cell.
+//! A grid of cells over a cloud of points, and sorting by cell.
 
 use std::ops::Range;
 
 use gluey_geom::Vector;
 
-/// A lattice of cells over a cloud of points.
+/// A grid of cells over a cloud of points.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lattice<const D: usize> {
+pub(crate) struct Grid<const D: usize> {
     lower: Vector<D>,
     inverse_width: f64,
     counts: [usize; D],
 }
 
-impl<const D: usize> Lattice<D> {
-    /// The lattice of cells at least `width` wide, wider if there would be more than `most` of them.
+impl<const D: usize> Grid<D> {
+    /// The grid of cells at least `width` wide, wider if there would be more than `most` of them.
     pub(crate) fn over(points: &[Vector<D>], width: f64, most: usize) -> Self {
         let (lower, extent) = bounds(points);
         Self::within(lower, extent, width, most)
     }
 
-    /// A lattice with about one cell per point.
+    /// A grid with about one cell per point.
     pub(crate) fn fine(points: &[Vector<D>]) -> Self {
         let (lower, extent) = bounds(points);
         Self::within(lower, extent, extent.amax() / points.len().max(1) as f64, points.len())
