@@ -1,6 +1,6 @@
 //! The trait that stands between the flow and the particles.
 
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
 
 use crate::Film;
 
@@ -23,6 +23,15 @@ where
 
     /// Sets the factor of the imposed shear rate (1 = as configured, -1 = reversed).
     fn set_shear_factor(&mut self, factor: f64);
+
+    /// Sets the shear strain of the periodic images at the next prediction, where these slide along each other:
+    /// the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound.
+    fn set_strain(&mut self, _strain: f64) {}
+
+    /// The mean stress of the last prediction; `None` where the model has none.
+    fn stress(&self) -> Option<MeanStress<D>> {
+        None
+    }
 
     /// The films of the last prediction that lubrication keeps open, with gaps up to `reach`, sorted by
     /// particles. None where the model lets gaps close.
@@ -91,6 +100,55 @@ pub struct FlowStatistics {
     pub iteration_count: usize,
     /// Seconds spent in each named phase (mesh, assembly, factorisation, ...), in order.
     pub phases: Vec<(&'static str, f64)>,
+}
+
+/// The mean stress of a suspension in simple shear `rate y e_x` in a periodic box, beyond that of the fluid
+/// alone, `-p + 2 eta E`, and the power dissipated; per unit of volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeanStress<const D: usize> {
+    /// The shear rate, negative while the flow is reversed.
+    pub rate: f64,
+    /// Viscosity of the fluid.
+    pub viscosity: f64,
+    /// Mean of the symmetric first moments of the tractions on the bodies, films included.
+    pub of_bodies: Matrix<D>,
+    /// The share of films that are too thin for the mesh.
+    pub of_films: Matrix<D>,
+    /// Power dissipated.
+    pub dissipation: f64,
+}
+
+impl<const D: usize> MeanStress<D> {
+    /// Viscosity of the suspension over that of the fluid.
+    pub fn relative_viscosity(&self) -> f64 {
+        1.0 + self.over_rate(self.of_bodies[(0, 1)])
+    }
+
+    /// The share of films in the relative viscosity.
+    pub fn viscosity_of_films(&self) -> f64 {
+        self.over_rate(self.of_films[(0, 1)])
+    }
+
+    /// The relative viscosity from the power that is dissipated.
+    pub fn viscosity_by_dissipation(&self) -> f64 {
+        self.dissipation / (self.viscosity * self.rate * self.rate)
+    }
+
+    /// `N_1 = sigma_xx - sigma_yy` and `N_2 = sigma_yy - sigma_zz` over viscosity and size of the shear rate; no
+    /// `N_2` in 2D.
+    pub fn normal_stress_differences(&self) -> [Option<f64>; 2] {
+        let normal = |d: usize| self.of_bodies[(d, d)] / (self.viscosity * self.rate.abs());
+        [Some(normal(0) - normal(1)), (D == 3).then(|| normal(1) - normal(D - 1))]
+    }
+
+    /// Pressure of the particles, `-tr / D`, over viscosity and size of the shear rate.
+    pub fn particle_pressure(&self) -> f64 {
+        -self.of_bodies.trace() / (D as f64 * self.viscosity * self.rate.abs())
+    }
+
+    fn over_rate(&self, stress: f64) -> f64 {
+        stress / (self.viscosity * self.rate)
+    }
 }
 
 /// The flow fields on a mesh of quadratic cells, ready to be written.

@@ -138,13 +138,11 @@ fn every_disc_of_a_cell_has_its_velocity() {
         let places: Vec<_> = discs.iter().map(|row| Vector::<2>::new(row[3], row[4])).collect();
         let in_box = Box::<2>::unit(discs[0][1], 5);
         let flow = in_box.flow(&places, discs[0][2]);
-        // Of the largest velocity along the flow, that of the upper border.
-        let miss = |(k, row): (usize, &&Vec<f64>)| {
-            (flow.twists[k].velocity - Vector::<2>::new(row[5], row[6]))
-                .norm()
-                .max((spin(&flow, k) - row[7]).abs())
-        };
-        let worst = discs.iter().enumerate().map(miss).fold(0.0, f64::max);
+        let misses = discs.iter().enumerate().map(|(k, row)| {
+            let velocity = (flow.twists[k].velocity - Vector::<2>::new(row[5], row[6])).norm();
+            [velocity, (spin(&flow, k) - row[7]).abs()]
+        });
+        let worst = misses.fold([0.0f64; 2], |worst, miss| [worst[0].max(miss[0]), worst[1].max(miss[1])]);
         let [viscosity, n1, _] = rheology(&flow, 1.0);
         let errors = [viscosity / discs[0][8] - 1.0, n1 - discs[0][9]];
         println!("cell {cell}: {worst:?} {errors:?}");
