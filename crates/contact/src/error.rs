@@ -112,6 +112,16 @@ pub enum ContactError {
         /// Its period.
         period: f64,
     },
+    /// A tilt that is not finite or huge beside the period in x, or images that slide too fast.
+    #[error(
+        "the tilt {tilt} must be below 1e8 periods, and its growth {tilt_step} in a step at most half the period in y"
+    )]
+    BadTilt {
+        /// Displacement along x of the image one period up in y.
+        tilt: f64,
+        /// Its growth in the step.
+        tilt_step: f64,
+    },
     /// A particle that would meet its own images.
     #[error(
         "particle {} of radius {radius} is too large for the period {period} along {}: \

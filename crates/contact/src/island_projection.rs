@@ -129,6 +129,13 @@ impl<const D: usize> IslandWorkspace<D> {
     }
 }
 
+/// An instant of the step.
+#[derive(Clone, Copy)]
+enum Instant {
+    Beginning,
+    End,
+}
+
 /// Some consecutive islands with their parts of all vectors.
 struct IslandSlice<'a, const D: usize> {
     islands: &'a [Island],
@@ -251,28 +258,32 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
         value(head as usize) - value(tail as usize)
     }
 
-    /// Gap of a row when slots have moved by `moved`.
-    fn gap(&self, row: usize) -> f64 {
+    /// Gap of a row when slots have moved by `moved` and its image is this far behind where it ends.
+    fn gap(&self, row: usize, behind: &Vector<D>) -> f64 {
         let [tail, head] = self.ends[row].map(|slot| slot as usize);
         let end = |slot: usize| self.slots[slot].position + self.moved[slot];
         let separation = match self.rows[row].tail {
             GROUND => end(head),
-            _ => end(head) + self.rows[row].shift - end(tail),
+            _ => end(head) + (self.rows[row].shift - behind) - end(tail),
         };
         self.rows[row].gap_at(&separation)
     }
 
     /// Writes the gaps at the end of the step as linear functions of the velocities, about the displacements
-    /// `moved`.
+    /// `moved`, with images where they are at this instant.
     ///
     /// The gaps are exact at `moved`, the normals those of the beginning of the step throughout: contact
     /// forces belong to `u^n`, which multi-step schemes extrapolate. Normals of the end of the step converge
     /// faster (by `phi^2/2` per pass here, `phi` the rotation of the pair in the step), but make the
     /// encounter of two spheres first order in dt.
-    fn set_free_gaps(&mut self) {
+    fn set_free_gaps(&mut self, instant: Instant) {
         for k in 0..self.rows.len() {
-            let beyond = self.difference(k, |slot| self.slots[slot].free - self.moved[slot]);
-            let gap = self.gap(k) + self.rows[k].normal.dot(&beyond);
+            let behind = match instant {
+                Instant::Beginning => self.rows[k].slide,
+                Instant::End => Vector::zeros(),
+            };
+            let beyond = self.difference(k, |slot| self.slots[slot].free - self.moved[slot]) + behind;
+            let gap = self.gap(k, &behind) + self.rows[k].normal.dot(&beyond);
             self.free_gaps[k] = self.scales[k] * gap;
         }
     }
@@ -282,7 +293,7 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
         let mut farthest = None;
         let mut largest = 2.0 * tolerance;
         for k in 0..self.rows.len() {
-            let gap = self.gap(k);
+            let gap = self.gap(k, &Vector::zeros());
             let compliance = self.scaled_rows[k].compliance(self.weights);
             let slack = compliance * self.scales[k] * (self.forces[k] - self.floors[k]);
             let off = gap.min(slack).abs();
@@ -303,7 +314,7 @@ struct IslandProblem<'a, 'b, const D: usize, M> {
 impl<const D: usize, M: Mobility<D>> Linearised for IslandProblem<'_, '_, D, M> {
     fn begin(&mut self) {
         self.island.moved.fill(Vector::zeros());
-        self.island.set_free_gaps();
+        self.island.set_free_gaps(Instant::Beginning);
     }
 
     fn project(&mut self) -> Result<SolveReport, SolveFailure> {
@@ -329,7 +340,7 @@ impl<const D: usize, M: Mobility<D>> Linearised for IslandProblem<'_, '_, D, M> 
 
     fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
         let off = self.island.farthest_off(self.context.tuning.tolerance)?;
-        self.island.set_free_gaps();
+        self.island.set_free_gaps(Instant::End);
         Some(off)
     }
 }

@@ -22,8 +22,8 @@ pub struct PairKey {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Partner {
-    /// Another particle, or a periodic image of it: `x_index + image * period` (`0` in directions without a
-    /// period).
+    /// Another particle, or a periodic image of it: `x_index` and [`Domain::shift`] of the image (`0` in
+    /// directions without a period).
     Particle {
         /// Its index.
         index: u32,
@@ -40,7 +40,7 @@ impl PairKey {
         Self::across(i, j, [0; 3])
     }
 
-    /// The pair of particle `i` with the image `x_j + image * period` of particle `j`.
+    /// The pair of particle `i` with an image of particle `j`.
     pub fn across(i: usize, j: usize, image: [i32; 3]) -> Self {
         let (first, index, image) = if i <= j { (i, j, image) } else { (j, i, image.map(|n| -n)) };
         Self { first: first as u32, second: Partner::Particle { index: index as u32, image } }
@@ -59,8 +59,8 @@ impl PairKey {
         }
     }
 
-    /// Vector from the first particle to its partner: to the centre of the image, or to the foot point on the
-    /// wall; `None` if one of them is not there.
+    /// Vector from the first particle to its partner at the beginning of the domain's step: to the centre of
+    /// the image, or to the foot point on the wall; `None` if one of them is not there.
     pub fn branch<const D: usize>(self, positions: &[Vector<D>], domain: &Domain<D>) -> Option<Vector<D>> {
         let x = positions.get(self.first as usize)?;
         match self.second {

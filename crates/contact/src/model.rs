@@ -63,6 +63,10 @@ where
 
     /// Tells that the flow was reversed, so that remembered forces change their sign.
     fn reverse(&mut self);
+
+    /// Tells how the images across the border in `y` slide: their tilt at the beginning of the next step and
+    /// its growth in the step, lengths along `x` (see [`Domain`]). Models without periods have none that do.
+    fn set_sliding(&mut self, _tilt: f64, _tilt_step: f64) {}
 }
 
 /// A contact at the end of a step.
@@ -171,6 +175,8 @@ pub(crate) fn is_positive(x: f64) -> bool {
 
 /// Positions may be so many periods away from the origin: images are counted in `i32`.
 const FARTHEST_PERIOD: f64 = 1e8;
+/// The lattice may be sheared so far in a step: neighbours are found with room to spare.
+const LARGEST_STRAIN: f64 = 0.5;
 
 fn validate_walls<const D: usize>(walls: &[Wall<D>]) -> Result<(), ContactError> {
     for (wall, Wall { normal, offset, speed }) in walls.iter().enumerate() {
@@ -186,15 +192,22 @@ fn validate_periods<const D: usize>(
     step: &StepGeometry<'_, D>,
     domain: &Domain<D>,
 ) -> Result<(), ContactError> {
-    for (direction, period) in (0..D).filter_map(|d| domain.periods[d].map(|period| (d, period))) {
-        let farthest = step.positions.iter().map(|x| x[direction].abs()).fold(0.0, f64::max);
-        if !(period > 0.0 && period.is_finite() && farthest < FARTHEST_PERIOD * period) {
+    let farthest = |d: usize| step.positions.iter().map(|x| x[d].abs()).fold(0.0, f64::max);
+    for (direction, period) in (0..D).filter_map(|d| domain.lattice.periods()[d].map(|period| (d, period))) {
+        if !(is_positive(period) && farthest(direction) < FARTHEST_PERIOD * period) {
             return Err(ContactError::BadPeriod { direction, period });
         }
         if let Some(particle) = step.radii.iter().position(|radius| 4.0 * radius > period) {
             let radius = step.radii[particle];
             return Err(ContactError::ParticleTooLarge { particle, radius, direction, period });
         }
+    }
+    let [Some(length), Some(height)] = [0, 1].map(|d| domain.lattice.periods()[d]) else { return Ok(()) };
+    let Domain { lattice, tilt_step, .. } = domain;
+    // Images are as far along x as the rows of boxes are tilted.
+    let farthest_shift = lattice.tilt().abs() * (1.0 + farthest(1) / height);
+    if !(farthest_shift < FARTHEST_PERIOD * length && tilt_step.abs() <= LARGEST_STRAIN * height) {
+        return Err(ContactError::BadTilt { tilt: lattice.tilt(), tilt_step: *tilt_step });
     }
     Ok(())
 }

@@ -17,8 +17,10 @@ pub(crate) struct Row<const D: usize> {
     pub tail: u32,
     /// Place of the head.
     pub head: u32,
-    /// Displacement of the head's image.
+    /// Displacement of the head's image at the end of the step.
     pub shift: Vector<D>,
+    /// How far the image slides in the step.
+    pub slide: Vector<D>,
     pub normal: Vector<D>,
     /// Distance at contact: the sum of the radii; for a wall, its offset at the end of the
     /// step and a radius.
@@ -47,8 +49,8 @@ impl<const D: usize> Row<D> {
         let ranks = [tail, head].map(|place| neighbours.ranks[place as usize]);
         let (tail, head, image) =
             if ranks[0] < ranks[1] { (tail, head, image) } else { (head, tail, image.map(|n| -n)) };
-        let shift = domain.shift(&image);
-        let separation = neighbours.positions[head as usize] + shift - neighbours.positions[tail as usize];
+        let (start, shift) = (domain.shift(&image), domain.end_shift(&image));
+        let separation = neighbours.positions[head as usize] + start - neighbours.positions[tail as usize];
         let (distance, rest) =
             (separation.norm(), neighbours.radii[tail as usize] + neighbours.radii[head as usize]);
         if distance <= COINCIDENT * rest {
@@ -59,6 +61,7 @@ impl<const D: usize> Row<D> {
             tail,
             head,
             shift,
+            slide: shift - start,
             normal: separation / distance,
             rest,
             is_flat: false,
@@ -73,6 +76,7 @@ impl<const D: usize> Row<D> {
             tail: GROUND,
             head,
             shift: Vector::zeros(),
+            slide: Vector::zeros(),
             normal: wall.normal,
             rest: wall.offset + wall.speed * dt + neighbours.radii[head as usize],
             is_flat: true,
@@ -117,7 +121,7 @@ pub(crate) fn closes<const D: usize>(
     }
     let tail = candidate.tail as usize;
     let separation = neighbours.positions[head] + domain.shift(&candidate.image) - neighbours.positions[tail];
-    let approach = displacements[head] - displacements[tail];
+    let approach = displacements[head] + domain.slide(&candidate.image) - displacements[tail];
     let (square, rest) = (separation.norm_squared(), neighbours.radii[tail] + neighbours.radii[head]);
     if square <= (COINCIDENT * rest).powi(2) {
         return true;

@@ -17,7 +17,7 @@ const TICK: usize = 10;
 /// Draws the discs; those with a period in x, from `x = 0` on.
 pub fn draw(contacts: &[Contact], positions: &[Vector<2>], radii: &[f64], domain: &Domain<2>) -> String {
     let top_of = |d: usize| positions.iter().zip(radii).map(move |(x, a)| x[d] + a).fold(0.0, f64::max);
-    let period = domain.periods[0];
+    let period = domain.lattice.periods()[0];
     let size = [period.unwrap_or_else(|| top_of(0)), top_of(1)];
     let mut svg = frame(size);
 

@@ -3,8 +3,27 @@
 //! In a shear flow displacements grow with the size of the cloud, those of neighbours against each other do
 //! not. With `s_i = s_0 + L x_i + r_i`, neighbours move by `|s_j - s_i| <= |L| |x_j - x_i| + |r_i| + |r_j|`
 //! against each other.
+//!
+//! Images move with the lattice: `L` is 0 along the directions that have a period, but for the shear of a
+//! lattice whose images slide. With it `|s_j - s_i|` is bounded for images as it is for particles.
 
 use gluey_geom::{Matrix, Vector};
+
+/// What is known of an affine motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame<const D: usize> {
+    /// Directions without a period.
+    pub free: [bool; D],
+    /// Shear strain of the lattice: displacement of images along `x` per unit of `y`.
+    pub shear: f64,
+}
+
+impl<const D: usize> Frame<D> {
+    /// `L` of the lattice.
+    fn gradient(&self) -> Matrix<D> {
+        Matrix::from_fn(|i, j| if (i, j) == (0, 1) { self.shear } else { 0.0 })
+    }
+}
 
 /// An affine motion `s_0 + L x`, fitted by least squares.
 #[derive(Clone, Copy, Debug)]
@@ -20,25 +39,24 @@ pub(crate) struct AffineFit<const D: usize> {
 const LARGEST_STRAIN: f64 = 0.5;
 
 impl<const D: usize> AffineFit<D> {
-    /// Fits `displacements` at `positions`; `L` acts on the directions that are `free` of a period only, so
-    /// that images of a particle move alike.
-    pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], free: [bool; D]) -> Self {
+    /// Fits `displacements` at `positions`: to the motion of the `frame`, `L` is fitted on the directions that
+    /// are free only.
+    pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], frame: &Frame<D>) -> Self {
+        let sliding = frame.gradient();
         let scale = 1.0 / positions.len().max(1) as f64;
         let center = positions.iter().sum::<Vector<D>>() * scale;
         let mean = displacements.iter().sum::<Vector<D>>() * scale;
         let (mut moments, mut products) = (Matrix::<D>::zeros(), Matrix::<D>::zeros());
         for (x, s) in positions.iter().zip(displacements) {
-            let (x, s) = (x - center, s - mean);
+            let x = x - center;
+            let s = s - mean - sliding * x;
             moments += x * x.transpose();
             products += s * x.transpose();
         }
-        let gradient = regression(moments, products, free);
-        let strain = gradient.norm();
-        if strain > 0.0 && strain <= LARGEST_STRAIN {
-            Self { center, mean, gradient, strain }
-        } else {
-            Self { center, mean, gradient: Matrix::zeros(), strain: 0.0 }
-        }
+        let fitted = regression(moments, products, frame.free);
+        let is_useful = fitted.norm() > 0.0 && fitted.norm() <= LARGEST_STRAIN;
+        let gradient = if is_useful { fitted + sliding } else { sliding };
+        Self { center, mean, gradient, strain: gradient.norm() }
     }
 
     /// `|r|`: how far a particle moves besides the affine motion.
@@ -90,12 +108,23 @@ mod tests {
         let positions: Vec<_> = (0..100).map(point).collect();
         let moves: Vec<_> =
             positions.iter().map(|x| gradient * x + Vector::<3>::new(3.0, 2.0, 1.0)).collect();
-        let fit = AffineFit::new(&positions, &moves, [true; 3]);
+        let fit = AffineFit::new(&positions, &moves, &Frame { free: [true; 3], shear: 0.0 });
         assert!((fit.gradient - gradient).norm() < 1e-12 && fit.strain >= gradient.norm() - 1e-12);
         assert!(positions.iter().zip(&moves).all(|(x, s)| fit.rest(x, s) < 1e-12));
         let flat: Vec<_> = positions.iter().map(|x| Vector::<3>::new(x.x, 0.0, x.z)).collect();
         let moves: Vec<_> = flat.iter().map(|x| gradient * x).collect();
-        let fit = AffineFit::new(&flat, &moves, [true, true, false]);
+        let fit = AffineFit::new(&flat, &moves, &Frame { free: [true, true, false], shear: 0.0 });
         assert_eq!((fit.gradient.column(1).norm(), fit.gradient.column(2).norm()), (0.0, 0.0));
+    }
+
+    #[test]
+    fn particles_that_move_with_a_sheared_lattice_leave_no_rest() {
+        let gradient = Matrix::<3>::new(0.0, 0.7, 0.1, 0.0, 0.0, 0.02, 0.0, 0.0, 0.03);
+        let point = |i: usize| Vector::<3>::from_fn(|d, _| (i as f64 * [0.7548, 0.5698, 0.4301][d]).fract());
+        let positions: Vec<_> = (0..100).map(point).collect();
+        let moves: Vec<_> = positions.iter().map(|x| gradient * x).collect();
+        let fit = AffineFit::new(&positions, &moves, &Frame { free: [false, false, true], shear: 0.7 });
+        assert!((fit.gradient - gradient).norm() < 1e-12 && fit.strain >= 0.7);
+        assert!(positions.iter().zip(&moves).all(|(x, s)| fit.rest(x, s) < 1e-12));
     }
 }

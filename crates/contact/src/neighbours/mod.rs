@@ -1,14 +1,14 @@
 //! The neighbour list (Verlet 1967, DOI 10.1103/PhysRev.159.98): candidates for contact, kept from step to
-//! step as long as particles stay near where they were.
+//! step as long as particles stay near where they were, or where images that slide carry them.
 
 mod affine;
 mod order;
 
-use gluey_geom::Vector;
+use gluey_geom::{Lattice, Vector};
 
 use crate::broadphase::{BestOf, Broadphase};
 use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
-use affine::AffineFit;
+use affine::{AffineFit, Frame};
 use order::SpatialOrder;
 
 /// Pairs nearer than this part of their summed radii are kept in the list whatever they do (the skin of the
@@ -22,7 +22,7 @@ pub(crate) struct Candidate {
     pub tail: u32,
     /// A particle's place.
     pub head: u32,
-    /// Which image of the head: `x_head + image * period`.
+    /// Which image of the head.
     pub image: [i32; 3],
 }
 
@@ -48,6 +48,7 @@ pub(crate) struct NeighbourList<const D: usize> {
     pub ranks: Vec<u32>,
     /// Where places were when the search was made, and the distance up to which it was made.
     reference: Vec<Vector<D>>,
+    reference_lattice: Lattice<D>,
     reach: Vec<f64>,
     remaining_reach: Vec<f64>,
     /// Gap kept between particles, relative to their radii.
@@ -264,6 +265,7 @@ impl<const D: usize> NeighbourList<D> {
         self.ranks.extend(0..self.order.len() as u32);
         self.load(step, needed);
         self.reference.clone_from(&self.positions);
+        self.reference_lattice = domain.lattice;
         self.set_reach(step, domain)?;
         self.load(step, displacements);
         self.radii.extend(self.order.iter().map(|&i| step.radii[i as usize]));
@@ -277,12 +279,14 @@ impl<const D: usize> NeighbourList<D> {
 
     /// How far to search around each place, for the displacements that are loaded.
     fn set_reach(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) -> Result<(), ContactError> {
-        let fit = AffineFit::new(&self.positions, &self.free, free_directions(domain));
+        let fit = AffineFit::new(&self.positions, &self.free, &frame_of_step(domain));
         self.reach.clear();
         for (place, &particle) in self.order.iter().enumerate() {
             let particle = particle as usize;
             let (radius, rest) = (step.radii[particle], fit.rest(&self.positions[place], &self.free[place]));
-            if let Some(&period) = domain.periods.iter().flatten().find(|period| rest > 0.5 * **period) {
+            if let Some(&period) =
+                domain.lattice.periods().iter().flatten().find(|period| rest > 0.5 * **period)
+            {
                 return Err(ContactError::TooFast { particle, displacement: rest, period });
             }
             // The next steps may strain as much before they search.
@@ -305,20 +309,11 @@ impl<const D: usize> NeighbourList<D> {
         let margin = 2.0 * self.reach.iter().copied().fold(0.0, f64::max);
         for place in 0..self.order.len() {
             let x = search.centers[place];
-            // Images per direction that come within the margin of the period.
-            let range = |d: usize| match domain.periods[d] {
-                None => 0..=0,
-                Some(period) => {
-                    ((-margin - x[d]) / period).ceil() as i32
-                        ..=((period + margin - x[d]) / period).floor() as i32
-                }
-            };
-            let ranges = [0, 1, 2].map(|d| if d < D { range(d) } else { 0..=0 });
-            for image in product(ranges).filter(|image| *image != [0; 3]) {
+            for_each_image(&x, &domain.lattice, margin, |image| {
                 search.centers.push(x + domain.shift(&image));
                 search.reaches.push(self.reach[place]);
                 search.ghosts.push((place as u32, image));
-            }
+            });
         }
     }
 
@@ -355,7 +350,8 @@ impl<const D: usize> NeighbourList<D> {
         let moved = &mut self.search.moved;
         moved.clear();
         moved.extend(self.positions.iter().zip(&self.reference).map(|(x, before)| x - before));
-        let past = AffineFit::new(&self.reference, moved, free_directions(domain));
+        let shear = domain.lattice.shear() - self.reference_lattice.shear();
+        let past = AffineFit::new(&self.reference, moved, &Frame { shear, ..frame_of_step(domain) });
         let rests = self.reference.iter().zip(moved).map(|(x, moved)| past.rest(x, moved));
         self.remaining_reach.clear();
         self.remaining_reach
@@ -364,7 +360,7 @@ impl<const D: usize> NeighbourList<D> {
 
     /// Whether the search reached as far as pairs could come together under `displacements` (by place).
     fn has_all_pairs(&self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
-        let fit = AffineFit::new(&self.positions, displacements, free_directions(domain));
+        let fit = AffineFit::new(&self.positions, displacements, &frame_of_step(domain));
         (0..self.order.len()).all(|place| {
             let rest = fit.rest(&self.positions[place], &displacements[place]);
             ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain)
@@ -373,9 +369,9 @@ impl<const D: usize> NeighbourList<D> {
     }
 }
 
-/// Directions without a period.
-fn free_directions<const D: usize>(domain: &Domain<D>) -> [bool; D] {
-    domain.periods.map(|period| period.is_none())
+/// The motion of the lattice in the step.
+fn frame_of_step<const D: usize>(domain: &Domain<D>) -> Frame<D> {
+    Frame { free: domain.lattice.periods().map(|period| period.is_none()), shear: domain.strain_step() }
 }
 
 /// Positions brought into the periods, `0 <= x < period`, and how many periods each was moved by.
@@ -386,23 +382,45 @@ fn wrap<const D: usize>(
     windings: &mut Vec<[i32; 3]>,
 ) {
     windings.clear();
-    windings.extend(positions.iter().map(|x| {
-        [0, 1, 2].map(|d| {
-            let period = domain.periods.get(d).copied().flatten();
-            period.map_or(0, |period| -(x[d] / period).floor() as i32)
-        })
-    }));
+    windings.extend(positions.iter().map(|x| winding(x, &domain.lattice)));
     wrapped.clear();
     wrapped.extend(positions.iter().zip(windings).map(|(x, winding)| x + domain.shift(winding)));
 }
 
-/// All triples of three ranges.
-fn product(ranges: [std::ops::RangeInclusive<i32>; 3]) -> impl Iterator<Item = [i32; 3]> {
-    let [x, y, z] = ranges;
-    x.flat_map(move |i| {
-        let z = z.clone();
-        y.clone().flat_map(move |j| z.clone().map(move |k| [i, j, k]))
-    })
+/// The image of a position that is in the periods.
+fn winding<const D: usize>(x: &Vector<D>, lattice: &Lattice<D>) -> [i32; 3] {
+    let count = |d: usize, x: f64| {
+        let period = lattice.periods().get(d).copied().flatten();
+        period.map_or(0, |period| -(x / period).floor() as i32)
+    };
+    let up = count(1, x[1]);
+    let along = count(0, x[0] + f64::from(up) * lattice.tilt());
+    [along, up, if D > 2 { count(2, x[2]) } else { 0 }]
+}
+
+/// Visits the images of a position in the periods that come within a margin of them, but for itself.
+fn for_each_image<const D: usize>(
+    x: &Vector<D>,
+    lattice: &Lattice<D>,
+    margin: f64,
+    mut visit: impl FnMut([i32; 3]),
+) {
+    let range = |d: usize, x: f64| match lattice.periods().get(d).copied().flatten() {
+        None => 0..=0,
+        Some(period) => {
+            ((-margin - x) / period).ceil() as i32..=((period + margin - x) / period).floor() as i32
+        }
+    };
+    let across = if D > 2 { range(2, x[2]) } else { 0..=0 };
+    for k in across {
+        for j in range(1, x[1]) {
+            for i in range(0, x[0] + f64::from(j) * lattice.tilt()) {
+                if [i, j, k] != [0; 3] {
+                    visit([i, j, k]);
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -95,6 +95,6 @@ fn check_known<const D: usize>(
     let (first, Some(second)) = pair.particles() else { return Ok(()) };
     let distance = pair.branch(step.positions, domain).map_or(0.0, |branch| branch.norm());
     let gap = distance - step.radii[first] - step.radii[second];
-    let shortest = domain.periods.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    let shortest = domain.lattice.periods().iter().flatten().copied().fold(f64::INFINITY, f64::min);
     if gap > FAR * shortest { Err(ContactError::Wrapped { pair, gap }) } else { Ok(()) }
 }

@@ -120,7 +120,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
 
     /// Changes the walls or periods, as for walls that move.
     pub fn set_domain(&mut self, domain: Domain<D>) {
-        if domain.periods != self.domain.periods {
+        if domain.lattice.periods() != self.domain.lattice.periods() {
             self.neighbours = NeighbourList::default();
         }
         self.domain = domain;
@@ -189,6 +189,10 @@ where
     fn reverse(&mut self) {
         self.record.reverse();
     }
+
+    fn set_sliding(&mut self, tilt: f64, tilt_step: f64) {
+        self.domain.set_sliding(tilt, tilt_step);
+    }
 }
 
 /// Whether the search went far enough.
@@ -242,7 +246,9 @@ where
         let radius = step.radii.iter().copied().fold(f64::INFINITY, f64::min);
         let farthest = free.iter().map(|s| s.norm()).fold(0.0, f64::max);
         let extent = step.positions.iter().map(|x| x.amax()).fold(0.0, f64::max);
-        self.params.residual(radius, farthest, extent)
+        // Images across the border in y are that far away along x.
+        let tilted = 2.0 * (self.domain.lattice.shear() * extent).abs() + self.domain.lattice.tilt().abs();
+        self.params.residual(radius, farthest, extent + tilted)
     }
 
     /// Gap below which pairs are pushed apart, relative to the mean radius.
