@@ -151,7 +151,7 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
     /// The connected components: particles that touch each other directly or by way of others. Walls join
     /// nothing.
     pub fn clusters(&self) -> Clusters<D> {
-        Clusters::of(self.contacts, self.positions.len())
+        Clusters::of(self.contacts, self.positions.len(), &self.domain.lattice)
     }
 
     /// Writes a table, one row per contact, as comma-separated values with a header:

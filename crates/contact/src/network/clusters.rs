@@ -1,6 +1,8 @@
 //! Clusters by union-find whose edges carry images: a cluster percolates where a way round leads to another
 //! image.
 
+use gluey_geom::Lattice;
+
 use crate::{Contact, Partner};
 
 /// The connected components of a contact network; particles without a contact are clusters of their own.
@@ -18,7 +20,8 @@ pub struct Cluster<const D: usize> {
     /// How many particles it has.
     pub size: usize,
     /// In which periodic directions one can walk from contact to contact and arrive at another image of the
-    /// start.
+    /// start. In a tilted lattice the second direction is that of the image one period up in `y` that is
+    /// nearest to straight above.
     pub percolates: [bool; D],
     /// The walls it touches, sorted.
     pub walls: Vec<u32>,
@@ -44,7 +47,7 @@ impl<const D: usize> Clusters<D> {
     }
 
     /// Finds them.
-    pub(super) fn of(contacts: &[Contact], count: usize) -> Self {
+    pub(super) fn of(contacts: &[Contact], count: usize, lattice: &Lattice<D>) -> Self {
         let mut forest = Forest::new(count);
         let mut loops = Vec::new();
         for contact in contacts {
@@ -56,7 +59,8 @@ impl<const D: usize> Clusters<D> {
         }
         let (clusters, of_particle) = forest.sorted();
         let mut found = Self { clusters, of_particle };
-        for (particle, way) in loops {
+        for (particle, mut way) in loops {
+            way[0] += way[1] * lattice.turns();
             let cluster = &mut found.clusters[found.of_particle[particle as usize] as usize];
             (0..D).for_each(|d| cluster.percolates[d] |= way[d] != 0);
         }
