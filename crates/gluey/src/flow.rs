@@ -199,6 +199,7 @@ where
             first: film.body as usize,
             second: film.side(1),
             branch: film.branch(),
+            slide: Vector::zeros(),
             gap: film.gap,
             curvature_radius: film.curvature_radius(),
         };

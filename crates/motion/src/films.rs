@@ -29,6 +29,11 @@ pub struct Film<const D: usize> {
     pub second: Option<usize>,
     /// From the centre of the first to that of its partner (the image that is meant), or to the wall.
     pub branch: Vector<D>,
+    /// Velocity of the partner's image beyond its particle's own: in simple shear of the rate `r` the image
+    /// `j` periods `H` up in `y` has `r j H` along `x` (Lees and Edwards 1972,
+    /// 10.1088/0022-3719/5/15/006). Taken as constant in the step and the one before, but that it changes
+    /// its sign with the flow. Zero for the particle itself and for walls.
+    pub slide: Vector<D>,
     /// Distance of the surfaces; unit: length.
     pub gap: f64,
     /// `A`, with `2/A = 1/a + 1/b`; unit: length.
@@ -181,9 +186,10 @@ impl<const D: usize> Film<D> {
         gap
     }
 
-    /// Difference of a vector between the partner and the first; walls have none.
-    fn across(&self, of: impl Fn(usize) -> Vector<D>) -> Vector<D> {
-        self.second.map_or(Vector::zeros(), &of) - of(self.first)
+    /// Difference of a vector between the partner and the first; walls have none. An image moves for a time
+    /// by its own slide besides: 1 makes velocities of it, the length of a step displacements.
+    fn across(&self, of: impl Fn(usize) -> Vector<D>, time: f64) -> Vector<D> {
+        self.second.map_or(Vector::zeros(), |second| of(second) + self.slide * time) - of(self.first)
     }
 }
 
@@ -215,9 +221,10 @@ where
         for film in films {
             let Film { first, second, branch, .. } = *film;
             let gap = film.gap.max(film.thinnest());
-            let rate = |twists: &[Twist<D>]| branch.normalize().dot(&film.across(|k| twists[k].velocity));
+            let rate =
+                |twists: &[Twist<D>]| branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
             let force = film.resistance(gap) * rate(twists);
-            let before = self.of(film);
+            let before = self.of(film, films);
             let old_force = match (before, step.history) {
                 (_, []) => 0.0,
                 (Some(before), _) => before.force,
@@ -237,14 +244,28 @@ where
         Ok(())
     }
 
-    /// What is remembered of a film.
-    fn of(&self, film: &Film<D>) -> Option<&Remembered<D>> {
-        let first = self.0.partition_point(|old| (old.first, old.second) < (film.first, film.second));
-        let mut same =
-            self.0[first..].iter().take_while(|old| (old.first, old.second) == (film.first, film.second));
-        // Of images across borders, the one in about this direction.
-        same.find(|old| old.branch.dot(&film.branch) > 0.0)
+    /// What is remembered of a film, which is one of these.
+    fn of(&self, film: &Film<D>, films: &[Film<D>]) -> Option<&Remembered<D>> {
+        let old = of_pair(&self.0, film, |old| (old.first, old.second));
+        let apart = |old: &Remembered<D>, film: &Film<D>| (old.branch - film.branch).norm_squared();
+        let nearest = old.iter().min_by(|a, b| apart(a, film).total_cmp(&apart(b, film)))?;
+        // Of images across borders, the one in about this direction, if it is not that of another film.
+        let mut others = of_pair(films, film, |film| (film.first, film.second)).iter();
+        let is_of_another = others.any(|other| apart(nearest, other) < apart(nearest, film));
+        (nearest.branch.dot(&film.branch) > 0.0 && !is_of_another).then_some(nearest)
     }
+}
+
+/// The part of a list, sorted by particles, that joins the same as a film.
+fn of_pair<'a, T, const D: usize>(
+    list: &'a [T],
+    film: &Film<D>,
+    pair: impl Fn(&T) -> (usize, Option<usize>),
+) -> &'a [T] {
+    let wanted = (film.first, film.second);
+    let start = list.partition_point(|item| pair(item) < wanted);
+    let count = list[start..].iter().take_while(|item| pair(item) == wanted).count();
+    &list[start..start + count]
 }
 
 impl<const D: usize> Step<'_, D>
@@ -253,10 +274,34 @@ where
 {
     /// See [`crate::Integrator::film_reach`].
     pub fn reach(&self, twists: &[Twist<D>]) -> f64 {
-        let radius = self.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
         let farthest = (0..twists.len()).map(|k| self.shift(k, twists).norm()).fold(0.0, f64::max);
-        // A wall has A = 2 a; two particles approach each other at twice the speed of each.
-        2.0 * radius * REACH * MEMORY_REACH + 2.0 * farthest
+        // Two particles approach each other at twice the speed of each.
+        self.memory_reach() + 2.0 * farthest
+    }
+
+    /// See [`crate::Integrator::film_reach_in_shear`].
+    pub fn reach_in_shear(&self, twists: &[Twist<D>], rate: f64) -> f64 {
+        let strain = rate * (self.weight + self.history_weight);
+        let rest = |k: usize| {
+            let mut shift = self.shift(k, twists);
+            shift[0] -= strain * self.particles[k].pose.position[1];
+            shift
+        };
+        let count = twists.len();
+        let mean = (0..count).map(rest).sum::<Vector<D>>() / count.max(1) as f64;
+        let farthest = (0..count).map(|k| (rest(k) - mean).norm()).fold(0.0, f64::max);
+        // Centres at the distance `2 a + reach` approach each other by the strain times that, besides.
+        let (strain, diameter) = (strain.abs(), 2.0 * self.largest_radius());
+        (self.memory_reach() + 2.0 * farthest + strain * diameter) / (1.0 - strain.min(0.5))
+    }
+
+    /// The gap up to which films are remembered; a wall has `A = 2 a`.
+    fn memory_reach(&self) -> f64 {
+        2.0 * self.largest_radius() * REACH * MEMORY_REACH
+    }
+
+    fn largest_radius(&self) -> f64 {
+        self.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max)
     }
 
     /// Displacement of a particle.
@@ -300,7 +345,8 @@ where
 
     /// Gap of a film after the step, and its direction.
     fn gap_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> (f64, Vector<D>) {
-        let moved = film.branch + film.across(|k| self.shift(k, twists));
+        let dt = self.weight + self.history_weight;
+        let moved = film.branch + film.across(|k| self.shift(k, twists), dt);
         let distance = film.branch.norm();
         match film.second {
             Some(_) => (moved.norm() - distance + film.gap, moved.normalize()),

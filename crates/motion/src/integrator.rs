@@ -134,6 +134,18 @@ where
         self.film_step(dt, particles).reach(twists)
     }
 
+    /// The same where images slide in a simple shear of this rate: displacements count from the sheared
+    /// lattice then, in which particles move little against each other, however far up in `y` they are.
+    pub fn film_reach_in_shear(
+        &self,
+        dt: f64,
+        particles: &[Particle<D>],
+        twists: &[Twist<D>],
+        rate: f64,
+    ) -> f64 {
+        self.film_step(dt, particles).reach_in_shear(twists, rate)
+    }
+
     fn film_step<'a>(&'a self, dt: f64, particles: &'a [Particle<D>]) -> Step<'a, D> {
         let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
         Step { weight, history_weight, particles, history: &self.history }

@@ -4,7 +4,7 @@
 //! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they
 //! should and overlap, as they do in a fluid solver that does not resolve the lubrication film.
 
-use gluey_geom::{Dim, Particle, Space, Twist};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 
 use crate::{Film, Hydrodynamics, LinearFlow, MobilityTable};
 
@@ -78,7 +78,8 @@ impl Hydrodynamics<3> for PairMobility {
         }
         let n = r / distance;
         let gap = distance - 2.0 * first.radius;
-        let film = Film { first: 0, second: Some(1), branch: r, gap, curvature_radius: first.radius };
+        let (slide, curvature_radius) = (Vector::zeros(), first.radius);
+        let film = Film { first: 0, second: Some(1), branch: r, slide, gap, curvature_radius };
         self.film = (gap > 0.0 && self.offset == 0.0).then_some(film);
         let mobility = self.table.at(distance / first.radius - 2.0 + self.offset);
 

@@ -78,7 +78,7 @@ where
     let radius = |k: usize| particles[k].radius;
     let curvature = 1.0 / radius(first) + second.map_or(0.0, |second| 1.0 / radius(second));
     let gap = branch.norm() - radius(first) - second.map_or(0.0, radius);
-    Film { first, second, branch, gap, curvature_radius: 2.0 / curvature }
+    Film { first, second, branch, slide: Vector::zeros(), gap, curvature_radius: 2.0 / curvature }
 }
 
 /// Particles that are driven together against a wall, in steps in which each would move by its diameter.

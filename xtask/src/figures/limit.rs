@@ -93,7 +93,8 @@ fn lubricated(s: f64) -> Option<Run> {
         run.memory.push((t, s * gap.ln()));
         let mut twists = twists(-t.cos() / (1.0 + s / gap));
         let branch = particles[1].pose.position - particles[0].pose.position;
-        let film = Film { first: 0, second: Some(1), branch, gap, curvature_radius: 1.0 };
+        let slide = Vector::zeros();
+        let film = Film { first: 0, second: Some(1), branch, slide, gap, curvature_radius: 1.0 };
         integrator.open_films(STEP, &particles, &[film], &mut twists).ok()?;
         integrator.advance(STEP, &mut particles, &twists);
     }
