@@ -247,7 +247,8 @@ where
         let farthest = free.iter().map(|s| s.norm()).fold(0.0, f64::max);
         let extent = step.positions.iter().map(|x| x.amax()).fold(0.0, f64::max);
         // Images across the border in y are that far away along x.
-        let tilted = 2.0 * (self.domain.lattice.shear() * extent).abs() + self.domain.lattice.tilt().abs();
+        let height = step.positions.iter().map(|x| x[1].abs()).fold(0.0, f64::max);
+        let tilted = 2.0 * (self.domain.lattice.shear() * height).abs() + self.domain.lattice.tilt().abs();
         self.params.residual(radius, farthest, extent + tilted)
     }
 
