@@ -117,6 +117,21 @@ fn a_helix_percolates_where_its_way_round_leads() {
 }
 
 #[test]
+fn a_column_percolates_upwards_in_any_tilt() {
+    // Two discs that stand on each other; the next row of boxes is a little, and some periods, further along.
+    let positions = [Vector::<2>::zeros(), Vector::<2>::new(0.0, 2.0)];
+    for turns in [0, 3, -2] {
+        let mut domain = Domain::periodic(&Vector::<2>::new(10.0, 4.0));
+        domain.set_sliding(0.1 + 10.0 * f64::from(turns), 0.0);
+        let up = PairKey::across(1, 0, [-turns, 1, 0]);
+        let contacts = [contact(PairKey::new(0, 1), 1.0), contact(up, 1.0)];
+        assert!((up.branch(&positions, &domain).expect("there").norm() - 2.0).abs() < 3e-3);
+        let network = ContactNetwork::new(&contacts, &positions, &[1.0; 2], &domain).expect("good");
+        assert_eq!(network.clusters().clusters[0].percolates, [false, true], "{turns}");
+    }
+}
+
+#[test]
 fn two_discs_and_walls() {
     // Pressed down by u = -1 each: the lower contact carries both, 2 a.
     let floor = Wall::new(&Vector::<2>::zeros(), &Vector::<2>::y());

@@ -34,6 +34,8 @@ where
     /// Velocities of the last step.
     twists: Vec<Twist<D>>,
     domain: Domain<D>,
+    /// 1, or -1 when the shear is reversed.
+    sense: f64,
     flow: BackgroundFlow<D>,
     contact: PairContact<D>,
     integrator: Integrator<D>,
@@ -50,6 +52,7 @@ where
             particles: positions.iter().map(|x| Particle::new(*x, RADIUS)).collect(),
             radii: vec![RADIUS; positions.len()],
             twists: vec![Twist::default(); positions.len()],
+            sense: 1.0,
             flow: BackgroundFlow::new(LinearFlow::shear(RATE, 0.0)),
             contact: PairContact::new(params).within(domain.clone()),
             integrator: Integrator::new(Scheme::AdamsBashforth2),
@@ -79,13 +82,20 @@ where
         let step =
             StepGeometry { positions: &positions, radii: &self.radii, drift: &drift, velocity_weight, dt };
         let (tilt, height) = (self.domain.lattice.tilt(), self.domain.lattice.periods()[1].unwrap_or(0.0));
-        let tilt_step = RATE * height * dt;
+        let tilt_step = self.sense * RATE * height * dt;
         self.contact.set_sliding(tilt, tilt_step);
         self.contact.correct(&step, &mut self.twists).expect("feasible");
         self.integrator.advance(dt, &mut self.particles, &self.twists);
         self.domain.set_sliding(tilt + tilt_step, 0.0);
         let changes = self.twists.iter().zip(&predicted).map(|(twist, old)| (twist.velocity - old) * RADIUS);
         changes.fold((Vector::zeros(), 0.0), |(sum, size), change| (sum + change, size + change.norm()))
+    }
+
+    fn reverse(&mut self) {
+        self.sense = -self.sense;
+        self.flow.set_shear_factor(self.sense);
+        self.integrator.reverse();
+        self.contact.reverse();
     }
 
     /// The smallest gap of all pairs, found without the crate.
@@ -172,14 +182,18 @@ where
     let lengths = Vector::from_fn(|d, _| packing.side * if d == axis { 2.0 } else { 1.0 });
     let tilt = one.domain.lattice.tilt() * if axis == 1 { 2.0 } else { 1.0 };
     let mut two = Suspension::new(&positions, &lengths, tilt, params.clone());
-    for _ in 0..60 {
+    for n in 0..90 {
+        if n == 60 {
+            one.reverse();
+            two.reverse();
+        }
         one.step(0.01);
         two.step(0.01);
     }
     assert!(one.contact.contacts().len() > 20);
     assert_eq!(two.contact.contacts().len(), 2 * one.contact.contacts().len());
     let mut slide = Vector::<D>::zeros();
-    slide[0] = RATE * shift[1];
+    slide[0] = one.sense * RATE * shift[1];
     let velocities = two.velocities();
     let (first, second) = velocities.split_at(packing.positions.len());
     let second: Vec<_> = second.iter().map(|velocity| velocity - slide).collect();

@@ -143,6 +143,11 @@ fn bad_surroundings_are_refused() {
     let large = ContactError::ParticleTooLarge { particle: 0, radius: 1.0, direction: 0, period: 3.9 };
     assert_eq!(refuse(periodic(3.9), 0.0, 0.0), large);
     assert!(matches!(refuse(periodic(8.0), 0.0, 900.0), ContactError::TooFast { particle: 0, .. }));
+    for (tilt, tilt_step) in [(f64::NAN, 0.0), (0.0, f64::NAN), (1e9, 0.0), (0.0, -4.1)] {
+        let mut sheared = Domain::periodic(&at(8.0, 8.0));
+        sheared.set_sliding(tilt, tilt_step);
+        assert!(matches!(refuse(sheared, 0.0, 0.0), ContactError::BadTilt { .. }), "{tilt} {tilt_step}");
+    }
     let mut wall = Wall::new(&at(0.0, 0.0), &at(1.0, 0.0));
     wall.normal *= 2.0;
     assert_eq!(refuse(Domain::default().with_wall(wall), 0.0, 0.0), ContactError::BadWall { wall: 0 });
