@@ -33,7 +33,7 @@ pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, Solver, UnknownName};
 
 use gluey_contact::{ContactParams, Domain, Wall};
-use gluey_geom::Vector;
+use gluey_geom::{Lattice, Vector};
 use gluey_stokes::PaperParams;
 use serde::{Deserialize, Serialize};
 
@@ -368,7 +368,8 @@ impl Case {
         let [below, above] = bounds;
         Domain {
             walls: vec![Wall::new(&below, &inwards), Wall::new(&above, &-inwards)],
-            periods: std::array::from_fn(|axis| self.period(axis)),
+            lattice: Lattice::new(std::array::from_fn(|axis| self.period(axis))),
+            ..Domain::default()
         }
     }
 

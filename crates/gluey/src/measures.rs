@@ -1,6 +1,6 @@
 //! Measures of a run, updated row by row: the rows themselves are on disk only.
 
-use gluey_geom::Vector;
+use gluey_geom::{Lattice, Vector};
 
 use crate::case::Case;
 use crate::reference::{Comparison, Deviation, Reference};
@@ -21,7 +21,7 @@ pub(crate) struct Instant<const D: usize> {
 #[derive(Clone, Debug)]
 pub(crate) struct Measures<const D: usize> {
     radii: Vec<f64>,
-    periods: [Option<f64>; D],
+    lattice: Lattice<D>,
     row_count: usize,
     smallest_gap_over_a: Option<f64>,
     pair: PairHistory,
@@ -34,7 +34,7 @@ impl<const D: usize> Measures<D> {
         let reference = case.reference.as_deref().and_then(Reference::named);
         Self {
             radii: case.particles.iter().map(|particle| particle.radius).collect(),
-            periods: case.surroundings().periods,
+            lattice: case.surroundings().lattice,
             row_count: 0,
             smallest_gap_over_a: None,
             pair: PairHistory::default(),
@@ -49,7 +49,7 @@ impl<const D: usize> Measures<D> {
         let gaps = [self.smallest_gap_over_a, *smallest_gap_over_a];
         self.smallest_gap_over_a = gaps.into_iter().flatten().reduce(f64::min);
         if let ([one, other, ..], [first, second, ..]) = (&centers[..], &self.radii[..]) {
-            self.pair.push(*time, [one, other], [*first, *second], &self.periods);
+            self.pair.push(*time, [one, other], [*first, *second], &self.lattice);
         }
         if let Some(comparison) = &mut self.comparison {
             comparison.add(*time, centers);

@@ -1,7 +1,7 @@
 //! Near pairs, and the smallest gap, at a cost proportional to the number of particles.
 
 use gluey_contact::broadphase::{BestOf, Broadphase};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Lattice, Space, Vector};
 
 use crate::trajectory::Row;
 
@@ -75,33 +75,35 @@ where
 
     /// One ball per particle, as large as to meet those within `reach`, and the images that could meet one.
     fn place_balls(&mut self, row: &Row<'_, D>, reach: f64) {
-        let periods = &row.domain.periods;
-        let longest = periods.iter().flatten().copied().fold(0.0, f64::max);
-        let wrap = |x: f64, period: Option<f64>| period.map_or(x, |period| x - period * (x / period).floor());
+        let lattice = row.domain.lattice.reduced();
+        let longest = lattice.periods().iter().flatten().copied().fold(0.0, f64::max);
         self.centers.clear();
-        self.centers.extend(
-            row.particles.iter().map(|p| Vector::from_fn(|d, _| wrap(p.pose.position[d], periods[d]))),
-        );
+        self.centers.extend(row.particles.iter().map(|p| wrapped(p.pose.position, &lattice)));
         self.reaches.clear();
         self.reaches
             .extend(row.particles.iter().map(|p| (p.radius + 0.5 * reach) * (1.0 + SLACK) + SLACK * longest));
         self.owners.clear();
         self.owners.extend(0..row.particles.len() as u32);
         let margin = 2.0 * self.reaches.iter().copied().fold(0.0, f64::max);
-        for (axis, period) in periods.iter().enumerate() {
-            if let Some(period) = *period {
-                self.add_images(axis, period, margin);
+        // Images across the border in y are moved along x, so x comes last.
+        for axis in (0..D).rev() {
+            if let Some(period) = lattice.periods()[axis] {
+                self.add_images(axis, period, margin, &lattice);
             }
         }
     }
 
     /// Images of all balls so far, one period up or down an axis: as far as nearest images are from the
     /// period.
-    fn add_images(&mut self, axis: usize, period: f64, margin: f64) {
+    fn add_images(&mut self, axis: usize, period: f64, margin: f64, lattice: &Lattice<D>) {
         for ball in 0..self.centers.len() {
-            for shift in [-period, period] {
+            for sign in [-1.0, 1.0] {
                 let mut image = self.centers[ball];
-                image[axis] += shift;
+                image[axis] += sign * period;
+                if axis == 1 && lattice.tilt() != 0.0 {
+                    image[0] += sign * lattice.tilt();
+                    image = wrapped_along(0, image, lattice);
+                }
                 if image[axis] >= -margin && image[axis] <= period + margin {
                     self.centers.push(image);
                     self.reaches.push(self.reaches[ball]);
@@ -110,6 +112,22 @@ where
             }
         }
     }
+}
+
+/// A place brought into the periods.
+fn wrapped<const D: usize>(x: Vector<D>, lattice: &Lattice<D>) -> Vector<D> {
+    (0..D).rev().fold(x, |x, axis| wrapped_along(axis, x, lattice))
+}
+
+/// A place brought into the period of one axis.
+fn wrapped_along<const D: usize>(axis: usize, mut x: Vector<D>, lattice: &Lattice<D>) -> Vector<D> {
+    let Some(period) = lattice.periods()[axis] else { return x };
+    let count = (x[axis] / period).floor();
+    x[axis] -= period * count;
+    if axis == 1 {
+        x[0] -= lattice.tilt() * count;
+    }
+    x
 }
 
 #[cfg(test)]
@@ -164,7 +182,10 @@ mod tests {
         let open = Domain::default();
         let channel = Domain::default().with_period(0, 1.0);
         let periodic = Domain::periodic(&Vector::<D>::repeat(1.0));
-        for domain in [&open, &channel, &periodic] {
+        let [mut tilted, mut sheared] = [periodic.clone(), periodic.clone()];
+        tilted.set_sliding(0.5, 0.0);
+        sheared.set_sliding(-3.3, 0.0);
+        for domain in [&open, &channel, &periodic, &tilted, &sheared] {
             // Dense, sparse, far apart, and far from the first period.
             for (count, radius, spread) in [
                 (60, 0.1, 1.0),

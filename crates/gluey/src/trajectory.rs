@@ -1,8 +1,7 @@
 //! One instant of a run, and what of all instants the report needs.
 
 use gluey_contact::Domain;
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
-use gluey_levelset::nearest_image;
+use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
 
 use crate::interpolate::cubic;
 
@@ -34,14 +33,14 @@ where
     /// Gap between the surfaces of two particles, of their nearest images (Verdon et al. 2010, eq. 14).
     pub fn gap(&self, first: usize, second: usize) -> f64 {
         let [one, other] = [first, second].map(|particle| &self.particles[particle]);
-        let distance = separation(&one.pose.position, &other.pose.position, &self.domain.periods).norm();
+        let distance = separation(&one.pose.position, &other.pose.position, &self.domain.lattice).norm();
         distance - (one.radius + other.radius)
     }
 
     /// Whether the nearest image of a particle is the particle itself.
     pub fn is_direct(&self, first: usize, second: usize) -> bool {
         let [one, other] = [first, second].map(|particle| &self.particles[particle].pose.position);
-        separation(one, other, &self.domain.periods) == other - one
+        separation(one, other, &self.domain.lattice) == other - one
     }
 
     /// All pairs, `(0, 1), (0, 2), (1, 2), ...` in the order 12, 13, ..., 23, ... of the output.
@@ -52,9 +51,8 @@ where
 }
 
 /// Vector from one point to the nearest image of another.
-fn separation<const D: usize>(one: &Vector<D>, other: &Vector<D>, periods: &[Option<f64>; D]) -> Vector<D> {
-    let direct = other - one;
-    Vector::from_fn(|axis, _| nearest_image(direct[axis], periods[axis]))
+fn separation<const D: usize>(one: &Vector<D>, other: &Vector<D>, lattice: &Lattice<D>) -> Vector<D> {
+    lattice.nearest(&(other - one)).0
 }
 
 /// History of particles 1 and 2 for the report: three numbers per row.
@@ -74,12 +72,12 @@ impl PairHistory {
         time: f64,
         centers: [&Vector<D>; 2],
         radii: [f64; 2],
-        periods: &[Option<f64>; D],
+        lattice: &Lattice<D>,
     ) {
         let [one, other] = centers;
         self.times.push(time);
         // The same expression as in `Row::gap`, so that both are equal bit for bit.
-        self.gaps.push(separation(one, other, periods).norm() - (radii[0] + radii[1]));
+        self.gaps.push(separation(one, other, lattice).norm() - (radii[0] + radii[1]));
         self.ahead.push(other[0] - one[0]);
     }
 
