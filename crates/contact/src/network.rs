@@ -13,7 +13,7 @@ use crate::{Contact, ContactError, Domain, Partner};
 /// The contacts of one instant, with what they join.
 ///
 /// Forces of a step act along the normals of its beginning: [`ContactNetwork::stress`] is exact with the
-/// positions the step was given, and off by `O(dt)` with those after it.
+/// positions (and the tilt) the step was given, and off by `O(dt)` with those after it.
 ///
 /// ```
 /// use gluey_contact::{Contact, ContactNetwork, Domain, PairKey};
