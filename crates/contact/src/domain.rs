@@ -51,9 +51,9 @@ impl<const D: usize> Wall<D> {
 ///
 /// `x + (i L + j tilt, j H, k W)`,  `tilt = r H t`,
 ///
-/// and moves by `j tilt_step` along `x` in a step besides the particle's own motion, `tilt_step = r H dt`. The
-/// tilt is not brought back into the period, so that images keep their names; [`Domain::set_sliding`] sets
-/// both at every step.
+/// and moves by `j tilt_step` along `x` in a step besides the particle's own motion, `tilt_step = r H dt`.
+/// The tilt is not brought back into the period, so that images keep their names; [`Domain::set_sliding`]
+/// sets both at every step.
 ///
 /// ```
 /// use gluey_contact::Domain;

@@ -279,8 +279,8 @@ where
         }
     }
     println!(
-        "{D}D {law}: {contact_count} contacts at most, smallest gap {:e} a, forces off balance by {imbalance:e}, \
-         gaps off by {off:e}, seconds {quarters:?}",
+        "{D}D {law}: {contact_count} contacts at most, smallest gap {:e} a, forces off balance by \
+         {imbalance:e}, gaps off by {off:e}, seconds {quarters:?}",
         smallest / RADIUS
     );
     assert!(contact_count > packing.positions.len() / 2);

@@ -2,6 +2,7 @@
 //! step as long as particles stay near where they were, or where images that slide carry them.
 
 mod affine;
+mod images;
 mod order;
 
 use gluey_geom::{Lattice, Vector};
@@ -9,6 +10,7 @@ use gluey_geom::{Lattice, Vector};
 use crate::broadphase::{BestOf, Broadphase};
 use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
 use affine::{AffineFit, Frame};
+use images::{for_each_image, wrap};
 use order::SpatialOrder;
 
 /// Pairs nearer than this part of their summed radii are kept in the list whatever they do (the skin of the
@@ -372,55 +374,6 @@ impl<const D: usize> NeighbourList<D> {
 /// The motion of the lattice in the step.
 fn frame_of_step<const D: usize>(domain: &Domain<D>) -> Frame<D> {
     Frame { free: domain.lattice.periods().map(|period| period.is_none()), shear: domain.strain_step() }
-}
-
-/// Positions brought into the periods, `0 <= x < period`, and how many periods each was moved by.
-fn wrap<const D: usize>(
-    positions: &[Vector<D>],
-    domain: &Domain<D>,
-    wrapped: &mut Vec<Vector<D>>,
-    windings: &mut Vec<[i32; 3]>,
-) {
-    windings.clear();
-    windings.extend(positions.iter().map(|x| winding(x, &domain.lattice)));
-    wrapped.clear();
-    wrapped.extend(positions.iter().zip(windings).map(|(x, winding)| x + domain.shift(winding)));
-}
-
-/// The image of a position that is in the periods.
-fn winding<const D: usize>(x: &Vector<D>, lattice: &Lattice<D>) -> [i32; 3] {
-    let count = |d: usize, x: f64| {
-        let period = lattice.periods().get(d).copied().flatten();
-        period.map_or(0, |period| -(x / period).floor() as i32)
-    };
-    let up = count(1, x[1]);
-    let along = count(0, x[0] + f64::from(up) * lattice.tilt());
-    [along, up, if D > 2 { count(2, x[2]) } else { 0 }]
-}
-
-/// Visits the images of a position in the periods that come within a margin of them, but for itself.
-fn for_each_image<const D: usize>(
-    x: &Vector<D>,
-    lattice: &Lattice<D>,
-    margin: f64,
-    mut visit: impl FnMut([i32; 3]),
-) {
-    let range = |d: usize, x: f64| match lattice.periods().get(d).copied().flatten() {
-        None => 0..=0,
-        Some(period) => {
-            ((-margin - x) / period).ceil() as i32..=((period + margin - x) / period).floor() as i32
-        }
-    };
-    let across = if D > 2 { range(2, x[2]) } else { 0..=0 };
-    for k in across {
-        for j in range(1, x[1]) {
-            for i in range(0, x[0] + f64::from(j) * lattice.tilt()) {
-                if [i, j, k] != [0; 3] {
-                    visit([i, j, k]);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]
