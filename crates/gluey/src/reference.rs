@@ -129,6 +129,8 @@ impl Comparison {
 
 #[cfg(test)]
 mod tests {
+    use gluey_geom::Lattice;
+
     use super::*;
 
     #[test]
@@ -152,7 +154,7 @@ mod tests {
                 };
                 let centers = [center(0), center(1)];
                 comparison.add(time, &centers);
-                pair.push(time, [&centers[0], &centers[1]], [RADIUS; 2], &[None; 2]);
+                pair.push(time, [&centers[0], &centers[1]], [RADIUS; 2], &Lattice::default());
             }
             comparison.deviation(&pair).expect("a common time")
         };

@@ -126,7 +126,7 @@ fn write_number(f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>) -> f
 
 #[cfg(test)]
 mod tests {
-    use gluey_geom::Vector;
+    use gluey_geom::{Lattice, Vector};
 
     use super::*;
 
@@ -138,7 +138,7 @@ mod tests {
         let mut t = 0.0;
         while t <= end {
             let other = Vector::<2>::new(0.1 * (t - 5.0), above(t));
-            pair.push(t, [&Vector::zeros(), &other], [A; 2], &[None; 2]);
+            pair.push(t, [&Vector::zeros(), &other], [A; 2], &Lattice::default());
             t += 0.1;
         }
         pair
