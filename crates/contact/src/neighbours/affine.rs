@@ -39,8 +39,8 @@ pub(crate) struct AffineFit<const D: usize> {
 const LARGEST_STRAIN: f64 = 0.5;
 
 impl<const D: usize> AffineFit<D> {
-    /// Fits `displacements` at `positions`: besides the motion of the `frame`, `L` is fitted on the directions
-    /// that are free.
+    /// Fits `displacements` at `positions`: besides the motion of the `frame`, `L` is fitted on the
+    /// directions that are free.
     pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], frame: &Frame<D>) -> Self {
         let sliding = frame.gradient();
         let scale = 1.0 / positions.len().max(1) as f64;

@@ -114,6 +114,11 @@ fn searches<const D: usize>(periodic: [bool; D], count: usize) -> usize {
     let (height, strain_step, step_count) = (6.0, 0.01, 200);
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut cloud = Cloud::<D>::new(&mut random, [height; D], periodic, count);
+    if periodic[1] {
+        // Written many rows of boxes apart, which move fast against each other.
+        let rows = (0..count).map(|k| (100 * (k % 7)) as f64);
+        cloud.positions.iter_mut().zip(rows).for_each(|(x, rows)| x[1] += rows * height);
+    }
     let drift = vec![Vector::zeros(); count];
     let mut neighbours = NeighbourList::default();
     let mut search_count = 0;
