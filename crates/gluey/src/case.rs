@@ -75,6 +75,23 @@ pub struct Case {
     /// Flow.
     #[serde(default)]
     pub flow: FlowSpec,
+    /// Rheology, in a box that is sheared for ever.
+    #[serde(default)]
+    pub rheology: RheologySpec,
+}
+
+/// Rheology.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RheologySpec {
+    /// The stress of the suspension is computed and written every so many steps.
+    pub every: usize,
+}
+
+impl Default for RheologySpec {
+    fn default() -> Self {
+        Self { every: 1 }
+    }
 }
 
 /// The box of fluid.
@@ -353,8 +370,18 @@ impl Case {
     /// Length of the box along an axis in which the particles see images of each other.
     pub fn period(&self, axis: usize) -> Option<f64> {
         let flows = self.flow.hydrodynamics == Hydrodynamics::Stokes;
-        let is_periodic = flows && self.domain.boundary == Boundary::Periodic && axis != WALLED_AXIS;
+        let has_period = match self.domain.boundary {
+            Boundary::Couette => false,
+            Boundary::Periodic => axis != WALLED_AXIS,
+            Boundary::Sheared => true,
+        };
+        let is_periodic = flows && has_period;
         is_periodic.then(|| self.upper()[axis] - self.lower()[axis])
+    }
+
+    /// Whether the box is sheared for ever, with images that slide along each other.
+    pub fn is_sheared(&self) -> bool {
+        self.flow.hydrodynamics == Hydrodynamics::Stokes && self.domain.boundary == Boundary::Sheared
     }
 
     /// Surroundings of the particles: walls below and above (y), which move along themselves, and the
@@ -366,8 +393,12 @@ impl Case {
         let bounds = [self.lower(), self.upper()].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
         let inwards = Vector::<D>::from_fn(|d, _| if d == WALLED_AXIS { 1.0 } else { 0.0 });
         let [below, above] = bounds;
+        let walls = match self.is_sheared() {
+            true => Vec::new(),
+            false => vec![Wall::new(&below, &inwards), Wall::new(&above, &-inwards)],
+        };
         Domain {
-            walls: vec![Wall::new(&below, &inwards), Wall::new(&above, &-inwards)],
+            walls,
             lattice: Lattice::new(std::array::from_fn(|axis| self.period(axis))),
             ..Domain::default()
         }

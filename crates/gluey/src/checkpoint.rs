@@ -19,13 +19,13 @@ use thiserror::Error;
 use crate::case::Case;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::csv::CsvMarks;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{Mark, OutputError, write_atomically};
 use crate::phases::PhaseTable;
 use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
@@ -42,6 +42,8 @@ where
     pub state: SimulationState<D>,
     /// How far the files of rows had come.
     pub output: CsvMarks,
+    /// How far that of the rheology had come, where there is one.
+    pub rheology: Option<Mark>,
     /// Wall time so far, phase by phase.
     pub phases: PhaseTable,
     /// Wall time so far, in seconds.

@@ -10,9 +10,9 @@ mod fields;
 use std::time::Instant;
 
 use gluey_fem::{MeshError, TreeMesh};
-use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, ResumeError};
+use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, ResumeError};
 use gluey_stokes::{
     Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
     SolverKind, StokesError, WarmStartError,
@@ -64,6 +64,7 @@ impl From<MeshError> for FlowError {
 #[derive(Serialize, Deserialize)]
 struct WarmStart<const D: usize> {
     centers: Vec<Vector<D>>,
+    strain: f64,
     last: SavedFields,
     before: Option<SavedFields>,
 }
@@ -100,6 +101,8 @@ where
     periods: [Option<f64>; D],
     shear_rate: f64,
     shear_factor: f64,
+    /// In a box that is sheared for ever.
+    sheared: Option<Sheared>,
     /// Whether lubrication keeps particles apart.
     keeps_films_open: bool,
     radii: Vec<f64>,
@@ -107,6 +110,16 @@ where
     wrenches: Vec<Wrench<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
+    last_positions: Vec<Vector<D>>,
+    last_strain: f64,
+}
+
+/// A box that is sheared for ever.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sheared {
+    strain: f64,
+    /// Whether the next prediction is to have a stress.
+    with_stress: bool,
 }
 
 /// Sets up the finite-element flow of a checked case.
@@ -131,11 +144,14 @@ where
         periods: std::array::from_fn(|axis| case.period(axis)),
         shear_rate: case.shear_rate,
         shear_factor: 1.0,
+        sheared: case.is_sheared().then(Sheared::default),
         keeps_films_open: case.lubrication() == Lubrication::Deficit,
         radii,
         wrenches: case.wrenches(),
         last: None,
         last_balls: Vec::new(),
+        last_positions: Vec::new(),
+        last_strain: 0.0,
     })
 }
 
@@ -144,8 +160,64 @@ where
     Dim<D>: Space<D>,
 {
     fn balls(&self, centers: impl Iterator<Item = Vector<D>>) -> Vec<Ball<D>> {
-        let ball = |(center, &radius)| Ball::periodic(center, radius, self.periods);
+        let lattice = Lattice::new(self.periods);
+        let height = self.periods[1].unwrap_or(0.0);
+        let lattice = lattice.tilted(self.sheared.map_or(0.0, |sheared| sheared.strain * height));
+        let origin = self.domain.lower[1];
+        let ball = |(center, &radius)| Ball::in_space(&center, radius, &lattice, origin);
         centers.zip(&self.radii).map(ball).collect()
+    }
+
+    /// The undisturbed velocity.
+    fn undisturbed(&self) -> impl Fn(&Vector<D>) -> Vector<D> + use<D> {
+        let middle = self.domain.center()[1];
+        let rate = self.rate();
+        move |x: &Vector<D>| {
+            let mut u = Vector::zeros();
+            u[0] = rate * (x[1] - middle);
+            u
+        }
+    }
+
+    /// The shear rate now.
+    fn rate(&self) -> f64 {
+        self.shear_rate * self.shear_factor
+    }
+
+    /// The flow in a box with walls or Couette flow around.
+    fn solve(&mut self, mesh: TreeMesh<D>, balls: &[Ball<D>]) -> Result<Flow<D>, FlowError> {
+        let shear = self.undisturbed();
+        let conditions = Conditions::boundary(&shear).with_wrenches(&self.wrenches);
+        Ok(self.solver.solve_under(mesh, balls, &conditions)?)
+    }
+
+    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces on the particles are
+    /// balanced by a uniform one on all of the box, which is a mean gradient of the pressure.
+    fn solve_sheared(
+        &mut self,
+        mesh: TreeMesh<D>,
+        balls: &[Ball<D>],
+        with_stress: bool,
+    ) -> Result<Flow<D>, FlowError> {
+        let mut gradient = Matrix::<D>::zeros();
+        gradient[(0, 1)] = self.rate();
+        let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
+        let back = -total / self.domain.extent().product();
+        let uniform = move |_: &Vector<D>| back;
+        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&self.wrenches);
+        let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let conditions = if with_stress { conditions.with_stress() } else { conditions };
+        Ok(self.solver.solve_under(mesh, balls, &conditions)?)
+    }
+
+    /// Velocity of the image at a film beyond that of its particle.
+    fn slide(&self, film: &gluey_stokes::Film<D>) -> Vector<D> {
+        let mut slide = Vector::zeros();
+        if let (Some(_), Some(second)) = (self.sheared, film.side(1)) {
+            let direct = self.last_positions[second][1] - self.last_positions[film.body as usize][1];
+            slide[0] = self.rate() * (film.branch()[1] - direct);
+        }
+        slide
     }
 
     fn mesh(&self, balls: &[Ball<D>]) -> Result<TreeMesh<D>, FlowError> {
@@ -170,17 +242,23 @@ where
         let start = Instant::now();
         let mesh = self.mesh(&balls)?;
         let meshed = start.elapsed().as_secs_f64();
-        let middle = self.domain.center()[1];
-        let rate = self.shear_rate * self.shear_factor;
-        let shear = move |x: &Vector<D>| {
-            let mut u = Vector::zeros();
-            u[0] = rate * (x[1] - middle);
-            u
+        let mut flow = match self.sheared {
+            None => self.solve(mesh, &balls)?,
+            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, with_stress)?,
         };
-        let conditions = Conditions::boundary(&shear).with_wrenches(&self.wrenches);
-        let mut flow = self.solver.solve_under(mesh, &balls, &conditions)?;
         flow.times.assembly += meshed;
         twists.copy_from_slice(&flow.twists);
+        if self.sheared.is_some() {
+            let undisturbed = self.undisturbed();
+            let spin = -0.5 * self.rate();
+            for (twist, particle) in twists.iter_mut().zip(particles) {
+                twist.velocity += undisturbed(&particle.pose.position);
+                // About z, the only axis in 2D and the last one in 3D.
+                twist.spin[Dim::<D>::ROT - 1] += spin;
+            }
+        }
+        self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
+        self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
         self.last = Some(flow);
         self.last_balls = balls;
         Ok(())
@@ -188,6 +266,24 @@ where
 
     fn set_shear_factor(&mut self, factor: f64) {
         self.shear_factor = factor;
+    }
+
+    fn set_strain(&mut self, strain: f64, with_stress: bool) {
+        if let Some(sheared) = &mut self.sheared {
+            *sheared = Sheared { strain, with_stress };
+        }
+    }
+
+    fn stress(&self) -> Option<MeanStress<D>> {
+        let stress = self.last.as_ref()?.stress.as_ref()?;
+        let volume = self.domain.extent().product();
+        Some(MeanStress {
+            rate: self.rate(),
+            viscosity: self.params.viscosity,
+            of_bodies: stress.of_bodies(volume),
+            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            dissipation: stress.dissipation / volume,
+        })
     }
 
     fn films(&self, reach: f64) -> Vec<Film<D>> {
@@ -199,7 +295,7 @@ where
             first: film.body as usize,
             second: film.side(1),
             branch: film.branch(),
-            slide: Vector::zeros(),
+            slide: self.slide(&film),
             gap: film.gap,
             curvature_radius: film.curvature_radius(),
         };
@@ -220,13 +316,23 @@ where
 
     fn fields(&self) -> Option<Fields<D>> {
         let flow = self.last.as_ref()?;
-        Some(fields::fields(flow, &self.last_balls, &self.params))
+        let mut fields = fields::fields(flow, &self.last_balls, &self.params);
+        if self.sheared.is_some() {
+            let shear = flow.discretisation.mesh.shear();
+            let undisturbed = self.undisturbed();
+            for (point, velocity) in fields.points.iter_mut().zip(&mut fields.velocity) {
+                point[0] += shear * (point[1] - self.domain.lower[1]);
+                *velocity += undisturbed(point);
+            }
+        }
+        Some(fields)
     }
 
     fn checkpoint(&self) -> Result<Vec<u8>, FlowError> {
         let Some((last, before)) = self.solver.warm_start() else { return Ok(Vec::new()) };
-        let centers = self.last_balls.iter().map(|b| *b.center()).collect();
-        let state = WarmStart { centers, last: last.clone().into(), before: before.cloned().map(Into::into) };
+        let (centers, strain) = (self.last_positions.clone(), self.last_strain);
+        let state =
+            WarmStart { centers, strain, last: last.clone().into(), before: before.cloned().map(Into::into) };
         Ok(postcard::to_allocvec(&state)?)
     }
 
@@ -234,15 +340,17 @@ where
         if state.is_empty() {
             return Ok(());
         }
-        let WarmStart { centers, last, before } = postcard::from_bytes(state).map_err(FlowError::from)?;
+        let WarmStart { centers, strain, last, before } =
+            postcard::from_bytes(state).map_err(FlowError::from)?;
         let (saved, present) = (centers.len(), self.radii.len());
         if saved != present {
             return Err(FlowError::Particles { saved, present }.into());
         }
-        let balls = self.balls(centers.into_iter());
+        self.set_strain(strain, false);
+        let balls = self.balls(centers.iter().copied());
         let mesh = self.mesh(&balls)?;
         self.solver.set_warm_start(mesh, last.into(), before.map(Into::into)).map_err(FlowError::from)?;
-        self.last_balls = balls;
+        (self.last_balls, self.last_positions, self.last_strain) = (balls, centers, strain);
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ mod claim;
 pub mod csv;
 mod draft;
 mod pvd;
+pub mod rheology;
 pub mod vtk;
 
 use std::ffi::OsStr;

@@ -20,11 +20,12 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
+use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
 use crate::output::{Claim, OutputError, set_aside};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
-use crate::simulation::{RestoreError, Simulation, StepError};
+use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
@@ -77,6 +78,7 @@ where
     simulation: Simulation<D, H, PairContact<D>>,
     measures: Measures<D>,
     csv: CsvWriter<D>,
+    rheology: Option<RheologyWriter>,
     vtk: Option<(usize, FrameWriter<D>)>,
     checkpoints: Option<CheckpointFile>,
     /// The run before the step that is being done, where checkpoints are written.
@@ -104,10 +106,22 @@ where
         let (scheme, dt) = (case.time.scheme, case.time.step);
         let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
-        let drafts = earlier_drafts(&options.csv, case.particles.len())?;
+        let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
+        if case.is_sheared() {
+            drafts.extend(rheology::earlier_drafts(&options.csv)?);
+            simulation = simulation.sheared(Sliding {
+                rate: case.shear_rate,
+                height: case.upper()[1] - case.lower()[1],
+                stress_every: case.rheology.every,
+            });
+        }
         let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
+        let mut rheology = None;
         let csv = match &options.resume {
             None => {
+                if case.is_sheared() {
+                    rheology = Some(RheologyWriter::create::<D>(&options.csv)?);
+                }
                 if !drafts.is_empty() {
                     progress.notice(&Notice::EarlierDrafts { drafts });
                 }
@@ -116,6 +130,8 @@ where
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?;
                 wall_before_s = checkpoint.wall_s;
+                let mark = checkpoint.rheology.as_ref();
+                rheology = mark.map(|mark| RheologyWriter::resume(&options.csv, mark)).transpose()?;
                 go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?
             }
         };
@@ -129,6 +145,7 @@ where
             simulation,
             measures,
             csv,
+            rheology,
             vtk,
             checkpoints,
             last_good,
@@ -147,6 +164,7 @@ where
         let wall_s = self.wall_s();
         let flow = self.simulation.statistics();
         self.csv.finish()?;
+        self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
         Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
     }
 
@@ -181,6 +199,10 @@ where
         let (particles, twists) = (simulation.particles(), simulation.twists());
         let domain = simulation.contact().domain();
         let smallest_gap_over_a = self.csv.write(&Row { time, particles, twists, domain })?;
+        if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
+            let strain = simulation.strain();
+            rheology.write(&Rheology { time, strain, stress: &stress, smallest_gap_over_a })?;
+        }
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
         match &mut self.vtk {
@@ -251,6 +273,7 @@ where
             self.last_good = Some(Checkpoint {
                 state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
                 output: self.csv.marks(),
+                rheology: self.rheology.as_ref().map(RheologyWriter::mark),
                 phases: self.simulation.phases().clone(),
                 wall_s: self.wall_s(),
             });
@@ -262,6 +285,7 @@ where
     fn save(&mut self) -> Result<(), OutputError> {
         let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
         self.csv.sync()?;
+        self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
         self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
         file.write(checkpoint, self.case, self.progress)
     }

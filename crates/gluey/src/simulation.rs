@@ -2,7 +2,9 @@
 
 use gluey_contact::{BodyStep, Contact, ContactError, ContactModel, ContactState, MemoryError};
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
-use gluey_motion::{Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, ResumeError, Scheme};
+use gluey_motion::{
+    Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, ResumeError, Scheme,
+};
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
@@ -36,6 +38,8 @@ where
     dt: f64,
     step: usize,
     reversed: bool,
+    sliding: Option<Sliding>,
+    strain: f64,
     particles: Vec<Particle<D>>,
     radii: Vec<f64>,
     integrator: Integrator<D>,
@@ -45,6 +49,17 @@ where
     drift: Vec<Twist<D>>,
     twists: Vec<Twist<D>>,
     phases: PhaseTable,
+}
+
+/// How images slide along each other in simple shear for ever.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sliding {
+    /// The shear rate.
+    pub rate: f64,
+    /// Period across the shear, along `y`.
+    pub height: f64,
+    /// The stress is computed every so many steps, at least 1.
+    pub stress_every: usize,
 }
 
 /// A step could not be done.
@@ -145,6 +160,8 @@ where
     pub step: usize,
     /// Whether the shear is reversed.
     pub reversed: bool,
+    /// Shear strain of the periodic images, where they slide.
+    pub strain: f64,
     /// Particles.
     pub particles: Vec<Particle<D>>,
     /// Velocity history.
@@ -168,6 +185,8 @@ where
             dt,
             step: 0,
             reversed: false,
+            sliding: None,
+            strain: 0.0,
             radii: particles.iter().map(|particle| particle.radius).collect(),
             poses: particles.iter().map(|particle| particle.pose).collect(),
             particles,
@@ -178,6 +197,23 @@ where
             twists: vec![Twist::default(); count],
             phases: PhaseTable::default(),
         }
+    }
+
+    /// The same where periodic images slide along each other, in a box without strain at time 0.
+    #[must_use]
+    pub fn sheared(self, sliding: Sliding) -> Self {
+        Self { sliding: Some(sliding), ..self }
+    }
+
+    /// Shear strain of the periodic images, where they slide; zero elsewhere.
+    pub fn strain(&self) -> f64 {
+        self.strain
+    }
+
+    /// The shear rate at which images slide now.
+    fn sliding_rate(&self) -> f64 {
+        let rate = self.sliding.map_or(0.0, |sliding| sliding.rate);
+        if self.reversed { -rate } else { rate }
     }
 
     /// Does one step.
@@ -192,6 +228,10 @@ where
     /// Computes the velocities of all particles where they are, without contact.
     pub fn predict(&mut self) -> Result<(), StepError<H::Error>> {
         let (step, time) = (self.step, self.time());
+        if let Some(Sliding { height, stress_every, .. }) = self.sliding {
+            self.hydrodynamics.set_strain(self.strain, step.is_multiple_of(stress_every));
+            self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * self.dt);
+        }
         let start = std::time::Instant::now();
         let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
         self.book_flow(start.elapsed().as_secs_f64());
@@ -205,7 +245,8 @@ where
     /// Corrects the predicted velocities so that films that lubrication keeps open stay open.
     pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
         let (step, time) = (self.step, self.time());
-        let reach = self.integrator.film_reach(self.dt, &self.particles, &self.twists);
+        let rate = self.sliding_rate();
+        let reach = self.integrator.film_reach_in_shear(self.dt, &self.particles, &self.twists, rate);
         let films = self.hydrodynamics.films(reach);
         let (integrator, particles, twists) = (&mut self.integrator, &self.particles, &mut self.twists);
         self.phases
@@ -238,6 +279,7 @@ where
     pub fn advance(&mut self) {
         let (integrator, particles) = (&mut self.integrator, &mut self.particles);
         self.phases.time("motion", || integrator.advance(self.dt, particles, &self.twists));
+        self.strain += self.sliding_rate() * self.dt;
         self.step += 1;
     }
 
@@ -292,6 +334,11 @@ where
         self.hydrodynamics.fields()
     }
 
+    /// The mean stress of the last prediction, where the flow has one.
+    pub fn stress(&self) -> Option<MeanStress<D>> {
+        self.hydrodynamics.stress()
+    }
+
     /// Size and effort of the last prediction.
     pub fn statistics(&self) -> FlowStatistics {
         self.hydrodynamics.statistics()
@@ -315,6 +362,7 @@ where
         Ok(SimulationState {
             step: self.step,
             reversed: self.reversed,
+            strain: self.strain,
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
             contact: self.contact.checkpoint(),
@@ -337,6 +385,7 @@ where
         self.hydrodynamics.set_shear_factor(if state.reversed { -1.0 } else { 1.0 });
         self.step = state.step;
         self.reversed = state.reversed;
+        self.strain = state.strain;
         self.particles = state.particles;
         self.integrator = state.integrator;
         Ok(())

@@ -25,8 +25,9 @@ where
     fn set_shear_factor(&mut self, factor: f64);
 
     /// Sets the shear strain of the periodic images at the next prediction, where these slide along each other:
-    /// the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound.
-    fn set_strain(&mut self, _strain: f64) {}
+    /// the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound. And whether
+    /// that prediction is to have a stress.
+    fn set_strain(&mut self, _strain: f64, _with_stress: bool) {}
 
     /// The mean stress of the last prediction; `None` where the model has none.
     fn stress(&self) -> Option<MeanStress<D>> {

@@ -34,7 +34,7 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use films::{Film, FilmClosed};
-pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, ResumeError};
+pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, MeanStress, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};

@@ -29,6 +29,7 @@ impl Settings {
             contact: contact(case),
             domain: match case.domain.boundary {
                 Boundary::Couette => "Couette flow on all sides".to_owned(),
+                Boundary::Sheared => "periodic in all directions, images slide".to_owned(),
                 Boundary::Periodic => "walls below and above, periodic in x".to_owned(),
             },
             cells_per_radius: case.cells_per_radius(),

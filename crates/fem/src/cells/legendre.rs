@@ -11,8 +11,11 @@
 //! change of basis costs four operations per line of three nodes: `A_0 = u_0 + 4 u_1 + u_2`,
 //! `A_1 = u_0 - u_2`, `A_2 = u_1 - A_0 / 6` are `a_l / c_l`.
 //!
-//! Where cells are sheared, derivatives in space are `d_2 - g d_1` in the second direction and as they were in the
-//! others. Strains are still few Legendre products, whose mass is diagonal: 400 multiplications.
+//! Where cells are sheared, derivatives in space are `d_2 - g d_1` in the second direction and as they were in
+//! the others. The few hundred entries that this adds are a table: loops over strains, unrolled in every kernel,
+//! would take minutes to compile.
+
+use std::collections::BTreeMap;
 
 use gluey_linalg::Scalar;
 
@@ -44,13 +47,8 @@ pub(super) struct Coefficients<T> {
     cross: [[[T; 3]; 2]; 2],
     /// Of the divergence, by the degree of the pressure in the direction of the component.
     divergence: [T; 2],
-    /// Shear `g` of the cells.
-    shear: T,
-    /// Mass of the products.
-    mass: Vec<T>,
-    /// Derivatives in space along each axis: product that gets, product that gives, factor. In a table, for
-    /// loops that are unrolled in all kernels take minutes to compile.
-    derivatives: Vec<Vec<(u8, u8, T)>>,
+    /// What shear adds to the viscous matrix and to the divergence: row, column, entry.
+    of_shear: [Vec<(u8, u8, T)>; 2],
 }
 
 /// Unknowns of one component.
@@ -88,28 +86,26 @@ impl<T: Scalar> Coefficients<T> {
             cross: [0, 1]
                 .map(|i| [0, 1].map(|j| [0, 1, 2].map(|t| T::from_f64(lowered(i) * lowered(j) * third(t))))),
             divergence: [0, 1].map(|k| T::from_f64(divergence(k))),
-            shear: T::ZERO,
-            mass: (0..nodes::<D>())
-                .map(|k| T::from_f64(multi_index::<D>(k, 3).into_iter().map(mass).product()))
-                .collect(),
-            derivatives: Vec::new(),
+            of_shear: [Vec::new(), Vec::new()],
         }
     }
 
     /// The matrices of cells that are sheared.
     pub(super) fn sheared<const D: usize>(self, shear: f64) -> Self {
-        // c_{l+1} P_{l+1}' = slope c_l P_l.
-        let slope = |l: usize| DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l];
-        let along = |d: usize, factor: f64| {
-            let places = (0..nodes::<D>()).filter(move |k| k / stride(d) % 3 < 2);
-            let entry = move |k: usize| {
-                (k as u8, (k + stride(d)) as u8, T::from_f64(factor * slope(k / stride(d) % 3)))
-            };
-            places.map(entry).collect::<Vec<_>>()
+        let [before, after] = [0.0, shear].map(viscous_entries::<D>);
+        let added = after.iter().map(|(&(row, column), entry)| {
+            (row, column, entry - before.get(&(row, column)).copied().unwrap_or(0.0))
+        });
+        let added = added.filter(|entry| entry.2.abs() > 1e-15);
+        let viscous = added.map(|(row, column, entry)| (row, column, T::from_f64(entry))).collect();
+        let corner = |corner: usize| {
+            let degrees = (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2 & 1);
+            let unknown = nodes::<D>() + degrees + stride(0);
+            let entry = T::from_f64(-shear * self.divergence[corner & 1].to_f64());
+            (corner as u8, unknown as u8, entry)
         };
-        let mut derivatives: Vec<_> = (0..D).map(|d| along(d, 1.0)).collect();
-        derivatives[1].extend(along(0, -shear));
-        Self { shear: T::from_f64(shear), derivatives, ..self }
+        let divergence = if shear == 0.0 { Vec::new() } else { (0..1 << D).map(corner).collect() };
+        Self { of_shear: [viscous, divergence], ..self }
     }
 
     /// `r = K u`.
@@ -119,9 +115,6 @@ impl<T: Scalar> Coefficients<T> {
         u: &[V; UNKNOWNS],
         r: &mut [V; UNKNOWNS],
     ) {
-        if self.shear != T::ZERO {
-            return self.sheared_viscous::<V, D>(u, r);
-        }
         let n = nodes::<D>();
         for ((r, u), &diagonal) in r[..D * n].iter_mut().zip(&u[..D * n]).zip(&self.diagonal[..D * n]) {
             *r = u.mul(V::splat(diagonal));
@@ -131,60 +124,8 @@ impl<T: Scalar> Coefficients<T> {
             self.cross::<V, D, 0, 2>(u, r);
             self.cross::<V, D, 1, 2>(u, r);
         }
-    }
-
-    /// `r = K u` in sheared cells: `sum_{a<b} 4 eps_ab^2 + sum_a 2 eps_aa^2`, with twice the strain for `a < b`.
-    #[inline(always)]
-    fn sheared_viscous<V: Lanes<Scalar = T>, const D: usize>(
-        &self,
-        u: &[V; UNKNOWNS],
-        r: &mut [V; UNKNOWNS],
-    ) {
-        let n = nodes::<D>();
-        let (mass, two) = (&self.mass[..n], T::ONE + T::ONE);
-        r[..D * n].fill(V::splat(T::ZERO));
-        for b in 0..D {
-            for a in 0..=b {
-                let mut strain = [V::splat(T::ZERO); 27];
-                self.add_derivative::<V, D>(b, &u[a * n..], &mut strain);
-                if a < b {
-                    self.add_derivative::<V, D>(a, &u[b * n..], &mut strain);
-                }
-                let factor = if a == b { two } else { T::ONE };
-                for (strain, &mass) in strain.iter_mut().zip(mass) {
-                    *strain = strain.mul(V::splat(mass * factor));
-                }
-                self.add_transposed::<V, D>(b, &strain, &mut r[a * n..]);
-                if a < b {
-                    self.add_transposed::<V, D>(a, &strain, &mut r[b * n..]);
-                }
-            }
-        }
-    }
-
-    /// Adds the derivative in space of a component.
-    #[inline(always)]
-    fn add_derivative<V: Lanes<Scalar = T>, const D: usize>(
-        &self,
-        direction: usize,
-        u: &[V],
-        sum: &mut [V; 27],
-    ) {
-        for &(to, from, slope) in &self.derivatives[direction] {
-            sum[to as usize] = u[from as usize].mul_add(V::splat(slope), sum[to as usize]);
-        }
-    }
-
-    /// The transpose of [`Coefficients::add_derivative`].
-    #[inline(always)]
-    fn add_transposed<V: Lanes<Scalar = T>, const D: usize>(
-        &self,
-        direction: usize,
-        strain: &[V; 27],
-        r: &mut [V],
-    ) {
-        for &(from, to, slope) in &self.derivatives[direction] {
-            r[to as usize] = strain[from as usize].mul_add(V::splat(slope), r[to as usize]);
+        for &(row, column, entry) in &self.of_shear[0] {
+            r[row as usize] = u[column as usize].mul_add(V::splat(entry), r[row as usize]);
         }
     }
 
@@ -248,15 +189,42 @@ impl<T: Scalar> Coefficients<T> {
                 visit(corner, b * nodes::<D>() + degrees + stride(b), factors[corner >> b & 1]);
             }
         }
-        if self.shear == T::ZERO {
-            return;
-        }
-        let leaning = self.divergence.map(|factor| V::splat(T::ZERO - self.shear * factor));
-        for corner in 0..1 << D {
-            let degrees = (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2 & 1);
-            visit(corner, nodes::<D>() + degrees + stride(0), leaning[corner & 1]);
+        for &(corner, unknown, entry) in &self.of_shear[1] {
+            visit(corner as usize, unknown as usize, V::splat(entry));
         }
     }
+}
+
+/// Entries of the viscous matrix in cells with this shear: `sum_{a<b} (2 eps_ab)^2 + 2 sum_a eps_aa^2` in the
+/// products, whose mass is diagonal.
+fn viscous_entries<const D: usize>(shear: f64) -> BTreeMap<(u8, u8), f64> {
+    let n = nodes::<D>();
+    // c_{l+1} P_{l+1}' = slope c_l P_l.
+    let slope = |l: usize| DERIVATIVE[l] * VELOCITY[l + 1] / VELOCITY[l];
+    let along = |d: usize, component: usize, k: usize, factor: f64| {
+        let degree = k / stride(d) % 3;
+        (degree < 2).then(|| (component * n + k + stride(d), factor * slope(degree)))
+    };
+    // The derivative of a component along an axis of space, in the product `k`.
+    let derivative = |axis: usize, component: usize, k: usize| {
+        let leaning = if axis == 1 { along(0, component, k, -shear) } else { None };
+        along(axis, component, k, 1.0).into_iter().chain(leaning)
+    };
+    let mut entries = BTreeMap::new();
+    for (a, b, k) in (0..D).flat_map(|b| (0..=b).flat_map(move |a| (0..n).map(move |k| (a, b, k)))) {
+        let mut strain: Vec<(usize, f64)> = derivative(b, a, k).collect();
+        if a < b {
+            strain.extend(derivative(a, b, k));
+        }
+        let mass: f64 = multi_index::<D>(k, 3).into_iter().map(|l| MASS[l] * VELOCITY[l].powi(2)).product();
+        let factor = if a == b { 2.0 * mass } else { mass };
+        for &(row, first) in &strain {
+            for &(column, second) in &strain {
+                *entries.entry((row as u8, column as u8)).or_insert(0.0) += factor * first * second;
+            }
+        }
+    }
+    entries
 }
 
 /// From the values on a line of nodes to `A`.

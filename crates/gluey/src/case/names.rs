@@ -141,5 +141,7 @@ named! {
         Couette = "couette",
         /// Moving walls below and above (y), periodic in x (and z).
         Periodic = "periodic",
+        /// Simple shear for ever: periodic in all directions, with images that slide along each other.
+        Sheared = "sheared",
     }
 }

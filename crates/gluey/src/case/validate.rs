@@ -6,7 +6,7 @@ use super::Case;
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::mesh::MOST_ROOTS;
-use super::names::{Formulation, Hydrodynamics, Lubrication, UnknownName};
+use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
 use crate::reference::{self, Reference};
 
@@ -77,12 +77,40 @@ fn check_domain(case: &Case, key: &Key) -> Check {
         let key = Key::default().name("flow").name("mesh").name("root_cells");
         return out_of_range(f64::from(roots), &format!("from 1 to {MOST_ROOTS}"), key);
     }
+    check_sheared(case, key.name("boundary"))?;
     match case.flow.hydrodynamics {
         Hydrodynamics::Stokes if case.root_cells().is_none() => {
             fail(key.name("upper"), Problem::UnevenBox { edges: case.edges() })
         }
         _ => Ok(()),
     }
+}
+
+/// Boxes that are sheared for ever are those of one formulation.
+fn check_sheared(case: &Case, key: Key) -> Check {
+    let (flow, needed) = (&case.flow, Formulation::Unfitted);
+    let choice = || Boundary::Sheared.name().to_owned();
+    if case.domain.boundary != Boundary::Sheared {
+        return Ok(());
+    }
+    if flow.hydrodynamics != Hydrodynamics::Stokes {
+        let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
+        return fail(
+            key,
+            Problem::Unfit { choice: choice(), needs, found: format!("\"{}\"", flow.hydrodynamics) },
+        );
+    }
+    if flow.formulation != needed {
+        let needs = format!("flow.formulation = \"{needed}\"");
+        return fail(
+            key,
+            Problem::Unfit { choice: choice(), needs, found: format!("\"{}\"", flow.formulation) },
+        );
+    }
+    if case.rheology.every == 0 {
+        return out_of_range(0.0, "of 1 or more", Key::default().name("rheology").name("every"));
+    }
+    Ok(())
 }
 
 fn check_particles(case: &Case, key: &Key) -> Check {

@@ -115,7 +115,7 @@ fn a_sheared_square_lattice_has_its_viscosity_at_every_strain() {
     let wanted = exact.into_iter().filter(|row| row[0] >= 0.1 && row[0] <= 0.5);
     let errors = errors_of_lattice::<2>(4, |phi| (phi / PI).sqrt(), wanted);
     println!("square lattice: {errors:?}");
-    assert!(errors[0] < 1e-3 && errors[1] < 3e-3 && errors[2] < 3e-4, "{errors:?}");
+    assert!(errors[0] < 8e-4 && errors[1] < 1.3e-3 && errors[2] < 2e-4, "{errors:?}");
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_sheared_simple_cubic_lattice_has_its_viscosity_at_every_strain() {
     let wanted = exact.into_iter().filter(|row| row[0] <= 0.3);
     let errors = errors_of_lattice::<3>(3, |phi| (0.75 * phi / PI).cbrt(), wanted);
     println!("simple cubic lattice: {errors:?}");
-    assert!(errors[0] < 3e-3 && errors[1] < 6e-3 && errors[2] < 6e-4, "{errors:?}");
+    assert!(errors[0] < 4e-3 && errors[1] < 5e-3 && errors[2] < 5e-4, "{errors:?}");
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn every_disc_of_a_cell_has_its_velocity() {
         let errors = [viscosity / discs[0][8] - 1.0, n1 - discs[0][9]];
         println!("cell {cell}: {worst:?} {errors:?}");
         // The undisturbed velocity at the upper border is 1.
-        assert!(worst[0] < 1e-3 && worst[1] < 1e-2, "{worst:?}");
+        assert!(worst[0] < 1e-3 && worst[1] < 1.5e-2, "{worst:?}");
         assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?}");
     }
 }
@@ -214,8 +214,8 @@ where
 
 #[test]
 fn the_stress_does_the_power_that_is_dissipated() {
-    routes_agree::<2>(5, 1e-3);
-    routes_agree::<3>(4, 1e-3);
+    routes_agree::<2>(5, 2e-3);
+    routes_agree::<3>(3, 1e-2);
 }
 
 /// Bodies that are held need no force in all, and films act between images that slide.

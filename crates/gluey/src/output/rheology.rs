@@ -1,0 +1,142 @@
+//! The rheology of a sheared suspension as comma-separated values, a row whenever its stress was computed.
+//!
+//! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate. `viscosity` is by
+//! the stresslets of the particles, `viscosity_by_dissipation` by the power that fluid and films dissipate: their
+//! difference is an error of discretisation. `viscosity_of_films` is the share of films too thin for the mesh in
+//! the first. `particle_pressure` is `-tr S / (D V)`, relative to the mean pressure of the fluid.
+
+use std::path::{Path, PathBuf};
+
+use gluey_motion::MeanStress;
+
+use super::draft::{Draft, Mark, RowsError};
+use super::{OutputError, drafts};
+
+/// The first line in 2D; in 3D `N2` comes behind `N1`.
+const NAMES: [&str; 9] = [
+    "t",
+    "strain",
+    "viscosity",
+    "viscosity_by_dissipation",
+    "viscosity_of_films",
+    "N1",
+    "N2",
+    "particle_pressure",
+    "min_gap_over_a",
+];
+
+/// A row: the stress, and when it was.
+#[derive(Clone, Copy, Debug)]
+pub struct Rheology<'a, const D: usize> {
+    /// Time.
+    pub time: f64,
+    /// Shear strain since the beginning, less what was sheared back.
+    pub strain: f64,
+    /// The stress.
+    pub stress: &'a MeanStress<D>,
+    /// Smallest gap in mean radii, if there is any.
+    pub smallest_gap_over_a: Option<f64>,
+}
+
+/// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-rheology.csv` beside the trajectory.
+#[derive(Debug)]
+pub struct RheologyWriter(Draft);
+
+impl RheologyWriter {
+    /// Starts the file beside the trajectory `csv`.
+    pub fn create<const D: usize>(csv: &Path) -> Result<Self, RowsError> {
+        let mut draft = Draft::create(&rheology_path(csv))?;
+        draft.write(&format!("{}\n", header::<D>()))?;
+        Ok(Self(draft))
+    }
+
+    /// Goes on with the file at `mark`.
+    pub(crate) fn resume(csv: &Path, mark: &Mark) -> Result<Self, RowsError> {
+        Ok(Self(Draft::resume(&rheology_path(csv), mark)?))
+    }
+
+    /// Adds one row, which is with the operating system when this returns.
+    pub fn write<const D: usize>(&mut self, row: &Rheology<'_, D>) -> Result<(), RowsError> {
+        self.0.write(&line(row))
+    }
+
+    /// How far the file has come.
+    pub(crate) fn mark(&self) -> Mark {
+        self.0.mark()
+    }
+
+    /// Makes sure that what the file holds outlives a power failure.
+    pub(crate) fn sync(&self) -> Result<(), OutputError> {
+        self.0.sync()
+    }
+
+    /// Gives the complete file its name.
+    pub fn finish(self) -> Result<(), OutputError> {
+        self.0.finish()
+    }
+}
+
+/// Drafts that earlier runs left.
+pub(crate) fn earlier_drafts(csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    drafts(&rheology_path(csv))
+}
+
+/// The file beside a trajectory.
+pub fn rheology_path(csv: &Path) -> PathBuf {
+    let mut name = csv.file_stem().unwrap_or_default().to_owned();
+    name.push("-rheology.csv");
+    csv.with_file_name(name)
+}
+
+/// The first line.
+pub fn header<const D: usize>() -> String {
+    let names: Vec<&str> = NAMES.into_iter().filter(|name| D == 3 || *name != "N2").collect();
+    names.join(",")
+}
+
+/// A row as text, with its end of line.
+pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
+    let stress = row.stress;
+    let [n1, n2] = stress.normal_stress_differences();
+    let first = [
+        row.time,
+        row.strain,
+        stress.relative_viscosity(),
+        stress.viscosity_by_dissipation(),
+        stress.viscosity_of_films(),
+    ];
+    let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]);
+    let numbers = first.into_iter().chain(normal).map(|number| format!("{number:.16e}"));
+    let gap = row.smallest_gap_over_a.map_or(String::new(), |gap| format!("{gap:.16e}"));
+    let cells: Vec<String> = numbers.chain([gap]).collect();
+    format!("{}\n", cells.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use gluey_geom::Matrix;
+
+    use super::*;
+
+    /// Of a fluid of viscosity 2 sheared back at the rate 0.5.
+    #[test]
+    fn a_row_has_a_number_for_each_name() {
+        let mut of_bodies = Matrix::<3>::from_diagonal(&[-3.0, -2.0, -4.0].into());
+        (of_bodies[(0, 1)], of_bodies[(1, 0)]) = (-1.5, -1.5);
+        let stress = MeanStress {
+            rate: -0.5,
+            viscosity: 2.0,
+            of_bodies,
+            of_films: of_bodies * 0.1,
+            dissipation: 1.25,
+        };
+        let row = Rheology { time: 1.0, strain: -0.5, stress: &stress, smallest_gap_over_a: Some(0.25) };
+        let line = line(&row);
+        let numbers: Vec<f64> =
+            line.trim_end().split(',').map(|cell| cell.parse().expect("a number")).collect();
+        let expected = [1.0, -0.5, 2.5, 2.5, 0.15, -1.0, 2.0, 3.0, 0.25];
+        assert!(numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{numbers:?}");
+        assert_eq!(numbers.len(), header::<3>().split(',').count());
+        assert_eq!(header::<2>().split(',').count(), numbers.len() - 1);
+    }
+}
