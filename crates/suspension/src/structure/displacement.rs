@@ -4,8 +4,6 @@ use std::ops::RangeInclusive;
 
 use gluey_geom::Vector;
 
-use crate::statistics::Estimate;
-
 /// Groups of particles that are fitted apart, for the error of the diffusivity.
 const GROUP_COUNT: usize = 10;
 
@@ -95,13 +93,12 @@ impl<const D: usize> Displacements<D> {
         Some(std::array::from_fn(|d| {
             let values: Vec<f64> = parts.iter().map(|part| part[d]).collect();
             // Groups are independent but for the flow that they share.
-            let spread = Estimate::of(&values).map_or(f64::NAN, |_| spread(&values));
-            Diffusivity { value: whole[d], standard_error: spread }
+            Diffusivity { value: whole[d], standard_error: spread(&values) }
         }))
     }
 }
 
-/// Standard error of the mean of independent values.
+/// Standard error of the mean of independent values; not a number for one.
 fn spread(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
