@@ -6,6 +6,7 @@ pub mod csv;
 mod draft;
 mod pvd;
 pub mod vtk;
+pub mod xyz;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
