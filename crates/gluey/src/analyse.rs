@@ -10,8 +10,8 @@
 //! summary.txt            means with confidence intervals, diffusivities
 //! ```
 //!
-//! Lengths are in mean radii. Means and distributions leave out the transient, which is that of the median gap
-//! by the rule MSER-5 unless it is given.
+//! Lengths are in mean radii. Means and distributions leave out the transient, which is that of the median
+//! gap by the rule MSER-5 unless it is given.
 
 mod frames;
 mod observe;

@@ -25,6 +25,7 @@ mod load;
 mod mesh;
 mod names;
 pub(crate) mod neighbours;
+mod particle;
 mod particle_problem;
 mod particles_file;
 mod suggest;
@@ -39,6 +40,7 @@ pub use names::{
     ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, RadiiKind, Solver,
     UnknownName,
 };
+pub use particle::ParticleSpec;
 pub use particle_problem::ParticleProblem;
 pub use suspension::{RadiiSpec, SuspensionSpec};
 
@@ -75,15 +77,15 @@ pub struct Case {
     /// The box of fluid.
     #[serde(default)]
     pub domain: DomainSpec,
-    /// The particles at time 0. In a case that was read they are there, wherever they came from: a list in the
-    /// case, `suspension` or `particles_file`.
+    /// The particles at time 0. In a case that was read they are there, wherever they came from: a list in
+    /// the case, `suspension` or `particles_file`.
     #[serde(default)]
     pub particles: Vec<ParticleSpec>,
     /// Particles to generate instead of a list; absent once they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suspension: Option<SuspensionSpec>,
-    /// File of particles instead of a list, from the folder of the case file: comma-separated columns `x`, `y`
-    /// (`z` in 3D) and `radius` under a header with these names; absent once it was read.
+    /// File of particles instead of a list, from the folder of the case file: comma-separated columns `x`,
+    /// `y` (`z` in 3D) and `radius` under a header with these names; absent once it was read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub particles_file: Option<String>,
     /// Time stepping.
@@ -106,29 +108,6 @@ pub struct DomainSpec {
     pub upper: Option<Vec<f64>>,
     /// Condition on the boundary.
     pub boundary: Boundary,
-}
-
-/// A particle at time 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ParticleSpec {
-    /// Centre, one coordinate per dimension.
-    pub position: Vec<f64>,
-    /// Radius `a > 0`.
-    pub radius: f64,
-    /// Force beside its weight, one coordinate per dimension; none when absent.
-    #[serde(default)]
-    pub force: Option<Vec<f64>>,
-    /// Torque: one number in 2D (positive counter-clockwise), three in 3D; none when absent.
-    #[serde(default)]
-    pub torque: Option<Vec<f64>>,
-}
-
-impl ParticleSpec {
-    /// A particle without forces but its weight.
-    pub fn new(position: Vec<f64>, radius: f64) -> Self {
-        Self { position, radius, force: None, torque: None }
-    }
 }
 
 /// Time stepping.

@@ -1,5 +1,5 @@
-//! Makes a thousand hard spheres in equilibrium at several volume fractions, with the time that takes and the pair
-//! correlation at contact, against Carnahan and Starling's.
+//! Makes a thousand hard spheres in equilibrium at several volume fractions, with the time that takes and the
+//! pair correlation at contact, against Carnahan and Starling's.
 //!
 //! `cargo run --release -p gluey-suspension --example hard_spheres [count]`
 

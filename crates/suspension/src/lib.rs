@@ -21,8 +21,9 @@
 //! let spheres = Packing::new(&container, &params)?;
 //! assert!(spheres.smallest_gap(&container) >= 0.0);
 //!
-//! // Nearer than 0.2 radii each has 8 phi (1.1^3 - 1) g = 1.6 others, with Carnahan and Starling's g near contact.
-//! let network = ProximityNetwork::new(&container, &spheres.positions, &spheres.radii, 0.2 * spheres.radii[0]);
+//! // Nearer than 0.2 radii each has 8 phi (1.1^3 - 1) g = 1.6 others, with Carnahan and Starling's g.
+//! let reach = 0.2 * spheres.radii[0];
+//! let network = ProximityNetwork::new(&container, &spheres.positions, &spheres.radii, reach);
 //! let near = 2.0 * network.pair_count() as f64 / 100.0;
 //! assert!((1.0..2.4).contains(&near));
 //! # Ok::<(), gluey_suspension::packing::PackingError>(())

@@ -53,8 +53,8 @@ pub enum FramesError {
     Frame(#[from] XyzError),
 }
 
-/// The files of a run's frames, in the order of the steps: in `folder`, or in the only folder in it whose name
-/// ends in `-xyz`.
+/// The files of a run's frames, in the order of the steps: in `folder`, or in the only folder in it whose
+/// name ends in `-xyz`.
 pub(super) fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
     let entries = list(folder)?;
     let is_series = |path: &&PathBuf| path.is_dir() && name(path).ends_with("-xyz");

@@ -12,8 +12,8 @@ impl Case {
         Container::new(Aabb { lower, upper }, std::array::from_fn(|axis| self.period(axis).is_some()))
     }
 
-    /// Shear strain that the undisturbed flow has made at this time: less again after the reversal, which is at
-    /// the first step that starts at `time.reverse_at` or later.
+    /// Shear strain that the undisturbed flow has made at this time: less again after the reversal, which is
+    /// at the first step that starts at `time.reverse_at` or later.
     pub fn strain_at(&self, time: f64) -> f64 {
         let step = self.time.step;
         let reversal = self.time.reverse_at.map_or(f64::INFINITY, |at| (at / step - 1e-9).ceil() * step);

@@ -11,9 +11,9 @@ use super::validate::{Check, Violation, check_surroundings};
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
 
 impl Case {
-    /// Makes the particles that `suspension` or `particles_file` describe, if one of them is there, and forgets
-    /// the description: a case made by a program is then as if it had been read. Files are looked for in
-    /// `folder`.
+    /// Makes the particles that `suspension` or `particles_file` describe, if one of them is there, and
+    /// forgets the description: a case made by a program is then as if it had been read. Files are looked for
+    /// in `folder`.
     pub fn fill_particles(&mut self, folder: impl AsRef<Path>) -> Result<(), CaseError> {
         let has_list = !self.particles.is_empty();
         let filled = check_surroundings(self).and_then(|()| fill(self, has_list, folder.as_ref()));

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::names::{ArrangementName, RadiiKind};
 use super::particle_problem::ParticleProblem;
 
-/// Particles to generate. Two of `volume_fraction`, `count` and `radius` are given; the third follows from the
-/// box. With a fraction and a radius the number of particles is rounded, and the radii are adapted so that the
-/// fraction is met exactly.
+/// Particles to generate. Two of `volume_fraction`, `count` and `radius` are given; the third follows from
+/// the box. With a fraction and a radius the number of particles is rounded, and the radii are adapted so
+/// that the fraction is met exactly.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SuspensionSpec {

@@ -22,8 +22,8 @@ const FINE: f64 = 1e-3;
 /// Sweeps over all pairs that a stage may take.
 const SWEEP_LIMIT: usize = 50_000;
 
-/// Centres of balls of these radii, in random places of the container, that do not overlap; with so many Monte
-/// Carlo moves of each ball after every stage.
+/// Centres of balls of these radii, in random places of the container, that do not overlap; with so many
+/// Monte Carlo moves of each ball after every stage.
 pub(super) fn grow<const D: usize>(
     container: &Container<D>,
     radii: &[f64],

@@ -76,8 +76,8 @@ where
         fraction(container, &self.radii)
     }
 
-    /// The smallest gap between two surfaces, or a surface and a wall; infinite for one particle without walls
-    /// whose images are far.
+    /// The smallest gap between two surfaces, or a surface and a wall; infinite for one particle without
+    /// walls whose images are far.
     pub fn smallest_gap(&self, container: &Container<D>) -> f64 {
         self.pair_gap(container).min(self.wall_gap(container))
     }

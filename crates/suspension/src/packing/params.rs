@@ -21,8 +21,8 @@ pub enum Amount {
         /// Number of particles.
         count: usize,
     },
-    /// As many particles of this mean radius as come nearest to the fraction, which is then met exactly: radii
-    /// differ a little from those asked for.
+    /// As many particles of this mean radius as come nearest to the fraction, which is then met exactly:
+    /// radii differ a little from those asked for.
     Radius {
         /// Volume of the particles over that of the box.
         fraction: f64,
@@ -49,8 +49,8 @@ pub struct PackingParams {
     pub arrangement: Arrangement,
     /// Smallest gap between surfaces, in mean radii; between particles and walls it is the same.
     pub min_gap: f64,
-    /// Displacements of particles from the sites of a lattice, relative to the largest that leave the smallest
-    /// gap whatever the others do: from 0 to 1.
+    /// Displacements of particles from the sites of a lattice, relative to the largest that leave the
+    /// smallest gap whatever the others do: from 0 to 1.
     pub jitter: f64,
     /// Seed of all random numbers.
     pub seed: u64,

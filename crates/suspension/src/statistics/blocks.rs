@@ -61,8 +61,8 @@ const FEWEST_BLOCKS: usize = 10;
 const NORMAL: f64 = 1.281_551_566;
 
 /// The first level from which on nothing tells against independence, and whether there is one; else the last.
-/// The evidence of all levels behind is tested together, against the quantile 0.9 of chi squared: a higher one
-/// takes errors for 10 % smaller than they are.
+/// The evidence of all levels behind is tested together, against the quantile 0.9 of chi squared: a higher
+/// one takes errors for 10 % smaller than they are.
 pub(super) fn independent(levels: &[BlockLevel]) -> Option<(&BlockLevel, bool)> {
     let mut evidence = 0.0;
     let mut first = None;

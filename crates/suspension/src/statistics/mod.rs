@@ -24,9 +24,9 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The mean of a series, by block averages (Flyvbjerg and Petersen 1989, DOI 10.1063/1.457480); the length
-    /// of the blocks by the test of Jonsson (2018, DOI 10.1103/PhysRevE.98.043304). `None` for fewer than
-    /// two values.
+    /// The mean of a series, by block averages (Flyvbjerg and Petersen 1989, DOI 10.1063/1.457480); the
+    /// length of the blocks by the test of Jonsson (2018, DOI 10.1103/PhysRevE.98.043304). `None` for fewer
+    /// than two values.
     ///
     /// ```
     /// use gluey_suspension::statistics::Estimate;

@@ -12,9 +12,9 @@ pub struct Transient {
     pub is_over: bool,
 }
 
-/// The transient of a series by the rule MSER-5 (White, Cobb and Spratt 2000, DOI 10.1109/WSC.2000.899722): of
-/// the means `Y_i` of five values, leave out the first `d` such that `sum_{i > d} (Y_i - mean)^2 / (n - d)^2`
-/// is least, with `d` at most half of them.
+/// The transient of a series by the rule MSER-5 (White, Cobb and Spratt 2000, DOI 10.1109/WSC.2000.899722):
+/// of the means `Y_i` of five values, leave out the first `d` such that
+/// `sum_{i > d} (Y_i - mean)^2 / (n - d)^2` is least, with `d` at most half of them.
 ///
 /// ```
 /// use gluey_suspension::statistics::mser;

@@ -6,13 +6,13 @@ use gluey_geom::Vector;
 
 use crate::{Container, ball_volume, for_each_pair};
 
-/// In 3D pairs count whose direction is so near the plane of shear: `|n_z|` at most this. Directions at random
-/// do with this probability.
+/// In 3D pairs count whose direction is so near the plane of shear: `|n_z|` at most this. Directions at
+/// random do with this probability.
 const BAND: f64 = 0.5;
 
-/// Pair correlation `g(theta)` of a shell around contact, `a_i + a_j <= r <= s (a_i + a_j)`, by the angle of the
-/// line of centres to the flow `x` in the plane `(x, y)`, from 0 to pi: above pi/2 in the quadrant where simple
-/// shear with a positive rate compresses. In 3D of pairs at most 30 degrees off that plane.
+/// Pair correlation `g(theta)` of a shell around contact, `a_i + a_j <= r <= s (a_i + a_j)`, by the angle of
+/// the line of centres to the flow `x` in the plane `(x, y)`, from 0 to pi: above pi/2 in the quadrant where
+/// simple shear with a positive rate compresses. In 3D of pairs at most 30 degrees off that plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AngularDistribution<const D: usize> {
     outer: f64,

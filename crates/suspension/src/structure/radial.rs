@@ -18,8 +18,8 @@ pub struct RadialBin {
 /// Pair correlation `g(r)`: the number of pairs at the distance `r` between centres, over that of as many
 /// points at random, whose number is `N (N - 1) / 2` times the volume of the shell over that of the box.
 ///
-/// Walls hide partners: between walls a height `h` apart a point at random sees the part `1 - |r_y| / h` of its
-/// surroundings, which is accounted for on average over directions; `h` is the room of the centres.
+/// Walls hide partners: between walls a height `h` apart a point at random sees the part `1 - |r_y| / h` of
+/// its surroundings, which is accounted for on average over directions; `h` is the room of the centres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadialDistribution<const D: usize> {
     range: f64,

@@ -20,8 +20,8 @@ pub struct WaveBin {
     pub vector_count: u64,
 }
 
-/// Static structure factor `S(k) = <|sum_j exp(i k.x_j)|^2> / N` on the vectors that the periods allow, averaged
-/// over shells of equal width; along axes with walls `k` has no component.
+/// Static structure factor `S(k) = <|sum_j exp(i k.x_j)|^2> / N` on the vectors that the periods allow,
+/// averaged over shells of equal width; along axes with walls `k` has no component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StructureFactor<const D: usize> {
     width: f64,
