@@ -88,7 +88,8 @@ fn missing_keys() {
     refused(&without(14), &["case.toml:13:", "time.step", "missing key `step`", "step = 0.025"]);
     refused(&without(12), &["case.toml:10:", "particles[1].radius", "missing key `radius`", "radius = 0.05"]);
     refused(&without(1), &["case.toml:1:", "name: missing key `name`", "name = \"my-case\""]);
-    refused("name = \"x\"\ndimension = 2\n", &["case.toml:1:", "missing key `particles`", "[[particles]]"]);
+    let empty = "name = \"x\"\ndimension = 2\ntime = { step = 0.1, end = 1.0 }\n";
+    refused(empty, &["case.toml:1:", "missing key `particles`", "[[particles]]"]);
 }
 
 #[test]

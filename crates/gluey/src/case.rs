@@ -16,21 +16,33 @@
 //! # Ok::<(), gluey::CaseError>(())
 //! ```
 
+mod box_and_strain;
 mod comparable;
 mod error;
+mod fill;
 mod forces;
 mod load;
 mod mesh;
 mod names;
 pub(crate) mod neighbours;
+mod particle;
+mod particle_problem;
+mod particles_file;
 mod suggest;
+mod suspension;
 mod validate;
 
 pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
-pub use names::{Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, Solver, UnknownName};
+pub use names::{
+    ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, RadiiKind, Solver,
+    UnknownName,
+};
+pub use particle::ParticleSpec;
+pub use particle_problem::ParticleProblem;
+pub use suspension::{RadiiSpec, SuspensionSpec};
 
 use gluey_contact::{ContactParams, Domain, Wall};
 use gluey_geom::{Lattice, Vector};
@@ -65,8 +77,17 @@ pub struct Case {
     /// The box of fluid.
     #[serde(default)]
     pub domain: DomainSpec,
-    /// The particles at time 0.
+    /// The particles at time 0. In a case that was read they are there, wherever they came from: a list in
+    /// the case, `suspension` or `particles_file`.
+    #[serde(default)]
     pub particles: Vec<ParticleSpec>,
+    /// Particles to generate instead of a list; absent once they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suspension: Option<SuspensionSpec>,
+    /// File of particles instead of a list, from the folder of the case file: comma-separated columns `x`,
+    /// `y` (`z` in 3D) and `radius` under a header with these names; absent once it was read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub particles_file: Option<String>,
     /// Time stepping.
     pub time: TimeSpec,
     /// Contact.
@@ -104,29 +125,6 @@ pub struct DomainSpec {
     pub upper: Option<Vec<f64>>,
     /// Condition on the boundary.
     pub boundary: Boundary,
-}
-
-/// A particle at time 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ParticleSpec {
-    /// Centre, one coordinate per dimension.
-    pub position: Vec<f64>,
-    /// Radius `a > 0`.
-    pub radius: f64,
-    /// Force beside its weight, one coordinate per dimension; none when absent.
-    #[serde(default)]
-    pub force: Option<Vec<f64>>,
-    /// Torque: one number in 2D (positive counter-clockwise), three in 3D; none when absent.
-    #[serde(default)]
-    pub torque: Option<Vec<f64>>,
-}
-
-impl ParticleSpec {
-    /// A particle without forces but its weight.
-    pub fn new(position: Vec<f64>, radius: f64) -> Self {
-        Self { position, radius, force: None, torque: None }
-    }
 }
 
 /// Time stepping.

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, Parser, Subcommand};
+use gluey::analyse::AnalyseOptions;
 use gluey::output::vtk::{Precision, VtkEncoding};
-use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions};
+use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions, XyzOptions};
 
 use crate::diagnostic::Diagnosed;
 use crate::terminal::{Reporter, say};
@@ -29,6 +30,33 @@ pub struct Cli {
 pub enum Command {
     /// Run a case and write its trajectory.
     Run(RunArguments),
+    /// Structure and statistics of the particles that a run wrote with --xyz.
+    Analyse(AnalyseArguments),
+}
+
+/// Arguments of `gluey analyse`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example:\n  gluey run suspension.toml --out out --xyz 10\n  gluey analyse out")]
+pub struct AnalyseArguments {
+    /// Folder of a run, or of its files in extended XYZ.
+    folder: PathBuf,
+    /// Folder for the tables; that of the run when absent.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Gap up to which particles count as in contact, in mean radii.
+    #[arg(long, value_name = "GAP", default_value_t = 0.05)]
+    reach: f64,
+    /// Frames to leave out at the beginning, instead of the transient that is found.
+    #[arg(long, value_name = "N")]
+    skip: Option<usize>,
+}
+
+impl AnalyseArguments {
+    /// What they ask of the library.
+    pub fn options(&self) -> AnalyseOptions {
+        let Self { folder, out, reach, skip } = self.clone();
+        AnalyseOptions { folder, out, reach_over_a: reach, skip }
+    }
 }
 
 /// Arguments of `gluey run`.
@@ -56,6 +84,12 @@ pub struct RunArguments {
     /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
     #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double)]
     vtk_precision: Precision,
+    /// Write particles in extended XYZ, which OVITO and ASE read, every N steps.
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    xyz: Option<usize>,
+    /// Compress the files in extended XYZ by gzip.
+    #[arg(long, requires = "xyz")]
+    xyz_gzip: bool,
     /// Write a checkpoint every N steps (one is written at Ctrl-C, at a request to terminate and
     /// when a step fails in any case).
     #[arg(long, value_name = "N", value_parser = at_least_one)]
@@ -104,6 +138,11 @@ impl RunArguments {
                 folder: self.out.join(format!("{stem}-vtk")),
                 every,
                 encoding: VtkEncoding { compression: self.vtk_compression, precision: self.vtk_precision },
+            }),
+            xyz: self.xyz.map(|every| XyzOptions {
+                folder: self.out.join(format!("{stem}-xyz")),
+                every,
+                gzip: self.xyz_gzip,
             }),
             checkpoint: Some(self.out.join(format!("{stem}.checkpoint"))),
             checkpoint_every: self.checkpoint_every,

@@ -19,6 +19,7 @@
 //!
 //! Not for inertia (Stokes flow only), and not for particles that are not round.
 
+pub mod analyse;
 pub mod case;
 mod checkpoint;
 pub mod flow;
@@ -47,7 +48,7 @@ pub use output::{ClaimError, OutputError, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
-pub use run::{RunError, RunOptions, VtkOptions, run};
+pub use run::{RunError, RunOptions, VtkOptions, XyzOptions, run};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
 pub use trajectory::Row;
 

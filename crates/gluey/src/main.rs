@@ -8,12 +8,18 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use cli::{Cli, Command};
+use cli::{AnalyseArguments, Cli, Command, RunArguments};
 
 fn main() -> ExitCode {
     diagnostic::install();
-    let Command::Run(arguments) = Cli::parse().command;
-    match cli::run(&arguments) {
+    match Cli::parse().command {
+        Command::Run(arguments) => run(&arguments),
+        Command::Analyse(arguments) => analyse(&arguments),
+    }
+}
+
+fn run(arguments: &RunArguments) -> ExitCode {
+    match cli::run(arguments) {
         Ok(report) => {
             terminal::print_report(&report);
             ExitCode::SUCCESS
@@ -21,6 +27,19 @@ fn main() -> ExitCode {
         Err(failure) => {
             terminal::say(&format!("{:?}", miette::Report::new(*failure.diagnostic)));
             ExitCode::from(failure.exit_code)
+        }
+    }
+}
+
+fn analyse(arguments: &AnalyseArguments) -> ExitCode {
+    match gluey::analyse::analyse(&arguments.options()) {
+        Ok(summary) => {
+            terminal::print_summary(&summary);
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            terminal::say(&format!("{:?}", miette::Report::from_err(error)));
+            ExitCode::FAILURE
         }
     }
 }

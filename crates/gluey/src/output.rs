@@ -7,6 +7,7 @@ mod draft;
 mod pvd;
 pub mod rheology;
 pub mod vtk;
+pub mod xyz;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};

@@ -13,7 +13,7 @@ use gluey_contact::{ContactModel, PairContact};
 use gluey_geom::{Dim, Particle, Space, Vector};
 
 pub use error::RunError;
-pub use options::{RunOptions, VtkOptions};
+pub use options::{RunOptions, VtkOptions, XyzOptions};
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
@@ -22,6 +22,7 @@ use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
+use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::output::{Claim, OutputError, set_aside};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
@@ -59,7 +60,8 @@ fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<
 /// Makes sure before the first step that files can be written, and that no other run writes them.
 fn claim_outputs(options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
     let vtk = options.vtk.as_ref().map(|vtk| vtk.folder.as_path());
-    let results = [Some(options.csv.as_path()), options.checkpoint.as_deref(), vtk];
+    let xyz = options.xyz.as_ref().map(|xyz| xyz.folder.as_path());
+    let results = [Some(options.csv.as_path()), options.checkpoint.as_deref(), vtk, xyz];
     let claims = results.into_iter().flatten().map(Claim::new).collect::<Result<Vec<_>, _>>()?;
     for lock in claims.iter().filter_map(Claim::unguarded) {
         progress.notice(&Notice::NotLocked { lock: lock.to_owned() });
@@ -80,6 +82,7 @@ where
     csv: CsvWriter<D>,
     rheology: Option<RheologyWriter>,
     vtk: Option<(usize, FrameWriter<D>)>,
+    xyz: Option<(usize, XyzWriter)>,
     checkpoints: Option<CheckpointFile>,
     /// The run before the step that is being done, where checkpoints are written.
     last_good: Option<Checkpoint<D>>,
@@ -137,6 +140,10 @@ where
         };
         let first_step = simulation.step_index();
         let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, dt)).transpose()?;
+        let xyz = options.xyz.as_ref();
+        let xyz = xyz
+            .map(|xyz| Ok::<_, OutputError>((xyz.every.max(1), XyzWriter::create(&xyz.folder, xyz.gzip)?)));
+        let xyz = xyz.transpose()?;
         let (started, last_good) = (Instant::now(), None);
         Ok(Self {
             case,
@@ -147,6 +154,7 @@ where
             csv,
             rheology,
             vtk,
+            xyz,
             checkpoints,
             last_good,
             started,
@@ -210,6 +218,13 @@ where
                 let (contacts, fields) = (simulation.contacts(), None);
                 let frame = Frame { step, time, particles, twists, contacts, domain, fields };
                 frames.write(&frame, simulation.fields())?;
+            }
+            _ => {}
+        }
+        match &self.xyz {
+            Some((every, writer)) if step.is_multiple_of(*every) => {
+                let (container, strain) = (self.case.container(), self.case.strain_at(time));
+                writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
             }
             _ => {}
         }

@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Write, stderr, stdout};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use gluey::analyse::Summary;
 use gluey::{Notice, Progress, ProgressState, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -105,6 +106,11 @@ pub fn print_report(report: &RunReport) {
     }
     // All results are on disk: that nobody reads this is no failure.
     let _ = stdout().write_all(text.as_bytes());
+}
+
+/// Prints what an analysis found.
+pub fn print_summary(summary: &Summary) {
+    let _ = stdout().write_all(summary.to_string().as_bytes());
 }
 
 #[cfg(test)]

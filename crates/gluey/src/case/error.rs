@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
+use super::particle_problem::ParticleProblem;
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -268,6 +269,9 @@ pub enum Problem {
         /// Numbers of the other pairs that overlap.
         others: Vec<(usize, usize)>,
     },
+    /// Particles could not be generated or read.
+    #[error(transparent)]
+    Particles(ParticleProblem),
     /// No particles at all.
     #[error("no particles")]
     NoParticles,
@@ -348,6 +352,7 @@ impl Problem {
             Self::Overlap { distance, contact_distance, .. } => {
                 format!("the centres are {distance} apart, at least {contact_distance} is needed")
             }
+            Self::Particles(problem) => problem.hint(),
             Self::NoParticles => "add a [[particles]] table with `position` and `radius`".into(),
             Self::MeshTooFine { finest, largest, .. } => {
                 format!("the tree has {finest} levels: at most {largest:.3} cells per radius")

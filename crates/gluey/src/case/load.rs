@@ -8,8 +8,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{CaseError, CaseIssue, Key, KeyPart, Problem};
 use super::suggest::closest;
-use super::validate::{Violation, check};
-use super::{Case, UnknownName};
+use super::validate::{Violation, check, check_surroundings};
+use super::{Case, UnknownName, fill};
 
 impl Case {
     /// Reads and checks a case file.
@@ -24,15 +24,25 @@ impl Case {
     pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, CaseError> {
         let source = Source { text, file: file.as_ref() };
         let tree = DeTable::parse(text).map_err(|error| source.syntax_issue(&error))?;
-        let case: Self = toml::from_str(text).map_err(|error| source.type_issue(&tree, &error))?;
+        let mut case: Self = toml::from_str(text).map_err(|error| source.type_issue(&tree, &error))?;
+        let has_list = tree.get_ref().contains_key("particles");
+        check_surroundings(&case)
+            .and_then(|()| fill::fill(&mut case, has_list, source.folder()))
+            .map_err(|violation| source.value_issue(&tree, violation))?;
         check(&case).map_err(|violation| source.value_issue(&tree, violation))?;
         Ok(case)
     }
 
     /// Checks a case that was not read from a file, or was changed after it was.
     pub fn check(&self) -> Result<(), CaseError> {
-        let source = Source { text: "", file: Path::new(&self.name) };
-        check(self).map_err(|violation| source.issue(0..0, violation.key, None, violation.problem))
+        check(self).map_err(|violation| CaseError::of_value(&self.name, violation.key, violation.problem))
+    }
+}
+
+impl CaseError {
+    /// Something wrong in a case of this name that was not read from a file.
+    pub(super) fn of_value(name: &str, key: Key, problem: Problem) -> Self {
+        Source { text: "", file: Path::new(name) }.issue(0..0, key, None, problem)
     }
 }
 
@@ -43,6 +53,11 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// Where the files lie that the case names.
+    fn folder(&self) -> &Path {
+        self.file.parent().unwrap_or(Path::new(""))
+    }
+
     fn syntax_issue(&self, error: &toml::de::Error) -> CaseError {
         let problem = Problem::Syntax { message: error.message().to_owned() };
         self.issue(error.span().unwrap_or(0..0), Key::default(), None, problem)

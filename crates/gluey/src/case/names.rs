@@ -134,6 +134,40 @@ named! {
 }
 
 named! {
+    /// How generated particles are arranged.
+    ArrangementName, "arrangement" {
+        /// Hard particles in equilibrium, by Monte Carlo moves.
+        #[default]
+        Equilibrium = "equilibrium",
+        /// Random points, grown and pushed apart.
+        Random = "random",
+        /// Discs on a square lattice.
+        Square = "square",
+        /// Discs on a hexagonal lattice.
+        Hexagonal = "hexagonal",
+        /// Spheres on a simple cubic lattice.
+        SimpleCubic = "simple-cubic",
+        /// Spheres on a body-centred cubic lattice.
+        BodyCentred = "bcc",
+        /// Spheres on a face-centred cubic lattice.
+        FaceCentred = "fcc",
+    }
+}
+
+named! {
+    /// How the radii of generated particles are distributed.
+    RadiiKind, "kind" {
+        /// All are equal.
+        #[default]
+        Equal = "equal",
+        /// Two radii.
+        Bidisperse = "bidisperse",
+        /// The logarithm is normally distributed.
+        Lognormal = "lognormal",
+    }
+}
+
+named! {
     /// Condition on the boundary of the box.
     Boundary, "boundary" {
         /// The velocity of undisturbed shear, `rate (y - y_mid) e_x`, on the whole boundary.

@@ -8,6 +8,7 @@ use super::error::{Key, Problem};
 use super::mesh::MOST_ROOTS;
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, UnknownName};
 use super::neighbours::{Neighbours, nearer_than};
+use super::particle_problem::ParticleProblem;
 use crate::reference::{self, Reference};
 
 /// A value that makes no sense, and its key.
@@ -17,7 +18,7 @@ pub(super) struct Violation {
     pub problem: Problem,
 }
 
-type Check = Result<(), Violation>;
+pub(super) type Check = Result<(), Violation>;
 
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
@@ -25,6 +26,17 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// The first thing wrong with `case`, in the order of the file format.
 pub(super) fn check(case: &Case) -> Check {
+    check_surroundings(case)?;
+    let root = Key::default();
+    check_particles(case, &root.name("particles"))?;
+    check_time(case, &root.name("time"))?;
+    check_contact(case, &root.name("contact"))?;
+    check_flow(case, &root.name("flow"))?;
+    check_reference(case, root.name("reference"))
+}
+
+/// The first thing wrong before the particles.
+pub(super) fn check_surroundings(case: &Case) -> Check {
     let root = Key::default();
     check_name(&case.name, root.name("name"))?;
     if !(2..=3).contains(&case.dimension) {
@@ -32,12 +44,7 @@ pub(super) fn check(case: &Case) -> Check {
     }
     finite(case.shear_rate, root.name("shear_rate"))?;
     check_force(&case.gravity, case, &root.name("gravity"))?;
-    check_domain(case, &root.name("domain"))?;
-    check_particles(case, &root.name("particles"))?;
-    check_time(case, &root.name("time"))?;
-    check_contact(case, &root.name("contact"))?;
-    check_flow(case, &root.name("flow"))?;
-    check_reference(case, root.name("reference"))
+    check_domain(case, &root.name("domain"))
 }
 
 fn check_name(name: &str, key: Key) -> Check {
@@ -114,6 +121,9 @@ fn check_sheared(case: &Case, key: Key) -> Check {
 }
 
 fn check_particles(case: &Case, key: &Key) -> Check {
+    if case.suspension.is_some() || case.particles_file.is_some() {
+        return fail(key.clone(), Problem::Particles(ParticleProblem::NotFilled));
+    }
     if case.particles.is_empty() {
         return fail(key.clone(), Problem::NoParticles);
     }

@@ -13,6 +13,8 @@ pub struct RunOptions {
     pub csv: PathBuf,
     /// Fields and particles for ParaView.
     pub vtk: Option<VtkOptions>,
+    /// Particles in extended XYZ, for OVITO and ASE.
+    pub xyz: Option<XyzOptions>,
     /// Where to write checkpoints: at interrupts, and as often as `checkpoint_every` says.
     pub checkpoint: Option<PathBuf>,
     /// Steps between checkpoints, at least 1.
@@ -32,6 +34,17 @@ pub struct VtkOptions {
     pub every: usize,
     /// How numbers are stored.
     pub encoding: VtkEncoding,
+}
+
+/// Output in extended XYZ, a file per frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct XyzOptions {
+    /// Folder for the files.
+    pub folder: PathBuf,
+    /// Steps between files, at least 1.
+    pub every: usize,
+    /// Whether files are compressed (`.xyz.gz`).
+    pub gzip: bool,
 }
 
 impl VtkOptions {

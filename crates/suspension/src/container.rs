@@ -1,0 +1,108 @@
+//! The box that particles fill: periodic along some axes, walled along the others.
+
+use gluey_geom::{Aabb, Lattice, Vector};
+
+/// A box of particles: along each axis it is periodic, or has a wall on either side.
+///
+/// ```
+/// use gluey_geom::{Aabb, Vector};
+/// use gluey_suspension::Container;
+/// // A channel along x, with walls below and above.
+/// let channel = Container::<2>::new(Aabb::unit(), [true, false]);
+/// assert_eq!(channel.wrapped(&Vector::<2>::new(-0.25, 0.5)).x, 0.75);
+/// assert!(channel.is_walled(1) && channel.volume() == 1.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Container<const D: usize> {
+    bounds: Aabb<D>,
+    lattice: Lattice<D>,
+}
+
+impl<const D: usize> Container<D> {
+    /// The box `bounds`, with its edge as the period of each periodic axis and walls across the others.
+    pub fn new(bounds: Aabb<D>, is_periodic: [bool; D]) -> Self {
+        let edges = bounds.extent();
+        Self { bounds, lattice: Lattice::new(std::array::from_fn(|d| is_periodic[d].then_some(edges[d]))) }
+    }
+
+    /// A box with a corner at the origin that is periodic along all axes.
+    pub fn periodic(edges: &Vector<D>) -> Self {
+        Self::new(Aabb { lower: Vector::zeros(), upper: *edges }, [true; D])
+    }
+
+    /// A box with walls on all sides.
+    pub fn walled(bounds: Aabb<D>) -> Self {
+        Self::new(bounds, [false; D])
+    }
+
+    /// The same with images that slide: that one period up in `y` lies `tilt` further along `x`, a length.
+    #[must_use]
+    pub fn tilted(self, tilt: f64) -> Self {
+        Self { lattice: self.lattice.tilted(tilt), ..self }
+    }
+
+    /// The box without tilt.
+    pub fn bounds(&self) -> &Aabb<D> {
+        &self.bounds
+    }
+
+    /// The translations to periodic images.
+    pub fn lattice(&self) -> &Lattice<D> {
+        &self.lattice
+    }
+
+    /// Whether there are walls across an axis.
+    pub fn is_walled(&self, axis: usize) -> bool {
+        self.lattice.periods()[axis].is_none()
+    }
+
+    /// Volume; area in 2D.
+    pub fn volume(&self) -> f64 {
+        self.bounds.extent().product()
+    }
+
+    /// The shortest period, if there is one.
+    pub fn shortest_period(&self) -> Option<f64> {
+        self.lattice.periods().iter().flatten().copied().reduce(f64::min)
+    }
+
+    /// Place of a point in the box without tilt, relative to its lower corner; not wrapped.
+    pub(crate) fn place(&self, x: &Vector<D>) -> Vector<D> {
+        self.lattice.to_box(x, self.bounds.lower[1]) - self.bounds.lower
+    }
+
+    /// The image of a point whose place is in the box.
+    pub fn wrapped(&self, x: &Vector<D>) -> Vector<D> {
+        let place = self.place(x);
+        *x + self.lattice.shift(&std::array::from_fn(|d| {
+            self.lattice.periods()[d].map_or(0, |period| -(place[d] / period).floor() as i32)
+        }))
+    }
+}
+
+/// Volume of a sphere, area of a disc: `4 pi a^3 / 3`, `pi a^2`.
+pub fn ball_volume<const D: usize>(radius: f64) -> f64 {
+    let unit = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
+    unit * radius.powi(D as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_wrapped_along_the_lattice() {
+        let container = Container::<3>::periodic(&Vector::<3>::new(2.0, 1.0, 3.0)).tilted(0.5);
+        let x = Vector::<3>::new(7.3, -4.2, 9.1);
+        let wrapped = container.wrapped(&x);
+        assert!(container.lattice().nearest(&(wrapped - x)).0.norm() < 1e-13);
+        let place = container.place(&wrapped);
+        assert!((0..3).all(|d| (0.0..=[2.0, 1.0, 3.0][d]).contains(&place[d])), "{place}");
+    }
+
+    #[test]
+    fn volumes_of_balls() {
+        assert!((ball_volume::<2>(2.0) - 12.566_370_614_359_172).abs() < 1e-14);
+        assert!((ball_volume::<3>(0.5) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
+    }
+}
