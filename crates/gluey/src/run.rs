@@ -223,7 +223,10 @@ where
         }
         match &self.xyz {
             Some((every, writer)) if step.is_multiple_of(*every) => {
-                let (container, strain) = (self.case.container(), self.case.strain_at(time));
+                let strain = self.case.strain_at(time);
+                let container = self.case.container();
+                let height = container.bounds().extent()[1];
+                let container = container.tilted(simulation.strain() * height);
                 writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
             }
             _ => {}
