@@ -9,6 +9,7 @@ mod integrator;
 mod lattices;
 mod linear_flow;
 mod manufactured;
+mod sheared;
 mod spheres;
 mod symmetry;
 mod wall;
@@ -26,6 +27,7 @@ pub const CASES: &[Case] = &[
     spheres::CASE,
     wall::CASE,
     lattices::CASE,
+    sheared::CASE,
     integrator::CASE,
     doublet::CASE,
     symmetry::CASE,

@@ -1,0 +1,170 @@
+//! Lattices of free bodies in boxes that are sheared.
+
+use std::f64::consts::PI;
+
+use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::{Conditions, Flow, FlowSolver, Refinement};
+use gluey_testkit::reference::{Table, sheared_simple_cubic_lattice, sheared_square_lattice};
+
+use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::method::{METHODS, Method};
+use crate::number::{Kind, Number};
+use crate::plot::Plot;
+use crate::set_up::shift;
+use crate::statistics::rms;
+
+/// Solid fractions of the square and of the simple cubic lattice.
+const FRACTIONS: [&[f64]; 2] = [&[0.1, 0.3, 0.5], &[0.1, 0.3]];
+/// Strains of the cell.
+const STRAINS: [f64; 4] = [0.0, 0.1, 0.3, 0.5];
+
+/// The chapter.
+pub const CASE: Case = Case {
+    name: "sheared",
+    title: "Sheared lattices",
+    text: "A free body in simple shear in a box that is periodic in all directions, whose images slide along each other: the square \
+           lattice of discs and the simple cubic lattice of spheres at several strains of the cell. Errors of the relative viscosity \
+           (relative), of the normal stress differences (over the excess of the viscosity) and of the spin, and the relative \
+           difference of the viscosities by the stresslet and by the power dissipated. Against spectral boundary integrals \
+           (data/reference/sheared_square2d.csv, sheared_sc3d.csv). Cells per edge of the box, all of one size; the body is anywhere \
+           in its cell.",
+    keys: &["dimension", "cells", "phi", "strain"],
+    measures: &["viscosity", "normal", "spin", "routes"],
+    tasks,
+    numbers,
+    plot,
+};
+
+/// Finest levels in 2D and 3D.
+fn levels(extent: Extent) -> [&'static [u8]; 2] {
+    match extent {
+        Extent::Quick => [&[4, 5], &[3]],
+        Extent::Full => [&[4, 5, 6], &[3, 4]],
+    }
+}
+
+fn tasks(extent: Extent) -> Vec<Task> {
+    let [plane, space] = levels(extent);
+    let mut tasks = Vec::new();
+    for method in methods() {
+        plane.iter().for_each(|&level| tasks.extend(of_mesh::<2>(method, level, FRACTIONS[0])));
+        space.iter().for_each(|&level| tasks.extend(of_mesh::<3>(method, level, FRACTIONS[1])));
+    }
+    tasks
+}
+
+/// The formulation that knows boxes that are sheared.
+fn methods() -> impl Iterator<Item = &'static Method> {
+    METHODS.iter().filter(|method| method.name == "unfitted")
+}
+
+fn of_mesh<const D: usize>(
+    method: &'static Method,
+    level: u8,
+    fractions: &[f64],
+) -> impl Iterator<Item = Task>
+where
+    Dim<D>: Space<D>,
+{
+    let cells = fractions.iter().flat_map(|&phi| STRAINS.map(|strain| (phi, strain)));
+    cells.map(move |(phi, strain)| {
+        let at = [D as f64, 2f64.powi(level.into()), phi, strain];
+        Task::new(method.name, &at, move || measure::<D>(method, level, phi, strain))
+    })
+}
+
+fn measure<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Vec<f64>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    let flow = flow::<D>(method, level, phi, strain)?;
+    let stress = flow.stress.as_ref().ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))?;
+    let of_body = stress.of_bodies(1.0);
+    let viscosity = 1.0 + of_body[(0, 1)];
+    let normal = |d: usize, e: usize| of_body[(d, d)] - of_body[(e, e)];
+    let spin = Dim::<D>::spin_slice(&flow.twists[0].spin)[Dim::<D>::ROT - 1] - 0.5;
+    let exact = exact(D, phi, strain)?;
+    let [eta, n1, n2, omega] = exact;
+    let miss = (normal(0, 1) - n1).abs().max(if D == 3 { (normal(1, D - 1) - n2).abs() } else { 0.0 });
+    let routes = stress.dissipation / viscosity - 1.0;
+    Ok(vec![viscosity / eta - 1.0, miss / (eta - 1.0), spin - omega, routes])
+}
+
+fn flow<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Flow<D>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    let radius = if D == 2 { (phi / PI).sqrt() } else { (0.75 * phi / PI).cbrt() };
+    let place = Vector::repeat(0.5) + shift::<D>((100.0 * strain) as usize);
+    let lattice = Lattice::new([Some(1.0); D]).tilted(strain);
+    let ball = [Ball::in_space(&place, radius, &lattice, 0.0)];
+    let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
+    let mesh = refinement.mesh(Aabb::unit(), [1; D], [true; D], &ball)?;
+    let mut gradient = Matrix::<D>::zeros();
+    gradient[(0, 1)] = 1.0;
+    let conditions = Conditions::in_linear_flow(&gradient).with_stress();
+    let tolerance = if D == 2 { 1e-9 } else { 1e-7 };
+    Ok(FlowSolver::new(method.params::<D>(tolerance))?.solve_under(mesh, &ball, &conditions)?)
+}
+
+/// Relative viscosity, normal stress differences and spin.
+fn exact(dimension: usize, phi: f64, strain: f64) -> Result<[f64; 4], VerifyError> {
+    let (table, spin) = match dimension {
+        2 => (sheared_square_lattice()?, "omega"),
+        _ => (sheared_simple_cubic_lattice()?, "omega_z"),
+    };
+    let [fractions, strains] = [table.column("phi")?, table.column("strain")?];
+    let row = (0..table.row_count()).find(|&row| fractions[row] == phi && strains[row] == strain);
+    let row =
+        row.ok_or_else(|| VerifyError::NoReference(format!("a fraction of {phi} at a strain of {strain}")))?;
+    let value = |table: &Table, name: &str| Ok::<f64, VerifyError>(table.column(name)?[row]);
+    let n2 = if dimension == 3 { value(&table, "N2")? } else { 0.0 };
+    Ok([value(&table, "eta_r")?, value(&table, "N1")?, n2, value(&table, spin)?])
+}
+
+fn numbers(tables: &Tables) -> Vec<Number> {
+    let table = tables.of(CASE.name);
+    let mut numbers = Vec::new();
+    for method in methods() {
+        for dimension in [2.0, 3.0] {
+            for cells in table.steps("cells", method.name, &[("dimension", dimension)]) {
+                let at = [("dimension", dimension), ("cells", cells)];
+                for measure in CASE.measures {
+                    let name = format!("{measure}, {dimension}D, {cells} cells");
+                    let values = table.values(measure, method.name, &at);
+                    let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+                    numbers.push(Number::new(Kind::Error, name, method.name, largest));
+                }
+            }
+        }
+    }
+    numbers
+}
+
+fn plot(tables: &Tables) -> Plot {
+    let table = tables.of(CASE.name);
+    let things = ["2D, viscosity", "2D, normal stress", "3D, viscosity", "3D, normal stresses"];
+    Plot::of_methods("cells per edge of the box", "rms error", &things, |method, thing| {
+        let at = [("dimension", (2 + thing / 2) as f64)];
+        let measure = if thing % 2 == 0 { "viscosity" } else { "normal" };
+        let error = |cells| rms(&table.values(measure, method, &[&at[..], &[("cells", cells)]].concat()));
+        table.steps("cells", method, &at).into_iter().map(|cells| (cells, error(cells))).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_has_a_reference_and_others_have_none() {
+        for (dimension, fractions) in [2, 3].into_iter().zip(FRACTIONS) {
+            for (&phi, strain) in fractions.iter().flat_map(|phi| STRAINS.map(|strain| (phi, strain))) {
+                let [viscosity, n1, _, spin] = exact(dimension, phi, strain).unwrap();
+                assert!(viscosity > 1.0 + 2.0 * phi && n1 <= 0.0 && (-0.5..-0.4).contains(&spin));
+            }
+            assert!(matches!(exact(dimension, 0.1, 0.123), Err(VerifyError::NoReference(_))));
+        }
+    }
+}
