@@ -125,8 +125,8 @@ fn one_thread_and_two_give_the_same_bits() {
     assert_eq!(one, two);
 }
 
-/// Spheres that settle in a periodic box: the mean velocity of fluid and spheres is zero, so they fall slower than
-/// one alone.
+/// Spheres that settle in a periodic box: the mean velocity of fluid and spheres is zero, so they fall slower
+/// than one alone.
 #[test]
 fn weight_is_balanced_by_a_gradient_of_the_pressure() {
     let folder = TempDir::new().expect("a folder");

@@ -191,8 +191,8 @@ where
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
-    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces on the particles are
-    /// balanced by a uniform one on all of the box, which is a mean gradient of the pressure.
+    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces on the particles
+    /// are balanced by a uniform one on all of the box, which is a mean gradient of the pressure.
     fn solve_sheared(
         &mut self,
         mesh: TreeMesh<D>,

@@ -105,18 +105,11 @@ where
         progress: &'a dyn Progress,
         hydrodynamics: H,
     ) -> Result<Self, RunError> {
-        let contact = PairContact::new(case.contact.params()).within(case.surroundings());
-        let (scheme, dt) = (case.time.scheme, case.time.step);
-        let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+        let mut simulation = simulation(case, hydrodynamics);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         if case.is_sheared() {
             drafts.extend(rheology::earlier_drafts(&options.csv)?);
-            simulation = simulation.sheared(Sliding {
-                rate: case.shear_rate,
-                height: case.upper()[1] - case.lower()[1],
-                stress_every: case.rheology.every,
-            });
         }
         let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
         let mut rheology = None;
@@ -139,11 +132,8 @@ where
             }
         };
         let first_step = simulation.step_index();
-        let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, dt)).transpose()?;
-        let xyz = options.xyz.as_ref();
-        let xyz = xyz
-            .map(|xyz| Ok::<_, OutputError>((xyz.every.max(1), XyzWriter::create(&xyz.folder, xyz.gzip)?)));
-        let xyz = xyz.transpose()?;
+        let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, case.time.step)).transpose()?;
+        let xyz = options.xyz.as_ref().map(xyz_writer).transpose()?;
         let (started, last_good) = (Instant::now(), None);
         Ok(Self {
             case,
@@ -392,6 +382,31 @@ impl CheckpointFile {
         }
         checkpoint.write(case, &self.path)
     }
+}
+
+/// A case at time 0.
+fn simulation<const D: usize, H>(case: &Case, hydrodynamics: H) -> Simulation<D, H, PairContact<D>>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+{
+    let contact = PairContact::new(case.contact.params()).within(case.surroundings());
+    let (scheme, dt) = (case.time.scheme, case.time.step);
+    let simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    if !case.is_sheared() {
+        return simulation;
+    }
+    simulation.sheared(Sliding {
+        rate: case.shear_rate,
+        height: case.upper()[1] - case.lower()[1],
+        stress_every: case.rheology.every,
+    })
+}
+
+/// The writer of frames and its interval.
+fn xyz_writer(options: &XyzOptions) -> Result<(usize, XyzWriter), OutputError> {
+    Ok((options.every.max(1), XyzWriter::create(&options.folder, options.gzip)?))
 }
 
 /// The writer and its interval; of the steps done, those with files stay listed.

@@ -44,8 +44,8 @@ impl<const D: usize> Ball<D> {
         Self { center, radius, lattice }
     }
 
-    /// A ball at a place in space, repeated by a lattice of any tilt, for a box whose lower border across `y` is
-    /// at `origin`. The tilt is reduced to half a period at most, which changes nothing but the box.
+    /// A ball at a place in space, repeated by a lattice of any tilt, for a box whose lower border across
+    /// `y` is at `origin`. The tilt is reduced to half a period at most, which changes nothing but the box.
     pub fn in_space(place: &Vector<D>, radius: f64, lattice: &Lattice<D>, origin: f64) -> Self {
         let lattice = lattice.reduced();
         Self { center: lattice.to_box(place, origin), radius, lattice }
@@ -56,8 +56,8 @@ impl<const D: usize> Ball<D> {
         &self.center
     }
 
-    /// Calls `visit(arm)` for all images whose surface is no farther than `reach` from a place in the box, with
-    /// the displacements from their centres.
+    /// Calls `visit(arm)` for all images whose surface is no farther than `reach` from a place in the box,
+    /// with the displacements from their centres.
     pub fn for_each_image(&self, x: &Vector<D>, reach: f64, mut visit: impl FnMut(&Vector<D>)) {
         let (nearest, farthest) = (self.arm(x), self.radius + reach);
         let mut visit_near = |arm: &Vector<D>| {

@@ -24,9 +24,9 @@ where
     /// Sets the factor of the imposed shear rate (1 = as configured, -1 = reversed).
     fn set_shear_factor(&mut self, factor: f64);
 
-    /// Sets the shear strain of the periodic images at the next prediction, where these slide along each other:
-    /// the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound. And whether
-    /// that prediction is to have a stress.
+    /// Sets the shear strain of the periodic images at the next prediction, where these slide along each
+    /// other: the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound. And
+    /// whether that prediction is to have a stress.
     fn set_strain(&mut self, _strain: f64, _with_stress: bool) {}
 
     /// The mean stress of the last prediction; `None` where the model has none.
@@ -135,8 +135,8 @@ impl<const D: usize> MeanStress<D> {
         self.dissipation / (self.viscosity * self.rate * self.rate)
     }
 
-    /// `N_1 = sigma_xx - sigma_yy` and `N_2 = sigma_yy - sigma_zz` over viscosity and size of the shear rate; no
-    /// `N_2` in 2D.
+    /// `N_1 = sigma_xx - sigma_yy` and `N_2 = sigma_yy - sigma_zz` over viscosity and size of the shear rate;
+    /// no `N_2` in 2D.
     pub fn normal_stress_differences(&self) -> [Option<f64>; 2] {
         let normal = |d: usize| self.of_bodies[(d, d)] / (self.viscosity * self.rate.abs());
         [Some(normal(0) - normal(1)), (D == 3).then(|| normal(1) - normal(D - 1))]

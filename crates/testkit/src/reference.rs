@@ -138,13 +138,14 @@ reference_table!(
     "sheared_square2d.csv"
 );
 reference_table!(
-    /// A simple cubic lattice of free spheres in shear, by the strain of the cell: `phi, strain, eta_r, N1, N2,
-    /// omega_z`.
+    /// A simple cubic lattice of free spheres in shear, by the strain of the cell:
+    /// `phi, strain, eta_r, N1, N2, omega_z`.
     sheared_simple_cubic_lattice,
     "sheared_sc3d.csv"
 );
 reference_table!(
-    /// Cells of several free discs in shear: `cell, strain, radius, x, y, u, v, omega, eta_r, N1`, a row a disc.
+    /// Cells of several free discs in shear: `cell, strain, radius, x, y, u, v, omega, eta_r, N1`, a row a
+    /// disc.
     cells_of_discs,
     "cells2d.csv"
 );

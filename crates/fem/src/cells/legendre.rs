@@ -11,9 +11,9 @@
 //! change of basis costs four operations per line of three nodes: `A_0 = u_0 + 4 u_1 + u_2`,
 //! `A_1 = u_0 - u_2`, `A_2 = u_1 - A_0 / 6` are `a_l / c_l`.
 //!
-//! Where cells are sheared, derivatives in space are `d_2 - g d_1` in the second direction and as they were in
-//! the others. The few hundred entries that this adds are a table: loops over strains, unrolled in every kernel,
-//! would take minutes to compile.
+//! Where cells are sheared, derivatives in space are `d_2 - g d_1` in the second direction and as they were
+//! in the others. The few hundred entries that this adds are a table: loops over strains, unrolled in every
+//! kernel, would take minutes to compile.
 
 use std::collections::BTreeMap;
 

@@ -25,8 +25,8 @@ pub struct HalfSpace {
     pub offset: f64,
 }
 
-/// The angles of heights at which the sections of a ball of this radius change, which flats cut and which lies
-/// in a cell with these faces along the height.
+/// The angles of heights at which the sections of a ball of this radius change, which flats cut and which
+/// lies in a cell with these faces along the height.
 pub fn breakpoints(radius: f64, flats: &[HalfSpace], faces: &[HalfSpace; 4]) -> Vec<Breakpoint> {
     let mut planes = flats.to_vec();
     planes.extend(faces);

@@ -14,8 +14,8 @@ pub struct FlatInCell<const D: usize> {
 }
 
 impl<const D: usize> FlatInCell<D> {
-    /// The half-space with this `m`, the unit normal if the cell is a cube; one whose border is a face of the cell but for rounding ends
-    /// there, so that the surface belongs to one of two neighbours.
+    /// The half-space with this `m`, the unit normal if the cell is a cube; one whose border is a face of the
+    /// cell but for rounding ends there, so that the surface belongs to one of two neighbours.
     pub fn new(normal: [f64; D], offset: f64) -> Self {
         let new = Self { normal, offset };
         let on_face = |k: usize| {

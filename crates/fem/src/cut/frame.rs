@@ -1,10 +1,10 @@
 //! Cells that are sheared, as planes of rays see them.
 //!
 //! In a cell with the coordinates `xi` in the unit cube the place is `A xi`, with the shear
-//! `A = 1 + g e_1 (x) e_2`, so that a ball is an ellipsoid `(xi - c)^T C (xi - c) <= r^2`, `C = A^T A`. With the
-//! axes in the order along the rays, across them, across their planes, and with Cholesky's factor of
-//! `C = T^T T`, the ball is round in `s = T (xi - c)`; and since `T` is triangular, rays and planes of rays are
-//! still such.
+//! `A = 1 + g e_1 (x) e_2`, so that a ball is an ellipsoid, `(xi - c)^T C (xi - c) <= r^2` with `C = A^T A`.
+//! With the axes in the order along the rays, across them, across their planes, and with Cholesky's factor
+//! `T` of `C = T^T T`, the ball is round in `s = T (xi - c)`; and since `T` is triangular, rays and planes of
+//! rays are still such.
 
 use gluey_geom::Vector;
 

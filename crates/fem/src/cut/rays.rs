@@ -1,10 +1,11 @@
 //! Rays through a ball along the edges of the unit cube.
 //!
-//! A ray lies at `y = c + rho sin(theta)` in a plane in which the ball is a disc of radius `rho`, and is inside
-//! the ball for `|x - c_d| <= rho cos(theta)`; in a sheared cell the disc is an ellipse, see
-//! [`super::frame`]. In 3D the planes lie at `z = c + a sin(phi)`, where `rho = a cos(phi)`. Moments of a cut
-//! change their form where a chord ends on a face; how they depend on `phi` changes where a disc begins to
-//! reach a face, like a square root, or an edge.
+//! A ray lies at `y = c + rho sin(theta)` in a plane in which the ball is a disc of radius
+//! `rho`, and is inside the ball for `|x - c_d| <= rho
+//! cos(theta)`; in a sheared cell the disc is an ellipse, see [`super::frame`]. In 3D the planes lie at
+//! `z = c + a sin(phi)`, where `rho = a cos(phi)`. Moments of a cut change their form where a chord ends on a
+//! face; how they depend on `phi` changes where a disc begins to reach a face, like a square root, or an
+//! edge.
 
 use super::ball::BallInCell;
 use super::corners::{self, HalfSpace};

@@ -1,9 +1,10 @@
 //! The rheology of a sheared suspension as comma-separated values, a row whenever its stress was computed.
 //!
-//! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate. `viscosity` is by
-//! the stresslets of the particles, `viscosity_by_dissipation` by the power that fluid and films dissipate: their
-//! difference is an error of discretisation. `viscosity_of_films` is the share of films too thin for the mesh in
-//! the first. `particle_pressure` is `-tr S / (D V)`, relative to the mean pressure of the fluid.
+//! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate.
+//! `viscosity` is by the stresslets of the particles, `viscosity_by_dissipation` by the power that fluid and
+//! films dissipate: their difference is an error of discretisation.
+//! `viscosity_of_films` is the share of films too thin for the mesh in the first. `particle_pressure` is
+//! `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
 use std::path::{Path, PathBuf};
 

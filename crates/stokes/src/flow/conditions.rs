@@ -56,9 +56,10 @@ where
     /// Free bodies without forces in the linear flow `G x`, whose trace is zero, in a box that is periodic in
     /// all directions.
     ///
-    /// Velocity and pressure are those of the deviation `u - G x`, which is periodic and whose mean over fluid
-    /// and bodies is zero; so are velocities and spins of bodies, given or found: relative to the undisturbed
-    /// flow at the centre of the body. Forces, torques and stresslets are those of the whole flow.
+    /// Velocity and pressure are those of the deviation `u - G x`, which is periodic and whose mean over
+    /// fluid and bodies is zero; so are velocities and spins of bodies, given or found: relative to the
+    /// undisturbed flow at the centre of the body. Forces, torques and stresslets are those of the whole
+    /// flow.
     pub fn in_linear_flow(gradient: &Matrix<D>) -> Self {
         Self { strain: (gradient + gradient.transpose()) * 0.5, ..Self::at_rest() }
     }

@@ -4,9 +4,9 @@
 //!
 //! `<sigma> = -<p> 1 + 2 eta E + (1/V) sum_b S_b`, `S_b = sym int (sigma.n) r dA`
 //!
-//! (Batchelor 1970, 10.1017/S0022112070000745), for rigid bodies on which nothing acts but the fluid. It does the
-//! power that the flow dissipates, `<sigma>:E = Phi / V`, which is computed from the strains of the fluid and the
-//! forces of films: another route to the viscosity.
+//! (Batchelor 1970, 10.1017/S0022112070000745), for rigid bodies on which nothing acts but the fluid. It does
+//! the power that the flow dissipates, `<sigma>:E = Phi / V`, which is computed from the strains of the fluid
+//! and the forces of films: another route to the viscosity.
 
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, gradient, node_count};
@@ -23,7 +23,8 @@ const STRAIN_POINTS: usize = 3;
 /// What the bodies add to the stress, and the power that is dissipated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stress<const D: usize> {
-    /// `S_b` of the whole flow on the mesh, for each body. The pressure is relative to its mean over the fluid.
+    /// `S_b` of the whole flow on the mesh, for each body. The pressure is relative to its mean over the
+    /// fluid.
     pub moments: Vec<Matrix<D>>,
     /// The same of films too thin for the mesh.
     pub of_films: Vec<Matrix<D>>,
@@ -40,8 +41,8 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// Power that the fluid dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative to a linear flow with
-/// this strain.
+/// Power that the fluid dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative to a linear flow
+/// with this strain.
 pub fn dissipation<const D: usize>(problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> f64
 where
     Dim<D>: Space<D>,

@@ -173,8 +173,8 @@ pub fn in_space<const D: usize>(shear: f64, place: &[f64; D]) -> Vector<D> {
     arm
 }
 
-/// The least and the largest distance of the points of a cell of edge `h` from one that its centre is at `arm`
-/// from. The least may be that of a box around a sheared cell.
+/// The least and the largest distance of the points of a cell of edge
+/// `h` from one that its centre is at `arm` from. The least may be that of a box around a sheared cell.
 fn distances<const D: usize>(arm: &Vector<D>, h: f64, shear: f64) -> [f64; 2] {
     let half = Vector::<D>::from_fn(|d, _| 0.5 * h * if d == 0 { 1.0 + shear.abs() } else { 1.0 });
     let nearest = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half[d]).max(0.0)).norm();

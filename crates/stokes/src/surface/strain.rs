@@ -1,8 +1,8 @@
 //! Bodies in a linear flow far away, without that flow.
 //!
-//! In a box that repeats itself everywhere a linear flow `G x` cannot be periodic, but what bodies add to it is:
-//! `u = G x + v`. With the strain `E` of `G = E + W` and twists relative to the undisturbed flow at the centre
-//! of each body, rigid bodies move the fluid at their surfaces by
+//! In a box that repeats itself everywhere a linear flow `G x` cannot be periodic, but what bodies add to it
+//! is: `u = G x + v`. With the strain `E` of `G = E + W` and twists relative to the undisturbed flow at the
+//! centre of each body, rigid bodies move the fluid at their surfaces by
 //!
 //! `v = V + w x r - E r`, `r` from the centre.
 //!

@@ -76,8 +76,8 @@ fn integrals_over_balls_do_not_depend_on_the_shear_of_cells() {
     shear_changes_nothing::<3>(1e-8);
 }
 
-/// A half-space that ends on faces of sheared cells takes nothing from those on its inner side, and its border
-/// belongs to the others.
+/// A half-space that ends on faces of sheared cells takes nothing from those on its inner side, and its
+/// border belongs to the others.
 #[test]
 fn flats_on_faces_of_sheared_cells_are_counted_once() {
     let shear = 0.4;
