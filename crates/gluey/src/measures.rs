@@ -21,7 +21,8 @@ pub(crate) struct Instant<const D: usize> {
 #[derive(Clone, Debug)]
 pub(crate) struct Measures<const D: usize> {
     radii: Vec<f64>,
-    lattice: Lattice<D>,
+    /// Periods of the box; `None` where images slide, and the first two particles are no pair.
+    lattice: Option<Lattice<D>>,
     row_count: usize,
     smallest_gap_over_a: Option<f64>,
     pair: PairHistory,
@@ -34,7 +35,7 @@ impl<const D: usize> Measures<D> {
         let reference = case.reference.as_deref().and_then(Reference::named);
         Self {
             radii: case.particles.iter().map(|particle| particle.radius).collect(),
-            lattice: case.surroundings().lattice,
+            lattice: (!case.is_sheared()).then(|| case.surroundings().lattice),
             row_count: 0,
             smallest_gap_over_a: None,
             pair: PairHistory::default(),
@@ -48,8 +49,10 @@ impl<const D: usize> Measures<D> {
         self.row_count += 1;
         let gaps = [self.smallest_gap_over_a, *smallest_gap_over_a];
         self.smallest_gap_over_a = gaps.into_iter().flatten().reduce(f64::min);
-        if let ([one, other, ..], [first, second, ..]) = (&centers[..], &self.radii[..]) {
-            self.pair.push(*time, [one, other], [*first, *second], &self.lattice);
+        if let ([one, other, ..], [first, second, ..], Some(lattice)) =
+            (&centers[..], &self.radii[..], &self.lattice)
+        {
+            self.pair.push(*time, [one, other], [*first, *second], lattice);
         }
         if let Some(comparison) = &mut self.comparison {
             comparison.add(*time, centers);
