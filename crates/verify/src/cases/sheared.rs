@@ -15,7 +15,7 @@ use crate::set_up::shift;
 use crate::statistics::rms;
 
 /// Solid fractions of the square and of the simple cubic lattice.
-const FRACTIONS: [&[f64]; 2] = [&[0.1, 0.3, 0.5], &[0.1, 0.3]];
+const FRACTIONS: [&[f64]; 2] = [&[0.1, 0.3], &[0.1, 0.3]];
 /// Strains of the cell.
 const STRAINS: [f64; 4] = [0.0, 0.1, 0.3, 0.5];
 
