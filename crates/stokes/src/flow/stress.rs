@@ -9,13 +9,13 @@
 //! and the forces of films: another route to the viscosity.
 
 use gluey_fem::cut::POINTS;
-use gluey_fem::element::{gauss_cube, gradient, node_count};
+use gluey_fem::element::{gauss_cube, node_count};
 use gluey_geom::{Dim, Matrix, Space, Vector};
 use rayon::prelude::*;
 
 use super::mean::{fluid_weights, mean_of};
 use crate::formulation::Problem;
-use crate::surface::CellState;
+use crate::surface::{CellState, slope};
 
 /// Gauss points per direction for products of strains in whole cells.
 const STRAIN_POINTS: usize = 3;
@@ -51,12 +51,7 @@ where
     let (discretisation, cut) = (problem.discretisation(), &surfaces.cut);
     let shear = discretisation.mesh.shear();
     let slopes = |points: usize| -> Vec<(f64, Vec<Vector<D>>)> {
-        let in_space = |i: usize, x: &[f64; D]| {
-            let mut slope = Vector::from(gradient::<D>(2, i, x));
-            slope[1] -= shear * slope[0];
-            slope
-        };
-        let of_point = |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| in_space(i, x)).collect();
+        let of_point = |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| slope(shear, i, x)).collect();
         gauss_cube::<D>(points).iter().map(|(x, weight)| (*weight, of_point(x))).collect()
     };
     let (whole, fine) = (slopes(STRAIN_POINTS), slopes(POINTS));

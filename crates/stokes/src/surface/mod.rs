@@ -8,6 +8,7 @@ mod flats;
 mod load;
 mod penalty;
 mod products;
+mod shapes;
 mod strain;
 mod traction;
 
@@ -16,5 +17,6 @@ pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
 pub use flats::{Flat, Flats};
 pub use load::{add_load_of_cut_cells, forces_on_bodies};
+pub use shapes::slope;
 pub use strain::load_of_strain;
 pub use traction::first_moments;

@@ -9,12 +9,11 @@
 //! Since `-div(2 eta E) = 0` there is no other load than this, which Nitsche's terms put on the fluid, on the
 //! pressures and, by its reaction, on the bodies.
 
-use gluey_fem::cut::POINTS;
-use gluey_fem::element::{gauss_cube, gradient, node_count, value};
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
 
 use super::coupling::SurfaceCoupling;
 use super::cut_cells::in_space;
+use super::shapes::Shapes;
 use crate::space::Discretisation;
 
 /// Loads on the nodal velocities and on the pressures at all nodes, and on the bodies.
@@ -28,32 +27,6 @@ where
     pub pressure: Vec<f64>,
     /// On the bodies.
     pub wrenches: Vec<Wrench<D>>,
-}
-
-/// The functions of a cell at its points: value and gradient in space of velocities, value of pressures.
-struct Shapes<const D: usize> {
-    points: Vec<[f64; D]>,
-    velocity: Vec<Vec<(f64, Vector<D>)>>,
-    pressure: Vec<Vec<f64>>,
-}
-
-impl<const D: usize> Shapes<D> {
-    fn new(shear: f64) -> Self {
-        let points: Vec<[f64; D]> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.0).collect();
-        let slope = |i: usize, x: &[f64; D]| {
-            let mut slope = Vector::from(gradient::<D>(2, i, x));
-            slope[1] -= shear * slope[0];
-            slope
-        };
-        let of_velocity =
-            |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| (value::<D>(2, i, x), slope(i, x))).collect();
-        let of_pressure = |x: &[f64; D]| (0..node_count::<D>(1)).map(|i| value::<D>(1, i, x)).collect();
-        Self {
-            velocity: points.iter().map(of_velocity).collect(),
-            pressure: points.iter().map(of_pressure).collect(),
-            points,
-        }
-    }
 }
 
 /// The load of a strain `E`, a symmetric matrix without trace, on `body_count` bodies.

@@ -1,13 +1,12 @@
 //! First moments of the tractions on the surfaces.
 
-use gluey_fem::cut::POINTS;
-use gluey_fem::element::{gauss_cube, gradient, node_count, value};
 use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_levelset::{Ball, Body};
 use rayon::prelude::*;
 
 use super::coupling::SurfaceCoupling;
 use super::cut_cells::{CutCell, in_space};
+use super::shapes::Shapes;
 use crate::space::{Discretisation, VelocitySpace};
 
 /// A field at a point of a cut cell, and the weights there.
@@ -18,31 +17,7 @@ struct Sample<const D: usize> {
     pressure: f64,
 }
 
-/// Shape functions at the points of a cell.
-struct Shapes<const D: usize> {
-    points: Vec<[f64; D]>,
-    velocity: Vec<Vec<(f64, [f64; D])>>,
-    pressure: Vec<Vec<f64>>,
-}
-
 impl<const D: usize> Shapes<D> {
-    fn new(shear: f64) -> Self {
-        let points: Vec<[f64; D]> = gauss_cube::<D>(POINTS).into_iter().map(|point| point.0).collect();
-        let in_space = |mut slope: [f64; D]| {
-            slope[1] -= shear * slope[0];
-            slope
-        };
-        let of_velocity = |x: &[f64; D]| {
-            (0..node_count::<D>(2)).map(|i| (value::<D>(2, i, x), in_space(gradient::<D>(2, i, x)))).collect()
-        };
-        let of_pressure = |x: &[f64; D]| (0..node_count::<D>(1)).map(|i| value::<D>(1, i, x)).collect();
-        Self {
-            velocity: points.iter().map(of_velocity).collect(),
-            pressure: points.iter().map(of_pressure).collect(),
-            points,
-        }
-    }
-
     fn sample(
         &self,
         discretisation: &Discretisation<D>,
@@ -55,7 +30,7 @@ impl<const D: usize> Shapes<D> {
         for (&node, (shape, slope)) in nodes.iter().zip(&self.velocity[point]) {
             let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
             sample.velocity += u * *shape;
-            let gradient = u * Vector::<D>::from_column_slice(slope).transpose();
+            let gradient = u * slope.transpose();
             sample.strain += gradient + gradient.transpose();
         }
         let nodes = discretisation.pressure.cell(cell).iter().zip(&self.pressure[point]);
