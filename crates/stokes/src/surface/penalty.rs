@@ -7,7 +7,7 @@
 //! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products
 //! of gradients in the volume and on the surface:
 //!
-//! `beta = 1.7 mu eta`.
+//! `beta = 2 mu eta`.
 //!
 //! In coordinates of the unit cube `mu h` is a number of the cut alone.
 
@@ -25,7 +25,7 @@ use crate::error::StokesError;
 use crate::space::Discretisation;
 
 /// Multiple of the eigenvalue.
-const FACTOR: f64 = 1.7;
+const FACTOR: f64 = 2.0;
 /// Share of the mean diagonal that is added to the strain energy: rigid motions have none.
 const SHIFT: f64 = 1e-9;
 
