@@ -20,11 +20,13 @@ mod box_and_strain;
 mod comparable;
 mod error;
 mod fill;
+mod filled;
 mod forces;
 mod load;
 mod mesh;
 mod names;
 pub(crate) mod neighbours;
+mod overrides;
 mod particle;
 mod particle_problem;
 mod particles_file;
@@ -40,6 +42,7 @@ pub use names::{
     ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, RadiiKind, Solver,
     UnknownName,
 };
+pub use overrides::{BadOverride, Override};
 pub use particle::ParticleSpec;
 pub use particle_problem::ParticleProblem;
 pub use suspension::{RadiiSpec, SuspensionSpec};
@@ -99,6 +102,9 @@ pub struct Case {
     /// Rheology, in a box that is sheared for ever.
     #[serde(default)]
     pub rheology: RheologySpec,
+    /// Seed of the particles that were generated; no key of a case file.
+    #[serde(skip)]
+    pub seed: Option<u64>,
 }
 
 /// Rheology.

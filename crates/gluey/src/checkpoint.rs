@@ -25,7 +25,7 @@ use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
@@ -76,7 +76,7 @@ pub enum CheckpointError {
         found: u32,
     },
     /// Its bytes are not those that were written.
-    #[error("{}: damaged: its digest does not match its contents", path.display())]
+    #[error("{}: damaged: it is cut short, or its digest does not match its contents", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -117,9 +117,11 @@ pub struct CaseDifference {
     pub given: String,
 }
 
-/// Content of the file: the case as text, then the run, decoded only if the case is the right one.
+/// Content of the file: who wrote it, the case as text, then the run, decoded only if the case is the right
+/// one.
 #[derive(Serialize, Deserialize)]
 struct Payload {
+    gluey: String,
     case: String,
     run: Vec<u8>,
 }
@@ -132,7 +134,8 @@ where
     pub fn write(&self, case: &Case, path: &Path) -> Result<(), OutputError> {
         let encode = || -> io::Result<Vec<u8>> {
             let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
-            let payload = Payload { case: canonical(case).map_err(io::Error::other)?, run };
+            let gluey = env!("CARGO_PKG_VERSION").to_owned();
+            let payload = Payload { gluey, case: canonical(case).map_err(io::Error::other)?, run };
             let bytes = postcard::to_stdvec(&payload).map_err(io::Error::other)?;
             let mut body = Vec::new();
             ZlibEncoder::new(bytes.as_slice(), Compression::new(COMPRESSION_LEVEL)).read_to_end(&mut body)?;
@@ -149,27 +152,7 @@ where
     /// Reads a checkpoint of a run of `case`. The end of the run may differ: a run can be prolonged.
     pub fn read(case: &Case, path: &Path) -> Result<Self, CheckpointError> {
         let path = path.to_owned();
-        let bytes = match fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(source) => return Err(CheckpointError::Read { path, source }),
-        };
-        let Some((header, body)) = bytes.split_at_checked(HEADER_LENGTH) else {
-            return Err(CheckpointError::Foreign { path });
-        };
-        let (magic, rest) = header.split_at(MAGIC.len());
-        let (version, digest) = rest.split_at(4);
-        if magic != MAGIC {
-            return Err(CheckpointError::Foreign { path });
-        }
-        let found = version.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte));
-        if found != VERSION {
-            return Err(CheckpointError::Version { path, found });
-        }
-        if blake3::hash(body).as_bytes() != digest {
-            return Err(CheckpointError::Damaged { path });
-        }
-        let payload: Option<Payload> = inflated(body).and_then(|bytes| postcard::from_bytes(&bytes).ok());
-        let Some(payload) = payload else { return Err(CheckpointError::Damaged { path }) };
+        let payload = payload(&path)?;
         let given = match canonical(case) {
             Ok(given) => given,
             Err(source) => return Err(CheckpointError::CaseText { path, source }),
@@ -181,6 +164,79 @@ where
     }
 }
 
+/// What stands in the file, its case and run not yet decoded.
+fn payload(path: &Path) -> Result<Payload, CheckpointError> {
+    let path = path.to_owned();
+    let bytes = match fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(source) => return Err(CheckpointError::Read { path, source }),
+    };
+    let is_cut = MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) && !bytes.is_empty();
+    let Some((header, body)) = bytes.split_at_checked(HEADER_LENGTH) else {
+        return Err(if is_cut {
+            CheckpointError::Damaged { path }
+        } else {
+            CheckpointError::Foreign { path }
+        });
+    };
+    let (magic, rest) = header.split_at(MAGIC.len());
+    let (version, digest) = rest.split_at(4);
+    if magic != MAGIC {
+        return Err(CheckpointError::Foreign { path });
+    }
+    let found = version.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte));
+    if found != VERSION {
+        return Err(CheckpointError::Version { path, found });
+    }
+    if blake3::hash(body).as_bytes() != digest {
+        return Err(CheckpointError::Damaged { path });
+    }
+    let payload: Option<Payload> = inflated(body).and_then(|bytes| postcard::from_bytes(&bytes).ok());
+    payload.ok_or(CheckpointError::Damaged { path })
+}
+
+/// What a checkpoint says of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckpointSummary {
+    /// Layout of the file.
+    pub layout: u32,
+    /// Version of gluey that wrote it.
+    pub gluey: String,
+    /// The case, without its end.
+    pub case: Case,
+    /// Steps done.
+    pub step: usize,
+    /// Wall time so far, in seconds.
+    pub wall_s: f64,
+}
+
+impl CheckpointSummary {
+    /// Reads what stands in a checkpoint, whatever its case is.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if no run could go on from it.
+    pub fn read(path: &Path) -> Result<Self, CheckpointError> {
+        let payload = payload(path)?;
+        let damaged = || CheckpointError::Damaged { path: path.to_owned() };
+        let case: Case = toml::from_str(&payload.case).map_err(|_| damaged())?;
+        let (step, wall_s) = match case.dimension {
+            2 => progress::<2>(&payload.run),
+            _ => progress::<3>(&payload.run),
+        }
+        .ok_or_else(damaged)?;
+        Ok(Self { layout: VERSION, gluey: payload.gluey, case, step, wall_s })
+    }
+}
+
+/// Steps done and seconds spent.
+fn progress<const D: usize>(run: &[u8]) -> Option<(usize, f64)>
+where
+    Dim<D>: Space<D>,
+{
+    let checkpoint: Checkpoint<D> = postcard::from_bytes(run).ok()?;
+    Some((checkpoint.state.step, checkpoint.wall_s))
+}
+
 /// Bytes before compression; `None` if `body` is not compressed.
 fn inflated(body: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -188,14 +244,15 @@ fn inflated(body: &[u8]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// The case as text, without its end.
-fn canonical(case: &Case) -> Result<String, toml::ser::Error> {
+/// The case as text, without its end, all defaults stated.
+pub(crate) fn canonical(case: &Case) -> Result<String, toml::ser::Error> {
     let mut case = case.clone();
     case.time.end = 0.0;
-    toml::to_string(&case)
+    case.to_toml()
 }
 
-fn difference(saved: &str, given: &str) -> Option<CaseDifference> {
+/// The first line in which two cases as text differ.
+pub(crate) fn difference(saved: &str, given: &str) -> Option<CaseDifference> {
     let line = |line: Option<&str>| line.unwrap_or("(nothing)").to_owned();
     let (mut a, mut b) = (saved.lines(), given.lines());
     loop {

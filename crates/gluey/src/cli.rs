@@ -7,8 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, Parser, Subcommand};
 use gluey::analyse::AnalyseOptions;
+use gluey::case::Override;
 use gluey::output::vtk::{Precision, VtkEncoding};
-use gluey::{Case, Formulation, RunError, RunOptions, RunReport, Strategy, VtkOptions, XyzOptions};
+use gluey::{
+    Case, Formulation, RecordOptions, RunError, RunOptions, RunReport, Strategy, VtkOptions, XyzOptions,
+};
 
 use crate::diagnostic::Diagnosed;
 use crate::terminal::{Reporter, say};
@@ -61,9 +64,15 @@ impl AnalyseArguments {
 
 /// Arguments of `gluey run`.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  gluey run pair.toml --out out --set time.step=0.01 --checkpoint-minutes 30"
+)]
 pub struct RunArguments {
     /// The case file.
     case: PathBuf,
+    /// Set a key of the case: time.step=0.01, particles.0.radius=0.06, contact.strategy=gluey; repeatable.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
     /// What keeps particles from overlapping, instead of the case's choice: none, velocity-correction,
     /// inelastic, gluey.
     #[arg(long)]
@@ -74,6 +83,9 @@ pub struct RunArguments {
     /// Folder for all output.
     #[arg(long, default_value = "out", value_name = "DIR")]
     out: PathBuf,
+    /// Replace the results of another run in that folder.
+    #[arg(long)]
+    force: bool,
     /// Write fields, particles and contacts for ParaView every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
@@ -94,6 +106,9 @@ pub struct RunArguments {
     /// when a step fails in any case).
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     checkpoint_every: Option<usize>,
+    /// Write a checkpoint every T minutes.
+    #[arg(long, value_name = "T", value_parser = minutes)]
+    checkpoint_minutes: Option<f64>,
     /// Go on from a checkpoint of the same case.
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
@@ -124,7 +139,7 @@ pub fn run(arguments: &RunArguments) -> Result<RunReport, Failure> {
 
 impl RunArguments {
     fn case(&self) -> Result<Case, gluey::CaseError> {
-        let mut case = Case::load(&self.case)?;
+        let mut case = Case::load_with(&self.case, &self.set)?;
         case.contact.strategy = self.strategy.unwrap_or(case.contact.strategy);
         case.flow.formulation = self.formulation.unwrap_or(case.flow.formulation);
         Ok(case)
@@ -146,6 +161,8 @@ impl RunArguments {
             }),
             checkpoint: Some(self.out.join(format!("{stem}.checkpoint"))),
             checkpoint_every: self.checkpoint_every,
+            checkpoint_minutes: self.checkpoint_minutes,
+            record: Some(RecordOptions { force: self.force }),
             resume: self.resume.clone(),
             interrupt: Some(interrupt_flag()),
         }
@@ -174,5 +191,12 @@ fn at_least_one(text: &str) -> Result<usize, String> {
         Ok(0) => Err("must be at least 1".into()),
         Ok(number) => Ok(number),
         Err(_) => Err("must be a whole number, at least 1".into()),
+    }
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(minutes) if minutes > 0.0 && f64::is_finite(minutes) => Ok(minutes),
+        _ => Err("must be a number greater than 0".into()),
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use gluey::case::CaseIssue;
-use gluey::{CaseError, CheckpointError, RowsError, RunError};
+use gluey::{CaseError, CheckpointError, CheckpointSummary, RowsError, RunError};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -58,18 +58,46 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Checkpoint(CheckpointError::OtherCase { .. }) => {
             "resume with the case file, strategy and formulation of the interrupted run".into()
         }
-        RunError::Checkpoint(_) => "start without --resume".into(),
+        RunError::Checkpoint(error) => checkpoint_hint(error, case),
+        RunError::Occupied(_) => {
+            "write elsewhere with --out DIR, or replace those results with --force".into()
+        }
         RunError::LeftBox { .. } => {
             "end the run earlier, or take a larger box; contact keeps particles from its walls \
                                      (y), not from open sides"
                 .into()
         }
         RunError::Case(CaseError::Invalid(issue)) => issue.problem.hint(),
+        RunError::Case(CaseError::Argument { problem, .. }) => problem.hint(),
         RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
         RunError::Case(CaseError::Read { .. }) => "give the path of a case file".into(),
         _ => return None,
+    })
+}
+
+/// Offers the checkpoint before the last, where it is whole.
+fn checkpoint_hint(error: &CheckpointError, case: &Path) -> String {
+    let anew = "start without --resume".to_owned();
+    let path = match error {
+        CheckpointError::Read { path, .. }
+        | CheckpointError::Foreign { path }
+        | CheckpointError::Version { path, .. }
+        | CheckpointError::Damaged { path } => path,
+        _ => return anew,
+    };
+    let mut older = path.clone().into_os_string();
+    older.push(".previous");
+    let older = Path::new(&older);
+    CheckpointSummary::read(older).map_or(anew, |summary| {
+        format!(
+            "the checkpoint before it, after step {}, is whole; to go on from there: gluey run {} --resume {} (with the \
+             same options)",
+            summary.step,
+            case.display(),
+            older.display()
+        )
     })
 }
 

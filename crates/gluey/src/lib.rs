@@ -39,7 +39,7 @@ pub mod table;
 mod trajectory;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
-pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError};
+pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary};
 pub use flow::FlowError;
 pub use hydrodynamics::HydrodynamicsError;
 pub use memory::TooLarge;
@@ -48,7 +48,10 @@ pub use output::{ClaimError, OutputError, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
-pub use run::{RunError, RunOptions, VtkOptions, XyzOptions, run};
+pub use run::{
+    Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths, RunError, RunOptions,
+    RunRecord, RunState, VtkOptions, XyzOptions, run,
+};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
 pub use trajectory::Row;
 

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-pub(crate) use claim::Claim;
 pub use claim::ClaimError;
+pub(crate) use claim::{Claim, is_claimed};
 pub use draft::{Mark, RowsError};
 
 /// A file could not be written.

@@ -57,6 +57,13 @@ pub enum Notice {
         /// Why.
         reason: String,
     },
+    /// A run ended, and its record could not be brought up to date.
+    NoRecord {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
 }
 
 impl fmt::Display for Notice {
@@ -77,6 +84,9 @@ impl fmt::Display for Notice {
             ),
             Self::NoCheckpoint { path, reason } => {
                 write!(f, "{}: no checkpoint of the last good step: {reason}", path.display())
+            }
+            Self::NoRecord { path, reason } => {
+                write!(f, "{}: does not say how the run ended: {reason}", path.display())
             }
         }
     }

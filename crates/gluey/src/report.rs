@@ -3,7 +3,7 @@
 use std::fmt;
 
 use gluey_motion::FlowStatistics;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
@@ -14,7 +14,7 @@ use crate::trajectory::PairHistory;
 const TOUCHING_OVER_A: f64 = 1e-8;
 
 /// The result of a run in numbers. Lengths named `_over_a` are in mean radii.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// Name of the case.
     pub case: String,

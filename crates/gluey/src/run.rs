@@ -2,10 +2,15 @@
 //!
 //! The dimension of a case is matched here and nowhere else: below, everything is compiled for it.
 
+mod checkpoint_file;
 mod error;
+mod occupied;
 mod options;
+mod paths;
+mod record;
+mod recorder;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -13,7 +18,10 @@ use gluey_contact::{ContactModel, PairContact};
 use gluey_geom::{Dim, Particle, Space, Vector};
 
 pub use error::RunError;
-pub use options::{RunOptions, VtkOptions, XyzOptions};
+pub use occupied::OccupiedError;
+pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
+pub use paths::ResultPaths;
+pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
@@ -23,11 +31,13 @@ use crate::output::csv::{CsvWriter, earlier_drafts};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
-use crate::output::{Claim, OutputError, set_aside};
+use crate::output::{Claim, OutputError};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
+use checkpoint_file::CheckpointFile;
+use recorder::Recorder;
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -37,6 +47,7 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     case.check()?;
     crate::memory::check(case)?;
     let _claims = claim_outputs(options, progress)?;
+    occupied::check_free(case, options)?;
     match case.dimension {
         2 => run_2d(case, options, progress),
         _ => run_3d(case, options, progress),
@@ -84,9 +95,11 @@ where
     vtk: Option<(usize, FrameWriter<D>)>,
     xyz: Option<(usize, XyzWriter)>,
     checkpoints: Option<CheckpointFile>,
+    recorder: Option<Recorder>,
     /// The run before the step that is being done, where checkpoints are written.
     last_good: Option<Checkpoint<D>>,
     started: Instant,
+    saved: Instant,
     first_step: usize,
     wall_before_s: f64,
 }
@@ -134,6 +147,7 @@ where
         let first_step = simulation.step_index();
         let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, case.time.step)).transpose()?;
         let xyz = options.xyz.as_ref().map(xyz_writer).transpose()?;
+        let recorder = Recorder::begin(case, options, first_step)?;
         let (started, last_good) = (Instant::now(), None);
         Ok(Self {
             case,
@@ -146,8 +160,10 @@ where
             vtk,
             xyz,
             checkpoints,
+            recorder,
             last_good,
             started,
+            saved: started,
             first_step,
             wall_before_s,
         })
@@ -155,9 +171,16 @@ where
 
     /// Runs to the end.
     fn finish(mut self) -> Result<RunReport, RunError> {
-        if let Err(error) = self.all_steps() {
-            return Err(self.keep_last_good(error));
-        }
+        let outcome = self.all_steps().map_err(|error| self.keep_last_good(error));
+        let Some(recorder) = self.recorder.take() else { return outcome.and_then(|()| self.complete()) };
+        let done = self.last_good.as_ref().map(|checkpoint| checkpoint.state.step);
+        let step = done.unwrap_or(self.simulation.step_index());
+        let progress = self.progress;
+        recorder.close(step, outcome.and_then(|()| self.complete()), progress)
+    }
+
+    /// Gives all files their names.
+    fn complete(mut self) -> Result<RunReport, RunError> {
         self.vtk.take().map_or(Ok(()), |(_, frames)| frames.finish())?;
         let wall_s = self.wall_s();
         let flow = self.simulation.statistics();
@@ -261,9 +284,12 @@ where
         let (step, steps) = (self.simulation.step_index(), self.case.step_count());
         let interrupted =
             self.options.interrupt.as_ref().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed));
-        let due = self.options.checkpoint_every.is_some_and(|every| step.is_multiple_of(every.max(1)));
+        let minutes = self.saved.elapsed().as_secs_f64() / 60.0;
+        let due = self.options.checkpoint_every.is_some_and(|every| step.is_multiple_of(every.max(1)))
+            || self.options.checkpoint_minutes.is_some_and(|most| minutes >= most);
         if interrupted || due {
             self.save()?;
+            self.saved = Instant::now();
         }
         match interrupted && step < steps {
             true => {
@@ -295,7 +321,9 @@ where
         self.csv.sync()?;
         self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
         self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
-        file.write(checkpoint, self.case, self.progress)
+        file.write(checkpoint, self.case, self.progress)?;
+        let step = checkpoint.state.step;
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.reached(step))
     }
 
     /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good
@@ -349,39 +377,6 @@ where
     restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
     let count = simulation.particles().len();
     Ok(CsvWriter::resume(csv, &output, count, |row| measures.add(row))?)
-}
-
-/// Where a run writes its checkpoints.
-struct CheckpointFile {
-    path: PathBuf,
-    /// Whether an earlier run, whose drafts are still there, may want to go on from the file that is there.
-    is_wanted: bool,
-}
-
-impl CheckpointFile {
-    fn new(options: &RunOptions, has_drafts: bool) -> Option<Self> {
-        let path = options.checkpoint.clone()?;
-        let full = |path: &Path| path.canonicalize().ok();
-        let goes_on = options.resume.as_deref().is_some_and(|resume| full(resume) == full(&path));
-        Some(Self { path, is_wanted: has_drafts && !goes_on })
-    }
-
-    fn write<const D: usize>(
-        &mut self,
-        checkpoint: &Checkpoint<D>,
-        case: &Case,
-        progress: &dyn Progress,
-    ) -> Result<(), OutputError>
-    where
-        Dim<D>: Space<D>,
-    {
-        if std::mem::take(&mut self.is_wanted)
-            && let Some(to) = set_aside(&self.path)?
-        {
-            progress.notice(&Notice::CheckpointSetAside { from: self.path.clone(), to });
-        }
-        checkpoint.write(case, &self.path)
-    }
 }
 
 /// A case at time 0.

@@ -25,6 +25,20 @@ pub enum CaseError {
     /// The file was read, but something in it is wrong.
     #[error(transparent)]
     Invalid(Box<CaseIssue>),
+    /// The file may be as it should, but not what a command line sets in it.
+    #[error("--set {argument}: {}{problem}", at(key))]
+    Argument {
+        /// The argument.
+        argument: String,
+        /// The key that is wrong, where it is another one.
+        key: Key,
+        /// The error.
+        problem: Box<Problem>,
+    },
+}
+
+fn at(key: &Key) -> String {
+    if key.is_root() { String::new() } else { format!("{key}: ") }
 }
 
 /// One thing that is wrong in a case file, and where.
@@ -137,6 +151,14 @@ pub enum Problem {
         suggestion: Option<String>,
         /// All keys known here.
         known: Vec<String>,
+    },
+    /// An entry of a list that is not there.
+    #[error("there is no entry {index}")]
+    NoEntry {
+        /// Its index, from 0.
+        index: usize,
+        /// Entries there are.
+        count: usize,
     },
     /// A value of another type.
     #[error("wrong type: found {found}")]
@@ -329,6 +351,14 @@ impl Problem {
             Self::Syntax { .. } | Self::Malformed { .. } => "see the case format in the README".into(),
             Self::MissingKey { example, .. } => format!("add a line like `{example}`"),
             Self::UnknownKey { suggestion, known, .. } => unknown_key_hint(suggestion.as_deref(), known),
+            Self::NoEntry { count: 0, .. } => {
+                "the case has no such list; particles can be set one by one where the \
+                                               case lists them"
+                    .into()
+            }
+            Self::NoEntry { count, .. } => {
+                format!("entries are counted from 0: there are 0 to {}", count - 1)
+            }
             Self::WrongType { expected, .. } => format!("expected {expected}"),
             Self::UnknownName(name) => name.hint(),
             Self::Dimension { .. } => "dimension is 2 or 3".into(),

@@ -47,7 +47,9 @@ pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path) -> Check {
         case.particles_file = None;
     }
     if let Some(suspension) = &case.suspension {
+        let seed = suspension.seed;
         case.particles = generate(case, suspension, &root.name("suspension"))?;
+        case.seed = Some(seed);
         case.suspension = None;
     }
     Ok(())

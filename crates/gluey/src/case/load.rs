@@ -7,7 +7,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{CaseError, CaseIssue, Key, KeyPart, Problem};
-use super::suggest::closest;
+use super::overrides::Override;
+use super::suggest::{closest, synonym};
 use super::validate::{Violation, check, check_surroundings};
 use super::{Case, UnknownName, fill};
 
@@ -20,16 +21,38 @@ impl Case {
         Self::parse(&text, path)
     }
 
+    /// Reads and checks a case file of which some keys are set otherwise.
+    pub fn load_with(path: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, CaseError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
+        Self::parse_with(&text, path, overrides)
+    }
+
     /// Checks a case given as text; `file` is what errors call it.
     pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, CaseError> {
+        Self::parse_with(text, file, &[])
+    }
+
+    /// Checks a case given as text of which some keys are set otherwise; `file` is what errors call it.
+    pub fn parse_with(text: &str, file: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, CaseError> {
         let source = Source { text, file: file.as_ref() };
         let tree = DeTable::parse(text).map_err(|error| source.syntax_issue(&error))?;
-        let mut case: Self = toml::from_str(text).map_err(|error| source.type_issue(&tree, &error))?;
-        let has_list = tree.get_ref().contains_key("particles");
+        let (mut case, has_list) = match overrides {
+            [] => {
+                let case: Self = toml::from_str(text).map_err(|error| source.type_issue(&tree, &error))?;
+                (case, tree.get_ref().contains_key("particles"))
+            }
+            _ => source.overridden(&tree, overrides)?,
+        };
+        let issue = |violation: Violation| match overrides.iter().rfind(|set| set.concerns(&violation.key)) {
+            None => source.value_issue(&tree, violation),
+            Some(set) => argument_issue(set, violation.key, violation.problem),
+        };
         check_surroundings(&case)
             .and_then(|()| fill::fill(&mut case, has_list, source.folder()))
-            .map_err(|violation| source.value_issue(&tree, violation))?;
-        check(&case).map_err(|violation| source.value_issue(&tree, violation))?;
+            .map_err(issue)?;
+        check(&case).map_err(issue)?;
         Ok(case)
     }
 
@@ -46,6 +69,11 @@ impl CaseError {
     }
 }
 
+fn argument_issue(set: &Override, key: Key, problem: Problem) -> CaseError {
+    let key = if key == set.key { Key::default() } else { key };
+    CaseError::Argument { argument: set.text.clone(), key, problem: Box::new(problem) }
+}
+
 /// The text an error points into.
 struct Source<'a> {
     text: &'a str,
@@ -56,6 +84,36 @@ impl Source<'_> {
     /// Where the files lie that the case names.
     fn folder(&self) -> &Path {
         self.file.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The case with its overrides, and whether it lists particles. An error that the file has without any
+    /// override is the file's, another one that of the first override that brings it about.
+    fn overridden(
+        &self,
+        tree: &Spanned<DeTable<'_>>,
+        overrides: &[Override],
+    ) -> Result<(Case, bool), CaseError> {
+        let mut table: toml::Table =
+            toml::from_str(self.text).map_err(|error| self.type_issue(tree, &error))?;
+        let mut tables = vec![table.clone()];
+        for set in overrides {
+            set.apply(&mut table).map_err(|problem| argument_issue(set, set.key.clone(), problem))?;
+            tables.push(table.clone());
+        }
+        let typed = |table: &toml::Table| table.clone().try_into::<Case>();
+        let error = match typed(&table) {
+            Ok(case) => return Ok((case, table.contains_key("particles"))),
+            Err(error) => error.message().to_owned(),
+        };
+        let is_so = |table: &toml::Table| typed(table).is_err_and(|found| found.message() == error);
+        let first = tables.iter().position(is_so).unwrap_or(overrides.len());
+        match (first, toml::from_str::<Case>(self.text)) {
+            (0, Err(error)) => Err(self.type_issue(tree, &error)),
+            (first, _) => {
+                let set = &overrides[first.max(1) - 1];
+                Err(argument_issue(set, set.key.clone(), classify(&error, &set.key)))
+            }
+        }
     }
 
     fn syntax_issue(&self, error: &toml::de::Error) -> CaseError {
@@ -128,7 +186,8 @@ fn classify(message: &str, key: &Key) -> Problem {
         Problem::MissingKey { example: example(&first), name: first }
     } else if message.starts_with("unknown field") {
         let known = quoted[1..].to_vec();
-        let suggestion = closest(&first, known.iter().map(String::as_str)).map(str::to_owned);
+        let names = || known.iter().map(String::as_str);
+        let suggestion = synonym(&first, names()).or(closest(&first, names())).map(str::to_owned);
         Problem::UnknownKey { name: first, suggestion, known }
     } else if message.starts_with("unknown variant") {
         let what = key.0.iter().rev().find_map(|part| match part {

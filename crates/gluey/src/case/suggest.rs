@@ -1,5 +1,21 @@
 //! The known name nearest to a misspelt one.
 
+/// Names that other programs have for keys of a case.
+const SYNONYMS: [(&str, &str); 6] = [
+    ("dt", "step"),
+    ("time_step", "step"),
+    ("t_end", "end"),
+    ("phi", "volume_fraction"),
+    ("n", "count"),
+    ("method", "formulation"),
+];
+
+/// The candidate that `found` means elsewhere.
+pub(crate) fn synonym<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let (_, name) = SYNONYMS.iter().find(|(other, _)| *other == found.to_ascii_lowercase())?;
+    known.into_iter().find(|candidate| candidate == name)
+}
+
 /// The candidate with the smallest edit distance to `found`, if that is at most a third of its letters (but
 /// two edits are always allowed).
 pub(crate) fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

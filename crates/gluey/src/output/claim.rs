@@ -88,6 +88,12 @@ impl Drop for Claim {
     }
 }
 
+/// Whether a process holds the claim on `result` now.
+pub(crate) fn is_claimed(result: &Path) -> bool {
+    let file = File::options().read(true).write(true).open(with_suffix(result, ".lock"));
+    file.is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+}
+
 /// Tells others who holds the lock.
 fn sign(file: &mut File) -> io::Result<()> {
     file.set_len(0)?;
@@ -130,7 +136,9 @@ mod tests {
             }
             other => panic!("{other:?}"),
         }
+        assert!(is_claimed(&one));
         drop(claim);
+        assert!(!is_claimed(&one));
         Claim::new(&one).expect("free again");
         assert_eq!(cfg!(unix), !with_suffix(&one, ".lock").exists());
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::occupied::OccupiedError;
 use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
@@ -26,6 +27,9 @@ pub enum RunError {
     /// Another run is writing the same results.
     #[error(transparent)]
     InUse(ClaimError),
+    /// The results of another run are where this one would write.
+    #[error(transparent)]
+    Occupied(#[from] OccupiedError),
     /// Rows on disk could not be gone on with.
     #[error(transparent)]
     Rows(RowsError),

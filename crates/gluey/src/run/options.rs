@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use serde::{Deserialize, Serialize};
+
 use crate::output::vtk::VtkEncoding;
 
 /// Output of a run, and its places.
@@ -19,16 +21,28 @@ pub struct RunOptions {
     pub checkpoint: Option<PathBuf>,
     /// Steps between checkpoints, at least 1.
     pub checkpoint_every: Option<usize>,
+    /// Minutes of wall time between checkpoints, beside those that `checkpoint_every` asks for.
+    pub checkpoint_minutes: Option<f64>,
+    /// Whether and how the case as run and a record of the run are written beside the trajectory.
+    pub record: Option<RecordOptions>,
     /// A checkpoint of the same case to go on from.
     pub resume: Option<PathBuf>,
     /// Set from outside to stop after the current step.
     pub interrupt: Option<Arc<AtomicBool>>,
 }
 
+/// How a run is recorded: see [`super::RunRecord`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RecordOptions {
+    /// Whether the results of another run may be replaced.
+    pub force: bool,
+}
+
 /// Output for ParaView.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct VtkOptions {
-    /// Folder for the files.
+    /// Folder for the files; a record of a run does without, for results can be moved.
+    #[serde(skip)]
     pub folder: PathBuf,
     /// Steps between files, at least 1.
     pub every: usize,
@@ -37,9 +51,10 @@ pub struct VtkOptions {
 }
 
 /// Output in extended XYZ, a file per frame.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct XyzOptions {
-    /// Folder for the files.
+    /// Folder for the files; a record of a run does without, for results can be moved.
+    #[serde(skip)]
     pub folder: PathBuf,
     /// Steps between files, at least 1.
     pub every: usize,

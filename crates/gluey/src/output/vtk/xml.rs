@@ -10,6 +10,7 @@ use std::str::FromStr;
 
 use base64::engine::{Engine, general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
+use serde::{Deserialize, Serialize};
 use vtkio::IOBuffer;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version,
@@ -23,7 +24,7 @@ const BLOCK: usize = 1 << 18;
 const SIZE_LENGTH: usize = 8;
 
 /// How numbers are stored in the files for ParaView.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct VtkEncoding {
     /// From 0 (none) over 1 (fast) to 9 (small).
     pub compression: u32,
@@ -39,11 +40,13 @@ impl Default for VtkEncoding {
 }
 
 /// Bits of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Precision {
     /// 32 bits: seven digits, half the size.
+    #[serde(rename = "f32")]
     Single,
     /// 64 bits: the numbers as they were computed.
+    #[serde(rename = "f64")]
     Double,
 }
 

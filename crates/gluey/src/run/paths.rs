@@ -1,0 +1,107 @@
+//! Names of the files of a run.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::output::is_claimed;
+
+/// What the name of a record ends with.
+const RECORD: &str = "-run.json";
+
+/// Names of the files of a run: all begin with the same stem in the same folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ResultPaths {
+    folder: PathBuf,
+    stem: OsString,
+}
+
+impl ResultPaths {
+    /// The files in `folder` whose names begin with `stem`.
+    pub fn new(folder: impl Into<PathBuf>, stem: impl Into<OsString>) -> Self {
+        Self { folder: folder.into(), stem: stem.into() }
+    }
+
+    /// The files beside a trajectory.
+    pub fn of_csv(csv: &Path) -> Self {
+        let folder = csv.parent().unwrap_or(Path::new(""));
+        Self::new(folder, csv.file_stem().unwrap_or_default())
+    }
+
+    /// The files of all runs in `folder` that left a record, sorted by name.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn in_folder(folder: &Path) -> io::Result<Vec<Self>> {
+        let entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
+        let names = entries.iter().filter_map(|entry| entry.file_name().into_string().ok());
+        let mut stems: Vec<String> =
+            names.filter_map(|name| name.strip_suffix(RECORD).map(str::to_owned)).collect();
+        stems.sort();
+        Ok(stems.into_iter().map(|stem| Self::new(folder, stem)).collect())
+    }
+
+    /// Whether a process is writing these results now.
+    pub fn are_being_written(&self) -> bool {
+        is_claimed(&self.csv())
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What all names begin with.
+    pub fn stem(&self) -> String {
+        self.stem.to_string_lossy().into_owned()
+    }
+
+    /// The trajectory.
+    pub fn csv(&self) -> PathBuf {
+        self.with(".csv")
+    }
+
+    /// The case as it was run.
+    pub fn case_file(&self) -> PathBuf {
+        self.with("-case.toml")
+    }
+
+    /// The record of the run.
+    pub fn record(&self) -> PathBuf {
+        self.with(RECORD)
+    }
+
+    /// The last checkpoint.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.with(".checkpoint")
+    }
+
+    /// The checkpoint before the last.
+    pub fn previous_checkpoint(&self) -> PathBuf {
+        previous(&self.checkpoint())
+    }
+
+    /// The folder of files for ParaView.
+    pub fn vtk(&self) -> PathBuf {
+        self.with("-vtk")
+    }
+
+    /// The folder of files in extended XYZ.
+    pub fn xyz(&self) -> PathBuf {
+        self.with("-xyz")
+    }
+
+    fn with(&self, suffix: &str) -> PathBuf {
+        let mut name = self.stem.clone();
+        name.push(suffix);
+        self.folder.join(name)
+    }
+}
+
+/// Name of the generation before a checkpoint.
+pub(super) fn previous(checkpoint: &Path) -> PathBuf {
+    let mut name = checkpoint.as_os_str().to_owned();
+    name.push(".previous");
+    name.into()
+}

@@ -1,0 +1,97 @@
+//! Keeps the record of a run.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::error::RunError;
+use super::options::RunOptions;
+use super::paths::ResultPaths;
+use super::record::{RunRecord, RunState};
+use crate::case::Case;
+use crate::output::{OutputError, write_atomically};
+use crate::progress::{Notice, Progress};
+use crate::report::RunReport;
+
+/// The record of a run in progress.
+pub(super) struct Recorder {
+    path: PathBuf,
+    record: RunRecord,
+}
+
+impl Recorder {
+    /// Writes the case as it is run and the record of a run that begins after `step` steps, if `options` ask
+    /// for them.
+    pub fn begin(case: &Case, options: &RunOptions, step: usize) -> Result<Option<Self>, OutputError> {
+        if options.record.is_none() {
+            return Ok(None);
+        }
+        let paths = ResultPaths::of_csv(&options.csv);
+        let mut record = RunRecord::new(&case.name, options);
+        record.seed = case.seed;
+        if options.resume.is_some()
+            && let Ok(before) = RunRecord::read(&paths.record())
+        {
+            record.started = before.started;
+            record.resumed = before.resumed + 1;
+            record.seed = record.seed.or(before.seed);
+        }
+        (record.steps, record.steps_done) = (case.step_count(), step);
+        write_case(case, &record, &paths)?;
+        let recorder = Self { path: paths.record(), record };
+        recorder.record.write(&recorder.path)?;
+        Ok(Some(recorder))
+    }
+
+    /// Notes that a checkpoint after `step` steps is on disk.
+    pub fn reached(&mut self, step: usize) -> Result<(), OutputError> {
+        self.record.steps_done = step;
+        self.record.write(&self.path)
+    }
+
+    /// Notes how the run ended after `step` steps, and hands that on. That a run failed is told even where it
+    /// cannot be noted.
+    pub fn close(
+        mut self,
+        step: usize,
+        outcome: Result<RunReport, RunError>,
+        progress: &dyn Progress,
+    ) -> Result<RunReport, RunError> {
+        match &outcome {
+            Ok(report) => {
+                self.record.end(RunState::Complete, report.steps);
+                self.record.report = Some(report.clone());
+                self.record.write(&self.path)?;
+            }
+            Err(error) => {
+                let interrupted = matches!(error, RunError::Interrupted { .. });
+                self.record.end(if interrupted { RunState::Interrupted } else { RunState::Failed }, step);
+                self.record.error = (!interrupted).then(|| in_full(error));
+                if let Err(error) = self.record.write(&self.path) {
+                    let (path, reason) = (error.path, error.source.to_string());
+                    progress.notice(&Notice::NoRecord { path, reason });
+                }
+            }
+        }
+        outcome
+    }
+}
+
+/// An error with all its causes.
+fn in_full(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+}
+
+fn write_case(case: &Case, record: &RunRecord, paths: &ResultPaths) -> Result<(), OutputError> {
+    let path = paths.case_file();
+    let encoded = case.to_toml().map_err(io::Error::other);
+    let text = encoded.map_err(|error| OutputError::new(&path, "encode the case", error))?;
+    let seed = record
+        .seed
+        .map_or(String::new(), |seed| format!(" Its particles were generated from the seed {seed}."));
+    let head = format!(
+        "# The case as gluey {} ran it, with all overrides and defaults; it alone suffices to run it again.{seed}\n",
+        record.gluey
+    );
+    write_atomically(&path, format!("{head}{text}").as_bytes())
+}

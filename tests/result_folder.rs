@@ -1,0 +1,110 @@
+//! A folder of results says what was run and how it went, and is not written over.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use gluey::{Case, CheckpointSummary, RunRecord, RunState};
+use tempfile::TempDir;
+
+const STEM: &str = "pair-3d-mobility-gluey";
+const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
+
+/// Exit code and error output of the command.
+fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
+    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
+}
+
+fn succeeds(folder: &Path, arguments: &[&str]) {
+    let (code, stderr) = gluey(folder, arguments);
+    assert_eq!(code, Some(0), "{stderr}");
+}
+
+fn fails(folder: &Path, arguments: &[&str], expected: &[&str]) {
+    let (code, stderr) = gluey(folder, arguments);
+    assert_eq!(code, Some(1), "{stderr}");
+    for part in expected {
+        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
+    }
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    fs::read(folder.join(format!("{name}/{STEM}.csv"))).expect("a trajectory")
+}
+
+#[test]
+fn the_case_as_run_repeats_the_run() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    succeeds(folder, &["run", CASE, "--set", "time.step=0.04", "--out", "one"]);
+    let case_file = format!("one/{STEM}-case.toml");
+    let case = Case::load(folder.join(&case_file)).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(case.time.step, 0.04);
+    succeeds(folder, &["run", &case_file, "--out", "two"]);
+    assert!(read(folder, "one") == read(folder, "two"), "another trajectory");
+    let record = RunRecord::read(&folder.join(format!("one/{STEM}-run.json"))).expect("a record");
+    assert_eq!((record.state, record.steps_done), (RunState::Complete, case.step_count()));
+    assert_eq!(record.report.expect("a report").steps, case.step_count());
+    assert!(record.ended.is_some() && record.machine.cpus > 0 && record.threads > 0);
+}
+
+#[test]
+fn results_of_other_runs_are_not_replaced() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    succeeds(folder, &["run", CASE]);
+    let before = read(folder, "out");
+    fails(folder, &["run", CASE], &["complete run of this case", "--force", "--out DIR"]);
+    let other = ["run", CASE, "--set", "time.step=0.02"];
+    fails(folder, &other, &["a run of another case", "step = 0.05", "step = 0.02", "--force"]);
+    assert!(read(folder, "out") == before);
+    succeeds(folder, &[&other[..], &["--force"]].concat());
+    assert!(read(folder, "out") != before);
+    fs::remove_file(folder.join(format!("out/{STEM}-run.json"))).expect("a record");
+    fails(folder, &["run", CASE], &["no record of their run"]);
+}
+
+#[test]
+fn arguments_are_named_in_errors() {
+    let folder = TempDir::new().expect("a folder");
+    let refused = |set: &str, expected: &[&str]| fails(folder.path(), &["run", CASE, "--set", set], expected);
+    refused("time.dt=0.01", &["--set time.dt=0.01", "unknown key `dt`", "did you mean `step`?"]);
+    refused("tme.step=0.01", &["--set tme.step=0.01", "unknown key `tme`", "did you mean `time`?"]);
+    refused("time.step=-1", &["--set time.step=-1", "out of range", "greater than 0"]);
+    refused("time.step=fast", &["--set time.step=fast", "wrong type", "a number"]);
+    refused("contact.strategy=glue", &["--set contact.strategy=glue", "did you mean \"gluey\"?"]);
+    refused("particles.7.radius=0.1", &["there is no entry 7", "0 to 1"]);
+    refused("particles.1.radius=9.0", &["--set particles.1.radius=9.0", "radius"]);
+    for usage in ["time.step", "=1", "time..step=1", "time.step=0.1.2"] {
+        let (code, stderr) = gluey(folder.path(), &["run", CASE, "--set", usage]);
+        assert_eq!(code, Some(2), "{stderr}");
+    }
+    assert!(!folder.path().join("out").exists());
+}
+
+/// The last checkpoint is cut short: it is refused, the one before it is offered, and leads to the same rows.
+#[test]
+fn the_checkpoint_before_the_last_is_offered() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    succeeds(folder, &["run", CASE, "--checkpoint-every", "100"]);
+    let last = format!("out/{STEM}.checkpoint");
+    let older = format!("{last}.previous");
+    let step = |file: &str| CheckpointSummary::read(&folder.join(file)).expect("whole").step;
+    assert_eq!((step(&last), step(&older)), (300, 200));
+    let whole = fs::read(folder.join(&last)).expect("a checkpoint");
+    let before = read(folder, "out");
+    for (bytes, reason) in
+        [(&whole[..whole.len() / 2], "damaged"), (&whole[..10], "damaged"), (b"x", "not a gluey")]
+    {
+        fs::write(folder.join(&last), bytes).expect("a file");
+        let command = format!("--resume {older}");
+        fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 200, is whole", &command]);
+    }
+    succeeds(folder, &["run", CASE, "--resume", &older, "--checkpoint-every", "100"]);
+    assert!(read(folder, "out") == before);
+    assert_eq!((step(&last), step(&older)), (300, 200));
+    assert!(folder.join(format!("{last}.earlier-1")).exists(), "the damaged one was kept");
+}
