@@ -10,8 +10,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::figures::canvas::Canvas;
 use files::WriteError;
+use gluey_pictures::Canvas;
 
 /// Something that did not work.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -1,6 +1,6 @@
 //! Self-contained pages: their frame and style, and how numbers read.
 
-use crate::figures::canvas::font_faces;
+use gluey_pictures::font_faces;
 
 const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:66rem;margin:2rem auto;padding:0 1rem;\
 line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\

@@ -1,10 +1,10 @@
 //! Gaps over time on a logarithmic scale: figures 5, 7a and 9.
 
-use super::canvas::Canvas;
-use super::chart::{Axis, Chart, Curve, Stroke, stack};
 use super::{Data, exact_curve, legend, stroke};
 use crate::reproduce::plan::{Approach, CaseName, FigureName};
 use crate::reproduce::trajectory::Trajectory;
+use gluey_pictures::Canvas;
+use gluey_pictures::{Axis, Chart, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 300.0;
 const PANEL_HEIGHT: f64 = 170.0;

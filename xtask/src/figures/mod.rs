@@ -1,11 +1,8 @@
 //! The paper's figures, drawn from whatever runs exist.
 
-pub mod canvas;
-pub mod chart;
 mod gaps;
 mod limit;
 mod setups;
-pub mod text;
 mod trajectories;
 
 use std::collections::BTreeMap;
@@ -13,8 +10,7 @@ use std::collections::BTreeMap;
 use crate::reproduce::plan::{Approach, CaseName, FigureName, RunKey};
 use crate::reproduce::settings::Settings;
 use crate::reproduce::trajectory::Trajectory;
-use canvas::Canvas;
-use chart::{Curve, Stroke};
+use gluey_pictures::{Canvas, Curve, Stroke};
 
 /// Data from which figures are drawn.
 #[derive(Debug, Default)]

@@ -1,10 +1,10 @@
 //! Paths of the centres in the x-y plane, both axes to one scale: figures 6, 7b, 10 and 11.
 
-use super::canvas::Canvas;
-use super::chart::{Axis, Chart, Curve, Mark, equal_aspect_height, stack};
 use super::{Data, exact_curve, legend, stroke};
 use crate::reproduce::plan::FigureName;
 use crate::reproduce::trajectory::Trajectory;
+use gluey_pictures::Canvas;
+use gluey_pictures::{Axis, Chart, Curve, Mark, equal_aspect_height, stack};
 
 /// Figure 6 or 7b: both particles of a pair.
 pub fn pair(figure: FigureName, data: &Data) -> Canvas {

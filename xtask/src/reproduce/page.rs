@@ -9,7 +9,7 @@ use super::plan::FigureName;
 use super::summary::{self, Summary};
 use super::verdict::{self, Kind, Row};
 use crate::book::page::{self, duration, escape, number};
-use crate::figures::canvas::Canvas;
+use gluey_pictures::Canvas;
 
 /// A figure with what is said about it.
 pub struct Section {

@@ -17,7 +17,7 @@ use gluey_verify::{
 use crate::book::files::{self, WriteError};
 use crate::book::schedule::{self, JobError};
 use crate::book::{Failure, write_drawing};
-use crate::figures::canvas::Canvas;
+use gluey_pictures::Canvas;
 
 /// Time between two lines of progress.
 const LINE_EVERY: Duration = Duration::from_secs(20);

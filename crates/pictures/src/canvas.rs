@@ -8,15 +8,17 @@ use base64::engine::general_purpose::STANDARD;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg;
 
-use super::chart::Stroke;
-use super::text;
+use crate::chart::Stroke;
+use crate::text;
 
 /// The bundled font first, then fonts of similar width.
 pub const FONT_FAMILY: &str = "Libertinus Serif, Linux Libertine, Times New Roman, serif";
-const REGULAR: &[u8] = include_bytes!("../../assets/LibertinusSerif-Regular.otf");
-const ITALIC: &[u8] = include_bytes!("../../assets/LibertinusSerif-Italic.otf");
+const REGULAR: &[u8] = include_bytes!("../assets/LibertinusSerif-Regular.otf");
+const ITALIC: &[u8] = include_bytes!("../assets/LibertinusSerif-Italic.otf");
 /// PNG pixels per SVG pixel: 600 SVG pixels are 1800 PNG pixels, 300 dpi at 152 mm.
 const PNG_ZOOM: f32 = 3.0;
+/// SVG pixels per millimetre on paper: labels of 15 pixels are 3 mm high.
+pub const PIXELS_PER_MM: f64 = 5.0;
 
 /// An SVG drawing under construction; lengths in SVG pixels, y downwards.
 pub struct Canvas {
@@ -89,7 +91,7 @@ impl Canvas {
         ));
     }
 
-    /// A label with the markup of [`text`]; `anchor` is `start`, `middle` or `end`.
+    /// A label with the markup of the [crate]; `anchor` is `start`, `middle` or `end`.
     pub fn text(&mut self, x: f64, y: f64, size: f64, anchor: &str, label: &str) {
         let escaped = label.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
         self.element(format_args!(
@@ -112,6 +114,15 @@ impl Canvas {
     /// The drawing as an SVG document that carries its fonts.
     pub fn svg(&self) -> String {
         self.document(&format!("<style>{}</style>", font_faces()))
+    }
+
+    /// The same document with its size in millimetres, for print.
+    pub fn svg_for_print(&self) -> String {
+        let (w, h) = (self.width, self.height);
+        let pixels = format!("width=\"{w:.0}\" height=\"{h:.0}\"");
+        let millimetres =
+            format!("width=\"{:.1}mm\" height=\"{:.1}mm\"", w / PIXELS_PER_MM, h / PIXELS_PER_MM);
+        self.svg().replacen(&pixels, &millimetres, 1)
     }
 
     /// The drawing as a PNG picture, drawn with the bundled fonts only.
@@ -151,4 +162,29 @@ pub fn font_faces() -> String {
         )
     };
     face("normal", REGULAR) + &face("italic", ITALIC)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn print_has_millimetres_where_the_screen_has_pixels() {
+        let canvas = Canvas::new(425.0, 300.0);
+        let print = canvas.svg_for_print();
+        assert!(
+            print.contains("width=\"85.0mm\" height=\"60.0mm\" viewBox=\"0 0 425 300\""),
+            "{}",
+            &print[..200]
+        );
+        assert!(canvas.svg().contains("width=\"425\" height=\"300\" viewBox"));
+    }
+
+    #[test]
+    fn pngs_have_three_pixels_for_one() {
+        let png = Canvas::new(425.0, 300.0).png().expect("a picture");
+        // Behind the signature and the name of the block: width and height, four bytes each.
+        let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().expect("four bytes"));
+        assert_eq!((number(16), number(20)), (1275, 900));
+    }
 }

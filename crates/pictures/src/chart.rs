@@ -8,7 +8,7 @@ use kuva::render::plots::Plot;
 use kuva::render::render::render_multiple;
 use std::sync::Arc;
 
-use super::canvas::{Canvas, FONT_FAMILY};
+use crate::canvas::{Canvas, FONT_FAMILY};
 
 /// Width of a figure, in SVG pixels.
 pub const WIDTH: f64 = 600.0;
@@ -33,7 +33,7 @@ pub struct Stroke {
 /// A curve as pieces of consecutive points (it may be interrupted).
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Legend text with the markup of [`super::text`]; `None` keeps it out of the legend.
+    /// Legend text with the markup of the [crate]; `None` keeps it out of the legend.
     pub label: Option<String>,
     /// How it is drawn.
     pub stroke: Stroke,
@@ -44,7 +44,7 @@ pub struct Curve {
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// Label with the markup of [`super::text`].
+    /// Label with the markup of the [crate].
     pub label: String,
     /// Smallest value shown.
     pub min: f64,
@@ -76,7 +76,7 @@ pub struct Chart {
 pub struct Mark {
     /// Where, in data coordinates.
     pub at: (f64, f64),
-    /// Text with the markup of [`super::text`]; may be empty.
+    /// Text with the markup of the [crate]; may be empty.
     pub label: String,
 }
 
@@ -89,6 +89,27 @@ impl Axis {
         Self { label: label.to_owned(), min: decade(first), max, tick: 1.0, log: true }
     }
 
+    /// A linear axis around these values, with ticks at round numbers; without finite values from 0 to 1.
+    pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let finite = values.into_iter().filter(|value| value.is_finite());
+        let ends = finite.fold(None, |ends: Option<(f64, f64)>, value| match ends {
+            None => Some((value, value)),
+            Some((low, high)) => Some((low.min(value), high.max(value))),
+        });
+        let (low, high) = ends.unwrap_or((0.0, 1.0));
+        // A constant has room around it.
+        let room = if high - low > 1e-9 * high.abs().max(low.abs()) {
+            0.0
+        } else {
+            0.5 * high.abs().max(f64::MIN_POSITIVE.sqrt())
+        };
+        let (low, high) = (low - room, high + room);
+        let tick = round_step((high - low) / 5.0);
+        let half = 0.5 * tick;
+        let (min, max) = ((low / half + 1e-6).floor() * half, (high / half - 1e-6).ceil() * half);
+        Self { label: label.to_owned(), min, max, tick, log: false }
+    }
+
     /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
     fn fraction(&self, value: f64) -> f64 {
         let scale = |x: f64| if self.log { x.log10() } else { x };
@@ -96,18 +117,33 @@ impl Axis {
     }
 }
 
-/// Stacks charts of equal width, the legend of all of them on top, into one SVG canvas.
+/// The smallest of 1, 2, 5, 10, ... times a power of ten that is not below `step`.
+fn round_step(step: f64) -> f64 {
+    let decade = 10f64.powf(step.log10().floor());
+    [1.0, 2.0, 5.0]
+        .map(|digit| digit * decade)
+        .into_iter()
+        .find(|round| *round >= 0.999 * step)
+        .unwrap_or(10.0 * decade)
+}
+
+/// Stacks charts of the usual width, the legend of all of them on top, into one SVG canvas.
 pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
+    stack_to_width(charts, WIDTH, frame_height)
+}
+
+/// Stacks charts of this width, the legend of all of them on top, into one SVG canvas.
+pub fn stack_to_width(charts: &[Chart], width: f64, frame_height: impl Fn(&Chart) -> f64) -> Canvas {
     let entries = legend_entries(charts);
     let notes: Vec<&String> = charts.iter().flat_map(|chart| &chart.notes).collect();
-    let rows = entries.len().div_ceil(LEGEND_COLUMNS) + notes.len();
+    let rows = entries.len().div_ceil(legend_columns(width)) + notes.len();
     let mut y = 6.0 + LEGEND_ROW * rows as f64;
     let heights: Vec<f64> = charts.iter().map(|c| frame_height(c) + MARGIN_TOP + c.margin_bottom()).collect();
-    let mut canvas = Canvas::new(WIDTH, y + heights.iter().sum::<f64>());
-    draw_legend(&mut canvas, &entries, &notes);
+    let mut canvas = Canvas::new(width, y + heights.iter().sum::<f64>());
+    draw_legend(&mut canvas, width, &entries, &notes);
     for (chart, height) in charts.iter().zip(heights) {
-        canvas.embed(&chart.svg(WIDTH, height), 0.0, y);
-        chart.draw_marks(&mut canvas, y + MARGIN_TOP, frame_height(chart));
+        canvas.embed(&chart.svg(width, height), 0.0, y);
+        chart.draw_marks(&mut canvas, y + MARGIN_TOP, (width, frame_height(chart)));
         y += height;
     }
     canvas
@@ -156,22 +192,22 @@ impl Chart {
     /// Where a point lies on a canvas of this height that has only this chart, with equal scales.
     pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
         let frame_height = equal_aspect_height(self);
-        self.point(canvas_height - self.margin_bottom() - frame_height, frame_height, at)
+        self.point(canvas_height - self.margin_bottom() - frame_height, (WIDTH, frame_height), at)
     }
 
-    /// A point in a frame of this height whose upper edge is at `top`.
-    fn point(&self, top: f64, frame_height: f64, at: (f64, f64)) -> (f64, f64) {
-        let frame_width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
+    /// A point in a frame of this height whose upper edge is at `top`, on a canvas of this width.
+    fn point(&self, top: f64, (width, frame_height): (f64, f64), at: (f64, f64)) -> (f64, f64) {
+        let frame_width = width - MARGIN_LEFT - MARGIN_RIGHT;
         let x = MARGIN_LEFT + frame_width * self.x.fraction(at.0);
         (x, top + frame_height * (1.0 - self.y.fraction(at.1)))
     }
 
     /// Draws the marks over a frame whose upper edge is at `top`, their labels where curves leave room.
-    fn draw_marks(&self, canvas: &mut Canvas, top: f64, frame_height: f64) {
+    fn draw_marks(&self, canvas: &mut Canvas, top: f64, size: (f64, f64)) {
         let on_curves = self.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
-        let taken = on_curves.map(|at| self.point(top, frame_height, *at)).collect::<Vec<_>>();
+        let taken = on_curves.map(|at| self.point(top, size, *at)).collect::<Vec<_>>();
         for Mark { at, label } in &self.marks {
-            let dot = self.point(top, frame_height, *at);
+            let dot = self.point(top, size, *at);
             canvas.circle(dot, 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
             if label.is_empty() {
                 continue;
@@ -200,7 +236,11 @@ impl Chart {
     }
 }
 
-const LEGEND_COLUMNS: usize = 2;
+/// Columns of the legend of a figure of this width.
+fn legend_columns(width: f64) -> usize {
+    if width < 0.9 * WIDTH { 1 } else { 2 }
+}
+
 /// Size of the labels of dots.
 const MARK_SIZE: f64 = 15.0;
 
@@ -236,15 +276,16 @@ fn legend_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
     entries
 }
 
-fn draw_legend(canvas: &mut Canvas, entries: &[(&str, Stroke)], notes: &[&String]) {
-    let column_width = (WIDTH - MARGIN_LEFT - MARGIN_RIGHT) / LEGEND_COLUMNS as f64;
+fn draw_legend(canvas: &mut Canvas, width: f64, entries: &[(&str, Stroke)], notes: &[&String]) {
+    let columns = legend_columns(width);
+    let column_width = (width - MARGIN_LEFT - MARGIN_RIGHT) / columns as f64;
     for (i, (label, stroke)) in entries.iter().enumerate() {
-        let x = MARGIN_LEFT + column_width * (i % LEGEND_COLUMNS) as f64;
-        let y = 6.0 + LEGEND_ROW * ((i / LEGEND_COLUMNS) as f64 + 0.5);
+        let x = MARGIN_LEFT + column_width * (i % columns) as f64;
+        let y = 6.0 + LEGEND_ROW * ((i / columns) as f64 + 0.5);
         canvas.line((x, y), (x + LEGEND_SAMPLE, y), *stroke);
         canvas.text(x + LEGEND_SAMPLE + 8.0, y + 5.0, 15.0, "start", label);
     }
-    let rows = entries.len().div_ceil(LEGEND_COLUMNS);
+    let rows = entries.len().div_ceil(columns);
     for (i, note) in notes.iter().enumerate() {
         let y = 6.0 + LEGEND_ROW * ((rows + i) as f64 + 0.5);
         canvas.text(MARGIN_LEFT, y + 5.0, 13.0, "start", note);
@@ -282,6 +323,21 @@ fn tick_format(axis: &Axis) -> TickFormat {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn axes_around_values_end_at_round_numbers() {
+        let ends = |values: &[f64]| {
+            let axis = Axis::around("", values.iter().copied());
+            (axis.min, axis.max, axis.tick)
+        };
+        assert_eq!(ends(&[0.0, 10.0]), (0.0, 10.0, 2.0));
+        assert_eq!(ends(&[-3.0, 41.0, f64::NAN]), (-5.0, 45.0, 10.0));
+        assert_eq!(ends(&[]), (0.0, 1.0, 0.2));
+        let (min, max, _) = ends(&[2.0, 2.0]);
+        assert!(min < 2.0 && max > 2.0, "a constant has room around it");
+        let (min, max, tick) = ends(&[0.0]);
+        assert!(min < 0.0 && max > 0.0 && tick > 0.0);
+    }
 
     #[test]
     fn labels_keep_away_from_curves() {
