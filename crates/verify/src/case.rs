@@ -6,6 +6,7 @@ use std::fmt::Write;
 use gluey_motion::PairMobilityError;
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
+use gluey_suspension::packing::PackingError;
 use gluey_testkit::reference::TableError;
 
 use crate::clock::CpuClock;
@@ -30,6 +31,9 @@ pub enum VerifyError {
     /// In the mobility of two spheres.
     #[error(transparent)]
     Mobility(#[from] PairMobilityError),
+    /// In the configuration of particles.
+    #[error(transparent)]
+    Packing(#[from] PackingError),
     /// In the reference data.
     #[error(transparent)]
     Reference(#[from] TableError),

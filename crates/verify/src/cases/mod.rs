@@ -4,6 +4,7 @@ mod cost;
 mod disc;
 mod discs;
 mod doublet;
+mod equilibrium;
 mod exact_flows;
 mod integrator;
 mod lattices;
@@ -28,6 +29,7 @@ pub const CASES: &[Case] = &[
     wall::CASE,
     lattices::CASE,
     sheared::CASE,
+    equilibrium::CASE,
     integrator::CASE,
     doublet::CASE,
     symmetry::CASE,
