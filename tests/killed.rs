@@ -80,7 +80,7 @@ fn every_request_to_stop_leaves_a_checkpoint_to_go_on_from() {
         assert_eq!(run.0.wait().expect("it ends").code(), Some(130), "{signal}: {stderr}");
         assert!(stderr.contains("interrupted after step"), "{stderr}");
         let checkpoint = format!("{STEM}.checkpoint");
-        assert!(stderr.contains(&format!("gluey run long.toml --resume {checkpoint}")), "{stderr}");
+        assert!(stderr.contains("to go on: gluey resume out\n"), "{stderr}");
         assert!(folder.path().join(checkpoint).is_file(), "{signal}");
     }
 }
@@ -194,4 +194,62 @@ fn no_row_is_lost_to_twenty_kills() {
         fs::read(folder.join(folder_name).join("pair-3d-mobility-gluey.csv")).expect("a trajectory")
     };
     assert!(read("out") == read("whole"), "the run that was killed ends otherwise");
+}
+
+/// All results of a run, by name, but those that tell of times and what a kill cut short.
+fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let is_left_out = |path: &Path| {
+        let name = path.to_string_lossy();
+        let parts = ["-run.json", ".checkpoint", ".lock", ".partial-"];
+        parts.iter().any(|part| name.contains(part))
+    };
+    let mut folders = vec![PathBuf::new()];
+    let mut found = BTreeMap::new();
+    while let Some(inside) = folders.pop() {
+        for entry in fs::read_dir(folder.join(&inside)).expect("a folder") {
+            let path = inside.join(entry.expect("an entry").file_name());
+            match folder.join(&path) {
+                full if full.is_dir() => folders.push(path),
+                _ if is_left_out(&path) => {}
+                full => drop(found.insert(path, fs::read(full).expect("a file"))),
+            }
+        }
+    }
+    found
+}
+
+/// With the options of the run: frames for ParaView and in extended XYZ are those of a run without a stop.
+#[test]
+fn a_killed_run_is_resumed_by_its_folder() {
+    let folder = folder(100_000);
+    let folder = folder.path();
+    let options = ["--checkpoint-every", "1000", "--vtk", "20000", "--xyz", "20000"];
+    let mut run = gluey(folder, &options).stderr(Stdio::null()).spawn().expect("it runs");
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !in_folder(folder, ".checkpoint.previous").exists() {
+        assert!(Instant::now() < deadline, "no checkpoint is written");
+        sleep(Duration::from_millis(1));
+    }
+    run.kill().expect("killed");
+    run.wait().expect("it ends");
+    assert!(!in_folder(folder, ".csv").exists(), "it was killed too late");
+    let resume = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+        let output = command.current_dir(folder).args(["resume", "out"]).args(arguments).output();
+        let output = output.expect("it runs");
+        (output.status.code(), String::from_utf8(output.stderr).expect("text"))
+    };
+    let (code, stderr) = resume(&["--previous", "--case", "pair-3d-mobility-gluey", "--threads", "1"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    let whole = gluey(folder, &[&options[..], &["--out", "whole"]].concat()).output().expect("it runs");
+    assert!(whole.status.success());
+    let (resumed, whole) = (results(&folder.join("out")), results(&folder.join("whole")));
+    assert_eq!(resumed.keys().collect::<Vec<_>>(), whole.keys().collect::<Vec<_>>());
+    assert!(whole.len() > 12, "{:?}", whole.keys());
+    for (path, bytes) in &whole {
+        assert!(resumed[path] == *bytes, "{} differs", path.display());
+    }
+    let (code, stderr) = resume(&[]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("the run is complete (100000 steps)"), "{stderr}");
 }

@@ -100,11 +100,58 @@ fn the_checkpoint_before_the_last_is_offered() {
         [(&whole[..whole.len() / 2], "damaged"), (&whole[..10], "damaged"), (b"x", "not a gluey")]
     {
         fs::write(folder.join(&last), bytes).expect("a file");
-        let command = format!("--resume {older}");
-        fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 200, is whole", &command]);
+        let command = "gluey resume out --previous";
+        fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 200, is whole", command]);
     }
     succeeds(folder, &["run", CASE, "--resume", &older, "--checkpoint-every", "100"]);
     assert!(read(folder, "out") == before);
     assert_eq!((step(&last), step(&older)), (300, 200));
     assert!(folder.join(format!("{last}.earlier-1")).exists(), "the damaged one was kept");
+}
+
+#[test]
+fn what_cannot_be_resumed_is_said() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    fails(folder, &["resume", "nowhere"], &["nowhere: cannot be read", "--out"]);
+    fails(folder, &["resume", "."], &["no run is recorded there", "--out"]);
+    succeeds(folder, &["run", CASE, "--set", "time.end=0.5"]);
+    fails(folder, &["resume", "out"], &["the run is complete (10 steps)"]);
+    fails(folder, &["resume", "out", "--case", "trio"], &["no run `trio`", STEM, "--case"]);
+    succeeds(folder, &["run", CASE, "--set", "time.end=0.5", "--strategy", "none"]);
+    fails(folder, &["resume", "out"], &["2 runs", "pair-3d-mobility-none", "--case"]);
+    let record = folder.join(format!("out/{STEM}-run.json"));
+    let text = fs::read_to_string(&record).expect("a record");
+    fs::write(&record, text.replace("\"complete\"", "\"running\"")).expect("a record");
+    let resume = ["resume", "out", "--case", STEM];
+    let anew = format!("start again: gluey run out/{STEM}-case.toml --out out");
+    fails(folder, &resume, &["there is no such checkpoint", &anew]);
+    fs::write(&record, "{}").expect("a record");
+    fails(folder, &resume, &["not the record of a run"]);
+}
+
+/// Standard output of the command.
+fn told(folder: &Path, arguments: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn reports_are_for_people_for_programs_or_for_nobody() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let run = ["run", CASE, "--set", "time.end=0.5", "--force"];
+    assert!(told(folder, &run).contains("10 steps in"));
+    assert_eq!(told(folder, &[&run[..], &["--quiet"]].concat()), "");
+    let report = told(folder, &[&run[..], &["--json", "--quiet", "--threads", "2"]].concat());
+    let report: gluey::RunReport = serde_json::from_str(&report).expect("a report and nothing else");
+    assert_eq!((report.case.as_str(), report.steps), ("pair-3d-mobility", 10));
+    let record = RunRecord::read(&folder.join(format!("out/{STEM}-run.json"))).expect("a record");
+    assert_eq!(record.threads, 2);
+    let mut failed = Command::new(env!("CARGO_BIN_EXE_gluey"));
+    let failed = failed.current_dir(folder).args(["run", CASE, "--json"]).output().expect("it runs");
+    assert!(!failed.status.success() && failed.stdout.is_empty() && !failed.stderr.is_empty());
 }

@@ -4,13 +4,13 @@ use std::fmt;
 use std::path::Path;
 
 use gluey::case::CaseIssue;
-use gluey::{CaseError, CheckpointError, CheckpointSummary, RowsError, RunError};
+use gluey::{CaseError, CheckpointError, CheckpointSummary, ResultPaths, RowsError, RunError};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
 #[derive(Debug)]
 pub struct Diagnosed {
-    error: RunError,
+    error: Box<dyn std::error::Error + Send + Sync>,
     hint: Option<String>,
     source: Option<NamedSource<String>>,
     label: Option<LabeledSpan>,
@@ -33,15 +33,18 @@ impl Diagnosed {
         let source =
             issue.map(|issue| NamedSource::new(issue.file.display().to_string(), issue.text.clone()));
         let label = issue.map(|issue| label(issue));
-        Self { hint, source, label, error }
+        Self { hint, source, label, error: Box::new(error) }
+    }
+
+    /// Any other error, and what to do about it.
+    pub fn with_hint(error: impl std::error::Error + Send + Sync + 'static, hint: Option<String>) -> Self {
+        Self { hint, source: None, label: None, error: Box::new(error) }
     }
 }
 
 /// What to do about `error`.
 fn hint(error: &RunError, case: &Path) -> Option<String> {
-    let go_on = |checkpoint: &Path| {
-        format!("gluey run {} --resume {} (with the same options)", case.display(), checkpoint.display())
-    };
+    let go_on = |checkpoint: &Path| go_on(checkpoint, checkpoint, case);
     Some(match error {
         RunError::Interrupted { checkpoint: Some(checkpoint), .. } => {
             format!("to go on: {}", go_on(checkpoint))
@@ -77,6 +80,22 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
     })
 }
 
+/// The command that goes on from `from`, which is `checkpoint` or the one before it.
+fn go_on(checkpoint: &Path, from: &Path, case: &Path) -> String {
+    let run = ResultPaths::of_csv(checkpoint);
+    if run.checkpoint() != checkpoint || !run.record().exists() {
+        return format!("gluey run {} --resume {} (with the same options)", case.display(), from.display());
+    }
+    let folder = match run.folder() {
+        folder if folder == Path::new("") => Path::new("."),
+        folder => folder,
+    };
+    let is_alone = ResultPaths::in_folder(folder).is_ok_and(|runs| runs.len() == 1);
+    let which = if is_alone { String::new() } else { format!(" --case {}", run.stem()) };
+    let generation = if from == checkpoint { "" } else { " --previous" };
+    format!("gluey resume {}{which}{generation}", folder.display())
+}
+
 /// Offers the checkpoint before the last, where it is whole.
 fn checkpoint_hint(error: &CheckpointError, case: &Path) -> String {
     let anew = "start without --resume".to_owned();
@@ -92,11 +111,9 @@ fn checkpoint_hint(error: &CheckpointError, case: &Path) -> String {
     let older = Path::new(&older);
     CheckpointSummary::read(older).map_or(anew, |summary| {
         format!(
-            "the checkpoint before it, after step {}, is whole; to go on from there: gluey run {} --resume {} (with the \
-             same options)",
+            "the checkpoint before it, after step {}, is whole; to go on from there: {}",
             summary.step,
-            case.display(),
-            older.display()
+            go_on(path, older, case)
         )
     })
 }

@@ -8,38 +8,15 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use cli::{AnalyseArguments, Cli, Command, RunArguments};
+use cli::Cli;
 
 fn main() -> ExitCode {
     diagnostic::install();
-    match Cli::parse().command {
-        Command::Run(arguments) => run(&arguments),
-        Command::Analyse(arguments) => analyse(&arguments),
-    }
-}
-
-fn run(arguments: &RunArguments) -> ExitCode {
-    match cli::run(arguments) {
-        Ok(report) => {
-            terminal::print_report(&report);
-            ExitCode::SUCCESS
-        }
+    match Cli::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             terminal::say(&format!("{:?}", miette::Report::new(*failure.diagnostic)));
             ExitCode::from(failure.exit_code)
-        }
-    }
-}
-
-fn analyse(arguments: &AnalyseArguments) -> ExitCode {
-    match gluey::analyse::analyse(&arguments.options()) {
-        Ok(summary) => {
-            terminal::print_summary(&summary);
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            terminal::say(&format!("{:?}", miette::Report::from_err(error)));
-            ExitCode::FAILURE
         }
     }
 }

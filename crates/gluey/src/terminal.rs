@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use gluey::analyse::Summary;
 use gluey::{Notice, Progress, ProgressState, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 /// Time between lines of a log.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
@@ -21,14 +22,16 @@ pub enum Reporter {
         name: String,
         /// Time of the last line.
         last: Mutex<Instant>,
+        /// Whether only what should be known is told, not where the run is.
+        quiet: bool,
     },
 }
 
 impl Reporter {
-    /// A bar if there is a terminal to draw it on.
-    pub fn new(name: &str) -> Self {
-        if !stderr().is_terminal() {
-            return Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()) };
+    /// A bar if there is a terminal to draw it on and `quiet` does not forbid it.
+    pub fn new(name: &str, quiet: bool) -> Self {
+        if quiet || !stderr().is_terminal() {
+            return Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()), quiet };
         }
         let bar = ProgressBar::no_length().with_prefix(name.to_owned());
         let template = "{prefix} [{bar:30}] step {pos}/{len} {msg}";
@@ -55,7 +58,8 @@ impl Progress for Reporter {
                 bar.set_position(state.step as u64);
                 bar.set_message(summary(state));
             }
-            Self::Log { name, last } => {
+            Self::Log { quiet: true, .. } => {}
+            Self::Log { name, last, .. } => {
                 let Ok(mut last) = last.lock() else { return };
                 if last.elapsed() >= LOG_INTERVAL {
                     *last = Instant::now();
@@ -106,6 +110,12 @@ pub fn print_report(report: &RunReport) {
     }
     // All results are on disk: that nobody reads this is no failure.
     let _ = stdout().write_all(text.as_bytes());
+}
+
+/// Prints `value` as JSON.
+pub fn print_json(value: &impl Serialize) {
+    let text = serde_json::to_string_pretty(value).expect("keys are texts, and numbers have a form");
+    let _ = writeln!(stdout(), "{text}");
 }
 
 /// Prints what an analysis found.

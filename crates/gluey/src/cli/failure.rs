@@ -1,0 +1,39 @@
+//! How a command ends that does not come to its end.
+
+use gluey::{CaseError, RunError};
+
+use crate::diagnostic::Diagnosed;
+
+/// What a shell reports for a program ended by Ctrl-C.
+pub const INTERRUPTED: u8 = 130;
+
+/// Why a command failed, and what the program's exit says about it.
+#[derive(Debug)]
+pub struct Failure {
+    /// What to show.
+    pub diagnostic: Box<Diagnosed>,
+    /// Not 0.
+    pub exit_code: u8,
+}
+
+impl Failure {
+    /// A failure of a run, or an interrupt.
+    pub fn of_run(error: RunError, case: &std::path::Path) -> Self {
+        let exit_code = if matches!(error, RunError::Interrupted { .. }) { INTERRUPTED } else { 1 };
+        Self { diagnostic: Box::new(Diagnosed::new(error, case)), exit_code }
+    }
+
+    /// Any other failure, and what to do about it.
+    pub fn new(
+        error: impl std::error::Error + Send + Sync + 'static,
+        hint: impl Into<Option<String>>,
+    ) -> Self {
+        Self { diagnostic: Box::new(Diagnosed::with_hint(error, hint.into())), exit_code: 1 }
+    }
+}
+
+impl From<CaseError> for Failure {
+    fn from(error: CaseError) -> Self {
+        Self { diagnostic: Box::new(error.into()), exit_code: 1 }
+    }
+}

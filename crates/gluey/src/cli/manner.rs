@@ -1,0 +1,53 @@
+//! With how many threads a run is done, and what it tells of itself.
+
+use std::path::Path;
+
+use clap::Args;
+use gluey::{Case, Progress, RunOptions, RunReport};
+use rayon::ThreadPoolBuilder;
+
+use super::failure::Failure;
+use crate::terminal::{Reporter, print_json, print_report};
+
+/// The most threads that can be asked for.
+const MOST_THREADS: i64 = 4096;
+
+/// With how many threads a run is done, and what it tells of itself.
+#[derive(Clone, Debug, Args)]
+pub struct Manner {
+    /// Threads, instead of one per processor; results do not depend on them.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
+    threads: Option<u32>,
+    /// Print no progress and no report, only warnings and errors.
+    #[arg(long)]
+    quiet: bool,
+    /// Print the report as JSON; nothing else goes to standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Manner {
+    /// Runs `case`, which was read from `file`.
+    pub fn run(&self, case: &Case, options: &RunOptions, file: &Path) -> Result<RunReport, Failure> {
+        self.set_threads()?;
+        let reporter = Reporter::new(&case.name, self.quiet);
+        let outcome = gluey::run(case, options, &reporter as &dyn Progress);
+        reporter.finish();
+        outcome.map_err(|error| Failure::of_run(error, file))
+    }
+
+    /// Says what came out.
+    pub fn tell(&self, report: &RunReport) {
+        match (self.json, self.quiet) {
+            (true, _) => print_json(report),
+            (false, false) => print_report(report),
+            (false, true) => {}
+        }
+    }
+
+    fn set_threads(&self) -> Result<(), Failure> {
+        let Some(threads) = self.threads else { return Ok(()) };
+        let pool = ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
+        pool.map_err(|error| Failure::new(error, Some("take fewer --threads".to_owned())))
+    }
+}
