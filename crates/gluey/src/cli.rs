@@ -1,5 +1,7 @@
 //! Arguments of the command, and what they ask of the library.
 
+mod view;
+
 use std::path::PathBuf;
 use std::process;
 use std::sync::Arc;
@@ -15,6 +17,8 @@ use gluey::{
 
 use crate::diagnostic::Diagnosed;
 use crate::terminal::{Reporter, say};
+
+pub use view::ViewArguments;
 
 /// What a shell reports for a program ended by Ctrl-C.
 const INTERRUPTED: u8 = 130;
@@ -35,6 +39,8 @@ pub enum Command {
     Run(RunArguments),
     /// Structure and statistics of the particles that a run wrote with --xyz.
     Analyse(AnalyseArguments),
+    /// A page for the browser that shows the particles that a run wrote with --xyz.
+    View(ViewArguments),
 }
 
 /// Arguments of `gluey analyse`.

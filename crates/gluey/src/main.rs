@@ -8,13 +8,14 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use cli::{AnalyseArguments, Cli, Command, RunArguments};
+use cli::{AnalyseArguments, Cli, Command, RunArguments, ViewArguments};
 
 fn main() -> ExitCode {
     diagnostic::install();
     match Cli::parse().command {
         Command::Run(arguments) => run(&arguments),
         Command::Analyse(arguments) => analyse(&arguments),
+        Command::View(arguments) => view(&arguments),
     }
 }
 
@@ -35,6 +36,19 @@ fn analyse(arguments: &AnalyseArguments) -> ExitCode {
     match gluey::analyse::analyse(&arguments.options()) {
         Ok(summary) => {
             terminal::print_summary(&summary);
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            terminal::say(&format!("{:?}", miette::Report::from_err(error)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn view(arguments: &ViewArguments) -> ExitCode {
+    match gluey::view::view(&arguments.options()) {
+        Ok(viewed) => {
+            terminal::print_viewed(&viewed);
             ExitCode::SUCCESS
         }
         Err(error) => {
