@@ -13,7 +13,7 @@
 //! Lengths are in mean radii. Means and distributions leave out the transient, which is that of the median
 //! gap by the rule MSER-5 unless it is given.
 
-mod frames;
+pub(crate) mod frames;
 mod observe;
 mod summary;
 mod tables;

@@ -5,6 +5,7 @@ mod interrupt;
 mod manner;
 mod resume;
 mod run;
+mod view;
 
 use std::path::PathBuf;
 
@@ -15,6 +16,7 @@ use crate::terminal;
 pub use failure::Failure;
 use resume::ResumeArguments;
 use run::RunArguments;
+use view::ViewArguments;
 
 /// Rigid particles in a Stokes flow with the gluey contact model.
 #[derive(Debug, Parser)]
@@ -34,6 +36,8 @@ pub enum Command {
     Resume(ResumeArguments),
     /// Structure and statistics of the particles that a run wrote with --xyz.
     Analyse(AnalyseArguments),
+    /// A page for the browser that shows the particles that a run wrote with --xyz.
+    View(ViewArguments),
 }
 
 impl Command {
@@ -43,6 +47,7 @@ impl Command {
             Self::Run(arguments) => arguments.run(),
             Self::Resume(arguments) => arguments.run(),
             Self::Analyse(arguments) => arguments.run(),
+            Self::View(arguments) => arguments.run(),
         }
     }
 }

@@ -37,6 +37,7 @@ mod run;
 mod simulation;
 pub mod table;
 mod trajectory;
+pub mod view;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
 pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary};

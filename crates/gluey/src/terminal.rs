@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use gluey::analyse::Summary;
+use gluey::view::Viewed;
 use gluey::{Notice, Progress, ProgressState, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -121,6 +122,17 @@ pub fn print_json(value: &impl Serialize) {
 /// Prints what an analysis found.
 pub fn print_summary(summary: &Summary) {
     let _ = stdout().write_all(summary.to_string().as_bytes());
+}
+
+/// Prints which page was written.
+pub fn print_viewed(viewed: &Viewed) {
+    let Viewed { page, frame_count, particle_count, size } = viewed;
+    let megabytes = *size as f64 / 1e6;
+    let text = format!(
+        "{}: {frame_count} frames of {particle_count} particles, {megabytes:.1} MB; open it in a browser\n",
+        page.display()
+    );
+    let _ = stdout().write_all(text.as_bytes());
 }
 
 #[cfg(test)]

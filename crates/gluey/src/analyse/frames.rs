@@ -55,7 +55,7 @@ pub enum FramesError {
 
 /// The files of a run's frames, in the order of the steps: in `folder`, or in the only folder in it whose
 /// name ends in `-xyz`.
-pub(super) fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
+pub(crate) fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
     let entries = list(folder)?;
     let is_series = |path: &&PathBuf| path.is_dir() && name(path).ends_with("-xyz");
     let mut folders = entries.iter().filter(is_series);
@@ -95,13 +95,13 @@ fn is_frame(path: &Path) -> bool {
 }
 
 /// The dimension of the first frame.
-pub(super) fn dimension(files: &[PathBuf]) -> Result<usize, FramesError> {
+pub(crate) fn dimension(files: &[PathBuf]) -> Result<usize, FramesError> {
     let first = &files[0];
     Ok(xyz::dimension(first, &read_text(first)?)?)
 }
 
 /// All frames; each has the particles and the box of the first, whatever its tilt.
-pub(super) fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError>
+pub(crate) fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError>
 where
     Dim<D>: Space<D>,
 {

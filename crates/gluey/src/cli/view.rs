@@ -1,0 +1,37 @@
+//! Arguments of `gluey view`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use gluey::view::ViewOptions;
+
+use super::Failure;
+use crate::terminal;
+
+/// Arguments of `gluey view`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example:\n  gluey run suspension.toml --out out --xyz 10\n  gluey view out")]
+pub struct ViewArguments {
+    /// Folder of a run, or of its files in extended XYZ.
+    folder: PathBuf,
+    /// The page; view.html in that folder when absent.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Show every Nth frame only.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::run::at_least_one)]
+    every: usize,
+}
+
+impl ViewArguments {
+    /// Writes the page.
+    pub fn run(&self) -> Result<(), Failure> {
+        let viewed = gluey::view::view(&self.options()).map_err(|error| Failure::new(error, None))?;
+        terminal::print_viewed(&viewed);
+        Ok(())
+    }
+
+    fn options(&self) -> ViewOptions {
+        let Self { folder, out, every } = self.clone();
+        ViewOptions { folder, out, every }
+    }
+}

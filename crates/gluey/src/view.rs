@@ -1,0 +1,157 @@
+//! A page that shows the frames of a run in a browser: one file, which needs no network and no server.
+//!
+//! The page is `view/viewer.html` with its scripts, `view/viewer.js` and `view/controls.js`; the frames lie in it as JSON. Numbers are
+//! rounded to single precision, so gaps below 1e-4 mean radii are only shown as such.
+
+use std::path::{Path, PathBuf};
+
+use gluey_geom::{Dim, Space};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::analyse::FramesError;
+use crate::analyse::frames::{dimension, frame_files, read_frames};
+use crate::output::xyz::XyzFrame;
+use crate::output::{OutputError, write_atomically};
+
+const PAGE: &str = include_str!("view/viewer.html");
+const SCRIPTS: [&str; 2] = [include_str!("view/viewer.js"), include_str!("view/controls.js")];
+
+/// What to show, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ViewOptions {
+    /// Folder of a run, or of its files in extended XYZ.
+    pub folder: PathBuf,
+    /// The page; `view.html` in `folder` when absent.
+    pub out: Option<PathBuf>,
+    /// Frames from one that is shown to the next, at least 1.
+    pub every: usize,
+}
+
+/// A page that was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Viewed {
+    /// The page.
+    pub page: PathBuf,
+    /// Frames in it.
+    pub frame_count: usize,
+    /// Particles in each.
+    pub particle_count: usize,
+    /// Size of the page in bytes.
+    pub size: usize,
+}
+
+/// Why a run could not be shown.
+#[derive(Debug, Error)]
+pub enum ViewError {
+    /// Its frames could not be read.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// The page could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Reads the frames of a run and writes the page.
+pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
+    let files = frame_files(&options.folder)?;
+    let title = title(&files[0]);
+    let files: Vec<PathBuf> = files.into_iter().step_by(options.every.max(1)).collect();
+    let run = match dimension(&files)? {
+        2 => Run::of(title, &read_frames::<2>(&files)?),
+        _ => Run::of(title, &read_frames::<3>(&files)?),
+    };
+    let page = options.out.clone().unwrap_or_else(|| options.folder.join("view.html"));
+    let text = run.page();
+    if let Some(folder) = page.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| OutputError::new(folder, "create the folder", error))?;
+    }
+    write_atomically(&page, text.as_bytes())?;
+    let (frame_count, particle_count) = (run.frames.len(), run.radii.len());
+    Ok(Viewed { page, frame_count, particle_count, size: text.len() })
+}
+
+/// The name of the folder of a frame, without what says that frames are in it.
+fn title(frame: &Path) -> String {
+    let absolute = std::path::absolute(frame).unwrap_or_else(|_| frame.to_owned());
+    let name = absolute.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+    name.strip_suffix("-xyz").unwrap_or(&name).to_owned()
+}
+
+/// A run as the script reads it; vectors have three coordinates each, one after the other.
+#[derive(Serialize)]
+struct Run {
+    title: String,
+    dimension: usize,
+    /// Lower corner of the box.
+    origin: [f32; 3],
+    /// Edges of the box without its tilt; in 2D the third is 0.
+    edges: [f32; 3],
+    periodic: [bool; 3],
+    radii: Vec<f32>,
+    frames: Vec<Frame>,
+}
+
+#[derive(Serialize)]
+struct Frame {
+    time: f64,
+    strain: f64,
+    /// Displacement in x of the upper border against the lower one.
+    tilt: f32,
+    positions: Vec<f32>,
+    velocities: Vec<f32>,
+    spins: Vec<f32>,
+}
+
+impl Run {
+    /// All frames have the radii and the box of the first.
+    fn of<const D: usize>(title: String, frames: &[XyzFrame<D>]) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let (container, radii) = (&frames[0].container, &frames[0].radii);
+        let bounds = container.bounds();
+        Self {
+            title,
+            dimension: D,
+            origin: triple(bounds.lower.as_slice()),
+            edges: triple(bounds.extent().as_slice()),
+            periodic: std::array::from_fn(|d| d < D && !container.is_walled(d)),
+            radii: radii.iter().map(|radius| *radius as f32).collect(),
+            frames: frames.iter().map(Frame::of).collect(),
+        }
+    }
+
+    fn page(&self) -> String {
+        // Numbers and text only: it cannot fail. Nothing in it can end the element of the page that holds it.
+        let json = serde_json::to_string(self).expect("plain data is JSON").replace('<', "\\u003c");
+        let title = self.title.replace('&', "&amp;").replace('<', "&lt;");
+        let page = PAGE.replacen("{{script}}", &SCRIPTS.concat(), 1).replace("{{title}}", &title);
+        page.replacen("{{run}}", &json, 1)
+    }
+}
+
+impl Frame {
+    fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let flat = |vectors: &[gluey_geom::Vector<D>]| {
+            vectors.iter().flat_map(|vector| triple(vector.as_slice())).collect()
+        };
+        Self {
+            time: frame.time,
+            strain: frame.strain,
+            tilt: frame.container.lattice().tilt() as f32,
+            positions: flat(&frame.positions),
+            velocities: flat(&frame.velocities),
+            spins: frame.spins.iter().flat_map(|spin| triple(spin)).collect(),
+        }
+    }
+}
+
+/// Three coordinates; the third of a plane is 0.
+fn triple(x: &[f64]) -> [f32; 3] {
+    std::array::from_fn(|d| x.get(d).map_or(0.0, |x| *x as f32))
+}

@@ -1,0 +1,321 @@
+"use strict";
+// Shows the frames of a run on a canvas. Coordinates of the run: x along the shear, y up, z towards the reader.
+// The view turns them about the middle of the box; depth is what then points to the reader.
+
+const run = JSON.parse(document.getElementById("run").textContent);
+const element = (id) => document.getElementById(id);
+const canvas = element("canvas");
+const pen = canvas.getContext("2d");
+const count = run.radii.length;
+const meanRadius = run.radii.reduce((sum, radius) => sum + radius, 0) / count;
+const flat = run.dimension === 2;
+const SMALLEST_GAP = 1e-4; // in mean radii: the rounding of positions
+const FRAMES_PER_SECOND = 20;
+
+// Dark to light, so that order is seen without colours too.
+const SCALE = [[52, 38, 120], [42, 96, 158], [38, 150, 145], [122, 198, 92], [247, 226, 78]];
+const PARTICLES = [[43, 110, 190], [214, 90, 40], [38, 145, 95], [155, 85, 180], [209, 164, 22], [120, 120, 120]];
+
+const initial = () => ({ yaw: flat ? 0 : -0.55, pitch: flat ? 0 : 0.35, zoom: 1, shift: [0, 0] });
+let view = initial();
+let frame = 0;
+let timer = null;
+
+window.addEventListener("error", (event) => { element("fault").textContent = event.message; });
+
+// Vectors
+
+const at = (numbers, i) => [numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]];
+const plus = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const norm = (a) => Math.hypot(a[0], a[1], a[2]);
+
+// The box and its periods
+
+// Displacement of the image above against the box, brought to at most half an edge.
+function tilt(now) {
+  const period = run.edges[0];
+  return run.periodic[0] ? now.tilt - period * Math.round(now.tilt / period) : now.tilt;
+}
+
+// A vector less whole periods, each taken so that `rounding` of its number is 0.
+function reduced(x, now, rounding) {
+  const [lx, ly, lz] = run.edges;
+  const [px, py, pz] = run.periodic;
+  const up = py ? rounding(x[1] / ly) : 0;
+  const y = x[1] - up * ly;
+  const alongX = x[0] - up * tilt(now);
+  // The box is a parallelogram: its left border at this height.
+  const border = rounding === Math.floor && py ? tilt(now) * y / ly : 0;
+  const right = px ? rounding((alongX - border) / lx) : 0;
+  const front = pz ? rounding(x[2] / lz) : 0;
+  return [alongX - right * lx, y, x[2] - front * lz];
+}
+
+const nearest = (x, now) => reduced(x, now, Math.round);
+const wrapped = (x, now) => plus(run.origin, reduced(minus(x, run.origin), now, Math.floor));
+
+function corners(now) {
+  const [lx, ly, lz] = run.edges;
+  const sheared = run.periodic[1] ? tilt(now) : 0;
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((n) =>
+    plus(run.origin, [(n & 1) * lx + ((n >> 1) & 1) * sheared, ((n >> 1) & 1) * ly, ((n >> 2) & 1) * lz]));
+}
+
+// What a frame tells
+
+// Pairs with a gap up to one mean radius, of nearest images; gaps in mean radii. Kept once they are known.
+function pairs(now) {
+  if (now.pairs) return now.pairs;
+  now.pairs = [];
+  for (let i = 0; i < count; i++) {
+    for (let j = i + 1; j < count; j++) {
+      const apart = nearest(minus(at(now.positions, j), at(now.positions, i)), now);
+      const gap = (norm(apart) - run.radii[i] - run.radii[j]) / meanRadius;
+      if (gap <= 1) now.pairs.push({ i, j, apart, gap });
+    }
+  }
+  return now.pairs;
+}
+
+// The rotation about z since the first frame, by the trapezoidal rule: frames hold spins only.
+function turns() {
+  if (run.turns) return run.turns;
+  run.turns = [new Float64Array(count)];
+  for (let n = 1; n < run.frames.length; n++) {
+    const [before, after] = [run.frames[n - 1], run.frames[n]];
+    const half = 0.5 * (after.time - before.time);
+    run.turns.push(run.turns[n - 1].map((turn, i) => turn + half * (before.spins[3 * i + 2] + after.spins[3 * i + 2])));
+  }
+  return run.turns;
+}
+
+// Numbers of the particles that decide their colours.
+const measures = {
+  speed: (now) => run.radii.map((_, i) => norm(at(now.velocities, i))),
+  spin: (now) => run.radii.map((_, i) => norm(at(now.spins, i))),
+  gap: (now) => {
+    const gaps = new Array(count).fill(1);
+    pairs(now).forEach(({ i, j, gap }) => { gaps[i] = Math.min(gaps[i], gap); gaps[j] = Math.min(gaps[j], gap); });
+    return gaps.map((gap) => Math.log10(Math.max(gap, SMALLEST_GAP)));
+  },
+};
+
+// Smallest and largest value in all frames, so that a colour means the same thing in each.
+const ranges = { gap: [Math.log10(SMALLEST_GAP), 0] };
+function range(name) {
+  if (!ranges[name]) {
+    let [low, high] = [Infinity, -Infinity];
+    run.frames.forEach((now) => measures[name](now).forEach((value) => {
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }));
+    ranges[name] = [low, high];
+  }
+  return ranges[name];
+}
+
+// Colours
+
+function scaled(fraction) {
+  const place = Math.min(Math.max(fraction, 0), 1) * (SCALE.length - 1);
+  const first = Math.min(Math.floor(place), SCALE.length - 2);
+  return SCALE[first].map((c, k) => c + (place - first) * (SCALE[first + 1][k] - c));
+}
+
+function colours(now) {
+  const name = element("colour").value;
+  if (name === "id") return run.radii.map((_, i) => PARTICLES[i % PARTICLES.length]);
+  const [low, high] = range(name);
+  return measures[name](now).map((value) => scaled(high > low ? (value - low) / (high - low) : 0.5));
+}
+
+const css = ([r, g, b], light = 1) =>
+  `rgb(${[r, g, b].map((c) => Math.round(light > 1 ? c + (255 - c) * (light - 1) : c * light)).join(",")})`;
+const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
+
+// Projection
+
+function camera() {
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const [lx, ly, lz] = run.edges;
+  const middle = plus(run.origin, [lx / 2, ly / 2, lz / 2]);
+  // A sheared box sticks out by at most a quarter of its edge on either side of its middle.
+  const breadth = run.periodic[1] ? 1.5 * lx : lx;
+  const border = run.periodic.some(Boolean) ? 2 * Math.max(...run.radii) : 0; // for images
+  const room = flat ? [breadth + border, ly + border] : [Math.hypot(lx, ly, lz), Math.hypot(lx, ly, lz)];
+  const scale = 0.88 * view.zoom * Math.min(width / room[0], height / room[1]);
+  const [sy, cy, sp, cp] = [Math.sin(view.yaw), Math.cos(view.yaw), Math.sin(view.pitch), Math.cos(view.pitch)];
+  const sheared = (now) => (run.periodic[1] ? tilt(now) / 2 : 0);
+  const project = (x, now) => {
+    const d = minus(x, plus(middle, [sheared(now), 0, 0]));
+    const [a, b] = [cy * d[0] + sy * d[2], -sy * d[0] + cy * d[2]];
+    const [up, depth] = [cp * d[1] - sp * b, sp * d[1] + cp * b];
+    return { x: width / 2 + view.shift[0] + scale * a, y: height / 2 + view.shift[1] - scale * up, depth };
+  };
+  return { project, scale, width, height };
+}
+
+// Drawing
+
+function line(from, to, colour, width, dashes = []) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.setLineDash(dashes);
+  pen.beginPath();
+  pen.moveTo(from.x, from.y);
+  pen.lineTo(to.x, to.y);
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+// The edges at the nearest corner, or all others.
+function drawBox(eye, now, inFront) {
+  const ends = corners(now).map((corner) => eye.project(corner, now));
+  const first = ends.reduce((best, end, n) => (end.depth > ends[best].depth ? n : best), 0);
+  const isInFront = (n, bit) => !flat && (n === first || (n | bit) === first);
+  for (let n = 0; n < 8; n++) {
+    [1, 2, 4].filter((bit) => !(n & bit) && !(flat && (bit === 4 || n & 4))).forEach((bit) => {
+      if (isInFront(n, bit) !== inFront) return;
+      // Walls of the plane are solid, periodic borders dashed.
+      const isPeriodic = flat && run.periodic[bit === 1 ? 1 : 0];
+      line(ends[n], ends[n | bit], themed("--edge"), 1.2, isPeriodic ? [6, 4] : []);
+    });
+  }
+}
+
+// Images of a ball that reach into the box, without the ball.
+function images(x, radius, now) {
+  const found = [];
+  const steps = run.periodic.map((periodic) => (periodic ? [-1, 0, 1] : [0]));
+  const [lx, ly, lz] = run.edges;
+  for (const p of steps[0]) for (const q of steps[1]) for (const r of steps[2]) {
+    if (!p && !q && !r) continue;
+    const image = plus(x, [p * lx + q * tilt(now), q * ly, r * lz]);
+    const d = minus(image, run.origin);
+    const slope = run.periodic[1] ? tilt(now) / ly : 0;
+    const along = (d[0] - slope * d[1]) / Math.hypot(1, slope);
+    const reach = lx / Math.hypot(1, slope);
+    const meets = (value, length) => value > -radius && value < length + radius;
+    if (meets(along, reach) && meets(d[1], ly) && (flat || meets(d[2], lz))) found.push(image);
+  }
+  return found;
+}
+
+// Balls from back to front.
+function balls(eye, now) {
+  const [inBox, withImages] = [element("wrap").checked, element("images").checked];
+  const fill = colours(now);
+  const list = [];
+  for (let i = 0; i < count; i++) {
+    const own = at(now.positions, i);
+    const place = inBox ? wrapped(own, now) : own;
+    list.push({ i, image: false, colour: fill[i], ...eye.project(place, now) });
+    if (withImages && inBox) {
+      images(place, run.radii[i], now).forEach((image) =>
+        list.push({ i, image: true, colour: fill[i], ...eye.project(image, now) }));
+    }
+  }
+  return list.sort((a, b) => a.depth - b.depth);
+}
+
+function drawBall(ball, eye, turn) {
+  const radius = Math.max(eye.scale * run.radii[ball.i], 0.5);
+  pen.globalAlpha = ball.image ? 0.3 : 1;
+  if (flat) {
+    pen.fillStyle = css(ball.colour);
+  } else {
+    const light = pen.createRadialGradient(
+      ball.x - 0.35 * radius, ball.y - 0.4 * radius, 0.05 * radius, ball.x, ball.y, radius);
+    light.addColorStop(0, css(ball.colour, 1.65));
+    light.addColorStop(0.45, css(ball.colour, 1));
+    light.addColorStop(1, css(ball.colour, 0.42));
+    pen.fillStyle = light;
+  }
+  pen.beginPath();
+  pen.arc(ball.x, ball.y, radius, 0, 2 * Math.PI);
+  pen.fill();
+  pen.strokeStyle = css(ball.colour, 0.5);
+  pen.lineWidth = 0.8;
+  pen.stroke();
+  if (flat) {
+    const end = { x: ball.x + 0.9 * radius * Math.cos(turn), y: ball.y - 0.9 * radius * Math.sin(turn) };
+    line(ball, end, "rgba(255,255,255,0.9)", Math.max(0.08 * radius, 1));
+  }
+  pen.globalAlpha = 1;
+}
+
+function drawLinks(eye, now) {
+  const reach = 10 ** Number(element("reach").value);
+  const inBox = element("wrap").checked;
+  let drawn = 0;
+  pairs(now).filter(({ gap }) => gap <= reach).forEach(({ i, j, apart, gap }) => {
+    drawn++;
+    const width = 1 + 0.8 * Math.log10(1 / Math.max(gap, SMALLEST_GAP));
+    const ends = [[i, apart], [j, apart.map((x) => -x)]].map(([n, step]) => {
+      const start = inBox ? wrapped(at(now.positions, n), now) : at(now.positions, n);
+      return [eye.project(start, now), eye.project(plus(start, step), now)];
+    });
+    // Across a border the pair is seen at both ends; elsewhere both lines are the same.
+    const across = Math.hypot(ends[0][1].x - ends[1][0].x, ends[0][1].y - ends[1][0].y) > 0.5;
+    (across ? ends : ends.slice(0, 1)).forEach(([from, to]) => {
+      line(from, to, themed("--paper"), width + 2.5);
+      line(from, to, themed("--link"), width);
+    });
+  });
+  return drawn;
+}
+
+function drawLegend(eye) {
+  const name = element("colour").value;
+  if (name === "id") return;
+  const [left, top, width, height] = [16, eye.height - 40, 160, 10];
+  pen.globalAlpha = 0.8;
+  pen.fillStyle = themed("--paper");
+  pen.fillRect(left - 8, top - 24, width + 24, 60);
+  pen.globalAlpha = 1;
+  const fill = pen.createLinearGradient(left, 0, left + width, 0);
+  for (let n = 0; n <= 8; n++) fill.addColorStop(n / 8, css(scaled(n / 8)));
+  pen.fillStyle = fill;
+  pen.fillRect(left, top, width, height);
+  pen.fillStyle = themed("--ink");
+  pen.font = "13px system-ui, sans-serif";
+  const digits = (value) => Number((name === "gap" ? 10 ** value : value).toPrecision(3)).toString();
+  const title = { speed: "speed", spin: "spin (angular speed)", gap: "smallest gap, mean radii" }[name];
+  pen.textAlign = "left";
+  pen.fillText(title, left, top - 6);
+  pen.fillText(digits(range(name)[0]), left, top + 24);
+  pen.textAlign = "right";
+  pen.fillText(digits(range(name)[1]), left + width, top + 24);
+}
+
+function describe(now, drawn) {
+  const smallest = pairs(now).reduce((least, { gap }) => Math.min(least, gap), Infinity);
+  const gap = smallest > 1 ? "above 1" : smallest < SMALLEST_GAP ? `below ${SMALLEST_GAP}` : smallest.toPrecision(2);
+  const linked = element("links").checked ? `, pairs drawn: ${drawn}` : "";
+  element("facts").textContent = `frame ${frame + 1} of ${run.frames.length}, t = ${now.time.toPrecision(4)}, `
+    + `strain ${now.strain.toPrecision(4)}, ${count} particles, smallest gap ${gap} radii${linked}`;
+  element("reach-text").textContent = (10 ** Number(element("reach").value)).toPrecision(2);
+  element("frame").value = frame;
+  canvas.setAttribute("aria-label", element("facts").textContent);
+  document.body.dataset.frame = frame;
+  document.body.dataset.pairs = drawn;
+}
+
+function draw() {
+  const now = run.frames[frame];
+  const eye = camera();
+  pen.clearRect(0, 0, eye.width, eye.height);
+  drawBox(eye, now, false);
+  const list = balls(eye, now);
+  list.forEach((ball) => drawBall(ball, eye, flat ? turns()[frame][ball.i] : 0));
+  drawBox(eye, now, true);
+  const drawn = element("links").checked ? drawLinks(eye, now) : 0;
+  drawLegend(eye);
+  describe(now, drawn);
+  document.body.dataset.balls = list.length;
+}
