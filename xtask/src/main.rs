@@ -1,7 +1,8 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask bench-stokes`,
-//! `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask bench-suspension`, `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
+mod bench_suspension;
 mod book;
 mod ci;
 mod figures;
@@ -40,6 +41,8 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
+    /// Time a step of a sheared suspension and print one line of JSON.
+    BenchSuspension(bench_suspension::Options),
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
     /// Formatting, lints, all tests and a quick reproduction of the figures.
@@ -80,6 +83,7 @@ fn main() -> ExitCode {
         Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
         Task::Verify(arguments) => verify(arguments),
         Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
+        Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }
