@@ -118,6 +118,12 @@ pub fn print_json(value: &impl Serialize) {
     let _ = writeln!(stdout(), "{text}");
 }
 
+/// Prints lines of a name and what it stands for.
+pub fn print_lines(lines: &[(&str, String)]) {
+    let text: String = lines.iter().map(|(name, value)| format!("{name:<12} {value}\n")).collect();
+    let _ = stdout().write_all(text.as_bytes());
+}
+
 /// Prints what an analysis found.
 pub fn print_summary(summary: &Summary) {
     let _ = stdout().write_all(summary.to_string().as_bytes());
