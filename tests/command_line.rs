@@ -71,7 +71,7 @@ fn cases_runs_and_checkpoints_say_what_they_are() {
 fn every_command_has_examples_and_exit_codes_are_told() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    for command in ["run", "resume", "info", "analyse", "new", "completions"] {
+    for command in ["run", "resume", "check", "info", "analyse", "new", "completions"] {
         let help = told(folder, &[command, "--help"]);
         assert!(help.contains("Example") && help.contains(&format!("\n  gluey {command} ")), "{help}");
     }
@@ -131,4 +131,64 @@ fn new_cases_replace_nothing() {
         assert_eq!(gluey(folder, &usage).status.code(), Some(2));
     }
     assert_eq!(fs::read_dir(folder).expect("a folder").count(), 1);
+}
+
+/// Without shear nothing moves: the mesh of the report, which is the last, is the first one.
+#[test]
+fn unknowns_are_those_of_the_first_step() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    for (dimension, template) in [("2", "pair"), ("2", "trio"), ("3", "trio")] {
+        let name = format!("{template}-{dimension}");
+        told(folder, &["new", &name, "--template", template, "--dimension", dimension]);
+        let file = format!("{name}.toml");
+        let set = ["--set", "shear_rate=0.0", "--set", "time.end=0.05"];
+        let report = json(folder, &[&["run", &file, "--json", "--quiet"], &set[..]].concat());
+        let check = json(folder, &[&["check", &file, "--json"], &set[..]].concat());
+        assert_eq!(
+            (&check["mesh"]["cells"], &check["mesh"]["unknowns"]),
+            (&report["cells"], &report["dofs"])
+        );
+        assert_eq!(check["steps"], report["steps"]);
+    }
+}
+
+#[test]
+fn memory_is_estimated_and_time_found_by_trial() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    for dimension in ["2", "3"] {
+        let file = format!("trio-{dimension}.toml");
+        told(folder, &["new", &file, "--template", "trio", "--dimension", dimension]);
+        let check = json(folder, &["check", &file, "--json", "--quiet"]);
+        let number = |check: &Value, key: &str| check.pointer(key).and_then(Value::as_f64).expect("a number");
+        let (first, step, run) = ("/trial/first_s", "/trial/step_s", "/trial/run_s");
+        let [first, step, run] = [first, step, run].map(|key| number(&check, key));
+        assert!(first > 0.0 && step > 0.0 && (run - first - 200.0 * step).abs() < 1e-6 * run, "{check}");
+        let estimate = json(folder, &["check", &file, "--no-trial", "--json"]);
+        let ratio = number(&estimate, "/memory_bytes") / number(&check, "/memory_bytes");
+        assert!(estimate["trial"].is_null() && (0.6..1.6).contains(&ratio), "{ratio}: {check}");
+    }
+}
+
+#[test]
+fn checks_find_what_a_run_would() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let check = told(folder, &["check", CASE]);
+    assert!(check.contains("315 steps") && check.contains("time ") && !check.contains("mesh"), "{check}");
+    assert!(!told(folder, &["check", CASE, "--no-trial"]).contains("time  "));
+    fails(folder, &["check", CASE, "--set", "time.step=-1"], &["--set time.step=-1", "greater than 0"]);
+    fails(folder, &["check", "nowhere.toml"], &["nowhere.toml"]);
+    told(folder, &["new", "fine"]);
+    let fine = [
+        "check",
+        "fine.toml",
+        "--set",
+        "flow.mesh.cells_per_radius=9000",
+        "--set",
+        "flow.mesh.coarsest_level=16",
+    ];
+    fails(folder, &fine, &["GB of memory", "fewer cells per radius"]);
+    assert_eq!(fs::read_dir(folder).expect("a folder").count(), 1, "a check left files");
 }

@@ -1,5 +1,6 @@
 //! Arguments of the command, and what they ask of the library.
 
+mod check;
 mod completions;
 mod failure;
 mod info;
@@ -16,6 +17,7 @@ use clap::{Args, Parser, Subcommand};
 use gluey::analyse::AnalyseOptions;
 
 use crate::terminal;
+use check::CheckArguments;
 use completions::CompletionsArguments;
 pub use failure::Failure;
 use info::InfoArguments;
@@ -52,6 +54,8 @@ pub enum Command {
     Run(RunArguments),
     /// Go on with a run that was interrupted, killed or stopped by an error.
     Resume(ResumeArguments),
+    /// Check a case, and say what its run would be: unknowns, memory, time.
+    Check(CheckArguments),
     /// What a case file, a checkpoint or a folder of results is, and how far it is.
     Info(InfoArguments),
     /// Structure and statistics of the particles that a run wrote with --xyz.
@@ -68,6 +72,7 @@ impl Command {
         match self {
             Self::Run(arguments) => arguments.run(),
             Self::Resume(arguments) => arguments.run(),
+            Self::Check(arguments) => arguments.run(),
             Self::Info(arguments) => arguments.run(),
             Self::Analyse(arguments) => arguments.run(),
             Self::New(arguments) => arguments.run(),

@@ -91,7 +91,8 @@ fn summary(state: &ProgressState<'_>) -> String {
     format!("t = {:.3}, {rate} steps/s, {left} left, {}", state.time, state.phase)
 }
 
-fn duration(seconds: f64) -> String {
+/// A time one waits, in words.
+pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {
         0..60 => format!("{whole} s"),

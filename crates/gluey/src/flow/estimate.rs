@@ -20,6 +20,8 @@ use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 
 /// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
 const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
+/// The program and its tables; unit: bytes.
+const PROGRAM: f64 = 16e6;
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
 
@@ -198,6 +200,10 @@ fn cells_met(dimension: i32, radius: f64) -> f64 {
 
 /// Memory that a run takes, in bytes (measured: see `docs/benchmarks.md`).
 fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
+    PROGRAM + memory_of_solver(case, tree, cell_count)
+}
+
+fn memory_of_solver(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
     let direct = match case.flow.solver {
         Solver::Direct => true,
         Solver::Multigrid => false,
