@@ -1,10 +1,15 @@
 //! Arguments of the command, and what they ask of the library.
 
+mod check;
+mod completions;
 mod failure;
+mod info;
 mod interrupt;
 mod manner;
+mod new;
 mod resume;
 mod run;
+mod summary;
 mod view;
 
 use std::path::PathBuf;
@@ -13,14 +18,31 @@ use clap::{Args, Parser, Subcommand};
 use gluey::analyse::AnalyseOptions;
 
 use crate::terminal;
+use check::CheckArguments;
+use completions::CompletionsArguments;
 pub use failure::Failure;
+use info::InfoArguments;
+use new::NewArguments;
 use resume::ResumeArguments;
 use run::RunArguments;
 use view::ViewArguments;
 
+/// What `gluey --help` ends with; the exit codes are also in the README.
+const AFTER_HELP: &str = "\
+Examples:
+  gluey new doublet
+  gluey run doublet.toml --out out
+  gluey resume out
+
+Exit codes:
+  0    done
+  1    failed: what, where and what to do about it is on standard error
+  2    arguments that make no sense
+  130  interrupted (Ctrl-C, SIGTERM, SIGHUP); `gluey resume` goes on";
+
 /// Rigid particles in a Stokes flow with the gluey contact model.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version, about, after_help = AFTER_HELP)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -34,10 +56,18 @@ pub enum Command {
     Run(RunArguments),
     /// Go on with a run that was interrupted, killed or stopped by an error.
     Resume(ResumeArguments),
+    /// Check a case, and say what its run would be: unknowns, memory, time.
+    Check(CheckArguments),
+    /// What a case file, a checkpoint or a folder of results is, and how far it is.
+    Info(InfoArguments),
     /// Structure and statistics of the particles that a run wrote with --xyz.
     Analyse(AnalyseArguments),
     /// A page for the browser that shows the particles that a run wrote with --xyz.
     View(ViewArguments),
+    /// Write a new case file, with comments, to begin with.
+    New(NewArguments),
+    /// What a shell needs to complete arguments.
+    Completions(CompletionsArguments),
 }
 
 impl Command {
@@ -46,8 +76,12 @@ impl Command {
         match self {
             Self::Run(arguments) => arguments.run(),
             Self::Resume(arguments) => arguments.run(),
+            Self::Check(arguments) => arguments.run(),
+            Self::Info(arguments) => arguments.run(),
             Self::Analyse(arguments) => arguments.run(),
             Self::View(arguments) => arguments.run(),
+            Self::New(arguments) => arguments.run(),
+            Self::Completions(arguments) => arguments.run::<Cli>(),
         }
     }
 }

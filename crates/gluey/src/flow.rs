@@ -22,7 +22,7 @@ use thiserror::Error;
 
 use crate::case::{Case, Formulation, Lubrication, Solver};
 
-pub use estimate::MeshEstimate;
+pub use estimate::{MeshEstimate, MeshSize};
 
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -33,7 +33,10 @@ fn there(available: Option<u64>) -> String {
 
 /// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how
 /// much there is, only the first is checked.
-pub(crate) fn check(case: &Case) -> Result<(), TooLarge> {
+///
+/// # Errors
+/// [`TooLarge`] with the size expected.
+pub fn check(case: &Case) -> Result<(), TooLarge> {
     let available = available();
     match MeshEstimate::of(case) {
         Some(estimate) if !fits(&estimate, available) => Err(TooLarge { estimate, available }),

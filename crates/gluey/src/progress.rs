@@ -72,7 +72,7 @@ impl fmt::Display for Notice {
             Self::EarlierDrafts { drafts } => {
                 write!(f, "left by earlier runs, and kept as they are:")?;
                 drafts.iter().try_for_each(|draft| write!(f, " {}", draft.display()))?;
-                write!(f, " (--resume goes on with the one that the checkpoint belongs to)")
+                write!(f, " (`gluey resume` goes on with the one that the checkpoint belongs to)")
             }
             Self::CheckpointSetAside { from, to } => {
                 write!(f, "{}: the checkpoint of an earlier run is now {}", from.display(), to.display())

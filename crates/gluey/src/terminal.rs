@@ -92,7 +92,8 @@ fn summary(state: &ProgressState<'_>) -> String {
     format!("t = {:.3}, {rate} steps/s, {left} left, {}", state.time, state.phase)
 }
 
-fn duration(seconds: f64) -> String {
+/// A time one waits, in words.
+pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {
         0..60 => format!("{whole} s"),
@@ -117,6 +118,12 @@ pub fn print_report(report: &RunReport) {
 pub fn print_json(value: &impl Serialize) {
     let text = serde_json::to_string_pretty(value).expect("keys are texts, and numbers have a form");
     let _ = writeln!(stdout(), "{text}");
+}
+
+/// Prints lines of a name and what it stands for.
+pub fn print_lines(lines: &[(&str, String)]) {
+    let text: String = lines.iter().map(|(name, value)| format!("{name:<12} {value}\n")).collect();
+    let _ = stdout().write_all(text.as_bytes());
 }
 
 /// Prints what an analysis found.

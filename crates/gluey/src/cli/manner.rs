@@ -45,7 +45,18 @@ impl Manner {
         }
     }
 
-    fn set_threads(&self) -> Result<(), Failure> {
+    /// Whether what comes out is for programs.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// Whether only warnings and errors are told.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// Takes as many threads as were asked for.
+    pub fn set_threads(&self) -> Result<(), Failure> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
         pool.map_err(|error| Failure::new(error, Some("take fewer --threads".to_owned())))

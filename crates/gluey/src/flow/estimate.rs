@@ -11,15 +11,17 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Particle, Space};
-use gluey_stokes::Refinement;
+use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_stokes::{Discretisation, Refinement};
 
-use super::{FlowError, StokesFlow, refinement};
+use super::{FlowError, StokesFlow, refinement, stokes_flow};
 use crate::case::neighbours::{Neighbours, nearer_than};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 
 /// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
 const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
+/// The program and its tables; unit: bytes.
+const PROGRAM: f64 = 16e6;
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
 
@@ -46,6 +48,45 @@ impl MeshEstimate {
         let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
         Some(Self { cell_count, unknown_count, bytes: memory(case, &tree, cell_count) })
     }
+}
+
+/// Size of the first mesh of a case, which is built for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshSize {
+    /// Cells.
+    pub cell_count: usize,
+    /// Velocity and pressure unknowns, as reports count them.
+    pub dof_count: usize,
+    /// Memory that a run is expected to take; unit: bytes.
+    pub bytes: f64,
+}
+
+impl MeshSize {
+    /// The size for a checked case; `None` if its flow has no mesh.
+    ///
+    /// # Errors
+    /// [`FlowError`] if the box cannot be meshed.
+    pub fn of(case: &Case) -> Result<Option<Self>, FlowError> {
+        let Some(tree) = Tree::of(case).filter(|_| case.flow.hydrodynamics == Hydrodynamics::Stokes) else {
+            return Ok(None);
+        };
+        let (cell_count, dof_count) = match case.dimension {
+            2 => counts::<2>(case)?,
+            _ => counts::<3>(case)?,
+        };
+        Ok(Some(Self { cell_count, dof_count, bytes: memory(case, &tree, cell_count as f64) }))
+    }
+}
+
+/// Cells and unknowns of the first mesh.
+fn counts<const D: usize>(case: &Case) -> Result<(usize, usize), FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let flow = stokes_flow::<D>(case)?;
+    let centers = case.particles.iter().map(|particle| Vector::<D>::from_fn(|d, _| particle.position[d]));
+    let discretisation = Discretisation::new(flow.mesh(&flow.balls(centers))?);
+    Ok((discretisation.mesh.cell_count(), discretisation.dof_count()))
 }
 
 impl<const D: usize> StokesFlow<D>
@@ -159,6 +200,10 @@ fn cells_met(dimension: i32, radius: f64) -> f64 {
 
 /// Memory that a run takes, in bytes (measured: see `docs/benchmarks.md`).
 fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
+    PROGRAM + memory_of_solver(case, tree, cell_count)
+}
+
+fn memory_of_solver(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
     let direct = match case.flow.solver {
         Solver::Direct => true,
         Solver::Multigrid => false,

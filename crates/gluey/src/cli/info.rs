@@ -1,0 +1,224 @@
+//! `gluey info`.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use gluey::{Case, CheckpointSummary, RecordError, ResultPaths, RunRecord, RunState};
+use serde::Serialize;
+use thiserror::Error;
+
+use super::failure::Failure;
+use super::summary::{CaseSummary, shown};
+use crate::terminal::{print_json, print_lines};
+
+/// What a checkpoint begins with.
+const CHECKPOINT: &[u8] = b"gluey-ck";
+
+/// Arguments of `gluey info`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  gluey info pair.toml\n  gluey info out --json\n  gluey info \
+                        out/pair-gluey.checkpoint")]
+pub struct InfoArguments {
+    /// A case file, a checkpoint, or a folder of results.
+    path: PathBuf,
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Why there is nothing to say of a path.
+#[derive(Debug, Error)]
+enum InfoError {
+    /// It cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    /// A folder in which no run left a record.
+    #[error("{}: no run is recorded there (no file *-run.json)", path.display())]
+    NoRun { path: PathBuf },
+    /// A record cannot be read.
+    #[error("the record of a run cannot be used")]
+    Record(#[from] RecordError),
+}
+
+/// What a path is.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum Info {
+    Case(CaseSummary),
+    Checkpoint(CheckpointInfo),
+    Folder { runs: Vec<RunInfo> },
+}
+
+/// What a checkpoint says of itself.
+#[derive(Debug, Serialize)]
+struct CheckpointInfo {
+    file: PathBuf,
+    case: CaseSummary,
+    step: usize,
+    time: f64,
+    wall_s: f64,
+    gluey: String,
+    layout: u32,
+}
+
+/// A run that left a record.
+#[derive(Debug, Serialize)]
+struct RunInfo {
+    /// What its files begin with.
+    name: String,
+    /// `running`, `complete`, `interrupted`, `failed`, or `killed`: it was running, and no process writes its
+    /// results now.
+    state: String,
+    /// Time at the last step recorded; absent where the case as run cannot be read.
+    time: Option<f64>,
+    case: Option<CaseSummary>,
+    record: RunRecord,
+    checkpoints: Vec<CheckpointState>,
+}
+
+/// A checkpoint of a run.
+#[derive(Debug, Serialize)]
+struct CheckpointState {
+    file: PathBuf,
+    /// Steps done, where it is whole.
+    step: Option<usize>,
+    /// What is wrong with it, where it is not.
+    error: Option<String>,
+}
+
+impl InfoArguments {
+    /// Says what the path is.
+    pub fn run(&self) -> Result<(), Failure> {
+        let info = Info::of(&self.path)?;
+        match (self.json, &info) {
+            (true, _) => print_json(&info),
+            (_, Info::Case(case)) => print_lines(&case.lines()),
+            (_, Info::Checkpoint(checkpoint)) => print_lines(&checkpoint.lines()),
+            (_, Info::Folder { runs }) => runs.iter().for_each(|run| print_lines(&run.lines())),
+        }
+        Ok(())
+    }
+}
+
+impl Info {
+    fn of(path: &Path) -> Result<Self, Failure> {
+        if path.is_dir() {
+            return Ok(Self::Folder { runs: runs(path).map_err(failure)? });
+        }
+        let start = start(path).map_err(failure)?;
+        if start == CHECKPOINT[..start.len()] && !start.is_empty() {
+            let info = CheckpointInfo::of(path).map_err(|error| Failure::new(error, None))?;
+            return Ok(Self::Checkpoint(info));
+        }
+        Ok(Self::Case(CaseSummary::of(&Case::load(path)?)))
+    }
+}
+
+fn failure(error: InfoError) -> Failure {
+    let hint = match &error {
+        InfoError::Record(_) => None,
+        _ => Some("give a case file, a checkpoint, or the folder that a run wrote to".to_owned()),
+    };
+    Failure::new(error, hint)
+}
+
+fn runs(folder: &Path) -> Result<Vec<RunInfo>, InfoError> {
+    let path = folder.to_owned();
+    let runs = match ResultPaths::in_folder(folder) {
+        Ok(runs) if runs.is_empty() => return Err(InfoError::NoRun { path }),
+        Ok(runs) => runs,
+        Err(source) => return Err(InfoError::Read { path, source }),
+    };
+    runs.iter().map(RunInfo::of).collect()
+}
+
+/// The first bytes of a file.
+fn start(path: &Path) -> Result<Vec<u8>, InfoError> {
+    let read = || {
+        let mut bytes = Vec::new();
+        File::open(path)?.take(CHECKPOINT.len() as u64).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(|source| InfoError::Read { path: path.to_owned(), source })
+}
+
+impl CheckpointInfo {
+    fn of(path: &Path) -> Result<Self, gluey::CheckpointError> {
+        let CheckpointSummary { layout, gluey, case, step, wall_s } = CheckpointSummary::read(path)?;
+        let (file, time) = (path.to_owned(), step as f64 * case.time.step);
+        Ok(Self { file, case: CaseSummary::without_end(&case), step, time, wall_s, gluey, layout })
+    }
+
+    fn lines(&self) -> Vec<(&'static str, String)> {
+        let Self { file, step, time, wall_s, gluey, layout, .. } = self;
+        let mut lines = vec![
+            ("checkpoint", file.display().to_string()),
+            ("state", format!("after step {step}, t = {}, {wall_s:.1} s of wall time", shown(*time))),
+            ("written by", format!("gluey {gluey}, layout {layout}")),
+        ];
+        lines.extend(self.case.lines());
+        lines
+    }
+}
+
+impl RunInfo {
+    fn of(paths: &ResultPaths) -> Result<Self, InfoError> {
+        let record = RunRecord::read(&paths.record())?;
+        let case = Case::load(paths.case_file()).ok();
+        let files = [paths.checkpoint(), paths.previous_checkpoint()];
+        Ok(Self {
+            name: paths.stem(),
+            state: match record.state {
+                RunState::Running if !paths.are_being_written() => "killed".into(),
+                state => state.to_string(),
+            },
+            time: case.as_ref().map(|case| record.steps_done as f64 * case.time.step),
+            case: case.as_ref().map(CaseSummary::of),
+            record,
+            checkpoints: files.into_iter().filter(|file| file.exists()).map(CheckpointState::of).collect(),
+        })
+    }
+
+    fn lines(&self) -> Vec<(&'static str, String)> {
+        let record = &self.record;
+        let time = self.time.map_or(String::new(), |time| format!(", t = {}", shown(time)));
+        let mut lines = vec![
+            ("run", self.name.clone()),
+            ("state", format!("{}, {} of {} steps done{time}", self.state, record.steps_done, record.steps)),
+        ];
+        lines.extend(record.error.iter().map(|error| ("error", error.clone())));
+        let ended = record.ended.as_ref().map_or(String::new(), |ended| format!(", ended {ended}"));
+        lines.push(("started", format!("{}{ended}, resumed {} times", record.started, record.resumed)));
+        let machine = &record.machine;
+        lines.push((
+            "machine",
+            format!(
+                "{} {}, {} threads on {} processors",
+                machine.os, machine.arch, record.threads, machine.cpus
+            ),
+        ));
+        lines.push(("written by", format!("gluey {}", record.gluey)));
+        lines.extend(self.checkpoints.iter().map(|checkpoint| ("checkpoint", checkpoint.line())));
+        // The record has the number of steps.
+        lines.extend(self.case.iter().flat_map(CaseSummary::lines).filter(|(key, _)| *key != "run"));
+        lines
+    }
+}
+
+impl CheckpointState {
+    fn of(file: PathBuf) -> Self {
+        match CheckpointSummary::read(&file) {
+            Ok(summary) => Self { file, step: Some(summary.step), error: None },
+            Err(error) => Self { file, step: None, error: Some(error.to_string()) },
+        }
+    }
+
+    fn line(&self) -> String {
+        match (&self.error, self.step) {
+            (Some(error), _) => error.clone(),
+            (None, step) => format!("{}, after step {}", self.file.display(), step.unwrap_or_default()),
+        }
+    }
+}

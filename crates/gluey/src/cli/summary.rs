@@ -1,0 +1,102 @@
+//! What a case is, in a few numbers.
+
+use std::f64::consts::PI;
+
+use gluey::Case;
+use serde::Serialize;
+
+/// What a case is, in a few numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseSummary {
+    /// Name of the case.
+    pub name: String,
+    /// Dimension of space.
+    pub dimension: usize,
+    /// Number of particles.
+    pub particles: usize,
+    /// Part of the volume of the box (in 2D: of its area) that is in particles.
+    pub volume_fraction: f64,
+    /// Contact strategy.
+    pub strategy: String,
+    /// How rigidity enters the flow, or the name of the model that replaces the flow.
+    pub formulation: String,
+    /// Time step.
+    pub time_step: f64,
+    /// Time at the end of the run; absent in checkpoints, whose runs may end at any time.
+    pub end: Option<f64>,
+    /// Steps of the run; absent as `end` is.
+    pub steps: Option<usize>,
+}
+
+impl CaseSummary {
+    /// Of a case with its end.
+    pub fn of(case: &Case) -> Self {
+        let steps = case.step_count();
+        let end = Some(steps as f64 * case.time.step);
+        Self { end, steps: Some(steps), ..Self::without_end(case) }
+    }
+
+    /// Of a case whose end is not known.
+    pub fn without_end(case: &Case) -> Self {
+        Self {
+            name: case.name.clone(),
+            dimension: case.dimension,
+            particles: case.particles.len(),
+            volume_fraction: volume_fraction(case),
+            strategy: case.contact.strategy.to_string(),
+            formulation: case.flow_name().to_owned(),
+            time_step: case.time.step,
+            end: None,
+            steps: None,
+        }
+    }
+
+    /// For people.
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let of_what = if self.dimension == 2 { "discs" } else { "spheres" };
+        let mut lines = vec![
+            ("case", format!("{}, {}D", self.name, self.dimension)),
+            (
+                "particles",
+                format!("{} {of_what}, volume fraction {:.4}", self.particles, self.volume_fraction),
+            ),
+            ("model", format!("{}, contact {}", self.formulation, self.strategy)),
+        ];
+        if let (Some(steps), Some(end)) = (self.steps, self.end) {
+            lines.push(("run", format!("{steps} steps of {} to t = {}", self.time_step, shown(end))));
+        }
+        lines
+    }
+}
+
+/// A time without what rounding added to it.
+pub fn shown(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
+}
+
+fn volume_fraction(case: &Case) -> f64 {
+    let volume = |radius: f64| match case.dimension {
+        2 => PI * radius.powi(2),
+        _ => 4.0 / 3.0 * PI * radius.powi(3),
+    };
+    let solid: f64 = case.particles.iter().map(|particle| volume(particle.radius)).sum();
+    let edges = case.upper().into_iter().zip(case.lower()).map(|(upper, lower)| upper - lower);
+    solid / edges.product::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fraction_is_that_of_the_case() {
+        for (text, fraction) in [
+            (include_str!("../../../../data/cases/suspension-2d.toml"), 0.3),
+            (include_str!("../../../../data/cases/suspension-3d.toml"), 0.2),
+        ] {
+            let case = Case::parse(text, "case.toml").unwrap_or_else(|error| panic!("{error}"));
+            let found = CaseSummary::of(&case).volume_fraction;
+            assert!((found - fraction).abs() < 1e-12, "{found}");
+        }
+    }
+}
