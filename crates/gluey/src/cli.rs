@@ -1,5 +1,6 @@
 //! Arguments of the command, and what they ask of the library.
 
+mod plot;
 mod view;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use gluey::{
 use crate::diagnostic::Diagnosed;
 use crate::terminal::{Reporter, say};
 
+pub use plot::PlotArguments;
 pub use view::ViewArguments;
 
 /// What a shell reports for a program ended by Ctrl-C.
@@ -41,6 +43,8 @@ pub enum Command {
     Analyse(AnalyseArguments),
     /// A page for the browser that shows the particles that a run wrote with --xyz.
     View(ViewArguments),
+    /// Pictures of the results of a run, as SVG and PNG.
+    Plot(PlotArguments),
 }
 
 /// Arguments of `gluey analyse`.

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use cli::{AnalyseArguments, Cli, Command, RunArguments, ViewArguments};
+use cli::{AnalyseArguments, Cli, Command, PlotArguments, RunArguments, ViewArguments};
 
 fn main() -> ExitCode {
     diagnostic::install();
@@ -16,6 +16,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run(&arguments),
         Command::Analyse(arguments) => analyse(&arguments),
         Command::View(arguments) => view(&arguments),
+        Command::Plot(arguments) => plot(&arguments),
     }
 }
 
@@ -49,6 +50,19 @@ fn view(arguments: &ViewArguments) -> ExitCode {
     match gluey::view::view(&arguments.options()) {
         Ok(viewed) => {
             terminal::print_viewed(&viewed);
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            terminal::say(&format!("{:?}", miette::Report::from_err(error)));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn plot(arguments: &PlotArguments) -> ExitCode {
+    match gluey::plot::plot(&arguments.options()) {
+        Ok(pictures) => {
+            terminal::print_pictures(&pictures);
             ExitCode::SUCCESS
         }
         Err(error) => {
