@@ -1,4 +1,4 @@
-//! Pictures of a run: the page for the browser.
+//! Pictures of a run: charts of its tables, the page for the browser.
 
 use std::fs;
 use std::path::Path;
@@ -103,4 +103,42 @@ fn runs_without_frames_cannot_be_shown() {
     fs::write(folder.path().join("out/a-xyz/particles-000000.xyz"), "1\nDimension=2\n").expect("a file");
     fails(folder.path(), &["view", "out"], &["particles-000000.xyz:2"]);
     assert!(!folder.path().join("out/view.html").exists(), "a page of nothing");
+}
+
+#[test]
+fn results_are_drawn() {
+    let folder = TempDir::new().expect("a folder");
+    succeeds(folder.path(), &["run", CASE]);
+    let stdout = succeeds(folder.path(), &["plot", "out", "--width", "85"]);
+    assert_eq!(stdout.lines().count(), 4, "{stdout}");
+    let svg = |name: &str| {
+        fs::read_to_string(folder.path().join(format!("out/{STEM}-plots/{name}.svg"))).expect("a picture")
+    };
+    let gaps = svg("gaps");
+    assert!(gaps.contains("width=\"85.0mm\"") && gaps.contains("1 and 2"), "{}", &gaps[..300]);
+    // One line through all of the contact, whose gaps are 0 but for rounding.
+    assert_eq!(gaps.matches("stroke=\"#0b4f9e\"").count(), 2, "the curve and its sample");
+    assert!(svg("trajectories").contains("particle 2"));
+    let png = fs::read(folder.path().join(format!("out/{STEM}-plots/gaps.png"))).expect("a picture");
+    assert!(png.starts_with(b"\x89PNG") && png[16..20] == 1275u32.to_be_bytes());
+}
+
+#[test]
+fn results_that_are_missing_or_malformed_are_named() {
+    let folder = TempDir::new().expect("a folder");
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+    fails(folder.path(), &["plot", "nowhere"], &["nowhere: cannot be listed"]);
+    fails(folder.path(), &["plot", "."], &["no complete trajectory"]);
+    write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.5,half,0.1\n");
+    fails(folder.path(), &["plot", "."], &["a.csv: line 3: expected 4 numbers"]);
+    write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n");
+    fails(folder.path(), &["plot", "."], &["a.csv: 1 rows", "at least 2"]);
+    write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.6,0.5,0.1\n");
+    fails(folder.path(), &["plot", ".", "--only", "rheology"], &["a-rheology.csv: not there", "sheared"]);
+    write("a-rheology.csv", "t,strain,viscosity\n0,0,2\n1,1,2\n");
+    fails(folder.path(), &["plot", "."], &["a-rheology.csv: column `viscosity_by_dissipation` is missing"]);
+    write("a-gaps.csv", "t,i,j,gap_over_a,partner\n0,1,2,0.5,ghost\n");
+    fails(folder.path(), &["plot", ".", "--only", "gaps"], &["a-gaps.csv: line 2: expected 5 numbers"]);
+    let (code, _, stderr) = gluey(folder.path(), &["plot", ".", "--only", "speed"]);
+    assert!(code == Some(2) && stderr.contains("expected one of gaps, trajectories, rheology"), "{stderr}");
 }

@@ -7,6 +7,7 @@ mod info;
 mod interrupt;
 mod manner;
 mod new;
+mod plot;
 mod resume;
 mod run;
 mod summary;
@@ -23,6 +24,7 @@ use completions::CompletionsArguments;
 pub use failure::Failure;
 use info::InfoArguments;
 use new::NewArguments;
+use plot::PlotArguments;
 use resume::ResumeArguments;
 use run::RunArguments;
 use view::ViewArguments;
@@ -64,6 +66,8 @@ pub enum Command {
     Analyse(AnalyseArguments),
     /// A page for the browser that shows the particles that a run wrote with --xyz.
     View(ViewArguments),
+    /// Gaps, paths and rheology of a run as pictures, in SVG and PNG.
+    Plot(PlotArguments),
     /// Write a new case file, with comments, to begin with.
     New(NewArguments),
     /// What a shell needs to complete arguments.
@@ -80,6 +84,7 @@ impl Command {
             Self::Info(arguments) => arguments.run(),
             Self::Analyse(arguments) => arguments.run(),
             Self::View(arguments) => arguments.run(),
+            Self::Plot(arguments) => arguments.run(),
             Self::New(arguments) => arguments.run(),
             Self::Completions(arguments) => arguments.run::<Cli>(),
         }

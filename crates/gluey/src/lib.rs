@@ -30,6 +30,7 @@ pub mod memory;
 mod near_pairs;
 pub mod output;
 mod phases;
+pub mod plot;
 pub mod progress;
 pub mod reference;
 mod report;

@@ -1,6 +1,7 @@
 //! Progress and results in words: a bar on a terminal, plain lines in a log.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -140,6 +141,12 @@ pub fn print_viewed(viewed: &Viewed) {
         page.display()
     );
     let _ = stdout().write_all(text.as_bytes());
+}
+
+/// Prints which pictures were written.
+pub fn print_pictures(pictures: &[PathBuf]) {
+    let lines: String = pictures.iter().map(|picture| format!("{}\n", picture.display())).collect();
+    let _ = stdout().write_all(lines.as_bytes());
 }
 
 #[cfg(test)]

@@ -110,6 +110,12 @@ impl Axis {
         Self { label: label.to_owned(), min, max, tick, log: false }
     }
 
+    /// Whether a value lies between the ends, which [`Axis::around`] rounds a little.
+    fn shows(&self, value: f64) -> bool {
+        let slack = if self.log { 0.0 } else { 1e-6 * (self.max - self.min) };
+        (self.min - slack..=self.max + slack).contains(&value)
+    }
+
     /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
     fn fraction(&self, value: f64) -> f64 {
         let scale = |x: f64| if self.log { x.log10() } else { x };
@@ -228,9 +234,7 @@ impl Chart {
 
     /// The parts of the pieces that lie within the axes.
     fn inside(&self, pieces: &[Vec<(f64, f64)>]) -> Vec<Vec<(f64, f64)>> {
-        let visible = |&(x, y): &(f64, f64)| {
-            (self.x.min..=self.x.max).contains(&x) && (self.y.min..=self.y.max).contains(&y)
-        };
+        let visible = |&(x, y): &(f64, f64)| self.x.shows(x) && self.y.shows(y);
         let runs = pieces.iter().flat_map(|piece| piece.chunk_by(move |a, b| visible(a) && visible(b)));
         runs.filter(|run| run.len() > 1).map(<[_]>::to_vec).collect()
     }

@@ -1,0 +1,47 @@
+//! Arguments of `gluey plot`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use gluey::plot::{Figure, Format, PlotOptions};
+
+use super::Failure;
+use crate::terminal;
+
+/// Arguments of `gluey plot`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example:\n  gluey run suspension.toml --out out\n  gluey plot out --width 85")]
+pub struct PlotArguments {
+    /// Folder of a run.
+    folder: PathBuf,
+    /// What to draw: gaps, trajectories, rheology; whatever there are results for when absent.
+    #[arg(long, value_name = "FIGURE", value_delimiter = ',')]
+    only: Vec<Figure>,
+    /// How to write it: svg, png.
+    #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "svg,png")]
+    format: Vec<Format>,
+    /// Width on paper in millimetres.
+    #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = width)]
+    width: f64,
+}
+
+impl PlotArguments {
+    /// Draws.
+    pub fn run(&self) -> Result<(), Failure> {
+        let pictures = gluey::plot::plot(&self.options()).map_err(|error| Failure::new(error, None))?;
+        terminal::print_pictures(&pictures);
+        Ok(())
+    }
+
+    fn options(&self) -> PlotOptions {
+        let Self { folder, only, format, width } = self.clone();
+        PlotOptions { folder, only, formats: format, width_mm: width }
+    }
+}
+
+fn width(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(width) if (60.0..=400.0).contains(&width) => Ok(width),
+        _ => Err("must be a number from 60 to 400 (millimetres)".into()),
+    }
+}

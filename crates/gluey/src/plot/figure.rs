@@ -1,0 +1,38 @@
+//! Kinds of pictures.
+
+use std::str::FromStr;
+
+/// What can be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Figure {
+    /// Gaps against time.
+    Gaps,
+    /// Paths of the centres.
+    Trajectories,
+    /// Stress against strain.
+    Rheology,
+}
+
+impl Figure {
+    /// All, in the order in which they are drawn.
+    pub const ALL: [Self; 3] = [Self::Gaps, Self::Trajectories, Self::Rheology];
+
+    /// Name in files and options.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Gaps => "gaps",
+            Self::Trajectories => "trajectories",
+            Self::Rheology => "rheology",
+        }
+    }
+}
+
+impl FromStr for Figure {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || Self::ALL.map(Self::as_str).join(", ");
+        let found = Self::ALL.into_iter().find(|figure| figure.as_str() == text);
+        found.ok_or_else(|| format!("expected one of {}", names()))
+    }
+}

@@ -1,0 +1,175 @@
+//! The pictures.
+
+use std::collections::BTreeMap;
+
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, PALETTE, PIXELS_PER_MM, Stroke, stack_to_width};
+
+use super::error::PlotError;
+use super::figure::Figure;
+use super::read::{Results, Source};
+use crate::table::TableError;
+
+/// Many curves that are not told apart.
+const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: None };
+/// Paths of more particles than there are strokes.
+const THIN: Stroke = Stroke { color: "#0b4f9e", width: 1.0, dashes: None };
+/// Height of a frame over the width of the picture.
+const HEIGHT: f64 = 0.5;
+/// Ratio of the largest to the smallest gap from which on their axis is logarithmic.
+const LOGARITHMIC: f64 = 20.0;
+
+/// Gaps against time.
+pub fn gaps(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<Canvas>, PlotError> {
+    let source = results.trajectory(Figure::Gaps)?;
+    let t = source.column("t")?;
+    let mut curves = match source.table.find("min_gap_over_a") {
+        Some(gaps) => {
+            let smallest = curve(Some("the smallest".into()), PALETTE[0], t, gaps);
+            near_pairs(results)?.into_iter().chain([smallest]).collect()
+        }
+        None => all_pairs(&source, t),
+    };
+    if curves.is_empty() {
+        let (path, column) = (results.csv(), "gap12_over_a".to_owned());
+        let missing = PlotError::Table { path, source: TableError::Column { column } };
+        return if is_needed { Err(missing) } else { Ok(None) };
+    }
+    curves.retain(|curve| !curve.pieces.is_empty());
+    let values: Vec<f64> = points(&curves).map(|(_, gap)| gap).collect();
+    let (low, high) = ends(&values);
+    let y = match low > 0.0 && high > LOGARITHMIC * low {
+        true => Axis::decades("gap / *a*", low, high),
+        // Contacts lie beside the frame, not on it.
+        false => Axis::around("gap / *a*", values.into_iter().chain([low.min(-0.01 * high)])),
+    };
+    let chart = chart(Axis::around("time *t*", t.iter().copied()), y, curves);
+    Ok(Some(stacked(&[chart], width_mm)))
+}
+
+/// The gap of every pair, up to as many as there are strokes: those that come nearest.
+fn all_pairs(source: &Source, t: &[f64]) -> Vec<Curve> {
+    let names = (1..10).flat_map(|i| (i + 1..10).map(move |j| (i, j)));
+    let mut pairs: Vec<_> =
+        names.filter_map(|(i, j)| Some((i, j, source.table.find(&format!("gap{i}{j}_over_a"))?))).collect();
+    let smallest = |gaps: &[f64]| gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    pairs.sort_by(|one, other| smallest(one.2).total_cmp(&smallest(other.2)));
+    let named = pairs.iter().zip(PALETTE);
+    let curves = named.map(|(&(i, j, gaps), stroke)| curve(Some(format!("{i} and {j}")), stroke, t, gaps));
+    let rest = pairs.iter().skip(PALETTE.len());
+    let rest = rest.enumerate();
+    rest.map(|(n, (.., gaps))| curve((n == 0).then(|| "other pairs".into()), FAINT, t, gaps))
+        .chain(curves)
+        .collect()
+}
+
+/// The gap of each pair that is listed as near, interrupted where it is not.
+fn near_pairs(results: &Results) -> Result<Vec<Curve>, PlotError> {
+    let Some(source) = results.near_pairs()? else { return Ok(Vec::new()) };
+    let [t, i, j, gaps] = ["t", "i", "j", "gap_over_a"].map(|name| source.column(name));
+    let (t, i, j, gaps, partner) = (t?, i?, j?, gaps?, source.column("partner")?);
+    let mut instants: Vec<f64> = t.to_vec();
+    instants.dedup();
+    let step_of = |time: f64| instants.partition_point(|known| *known < time);
+    let mut pairs: BTreeMap<[u64; 3], Vec<(usize, f64)>> = BTreeMap::new();
+    for row in 0..t.len() {
+        pairs
+            .entry([i, j, partner].map(|column| column[row] as u64))
+            .or_default()
+            .push((step_of(t[row]), gaps[row]));
+    }
+    let label = |n| (n == 0).then(|| "all that are near".to_owned());
+    let curves = pairs.values().enumerate().map(|(n, pair)| {
+        let runs = pair.chunk_by(|one, other| other.0 == one.0 + 1);
+        let pieces = runs.map(|run| run.iter().map(|&(step, gap)| (instants[step], gap)).collect());
+        Curve { label: label(n), stroke: FAINT, pieces: pieces.collect() }
+    });
+    Ok(curves.collect())
+}
+
+/// Paths of the centres, with dots where they begin.
+pub fn trajectories(results: &Results, width_mm: f64) -> Result<Canvas, PlotError> {
+    let source = results.trajectory(Figure::Trajectories)?;
+    let count = (1..).take_while(|n| source.table.find(&format!("x{n}")).is_some()).count();
+    let rows = if source.table.find("z1").is_some() { &["y", "z"][..] } else { &["y"][..] };
+    let charts: Result<Vec<Chart>, PlotError> =
+        rows.iter().map(|across| paths(&source, across, count)).collect();
+    Ok(stacked(&charts?, width_mm))
+}
+
+fn paths(source: &Source, across: &str, count: usize) -> Result<Chart, PlotError> {
+    let mut curves = Vec::with_capacity(count);
+    for n in 1..=count {
+        let (x, y) = (source.column(&format!("x{n}"))?, source.column(&format!("{across}{n}"))?);
+        curves.push(match count <= PALETTE.len() {
+            true => curve(Some(format!("particle {n}")), PALETTE[n - 1], x, y),
+            false => curve(None, THIN, x, y),
+        });
+    }
+    let starts = curves.iter().filter_map(|curve| curve.pieces.first()?.first().copied());
+    let marks = starts.map(|at| Mark { at, label: String::new() }).collect();
+    let axis = |label: String, values: Vec<f64>| Axis::around(&label, values);
+    let x = axis("*x*".into(), points(&curves).map(|point| point.0).collect());
+    let y = axis(format!("*{across}*"), points(&curves).map(|point| point.1).collect());
+    let notes = if across == "y" { vec!["Dots: where particles begin".to_owned()] } else { Vec::new() };
+    Ok(Chart { marks, notes, ..chart(x, y, curves) })
+}
+
+/// Viscosities, and below them normal stresses, against strain.
+pub fn rheology(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<Canvas>, PlotError> {
+    let Some(source) = results.rheology(is_needed)? else { return Ok(None) };
+    let viscosity = [
+        ("viscosity", "by stresslets"),
+        ("viscosity_by_dissipation", "by dissipation"),
+        ("viscosity_of_films", "share of films"),
+    ];
+    let normal = [("N1", "*N*_{1}"), ("N2", "*N*_{2}"), ("particle_pressure", "particle pressure")];
+    let charts = [
+        against_strain(&source, "relative viscosity", &viscosity, 0)?,
+        against_strain(&source, "stress / viscous stress", &normal, viscosity.len())?,
+    ];
+    Ok(Some(stacked(&charts, width_mm)))
+}
+
+/// Columns against strain, with strokes from `first` on; `N2` is there in 3D only.
+fn against_strain(
+    source: &Source,
+    label: &str,
+    columns: &[(&str, &str)],
+    first: usize,
+) -> Result<Chart, PlotError> {
+    let strain = source.column("strain")?;
+    let mut curves = Vec::new();
+    for ((name, label), stroke) in columns.iter().zip(&PALETTE[first..]) {
+        let is_absent = *name == "N2" && source.table.find(name).is_none();
+        if !is_absent {
+            curves.push(curve(Some((*label).to_owned()), *stroke, strain, source.column(name)?));
+        }
+    }
+    let y = Axis::around(label, points(&curves).map(|point| point.1).collect::<Vec<_>>());
+    Ok(chart(Axis::around("strain *γ*", strain.iter().copied()), y, curves))
+}
+
+/// A curve through points, interrupted where there is no number.
+fn curve(label: Option<String>, stroke: Stroke, x: &[f64], y: &[f64]) -> Curve {
+    let all: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+    let runs = all.split(|(x, y)| !x.is_finite() || !y.is_finite());
+    let pieces = runs.filter(|run| !run.is_empty()).map(<[_]>::to_vec).collect();
+    Curve { label, stroke, pieces }
+}
+
+fn points(curves: &[Curve]) -> impl Iterator<Item = (f64, f64)> {
+    curves.iter().flat_map(|curve| curve.pieces.iter().flatten().copied())
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
+}
+
+fn chart(x: Axis, y: Axis, curves: Vec<Curve>) -> Chart {
+    Chart { x, y, curves, notes: Vec::new(), marks: Vec::new() }
+}
+
+fn stacked(charts: &[Chart], width_mm: f64) -> Canvas {
+    let width = width_mm * PIXELS_PER_MM;
+    stack_to_width(charts, width, |_| HEIGHT * width)
+}

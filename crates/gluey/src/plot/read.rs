@@ -1,0 +1,138 @@
+//! The tables of a run, read back.
+
+use std::path::{Path, PathBuf};
+
+use super::error::PlotError;
+use super::figure::Figure;
+use crate::run::ResultPaths;
+use crate::table::Table;
+
+/// A table and where it came from.
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    /// Its numbers.
+    pub table: Table,
+}
+
+impl Source {
+    /// A column that must be there.
+    pub fn column(&self, name: &str) -> Result<&[f64], PlotError> {
+        self.table.column(name).map_err(|source| PlotError::Table { path: self.path.clone(), source })
+    }
+
+    /// The table, if a line can be drawn through its rows.
+    fn with_rows(self, figure: Figure) -> Result<Self, PlotError> {
+        let rows = self.column("t")?.len();
+        if rows < 2 {
+            return Err(PlotError::TooShort { path: self.path, figure, rows });
+        }
+        Ok(self)
+    }
+}
+
+/// The results of one run.
+pub struct Results {
+    paths: ResultPaths,
+}
+
+impl Results {
+    /// Folder of its pictures.
+    pub fn plots(&self) -> PathBuf {
+        self.beside("-plots")
+    }
+
+    /// Where particles were.
+    pub fn trajectory(&self, figure: Figure) -> Result<Source, PlotError> {
+        read(self.paths.csv())?.with_rows(figure)
+    }
+
+    /// Near pairs, which runs of ten and more particles list.
+    pub fn near_pairs(&self) -> Result<Option<Source>, PlotError> {
+        let path = self.beside("-gaps.csv");
+        path.exists().then(|| read(path)).transpose()
+    }
+
+    /// Stresses; an error where they are needed and not there.
+    pub fn rheology(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
+        let path = self.beside("-rheology.csv");
+        let figure = Figure::Rheology;
+        match (path.exists(), is_needed) {
+            (true, _) => Ok(Some(read(path)?.with_rows(figure)?)),
+            (false, false) => Ok(None),
+            (false, true) => {
+                let hint = "runs in boxes with domain.boundary = \"sheared\" write it";
+                Err(PlotError::Missing { path, figure, hint })
+            }
+        }
+    }
+
+    /// The trajectory.
+    pub fn csv(&self) -> PathBuf {
+        self.paths.csv()
+    }
+
+    fn beside(&self, suffix: &str) -> PathBuf {
+        self.paths.folder().join(format!("{}{suffix}", self.paths.stem()))
+    }
+}
+
+/// All runs with a trajectory in a folder, by name.
+pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
+    let failed = |source| PlotError::List { folder: folder.to_owned(), source };
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.extension().is_some_and(|extension| extension == "csv") && is_trajectory(&path)? {
+            found.push(path);
+        }
+    }
+    found.sort();
+    if found.is_empty() {
+        return Err(PlotError::NoResults { folder: folder.to_owned() });
+    }
+    Ok(found.iter().map(|csv| Results { paths: ResultPaths::of_csv(csv) }).collect())
+}
+
+/// Whether a file begins as trajectories do.
+fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
+    Ok(text(path)?.starts_with("t,x1,"))
+}
+
+fn text(path: &Path) -> Result<String, PlotError> {
+    std::fs::read_to_string(path).map_err(|source| PlotError::Read { path: path.to_owned(), source })
+}
+
+fn read(path: PathBuf) -> Result<Source, PlotError> {
+    match Table::parse(&numbers(&text(&path)?)) {
+        Ok(table) => Ok(Source { path, table }),
+        Err(source) => Err(PlotError::Table { path, source }),
+    }
+}
+
+/// The text with numbers for words in its last column: 1 for walls, 0 for other partners of a gap, no number
+/// for an empty cell.
+fn numbers(text: &str) -> String {
+    let lines = text.lines().map(|line| match line.rsplit_once(',') {
+        Some((numbers, "particle" | "image")) => format!("{numbers},0"),
+        Some((numbers, "wall")) => format!("{numbers},1"),
+        Some((numbers, "")) => format!("{numbers},NaN"),
+        _ => line.to_owned(),
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partners_have_numbers_and_empty_last_cells_none() {
+        let table = Table::parse(&numbers("t,i,partner\n0,1,wall\n0,2,image\n")).expect("numbers");
+        assert_eq!(table.column("partner"), Ok(&[1.0, 0.0][..]));
+        let table = Table::parse(&numbers("t,gap\n0,\n1,2\n")).expect("numbers");
+        let gaps = table.column("gap").expect("a column");
+        assert!(gaps[0].is_nan() && gaps[1] == 2.0);
+        assert!(Table::parse(&numbers("t,i,partner\n0,1,ghost\n")).is_err(), "an unknown partner");
+    }
+}
