@@ -48,13 +48,15 @@ fn cases_runs_and_checkpoints_say_what_they_are() {
     let run = &json(folder, &["info", "out", "--json"])["runs"][0];
     assert_eq!((&run["name"], &run["state"]), (&STEM.into(), &"complete".into()));
     assert_eq!((&run["checkpoints"][0]["step"], &run["checkpoints"][1]["step"]), (&300.into(), &200.into()));
+    let record = format!("out/{STEM}-run.json");
+    assert_eq!(json(folder, &["info", &record, "--json"])["runs"][0], *run);
     let last = format!("out/{STEM}.checkpoint");
     let checkpoint = json(folder, &["info", &last, "--json"]);
     assert_eq!((&checkpoint["kind"], &checkpoint["step"]), (&"checkpoint".into(), &300.into()));
     assert_eq!(checkpoint["case"]["name"], "pair-3d-mobility");
     assert!(told(folder, &["info", &last]).contains("after step 300, t = 15,"));
     // A record that says `running` of a run that no process does any more.
-    let record = folder.join(format!("out/{STEM}-run.json"));
+    let record = folder.join(record);
     let text = fs::read_to_string(&record).expect("a record");
     fs::write(record, text.replace("\"complete\"", "\"running\"")).expect("a record");
     fs::write(folder.join(&last), "gluey-ck, cut").expect("a file");
@@ -71,7 +73,7 @@ fn cases_runs_and_checkpoints_say_what_they_are() {
 fn every_command_has_examples_and_exit_codes_are_told() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    for command in ["run", "resume", "check", "info", "analyse", "new", "completions"] {
+    for command in ["run", "resume", "check", "info", "analyse", "view", "view", "new", "completions"] {
         let help = told(folder, &[command, "--help"]);
         assert!(help.contains("Example") && help.contains(&format!("\n  gluey {command} ")), "{help}");
     }

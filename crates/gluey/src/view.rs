@@ -1,7 +1,8 @@
 //! A page that shows the frames of a run in a browser: one file, which needs no network and no server.
 //!
-//! The page is `view/viewer.html` with its scripts, `view/viewer.js` and `view/controls.js`; the frames lie
-//! in it as JSON. Numbers have single precision, so gaps below 1e-4 mean radii are only shown as such.
+//! The page is `view/viewer.html` with its scripts, `view/viewer.js` and `view/controls.js`; the frames
+//! lie in it as JSON. Numbers are rounded to single precision, so gaps below 1e-4 mean radii are only shown
+//! as such.
 
 use std::path::{Path, PathBuf};
 

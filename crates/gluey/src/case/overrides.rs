@@ -107,7 +107,7 @@ fn parse_key(text: &str) -> Result<Key, BadOverride> {
     };
     let dotted = text.replace('[', ".").replace(']', "");
     let parts: Vec<&str> = dotted.split('.').collect();
-    if !parts.iter().all(|part| fits(part)) {
+    if !parts.iter().all(fits) {
         return Err(bad());
     }
     let part = |part: &&str| match part.parse() {

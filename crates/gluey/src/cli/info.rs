@@ -21,7 +21,7 @@ const CHECKPOINT: &[u8] = b"gluey-ck";
 #[command(after_help = "Examples:\n  gluey info pair.toml\n  gluey info out --json\n  gluey info \
                         out/pair-gluey.checkpoint")]
 pub struct InfoArguments {
-    /// A case file, a checkpoint, or a folder of results.
+    /// A case file, a checkpoint, a record of a run, or a folder of results.
     path: PathBuf,
     /// Print it as JSON.
     #[arg(long)]
@@ -107,6 +107,9 @@ impl Info {
         if path.is_dir() {
             return Ok(Self::Folder { runs: runs(path).map_err(failure)? });
         }
+        if let Some(paths) = recorded_by(path) {
+            return Ok(Self::Folder { runs: vec![RunInfo::of(&paths).map_err(failure)?] });
+        }
         let start = start(path).map_err(failure)?;
         if start == CHECKPOINT[..start.len()] && !start.is_empty() {
             let info = CheckpointInfo::of(path).map_err(|error| Failure::new(error, None))?;
@@ -114,6 +117,12 @@ impl Info {
         }
         Ok(Self::Case(CaseSummary::of(&Case::load(path)?)))
     }
+}
+
+/// The run whose record `path` is by its name.
+fn recorded_by(path: &Path) -> Option<ResultPaths> {
+    let stem = path.file_name()?.to_str()?.strip_suffix("-run.json")?;
+    Some(ResultPaths::new(path.parent().unwrap_or(Path::new("")), stem))
 }
 
 fn failure(error: InfoError) -> Failure {
