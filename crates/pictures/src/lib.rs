@@ -7,11 +7,13 @@
 //!
 //! Not for interactive charts.
 
+mod ball;
 mod canvas;
 mod chart;
 mod palette;
 mod text;
 
+pub use ball::{Ball, Rgb, color_scale};
 pub use canvas::{Canvas, FONT_FAMILY, PIXELS_PER_MM, PngError, font_faces};
 pub use chart::{Axis, Chart, Curve, Mark, Stroke, WIDTH, equal_aspect_height, stack, stack_to_width};
 pub use palette::PALETTE;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::plot::{Figure, Format, PlotOptions};
+use gluey::plot::{Figure, Format, FrameChoice, PlotOptions};
 
 /// Arguments of `gluey plot`.
 #[derive(Clone, Debug, Args)]
@@ -14,6 +14,9 @@ pub struct PlotArguments {
     /// What to draw: gaps, trajectories, rheology; whatever there are results for when absent.
     #[arg(long, value_name = "FIGURE", value_delimiter = ',')]
     only: Vec<Figure>,
+    /// Draw the particles of a frame that was written with --xyz: last, or the number of a step.
+    #[arg(long, value_name = "STEP")]
+    frame: Option<FrameChoice>,
     /// How to write it: svg, png.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "svg,png")]
     format: Vec<Format>,
@@ -25,8 +28,8 @@ pub struct PlotArguments {
 impl PlotArguments {
     /// What they ask of the library.
     pub fn options(&self) -> PlotOptions {
-        let Self { folder, only, format, width } = self.clone();
-        PlotOptions { folder, only, formats: format, width_mm: width }
+        let Self { folder, only, frame, format, width } = self.clone();
+        PlotOptions { folder, only, frame, formats: format, width_mm: width }
     }
 }
 
