@@ -143,6 +143,7 @@ fn results_that_are_missing_or_malformed_are_named() {
     let folder = TempDir::new().expect("a folder");
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
     fails(folder.path(), &["plot", "nowhere"], &["nowhere: cannot be listed"]);
+    fs::write(folder.path().join("other.csv"), b"\xff\xfe, not ours").expect("a file");
     fails(folder.path(), &["plot", "."], &["no complete trajectory"]);
     write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.5,half,0.1\n");
     fails(folder.path(), &["plot", "."], &["a.csv: line 3: expected 4 numbers"]);

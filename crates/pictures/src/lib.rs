@@ -1,9 +1,9 @@
 //! Charts and drawings as SVG text and PNG bytes: numbers in, pictures out. It knows no file and no flow.
 //!
 //! A [`Chart`] has [`Curve`]s over two axes ([`Axis`]); [`stack`] puts charts of equal width onto a
-//! [`Canvas`], which also takes what no chart draws. Labels have a little markup: `*t*` is italic, `_{12}`
-//! a subscript, `^{-1}` a superscript. Lengths are SVG pixels; [`PIXELS_PER_MM`] of them are one
-//! millimetre on paper.
+//! [`Canvas`], which also takes what no chart draws: lines, labels, spheres with light on them ([`Ball`]).
+//! Labels have a little markup: `*t*` is italic, `_{12}` a subscript, `^{-1}` a superscript. Lengths are SVG
+//! pixels; [`PIXELS_PER_MM`] of them are one millimetre on paper.
 //!
 //! Not for interactive charts.
 
