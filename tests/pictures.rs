@@ -124,10 +124,26 @@ fn results_are_drawn() {
 }
 
 #[test]
+fn particles_of_a_frame_are_drawn() {
+    let folder = run_with_frames();
+    let stdout = succeeds(folder.path(), &["plot", "out", "--frame", "20", "--format", "svg"]);
+    assert_eq!(stdout, format!("out/{STEM}-plots/particles-000020.svg\n"));
+    let svg = fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
+    assert_eq!(svg.matches("<circle").count(), 2);
+    assert_eq!(svg.matches("<line").count(), 12, "the edges of the box");
+    let stdout = succeeds(folder.path(), &["plot", "out", "--frame", "last", "--only", "gaps"]);
+    assert_eq!(stdout.lines().count(), 4, "{stdout}");
+    fails(folder.path(), &["plot", "out", "--frame", "21"], &["no frame of this step", "0, 20, ..."]);
+    fs::remove_dir_all(folder.path().join(format!("out/{STEM}-xyz"))).expect("a folder");
+    fails(folder.path(), &["plot", "out", "--frame", "last"], &["run with --xyz N"]);
+}
+
+#[test]
 fn results_that_are_missing_or_malformed_are_named() {
     let folder = TempDir::new().expect("a folder");
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
     fails(folder.path(), &["plot", "nowhere"], &["nowhere: cannot be listed"]);
+    fs::write(folder.path().join("other.csv"), b"\xff\xfe, not ours").expect("a file");
     fails(folder.path(), &["plot", "."], &["no complete trajectory"]);
     write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.5,half,0.1\n");
     fails(folder.path(), &["plot", "."], &["a.csv: line 3: expected 4 numbers"]);

@@ -41,9 +41,10 @@ fn generated_particles_fill_the_box_and_are_echoed() {
     ] {
         let case = Case::parse(&case(dimension, boundary, &generated(keys)), "s.toml").expect(keys);
         assert!(case.suspension.is_none() && !case.particles.is_empty());
-        // What is written down is the same case.
+        // What is written down is the same case, but for the seed: its particles are listed.
         let echo = toml::to_string(&case).expect("text");
-        assert_eq!(Case::parse(&echo, "echo.toml").expect("a good case"), case);
+        let listed = Case::parse(&echo, "echo.toml").expect("a good case");
+        assert_eq!(listed, Case { seed: None, ..case });
     }
 }
 

@@ -4,14 +4,17 @@
 //! gaps           against time: of all pairs of up to nine particles, else the smallest and all near ones
 //! trajectories   y against x; in 3D also z against x
 //! rheology       relative viscosity and normal stresses against strain
+//! particles      those of a frame that is asked for, with their images, coloured by speed
 //! ```
 //!
-//! They are read from `<stem>.csv`, `<stem>-gaps.csv` and `<stem>-rheology.csv` and go to `<stem>-plots`.
+//! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv` and `<stem>-xyz` and go to
+//! `<stem>-plots`.
 
 mod error;
 mod figure;
 mod figures;
 mod read;
+mod snapshot;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -20,6 +23,7 @@ use gluey_pictures::Canvas;
 
 pub use error::PlotError;
 pub use figure::Figure;
+pub use snapshot::FrameChoice;
 
 use crate::output::{OutputError, write_atomically};
 use read::Results;
@@ -59,7 +63,9 @@ impl FromStr for Format {
 pub struct PlotOptions {
     /// Folder of results.
     pub folder: PathBuf,
-    /// What to draw; what there are results for when empty.
+    /// A frame whose particles to draw, instead of all that is not in `only`.
+    pub frame: Option<FrameChoice>,
+    /// What to draw; what there are results for when empty and no frame is named.
     pub only: Vec<Figure>,
     /// How to write it.
     pub formats: Vec<Format>,
@@ -70,6 +76,13 @@ pub struct PlotOptions {
 /// Draws the results of every run in a folder and gives the paths of the pictures.
 pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
     let mut written = Vec::new();
+    if let Some(frame) = options.frame {
+        let (canvas, stem) = snapshot::snapshot(&options.folder, frame, options.width_mm)?;
+        written.extend(write(&canvas, &stem, &options.formats)?);
+        if options.only.is_empty() {
+            return Ok(written);
+        }
+    }
     for results in read::results_in(&options.folder)? {
         for figure in Figure::ALL {
             let is_wanted = options.only.is_empty() || options.only.contains(&figure);

@@ -147,7 +147,13 @@ impl Canvas {
         ))
     }
 
-    fn element(&mut self, element: std::fmt::Arguments<'_>) {
+    /// Whether this is in the drawing.
+    pub(crate) fn contains(&self, text: &str) -> bool {
+        self.body.contains(text)
+    }
+
+    /// An element of SVG over all others.
+    pub(crate) fn element(&mut self, element: std::fmt::Arguments<'_>) {
         writeln!(self.body, "{element}").expect("writing to a String cannot fail");
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::plot::{Figure, Format, PlotOptions};
+use gluey::plot::{Figure, Format, FrameChoice, PlotOptions};
 
 use super::Failure;
 use crate::terminal;
@@ -17,6 +17,9 @@ pub struct PlotArguments {
     /// What to draw: gaps, trajectories, rheology; whatever there are results for when absent.
     #[arg(long, value_name = "FIGURE", value_delimiter = ',')]
     only: Vec<Figure>,
+    /// Draw the particles of a frame that was written with --xyz: last, or the number of a step.
+    #[arg(long, value_name = "STEP")]
+    frame: Option<FrameChoice>,
     /// How to write it: svg, png.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "svg,png")]
     format: Vec<Format>,
@@ -34,8 +37,8 @@ impl PlotArguments {
     }
 
     fn options(&self) -> PlotOptions {
-        let Self { folder, only, format, width } = self.clone();
-        PlotOptions { folder, only, formats: format, width_mm: width }
+        let Self { folder, only, frame, format, width } = self.clone();
+        PlotOptions { folder, only, frame, formats: format, width_mm: width }
     }
 }
 

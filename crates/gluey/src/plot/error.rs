@@ -7,6 +7,7 @@ use gluey_pictures::PngError;
 use thiserror::Error;
 
 use super::figure::Figure;
+use crate::analyse::FramesError;
 use crate::output::OutputError;
 use crate::table::TableError;
 
@@ -64,6 +65,17 @@ pub enum PlotError {
         /// Where it would come from.
         hint: &'static str,
     },
+    /// The frames could not be read.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// No frame of that step.
+    #[error("{}: no frame of this step; there are {}", folder.display(), listed(steps))]
+    NoFrame {
+        /// The folder.
+        folder: PathBuf,
+        /// Steps that have frames.
+        steps: Vec<usize>,
+    },
     /// A picture could not be drawn.
     #[error("{}: cannot be drawn", path.display())]
     Png {
@@ -75,4 +87,12 @@ pub enum PlotError {
     /// A picture could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+/// The first, the second and the last.
+fn listed(steps: &[usize]) -> String {
+    match steps {
+        [first, second, .., last] => format!("{first}, {second}, ... {last}"),
+        _ => steps.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
+    }
 }

@@ -17,6 +17,8 @@ const THIN: Stroke = Stroke { color: "#0b4f9e", width: 1.0, dashes: None };
 const HEIGHT: f64 = 0.5;
 /// Ratio of the largest to the smallest gap from which on their axis is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
+/// Largest gap below which it is too, since its ticks would have many digits.
+const SMALL: f64 = 0.01;
 
 /// Gaps against time.
 pub fn gaps(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<Canvas>, PlotError> {
@@ -37,10 +39,10 @@ pub fn gaps(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<
     curves.retain(|curve| !curve.pieces.is_empty());
     let values: Vec<f64> = points(&curves).map(|(_, gap)| gap).collect();
     let (low, high) = ends(&values);
-    let y = match low > 0.0 && high > LOGARITHMIC * low {
+    let y = match low > 0.0 && (high > LOGARITHMIC * low || high < SMALL) {
         true => Axis::decades("gap / *a*", low, high),
         // Contacts lie beside the frame, not on it.
-        false => Axis::around("gap / *a*", values.into_iter().chain([low.min(-0.01 * high)])),
+        false => Axis::around("gap / *a*", values.into_iter().chain([low.min(-0.01 * high), 1.02 * high])),
     };
     let chart = chart(Axis::around("time *t*", t.iter().copied()), y, curves);
     Ok(Some(stacked(&[chart], width_mm)))

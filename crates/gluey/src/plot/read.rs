@@ -1,11 +1,16 @@
 //! The tables of a run, read back.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::error::PlotError;
 use super::figure::Figure;
 use crate::run::ResultPaths;
 use crate::table::Table;
+
+/// How trajectories begin.
+const HEADER: &[u8] = b"t,x1,";
 
 /// A table and where it came from.
 pub struct Source {
@@ -96,7 +101,12 @@ pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
 
 /// Whether a file begins as trajectories do.
 fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
-    Ok(text(path)?.starts_with("t,x1,"))
+    let begins = || {
+        let mut start = Vec::new();
+        File::open(path)?.take(HEADER.len() as u64).read_to_end(&mut start)?;
+        Ok(start == HEADER)
+    };
+    begins().map_err(|source| PlotError::Read { path: path.to_owned(), source })
 }
 
 fn text(path: &Path) -> Result<String, PlotError> {

@@ -101,16 +101,13 @@ const measures = {
   },
 };
 
-// Smallest and largest value in all frames, so that a colour means the same thing in each.
+// From 0 to the largest value in all frames, so that a colour means the same thing in each.
 const ranges = { gap: [Math.log10(SMALLEST_GAP), 0] };
 function range(name) {
   if (!ranges[name]) {
-    let [low, high] = [Infinity, -Infinity];
-    run.frames.forEach((now) => measures[name](now).forEach((value) => {
-      low = Math.min(low, value);
-      high = Math.max(high, value);
-    }));
-    ranges[name] = [low, high];
+    let high = 0;
+    run.frames.forEach((now) => measures[name](now).forEach((value) => { high = Math.max(high, value); }));
+    ranges[name] = [0, high];
   }
   return ranges[name];
 }
