@@ -87,7 +87,7 @@ pub fn run(options: &Options) -> Result<(), BenchError> {
     let cpu = (all - one) / steps;
     let per_step = |name: &str| (seconds(&report, name) - seconds(&first, name)) / steps;
     let phases = report.phases.iter().map(|(name, _)| (name.clone(), per_step(name).into()));
-    let memory = peak_memory();
+    let memory = gluey::memory::peak();
     let measured = Measured {
         dimension: options.dimension,
         particles: options.count,
@@ -144,13 +144,6 @@ fn cpu_seconds() -> f64 {
 #[cfg(not(unix))]
 fn cpu_seconds() -> f64 {
     f64::NAN
-}
-
-/// The most memory that this process has held, where the system tells.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| 1024 * kilobytes)
 }
 
 #[cfg(test)]

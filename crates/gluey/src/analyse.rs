@@ -28,7 +28,7 @@ use thiserror::Error;
 pub use frames::FramesError;
 pub use summary::Summary;
 
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, prepare_folder_of, write_atomically};
 use frames::{dimension, frame_files, read_frames};
 use observe::{Distributions, Instant};
 
@@ -119,6 +119,9 @@ where
 }
 
 fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), OutputError> {
-    std::fs::create_dir_all(folder).map_err(|error| OutputError::new(folder, "create the folder", error))?;
-    files.iter().try_for_each(|(name, text)| write_atomically(&folder.join(name), text.as_bytes()))
+    files.iter().try_for_each(|(name, text)| {
+        let path = folder.join(name);
+        prepare_folder_of(&path)?;
+        write_atomically(&path, text.as_bytes())
+    })
 }

@@ -171,9 +171,8 @@ fn payload(path: &Path) -> Result<Payload, CheckpointError> {
         Ok(bytes) => bytes,
         Err(source) => return Err(CheckpointError::Read { path, source }),
     };
-    let is_cut = MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) && !bytes.is_empty();
     let Some((header, body)) = bytes.split_at_checked(HEADER_LENGTH) else {
-        return Err(if is_cut {
+        return Err(if is_start(&bytes[..bytes.len().min(MAGIC.len())]) {
             CheckpointError::Damaged { path }
         } else {
             CheckpointError::Foreign { path }
@@ -195,6 +194,11 @@ fn payload(path: &Path) -> Result<Payload, CheckpointError> {
     payload.ok_or(CheckpointError::Damaged { path })
 }
 
+/// Whether a checkpoint may begin so.
+fn is_start(bytes: &[u8]) -> bool {
+    MAGIC.starts_with(bytes) && !bytes.is_empty()
+}
+
 /// What a checkpoint says of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckpointSummary {
@@ -211,6 +215,16 @@ pub struct CheckpointSummary {
 }
 
 impl CheckpointSummary {
+    /// Whether a file begins like a checkpoint, as far as it goes: it may be cut short.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn is_announced_by(path: &Path) -> io::Result<bool> {
+        let mut start = Vec::new();
+        fs::File::open(path)?.take(MAGIC.len() as u64).read_to_end(&mut start)?;
+        Ok(is_start(&start))
+    }
+
     /// Reads what stands in a checkpoint, whatever its case is.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ mod interrupt;
 mod manner;
 mod new;
 mod plot;
+mod recorded;
 mod resume;
 mod run;
 mod summary;

@@ -106,14 +106,12 @@ fn checkpoint_hint(error: &CheckpointError, case: &Path) -> String {
         | CheckpointError::Damaged { path } => path,
         _ => return anew,
     };
-    let mut older = path.clone().into_os_string();
-    older.push(".previous");
-    let older = Path::new(&older);
-    CheckpointSummary::read(older).map_or(anew, |summary| {
+    let older = ResultPaths::previous(path);
+    CheckpointSummary::read(&older).map_or(anew, |summary| {
         format!(
             "the checkpoint before it, after step {}, is whole; to go on from there: {}",
             summary.step,
-            go_on(path, older, case)
+            go_on(path, &older, case)
         )
     })
 }
@@ -164,5 +162,24 @@ impl Diagnostic for Diagnosed {
         self.label
             .clone()
             .map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_record_is_resumed_with_its_case() {
+        let interrupted = RunError::Interrupted {
+            step: 3,
+            steps: 5,
+            time: 0.3,
+            checkpoint: Some("nowhere/pair.checkpoint".into()),
+        };
+        assert_eq!(
+            hint(&interrupted, Path::new("pair.toml")).as_deref(),
+            Some("to go on: gluey run pair.toml --resume nowhere/pair.checkpoint (with the same options)")
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Whether a run fits into the memory of the machine: found out before anything is allocated.
+//! Whether a run fits into the memory of the machine, found out before anything is allocated; and how much it took.
 
 use std::fs;
 use std::path::Path;
@@ -53,15 +53,20 @@ fn fits(estimate: &MeshEstimate, available: Option<u64>) -> bool {
 /// only.
 pub fn available() -> Option<u64> {
     let read = |path: &Path| fs::read_to_string(path).ok();
-    let machine = read(Path::new("/proc/meminfo")).and_then(|text| mem_available(&text));
+    let machine = read(Path::new("/proc/meminfo")).and_then(|text| bytes_of("MemAvailable:", &text));
     let groups = read(Path::new("/proc/self/cgroup")).unwrap_or_default();
     let limits = group_folders(&groups).into_iter().filter_map(|folder| group_rest(&folder, read));
     machine.into_iter().chain(limits).min()
 }
 
-/// `MemAvailable:  1234 kB`.
-fn mem_available(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+/// The most bytes this process has held so far. Linux only.
+pub fn peak() -> Option<u64> {
+    bytes_of("VmHWM:", &fs::read_to_string("/proc/self/status").ok()?)
+}
+
+/// What the system says of `key`, on a line like `MemAvailable:  1234 kB`.
+fn bytes_of(key: &str, text: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -104,9 +109,15 @@ mod tests {
     #[test]
     fn memory_of_the_machine_is_read() {
         let text = "MemTotal:       24689764 kB\nMemFree:  9 kB\nMemAvailable:   22000000 kB\n";
-        assert_eq!(mem_available(text), Some(22_000_000 * 1024));
-        assert_eq!(mem_available("MemAvailable: much\n"), None);
-        assert_eq!(mem_available(""), None);
+        assert_eq!(bytes_of("MemAvailable:", text), Some(22_000_000 * 1024));
+        assert_eq!(bytes_of("MemAvailable:", "MemAvailable: much\n"), None);
+        assert_eq!(bytes_of("MemAvailable:", ""), None);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_peak_of_this_process_is_known() {
+        assert!(peak().is_some_and(|bytes| bytes > 100_000 && bytes < 1_000_000_000_000));
     }
 
     #[test]

@@ -85,7 +85,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// Creates the folder of `path` if it is missing, and makes sure that `path` can be a file in it.
-fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
+pub(crate) fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
     if path.file_name().is_none() || path.is_dir() {
         let source = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file");
         return Err(OutputError::new(path, "write the file", source));

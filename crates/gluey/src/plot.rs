@@ -25,7 +25,7 @@ pub use error::PlotError;
 pub use figure::Figure;
 pub use snapshot::FrameChoice;
 
-use crate::output::{OutputError, write_atomically};
+use crate::output::{prepare_folder_of, write_atomically};
 use read::Results;
 
 /// How a picture is written.
@@ -114,10 +114,7 @@ fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf
             Format::Svg => canvas.svg_for_print().into_bytes(),
             Format::Png => canvas.png().map_err(|source| PlotError::Png { path: path.clone(), source })?,
         };
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|error| OutputError::new(folder, "create the folder", error))?;
-        }
+        prepare_folder_of(&path)?;
         write_atomically(&path, &bytes)?;
         paths.push(path);
     }

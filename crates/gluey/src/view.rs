@@ -13,7 +13,7 @@ use thiserror::Error;
 use crate::analyse::FramesError;
 use crate::analyse::frames::{dimension, frame_files, read_frames};
 use crate::output::xyz::XyzFrame;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, prepare_folder_of, write_atomically};
 
 const PAGE: &str = include_str!("view/viewer.html");
 const SCRIPTS: [&str; 2] = [include_str!("view/viewer.js"), include_str!("view/controls.js")];
@@ -64,10 +64,7 @@ pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
     };
     let page = options.out.clone().unwrap_or_else(|| options.folder.join("view.html"));
     let text = run.page();
-    if let Some(folder) = page.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| OutputError::new(folder, "create the folder", error))?;
-    }
+    prepare_folder_of(&page)?;
     write_atomically(&page, text.as_bytes())?;
     let (frame_count, particle_count) = (run.frames.len(), run.radii.len());
     Ok(Viewed { page, frame_count, particle_count, size: text.len() })

@@ -65,13 +65,10 @@ impl Canvas {
     /// The name of the light on spheres of a colour, which is defined once.
     fn gradient(&mut self, color: Rgb) -> String {
         let name = format!("ball-{}", &hex(color)[1..]);
-        let definition = format!(r#"<radialGradient id="{name}""#);
-        if !self.contains(&definition) {
-            let [light, plain, dark] = [1.65, 1.0, 0.42].map(|light| hex(shaded(color, light)));
-            self.element(format_args!(
-                r#"{definition} cx="0.5" cy="0.5" r="0.5" fx="0.33" fy="0.3"><stop offset="0.05" stop-color="{light}"/><stop offset="0.45" stop-color="{plain}"/><stop offset="1" stop-color="{dark}"/></radialGradient>"#
-            ));
-        }
+        let [light, plain, dark] = [1.65, 1.0, 0.42].map(|light| hex(shaded(color, light)));
+        self.define(&name, format_args!(
+            r#"<radialGradient id="{name}" cx="0.5" cy="0.5" r="0.5" fx="0.33" fy="0.3"><stop offset="0.05" stop-color="{light}"/><stop offset="0.45" stop-color="{plain}"/><stop offset="1" stop-color="{dark}"/></radialGradient>"#
+        ));
         name
     }
 }

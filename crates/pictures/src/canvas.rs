@@ -1,6 +1,7 @@
 //! A drawing surface for what kuva does not draw: legends, set-ups, stacked panels. Plain SVG, one element a
 //! call.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use base64::Engine;
@@ -25,6 +26,8 @@ pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
+    /// Names of what the body defines once and uses often.
+    defined: BTreeSet<String>,
 }
 
 /// Why a drawing could not become a PNG.
@@ -44,7 +47,7 @@ pub enum PngError {
 impl Canvas {
     /// An empty white canvas.
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new() }
+        Self { width, height, body: String::new(), defined: BTreeSet::new() }
     }
 
     /// Height in SVG pixels.
@@ -147,9 +150,11 @@ impl Canvas {
         ))
     }
 
-    /// Whether this is in the drawing.
-    pub(crate) fn contains(&self, text: &str) -> bool {
-        self.body.contains(text)
+    /// Writes an element that others refer to by its name, the first time that it is asked for.
+    pub(crate) fn define(&mut self, name: &str, element: std::fmt::Arguments<'_>) {
+        if self.defined.insert(name.to_owned()) {
+            self.element(element);
+        }
     }
 
     /// An element of SVG over all others.

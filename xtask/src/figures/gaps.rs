@@ -3,8 +3,7 @@
 use super::{Data, exact_curve, legend, stroke};
 use crate::reproduce::plan::{Approach, CaseName, FigureName};
 use crate::reproduce::trajectory::Trajectory;
-use gluey_pictures::Canvas;
-use gluey_pictures::{Axis, Chart, Curve, Stroke, stack};
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 300.0;
 const PANEL_HEIGHT: f64 = 170.0;

@@ -14,8 +14,7 @@ use gluey_contact::{ContactModel, ContactParams, GammaUpdate, PairContact, StepG
 use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Film, Integrator, Scheme};
 
-use gluey_pictures::Canvas;
-use gluey_pictures::{Axis, Chart, Curve, Stroke, stack};
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 210.0;
 const STEP: f64 = 0.005;

@@ -1,7 +1,6 @@
 //! The initial set-ups as drawings: figures 4 and 8.
 
-use gluey_pictures::Canvas;
-use gluey_pictures::Stroke;
+use gluey_pictures::{Canvas, Stroke};
 
 const BLACK: Stroke = Stroke { color: "black", width: 1.4, dashes: None };
 const FLOW: Stroke = Stroke { color: "#0b4f9e", width: 1.4, dashes: None };

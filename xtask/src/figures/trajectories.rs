@@ -3,8 +3,7 @@
 use super::{Data, exact_curve, legend, stroke};
 use crate::reproduce::plan::FigureName;
 use crate::reproduce::trajectory::Trajectory;
-use gluey_pictures::Canvas;
-use gluey_pictures::{Axis, Chart, Curve, Mark, equal_aspect_height, stack};
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, equal_aspect_height, stack};
 
 /// Figure 6 or 7b: both particles of a pair.
 pub fn pair(figure: FigureName, data: &Data) -> Canvas {

@@ -2,8 +2,7 @@
 
 use gluey_verify::Plot;
 
-use gluey_pictures::Canvas;
-use gluey_pictures::{Axis, Chart, Curve, Mark, Stroke, stack};
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, Stroke, stack};
 
 /// Colours that stay apart for colour-blind readers, one for each formulation.
 const COLORS: [&str; 4] = ["#0b4f9e", "#c8471b", "#1b7f4d", "#8a3ea0"];

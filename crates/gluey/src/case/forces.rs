@@ -1,8 +1,7 @@
 //! Forces and torques on the particles of a case.
 
-use std::f64::consts::PI;
-
 use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_suspension::ball_volume;
 
 use super::{Case, ParticleSpec};
 
@@ -29,7 +28,7 @@ impl Case {
             let mut torque = Dim::<D>::zero_spin();
             let numbers = particle.torque.iter().flatten();
             numbers.enumerate().for_each(|(k, number)| torque[k] = *number);
-            Wrench { force: gravity * volume(D, particle.radius) + vector(&particle.force), torque }
+            Wrench { force: gravity * ball_volume::<D>(particle.radius) + vector(&particle.force), torque }
         };
         self.particles.iter().map(wrench).collect()
     }
@@ -40,13 +39,10 @@ fn is_given(numbers: &Option<Vec<f64>>) -> bool {
     numbers.iter().flatten().any(|&number| number != 0.0)
 }
 
-/// Volume of a sphere or area of a disc.
-fn volume(dimension: usize, radius: f64) -> f64 {
-    if dimension == 2 { PI * radius.powi(2) } else { 4.0 / 3.0 * PI * radius.powi(3) }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]

@@ -15,10 +15,7 @@ use super::{Case, UnknownName, fill};
 impl Case {
     /// Reads and checks a case file.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, CaseError> {
-        let path = path.as_ref();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
-        Self::parse(&text, path)
+        Self::load_with(path, &[])
     }
 
     /// Reads and checks a case file of which some keys are set otherwise.

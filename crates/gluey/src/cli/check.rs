@@ -1,8 +1,7 @@
 //! `gluey check`: what a run would be, found out by meshing once and by a few trial steps.
 
-use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -16,7 +15,7 @@ use thiserror::Error;
 use super::failure::Failure;
 use super::manner::Manner;
 use super::summary::CaseSummary;
-use crate::terminal::{Reporter, duration, print_json, print_lines};
+use crate::terminal::{Reporter, duration, print_lines};
 
 /// Steps of a trial.
 const TRIAL_STEPS: usize = 4;
@@ -92,7 +91,7 @@ impl CheckArguments {
         let size = MeshSize::of(&case).map_err(|error| refused(RunError::Flow(error.into())))?;
         let available = memory::available();
         let trial = (!self.no_trial).then(|| self.trial(&case)).transpose()?;
-        let measured = trial.as_ref().and_then(|_| peak_memory());
+        let measured = trial.as_ref().and_then(|_| memory::peak()).map(|bytes| bytes as f64);
         let check = Check {
             case: CaseSummary::of(&case),
             mesh: size.map(|size| Mesh { cells: size.cell_count, unknowns: size.dof_count }),
@@ -101,11 +100,7 @@ impl CheckArguments {
             memory_available_bytes: available,
             trial,
         };
-        match (self.manner.is_json(), self.manner.is_quiet()) {
-            (true, _) => print_json(&check),
-            (false, false) => print_lines(&check.lines()),
-            (false, true) => {}
-        }
+        self.manner.tell(&check, |check| print_lines(&check.lines()));
         Ok(())
     }
 
@@ -202,14 +197,6 @@ fn size(bytes: f64) -> String {
     }
 }
 
-/// The most memory this process has taken, in bytes; Linux only.
-fn peak_memory() -> Option<f64> {
-    let status = fs::read_to_string(Path::new("/proc/self/status")).ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024.0)
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -228,11 +215,5 @@ mod tests {
         let times = Times { flows: vec![start, after(5), after(7)], last: Some(after(11)) };
         let trial = times.trial(2, 100);
         assert_eq!((trial.first_s, trial.step_s, trial.run_s), (5.0, 3.0, 305.0));
-    }
-
-    #[test]
-    #[cfg(target_os = "linux")]
-    fn memory_of_this_process_is_known() {
-        assert!(peak_memory().is_some_and(|bytes| bytes > 1e5 && bytes < 1e12));
     }
 }

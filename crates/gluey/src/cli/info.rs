@@ -1,7 +1,6 @@
 //! `gluey info`.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,11 +9,9 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::failure::Failure;
+use super::recorded::{FolderError, recorded_runs};
 use super::summary::{CaseSummary, shown};
 use crate::terminal::{print_json, print_lines};
-
-/// What a checkpoint begins with.
-const CHECKPOINT: &[u8] = b"gluey-ck";
 
 /// Arguments of `gluey info`.
 #[derive(Debug, Args)]
@@ -34,9 +31,9 @@ enum InfoError {
     /// It cannot be read.
     #[error("{}: cannot be read", path.display())]
     Read { path: PathBuf, source: io::Error },
-    /// A folder in which no run left a record.
-    #[error("{}: no run is recorded there (no file *-run.json)", path.display())]
-    NoRun { path: PathBuf },
+    /// A folder without runs.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// A record cannot be read.
     #[error("the record of a run cannot be used")]
     Record(#[from] RecordError),
@@ -107,22 +104,16 @@ impl Info {
         if path.is_dir() {
             return Ok(Self::Folder { runs: runs(path).map_err(failure)? });
         }
-        if let Some(paths) = recorded_by(path) {
+        if let Some(paths) = ResultPaths::of_record(path) {
             return Ok(Self::Folder { runs: vec![RunInfo::of(&paths).map_err(failure)?] });
         }
-        let start = start(path).map_err(failure)?;
-        if start == CHECKPOINT[..start.len()] && !start.is_empty() {
+        let unread = |source| failure(InfoError::Read { path: path.to_owned(), source });
+        if CheckpointSummary::is_announced_by(path).map_err(unread)? {
             let info = CheckpointInfo::of(path).map_err(|error| Failure::new(error, None))?;
             return Ok(Self::Checkpoint(info));
         }
         Ok(Self::Case(CaseSummary::of(&Case::load(path)?)))
     }
-}
-
-/// The run whose record `path` is by its name.
-fn recorded_by(path: &Path) -> Option<ResultPaths> {
-    let stem = path.file_name()?.to_str()?.strip_suffix("-run.json")?;
-    Some(ResultPaths::new(path.parent().unwrap_or(Path::new("")), stem))
 }
 
 fn failure(error: InfoError) -> Failure {
@@ -134,23 +125,7 @@ fn failure(error: InfoError) -> Failure {
 }
 
 fn runs(folder: &Path) -> Result<Vec<RunInfo>, InfoError> {
-    let path = folder.to_owned();
-    let runs = match ResultPaths::in_folder(folder) {
-        Ok(runs) if runs.is_empty() => return Err(InfoError::NoRun { path }),
-        Ok(runs) => runs,
-        Err(source) => return Err(InfoError::Read { path, source }),
-    };
-    runs.iter().map(RunInfo::of).collect()
-}
-
-/// The first bytes of a file.
-fn start(path: &Path) -> Result<Vec<u8>, InfoError> {
-    let read = || {
-        let mut bytes = Vec::new();
-        File::open(path)?.take(CHECKPOINT.len() as u64).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    read().map_err(|source| InfoError::Read { path: path.to_owned(), source })
+    recorded_runs(folder)?.iter().map(RunInfo::of).collect()
 }
 
 impl CheckpointInfo {

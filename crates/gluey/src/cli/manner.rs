@@ -5,9 +5,10 @@ use std::path::Path;
 use clap::Args;
 use gluey::{Case, Progress, RunOptions, RunReport};
 use rayon::ThreadPoolBuilder;
+use serde::Serialize;
 
 use super::failure::Failure;
-use crate::terminal::{Reporter, print_json, print_report};
+use crate::terminal::{Reporter, print_json};
 
 /// The most threads that can be asked for.
 const MOST_THREADS: i64 = 4096;
@@ -36,18 +37,13 @@ impl Manner {
         outcome.map_err(|error| Failure::of_run(error, file))
     }
 
-    /// Says what came out.
-    pub fn tell(&self, report: &RunReport) {
+    /// Says what came out: to programs as JSON, to people by `print`.
+    pub fn tell<T: Serialize>(&self, outcome: &T, print: impl FnOnce(&T)) {
         match (self.json, self.quiet) {
-            (true, _) => print_json(report),
-            (false, false) => print_report(report),
+            (true, _) => print_json(outcome),
+            (false, false) => print(outcome),
             (false, true) => {}
         }
-    }
-
-    /// Whether what comes out is for programs.
-    pub fn is_json(&self) -> bool {
-        self.json
     }
 
     /// Whether only warnings and errors are told.

@@ -1,6 +1,5 @@
 //! `gluey resume`.
 
-use std::io;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,6 +9,8 @@ use thiserror::Error;
 use super::failure::Failure;
 use super::interrupt::interrupt_flag;
 use super::manner::Manner;
+use super::recorded::{FolderError, recorded_runs};
+use crate::terminal::print_report;
 
 /// Arguments of `gluey resume`.
 #[derive(Debug, Args)]
@@ -30,12 +31,9 @@ pub struct ResumeArguments {
 /// There is nothing to resume.
 #[derive(Debug, Error)]
 enum ResumeError {
-    /// The folder cannot be listed.
-    #[error("{}: cannot be read", folder.display())]
-    Folder { folder: PathBuf, source: io::Error },
-    /// It has no record of any run.
-    #[error("{}: no run is recorded there (no file *-run.json)", folder.display())]
-    NoRun { folder: PathBuf },
+    /// The folder has no runs.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// It has several.
     #[error("{}: {} runs are recorded there: {}", folder.display(), names.len(), names.join(", "))]
     Several { folder: PathBuf, names: Vec<String> },
@@ -56,9 +54,7 @@ enum ResumeError {
 impl ResumeError {
     fn hint(&self) -> Option<String> {
         Some(match self {
-            Self::Folder { .. } | Self::NoRun { .. } => {
-                "give the folder that a run wrote to, the DIR of its --out".into()
-            }
+            Self::Folder(_) => "give the folder that a run wrote to, the DIR of its --out".into(),
             Self::Several { names, .. } | Self::Unknown { names, .. } => {
                 format!("choose one, such as --case {}", names[0])
             }
@@ -91,19 +87,15 @@ impl ResumeArguments {
         let file = paths.case_file();
         let case = Case::load(&file)?;
         let report = self.manner.run(&case, &options(&paths, record, checkpoint), &file)?;
-        self.manner.tell(&report);
+        self.manner.tell(&report, print_report);
         Ok(())
     }
 
     fn find(&self) -> Result<ResultPaths, ResumeError> {
         let folder = self.folder.clone();
-        let runs = match ResultPaths::in_folder(&folder) {
-            Ok(runs) => runs,
-            Err(source) => return Err(ResumeError::Folder { folder, source }),
-        };
+        let runs = recorded_runs(&folder)?;
         let names: Vec<String> = runs.iter().map(ResultPaths::stem).collect();
         match (&self.case, &runs[..]) {
-            (_, []) => Err(ResumeError::NoRun { folder }),
             (Some(name), _) => match runs.iter().find(|run| run.stem() == *name) {
                 Some(run) => Ok(run.clone()),
                 None => Err(ResumeError::Unknown { folder, name: name.clone(), names }),

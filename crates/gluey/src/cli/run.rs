@@ -10,6 +10,7 @@ use gluey::{Case, Formulation, RecordOptions, ResultPaths, RunOptions, Strategy,
 use super::failure::Failure;
 use super::interrupt::interrupt_flag;
 use super::manner::Manner;
+use crate::terminal::print_report;
 
 /// Arguments of `gluey run`.
 #[derive(Debug, Args)]
@@ -71,7 +72,7 @@ impl RunArguments {
         let case = self.case()?;
         let options = self.options(&case);
         let report = self.manner.run(&case, &options, &self.case)?;
-        self.manner.tell(&report);
+        self.manner.tell(&report, print_report);
         Ok(())
     }
 

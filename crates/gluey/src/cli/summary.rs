@@ -1,8 +1,7 @@
 //! What a case is, in a few numbers.
 
-use std::f64::consts::PI;
-
 use gluey::Case;
+use gluey_suspension::ball_volume;
 use serde::Serialize;
 
 /// What a case is, in a few numbers.
@@ -75,10 +74,7 @@ pub fn shown(time: f64) -> f64 {
 }
 
 fn volume_fraction(case: &Case) -> f64 {
-    let volume = |radius: f64| match case.dimension {
-        2 => PI * radius.powi(2),
-        _ => 4.0 / 3.0 * PI * radius.powi(3),
-    };
+    let volume = if case.dimension == 2 { ball_volume::<2> } else { ball_volume::<3> };
     let solid: f64 = case.particles.iter().map(|particle| volume(particle.radius)).sum();
     let edges = case.upper().into_iter().zip(case.lower()).map(|(upper, lower)| upper - lower);
     solid / edges.product::<f64>()

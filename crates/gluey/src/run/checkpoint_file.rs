@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use gluey_geom::{Dim, Space};
 
 use super::options::RunOptions;
-use super::paths::previous;
+use super::paths::ResultPaths;
 use crate::case::Case;
 use crate::checkpoint::Checkpoint;
 use crate::output::{OutputError, set_aside};
@@ -38,7 +38,7 @@ impl CheckpointFile {
         let path = options.checkpoint.clone()?;
         let full = |path: &Path| path.canonicalize().ok();
         let resumes = |path: &Path| options.resume.as_deref().is_some_and(|file| full(file) == full(path));
-        let found = match (resumes(&path), resumes(&previous(&path)), has_drafts) {
+        let found = match (resumes(&path), resumes(&ResultPaths::previous(&path)), has_drafts) {
             (true, ..) => Found::Own,
             (_, true, _) => Found::OwnPrevious,
             (.., true) => Found::Wanted,
@@ -57,7 +57,7 @@ impl CheckpointFile {
     where
         Dim<D>: Space<D>,
     {
-        let older = previous(&self.path);
+        let older = ResultPaths::previous(&self.path);
         let failed = |error| OutputError::new(&older, "keep the checkpoint before the last", error);
         let away: &[&PathBuf] = match std::mem::replace(&mut self.found, Found::Own) {
             Found::Own => {

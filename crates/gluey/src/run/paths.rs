@@ -29,6 +29,12 @@ impl ResultPaths {
         Self::new(folder, csv.file_stem().unwrap_or_default())
     }
 
+    /// The files of the run whose record `path` is by its name.
+    pub fn of_record(path: &Path) -> Option<Self> {
+        let stem = path.file_name()?.to_str()?.strip_suffix(RECORD)?;
+        Some(Self::new(path.parent().unwrap_or(Path::new("")), stem))
+    }
+
     /// The files of all runs in `folder` that left a record, sorted by name.
     ///
     /// # Errors
@@ -79,7 +85,14 @@ impl ResultPaths {
 
     /// The checkpoint before the last.
     pub fn previous_checkpoint(&self) -> PathBuf {
-        previous(&self.checkpoint())
+        Self::previous(&self.checkpoint())
+    }
+
+    /// The generation before a checkpoint.
+    pub fn previous(checkpoint: &Path) -> PathBuf {
+        let mut name = checkpoint.as_os_str().to_owned();
+        name.push(".previous");
+        name.into()
     }
 
     /// The folder of files for ParaView.
@@ -97,11 +110,4 @@ impl ResultPaths {
         name.push(suffix);
         self.folder.join(name)
     }
-}
-
-/// Name of the generation before a checkpoint.
-pub(super) fn previous(checkpoint: &Path) -> PathBuf {
-    let mut name = checkpoint.as_os_str().to_owned();
-    name.push(".previous");
-    name.into()
 }

@@ -25,7 +25,7 @@ use crate::error::StokesError;
 use crate::space::Discretisation;
 
 /// Multiple of the eigenvalue.
-const FACTOR: f64 = 2.0;
+pub const FACTOR: f64 = 2.0;
 /// Share of the mean diagonal that is added to the strain energy: rigid motions have none.
 const SHIFT: f64 = 1e-9;
 

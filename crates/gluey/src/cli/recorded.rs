@@ -1,0 +1,28 @@
+//! The runs that left records in a folder.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use gluey::ResultPaths;
+use thiserror::Error;
+
+/// A folder in which no run can be found.
+#[derive(Debug, Error)]
+pub enum FolderError {
+    /// It cannot be listed.
+    #[error("{}: cannot be read", folder.display())]
+    Read { folder: PathBuf, source: io::Error },
+    /// It has no record of any run.
+    #[error("{}: no run is recorded there (no file *-run.json)", folder.display())]
+    NoRun { folder: PathBuf },
+}
+
+/// The runs, sorted by name; one at least.
+pub fn recorded_runs(folder: &Path) -> Result<Vec<ResultPaths>, FolderError> {
+    let folder = folder.to_owned();
+    match ResultPaths::in_folder(&folder) {
+        Ok(runs) if runs.is_empty() => Err(FolderError::NoRun { folder }),
+        Ok(runs) => Ok(runs),
+        Err(source) => Err(FolderError::Read { folder, source }),
+    }
+}
