@@ -1,5 +1,7 @@
 //! Particles that do not come back in an oscillating shear.
 
+use std::f64::consts::PI;
+
 use super::drawing::{Series, draw};
 use super::point::{Done, Point, PointError};
 use super::{Findings, Study};
@@ -8,7 +10,7 @@ const FILES: [&str; 2] = ["reversibility-2d.toml", "reversibility-3d.toml"];
 /// Amplitudes of the strain in 2D and 3D.
 const AMPLITUDES: [&[f64]; 2] = [&[0.2, 0.4, 0.6, 1.0, 1.6], &[0.5, 1.0, 2.0]];
 /// Cycles in 2D and 3D.
-const CYCLES: [usize; 2] = [10, 5];
+const CYCLES: [usize; 2] = [8, 4];
 /// A particle that is farther than this from where it was a cycle before, in radii, did not come back.
 const AWAY: f64 = 0.05;
 
@@ -22,13 +24,13 @@ const ROUGHNESS: f64 = -0.05;
 
 pub const STUDY: Study = Study {
     title: "Who comes back in an oscillating shear",
-    text: "Thirty discs at an area fraction of 0.4 and twelve spheres at 0.3 in a box whose shear strain goes to &gamma;<sub>0</sub>, to \
+    text: "Thirty discs at an area fraction of 0.55 and twelve spheres at 0.4 in a box whose shear strain goes to &gamma;<sub>0</sub>, to \
            &minus;&gamma;<sub>0</sub> and back, again and again. Stokes flow is reversible: whatever does not come back is due to \
            contacts, or to time steps. Shown is the share of particles that are more than 0.05 radii from where they were a cycle \
            before, mean of the second half of the cycles, and their root mean square displacement in a cycle. Four models: lubrication \
            forces and no contact; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
            does not fall below &minus;0.05 a&sup2;, and inelastic contact. Experiments with spheres (Pine et al. 2005, \
-           10.1038/nature04380) find that they come back up to an amplitude of about 0.14 &phi;<sup>&minus;1.93</sup>, 1.4 at 0.3; \
+           10.1038/nature04380) find that they come back up to an amplitude of about 0.14 &phi;<sup>&minus;1.93</sup>, 0.8 at 0.4; \
            particles of models without contact memory come to rest in arrangements without collisions below such an amplitude.",
     points,
     findings,
@@ -38,7 +40,7 @@ fn points(quick: bool) -> Vec<Point> {
     let dimensions = if quick { 0..1 } else { 0..2 };
     let mut points = Vec::new();
     for place in dimensions {
-        let amplitudes = if quick { &[0.4, 1.0] } else { AMPLITUDES[place] };
+        let amplitudes = if quick { &[0.4, 1.6] } else { AMPLITUDES[place] };
         let cycles = if quick { 2 } else { CYCLES[place] };
         for &amplitude in amplitudes {
             points.extend(MODELS.iter().map(|model| point(place, model, amplitude, cycles)));
@@ -66,10 +68,12 @@ fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> Po
     }
 }
 
-/// Radius of the particles of the cases.
+/// Radius of the particles of the cases, from their number and fraction.
 fn radius(place: usize) -> f64 {
-    use std::f64::consts::PI;
-    if place == 0 { (0.4 / (30.0 * PI)).sqrt() } else { (0.3 * 3.0 / (12.0 * 4.0 * PI)).cbrt() }
+    match place {
+        0 => (0.55 / (30.0 * PI)).sqrt(),
+        _ => (0.4 * 3.0 / (12.0 * 4.0 * PI)).cbrt(),
+    }
 }
 
 /// Share that did not come back in a cycle, and root mean square displacement in radii: means over the second
@@ -127,4 +131,21 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
 
 fn series(model: &str) -> Series {
     Series { label: model.to_owned(), points: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn radii_are_those_of_the_cases() {
+        let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/studies");
+        for place in 0..2 {
+            let case = point(place, ROUGH, 1.0, 1).case(&data).unwrap();
+            assert!((case.mean_radius() - radius(place)).abs() < 1e-12);
+            assert!(case.contact.gamma_min.is_some_and(|floor| floor < 0.0));
+        }
+    }
 }
