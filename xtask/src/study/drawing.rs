@@ -4,8 +4,8 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 340.0;
 
-/// Solid lines for what was computed, in colours that stay apart for colour-blind readers; thinner ones lie on
-/// top, so that curves that coincide are all seen.
+/// Solid lines for what was computed, in colours that stay apart for colour-blind readers; thinner ones lie
+/// on top, so that curves that coincide are all seen.
 const COMPUTED: [Stroke; 4] = [
     Stroke { color: "#0b4f9e", width: 4.2, dashes: None },
     Stroke { color: "#c8471b", width: 3.0, dashes: None },

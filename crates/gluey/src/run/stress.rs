@@ -9,8 +9,8 @@ use gluey_motion::MeanStress;
 /// Minus the mean product of the contact forces with the lines between centres, in spheres that fill the
 /// periods of `contact`; nothing in 2D.
 ///
-/// A force is `6 pi eta lambda` with lambda from the projection, in whose metric a sphere feels its own Stokes
-/// drag only (Verdon et al. 2010, eq. 29): forces of clusters are as exact as that.
+/// A force is `6 pi eta lambda` with lambda from the projection, in whose metric a sphere feels its own
+/// Stokes drag only (Verdon et al. 2010, eq. 29): forces of clusters are as exact as that.
 fn of_contacts<const D: usize>(
     contact: &PairContact<D>,
     particles: &[Particle<D>],
