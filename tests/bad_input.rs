@@ -335,6 +335,8 @@ fn references_of_something_else() {
     refused(&fast, &["needs shear_rate = 1, but the case has 2"]);
     let reversed = unbounded.replace("[time]\n", "[time]\nreverse_at = 1.0\n");
     refused(&reversed, &["a shear that is not reversed", "time.reverse_at"]);
+    let oscillating = unbounded.replace("[time]\n", "[time]\nstrain_amplitude = 1.0\n");
+    refused(&oscillating, &["a shear that is not reversed", "time.strain_amplitude"]);
 }
 
 #[test]

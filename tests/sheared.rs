@@ -75,6 +75,29 @@ fn sheared_back_the_discs_return() {
     assert!(fine < 5e-3 && coarse > 2.5 * fine, "{coarse} {fine}");
 }
 
+#[test]
+fn in_an_oscillating_shear_the_discs_return_in_every_cycle() {
+    let folder = TempDir::new().expect("a folder");
+    let case = case(2, "time = { step = 0.05, end = 1.6, strain_amplitude = 0.2 }");
+    let [csv, rheology] = files(&case, folder.path(), "cycles");
+    let strains = column(&rheology, "strain");
+    let expected = (0..=32).map(|step| case.strain_after(step));
+    assert!(strains.iter().zip(expected).all(|(found, exact)| (found - exact).abs() < 1e-12), "{strains:?}");
+    let largest = strains.iter().fold(0.0f64, |largest, strain| largest.max(strain.abs()));
+    assert!((largest - 0.2).abs() < 1e-12, "{largest}");
+    let moved = |step: usize| {
+        let of_column = |k: usize, axis: &str| {
+            let x = column(&csv, &format!("{axis}{}", k + 1));
+            (x[step] - x[0]).powi(2)
+        };
+        let squares: f64 = (0..6).map(|k| of_column(k, "x") + of_column(k, "y")).sum();
+        (squares / 6.0).sqrt() / case.mean_radius()
+    };
+    let [quarter, first, second] = [4, 16, 32].map(moved);
+    println!("rms distance in radii: after a quarter {quarter:.1e}, one cycle {first:.1e}, two {second:.1e}");
+    assert!(quarter > 0.1 && first < 1e-3 && second < 1e-3, "{quarter} {first} {second}");
+}
+
 /// Interrupts a run when it has reached a step.
 struct StopAt(usize, Arc<AtomicBool>);
 

@@ -1,5 +1,5 @@
-//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask bench-stokes`,
-//! `cargo xtask bench-suspension`, `cargo xtask tidy`, `cargo xtask ci`.
+//! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
+//! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
@@ -7,6 +7,7 @@ mod book;
 mod ci;
 mod figures;
 mod reproduce;
+mod study;
 mod tidy;
 mod verify;
 
@@ -34,6 +35,8 @@ enum Task {
     ReproduceFigures(ReproduceArguments),
     /// Compute what has an exact solution, with all formulations, and hold it against limits.
     Verify(VerifyArguments),
+    /// Compute a study of suspensions: a table, pictures and a page beside the literature.
+    Study(StudyArguments),
     /// Time one solve of the Stokes core and print one line of JSON.
     #[command(disable_help_flag = true)]
     BenchStokes {
@@ -78,10 +81,26 @@ struct VerifyArguments {
     out: PathBuf,
 }
 
+#[derive(clap::Args)]
+struct StudyArguments {
+    /// The study.
+    name: study::Name,
+    /// Few points and short runs: minutes.
+    #[arg(long)]
+    quick: bool,
+    /// Output folder [default: target/studies/NAME].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Runs at a time [default: number of cores].
+    #[arg(long, value_name = "N")]
+    jobs: Option<std::num::NonZeroUsize>,
+}
+
 fn main() -> ExitCode {
     match Arguments::parse().task {
         Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
         Task::Verify(arguments) => verify(arguments),
+        Task::Study(arguments) => study(arguments),
         Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
         Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
         Task::Tidy => tidy(),
@@ -128,14 +147,33 @@ fn verify(arguments: VerifyArguments) -> ExitCode {
     }
 }
 
+fn study(arguments: StudyArguments) -> ExitCode {
+    let StudyArguments { name, quick, out, jobs: wanted } = arguments;
+    let folder = if quick { "target/studies/quick" } else { "target/studies" };
+    let out = out.unwrap_or_else(|| Path::new(folder).join(name.as_str()));
+    let options = study::Options { name, quick, root: workspace_root(), out, jobs: jobs(wanted) };
+    match study::study(&options) {
+        Ok(failures) => {
+            println!("table.csv, pictures and index.html are in {}", options.out.display());
+            failures.iter().for_each(|failure| eprintln!("error: {}: {}", failure.what, failure.error));
+            if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        }
+        Err(error) => outcome(Err(error)),
+    }
+}
+
+/// Runs at a time: as many as wanted, else one for each core.
+fn jobs(wanted: Option<std::num::NonZeroUsize>) -> usize {
+    wanted.or(std::thread::available_parallelism().ok()).map_or(1, usize::from)
+}
+
 fn reproduce_figures(arguments: ReproduceArguments) -> ExitCode {
-    let cores = std::thread::available_parallelism();
     let options = reproduce::Options {
         quick: arguments.quick,
         figures: chosen(arguments.only),
         root: workspace_root(),
         out: arguments.out,
-        jobs: arguments.jobs.or(cores.ok()).map_or(1, usize::from),
+        jobs: jobs(arguments.jobs),
     };
     match reproduce::reproduce(&options) {
         Ok(summary) => {

@@ -147,6 +147,10 @@ pub struct TimeSpec {
     /// The shear is reversed at the first step that starts at this time or later.
     #[serde(default)]
     pub reverse_at: Option<f64>,
+    /// The shear oscillates: at a constant rate the strain goes to this value, to minus this value and back
+    /// to 0, again and again. A whole number of steps makes up this strain; four times as many are a cycle.
+    #[serde(default)]
+    pub strain_amplitude: Option<f64>,
 }
 
 /// Contact.
@@ -386,6 +390,11 @@ impl Case {
     /// Whether the box is sheared for ever, with images that slide along each other.
     pub fn is_sheared(&self) -> bool {
         self.flow.hydrodynamics == Hydrodynamics::Stokes && self.domain.boundary == Boundary::Sheared
+    }
+
+    /// Whether there is a stress to compute: where the box is sheared, and not at the rate 0.
+    pub fn has_rheology(&self) -> bool {
+        self.is_sheared() && self.shear_rate != 0.0
     }
 
     /// Surroundings of the particles: walls below and above (y), which move along themselves, and the

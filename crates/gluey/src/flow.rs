@@ -282,6 +282,7 @@ where
             viscosity: self.params.viscosity,
             of_bodies: stress.of_bodies(volume),
             of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            of_contacts: None,
             dissipation: stress.dissipation / volume,
         })
     }

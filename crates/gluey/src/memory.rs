@@ -1,4 +1,5 @@
-//! Whether a run fits into the memory of the machine, found out before anything is allocated; and how much it took.
+//! Whether a run fits into the memory of the machine, found out before anything is allocated; how much this
+//! process took.
 
 use std::fs;
 use std::path::Path;

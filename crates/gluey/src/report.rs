@@ -70,7 +70,7 @@ impl RunReport {
             dofs: flow.dof_count,
             min_gap_over_a: measures.smallest_gap_over_a(),
             end_gap_over_a: pair.end_gap().map(|gap| gap / a),
-            reversibility_error: case.time.reverse_at.map_or_else(|| reversibility_error(pair, a), |_| None),
+            reversibility_error: (!case.turns_round()).then(|| reversibility_error(pair, a)).flatten(),
             reference: case.reference.clone(),
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),

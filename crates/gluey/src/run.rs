@@ -9,6 +9,7 @@ mod options;
 mod paths;
 mod record;
 mod recorder;
+mod stress;
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -38,6 +39,7 @@ use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
 use recorder::Recorder;
+use stress::with_contacts;
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -121,14 +123,14 @@ where
         let mut simulation = simulation(case, hydrodynamics);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
-        if case.is_sheared() {
+        if case.has_rheology() {
             drafts.extend(rheology::earlier_drafts(&options.csv)?);
         }
         let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
         let mut rheology = None;
         let csv = match &options.resume {
             None => {
-                if case.is_sheared() {
+                if case.has_rheology() {
                     rheology = Some(RheologyWriter::create::<D>(&options.csv)?);
                 }
                 if !drafts.is_empty() {
@@ -221,6 +223,8 @@ where
         let domain = simulation.contact().domain();
         let smallest_gap_over_a = self.csv.write(&Row { time, particles, twists, domain })?;
         if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
+            let stress = with_contacts(stress, simulation.contact(), particles)
+                .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
             rheology.write(&Rheology { time, strain, stress: &stress, smallest_gap_over_a })?;
         }
@@ -236,7 +240,7 @@ where
         }
         match &self.xyz {
             Some((every, writer)) if step.is_multiple_of(*every) => {
-                let strain = self.case.strain_at(time);
+                let strain = self.case.strain_after(step);
                 let container = self.case.container();
                 let height = container.bounds().extent()[1];
                 let container = container.tilted(simulation.strain() * height);
@@ -247,13 +251,12 @@ where
         Ok(())
     }
 
-    /// Moves the particles, and reverses the shear when it is time.
+    /// Moves the particles, and turns the shear round when it is time.
     fn advance(&mut self) -> Result<(), RunError> {
         self.tell("motion");
         self.simulation.advance();
         self.check_inside()?;
-        let now = self.simulation.time() * (1.0 + 1e-12);
-        if self.case.time.reverse_at.is_some_and(|at| now >= at) && !self.simulation.is_reversed() {
+        if self.case.is_reversed_after(self.simulation.step_index()) != self.simulation.is_reversed() {
             self.simulation.reverse_shear();
         }
         Ok(())

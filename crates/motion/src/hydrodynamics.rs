@@ -115,14 +115,27 @@ pub struct MeanStress<const D: usize> {
     pub of_bodies: Matrix<D>,
     /// The share of films that are too thin for the mesh.
     pub of_films: Matrix<D>,
-    /// Power dissipated.
+    /// Minus the mean product of the forces of contacts with the lines between the centres that they push
+    /// apart. In 3D only: forces of contacts between discs have no unit of force.
+    pub of_contacts: Option<Matrix<D>>,
+    /// Power dissipated by fluid and films.
     pub dissipation: f64,
 }
 
 impl<const D: usize> MeanStress<D> {
+    /// Stress of the particles: of the tractions on them, and of their contacts.
+    pub fn of_particles(&self) -> Matrix<D> {
+        self.of_bodies + self.of_contacts.unwrap_or_else(Matrix::zeros)
+    }
+
     /// Viscosity of the suspension over that of the fluid.
     pub fn relative_viscosity(&self) -> f64 {
-        1.0 + self.over_rate(self.of_bodies[(0, 1)])
+        1.0 + self.over_rate(self.of_particles()[(0, 1)])
+    }
+
+    /// The share of contacts in the relative viscosity.
+    pub fn viscosity_of_contacts(&self) -> Option<f64> {
+        self.of_contacts.map(|stress| self.over_rate(stress[(0, 1)]))
     }
 
     /// The share of films in the relative viscosity.
@@ -138,13 +151,14 @@ impl<const D: usize> MeanStress<D> {
     /// `N_1 = sigma_xx - sigma_yy` and `N_2 = sigma_yy - sigma_zz` over viscosity and size of the shear rate;
     /// no `N_2` in 2D.
     pub fn normal_stress_differences(&self) -> [Option<f64>; 2] {
-        let normal = |d: usize| self.of_bodies[(d, d)] / (self.viscosity * self.rate.abs());
+        let stress = self.of_particles();
+        let normal = |d: usize| stress[(d, d)] / (self.viscosity * self.rate.abs());
         [Some(normal(0) - normal(1)), (D == 3).then(|| normal(1) - normal(D - 1))]
     }
 
     /// Pressure of the particles, `-tr / D`, over viscosity and size of the shear rate.
     pub fn particle_pressure(&self) -> f64 {
-        -self.of_bodies.trace() / (D as f64 * self.viscosity * self.rate.abs())
+        -self.of_particles().trace() / (D as f64 * self.viscosity * self.rate.abs())
     }
 
     fn over_rate(&self, stress: f64) -> f64 {

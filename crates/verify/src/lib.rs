@@ -22,6 +22,7 @@ mod case;
 mod cases;
 mod clock;
 mod limits;
+pub mod literature;
 mod method;
 mod norms;
 mod number;

@@ -3,6 +3,7 @@
 
 pub mod files;
 pub mod page;
+pub mod progress;
 pub mod schedule;
 
 use std::error::Error;

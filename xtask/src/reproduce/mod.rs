@@ -5,7 +5,6 @@ pub mod known;
 pub mod measures;
 pub mod page;
 pub mod plan;
-pub mod progress;
 pub mod reference;
 pub mod rows;
 mod runner;
@@ -21,6 +20,7 @@ use std::time::Instant;
 use gluey::RunReport;
 
 use crate::book::files::{self, WriteError};
+use crate::book::progress::Board;
 use crate::book::{Failure, schedule, write_drawing};
 use crate::figures::{self, Data};
 use page::Section;
@@ -109,7 +109,7 @@ fn make_runs(
 ) -> BTreeMap<RunKey, RunReport> {
     let mut keys = plan::runs_for(&options.figures, options.quick);
     keys.retain(|key| settings.contains_key(key));
-    let board = progress::Board::new();
+    let board = Board::new();
     let results = schedule::in_parallel(&keys, options.jobs, |&key| {
         runner::run(&options.root, folder, key, options.quick, &board)
     });

@@ -6,7 +6,7 @@ use gluey::case::{Memory, ParticleVelocity};
 use gluey::{Case, CaseError, Formulation, RunError, RunOptions, RunReport, Strategy};
 
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
-use super::progress::Board;
+use crate::book::progress::Board;
 use crate::book::{chain, page::duration};
 
 /// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact
@@ -57,7 +57,7 @@ pub fn run(
     quick: bool,
     board: &Board,
 ) -> Result<RunReport, RunError> {
-    let line = board.start(key);
+    let line = board.start(&key.name());
     let result = run_to_files(root, folder, key, quick, &line);
     match &result {
         Ok(report) => line.finish(&format!("done in {}", duration(report.wall_s))),

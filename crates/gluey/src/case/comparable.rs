@@ -25,7 +25,8 @@ fn other_flow(case: &Case, reference: &Reference) -> Option<Mismatch> {
     let hydrodynamics =
         if reference.is_in_box() { Hydrodynamics::Stokes } else { Hydrodynamics::PairMobility };
     let found = case.flow.hydrodynamics;
-    let reversal = case.time.reverse_at;
+    let turned = [("reverse_at", case.time.reverse_at), ("strain_amplitude", case.time.strain_amplitude)];
+    let turned = turned.into_iter().find(|(_, value)| value.is_some());
     unless(case.dimension == dimension, format!("dimension {dimension}"), || {
         format!("dimension {}", case.dimension)
     })
@@ -42,7 +43,10 @@ fn other_flow(case: &Case, reference: &Reference) -> Option<Mismatch> {
         unless(!case.has_forces(), needs, || "some".to_owned())
     })
     .or_else(|| unless(case.shear_rate == 1.0, "shear_rate = 1", || format!("{}", case.shear_rate)))
-    .or_else(|| unless(reversal.is_none(), "a shear that is not reversed", || "time.reverse_at".to_owned()))
+    .or_else(|| {
+        let found = || format!("time.{}", turned.map_or("", |(name, _)| name));
+        unless(turned.is_none(), "a shear that is not reversed", found)
+    })
 }
 
 /// Flow in a box needs that box and its boundary; without walls the height at which the shear is at rest

@@ -215,10 +215,29 @@ fn check_time(case: &Case, key: &Key) -> Check {
         let problem = Problem::TooManySteps { end: time.end, step: time.step, steps };
         return fail(key.name("step"), problem);
     }
-    match time.reverse_at {
-        Some(reverse_at) => positive(reverse_at, key.name("reverse_at")),
-        None => Ok(()),
+    time.reverse_at.map_or(Ok(()), |at| positive(at, key.name("reverse_at")))?;
+    time.strain_amplitude
+        .map_or(Ok(()), |amplitude| check_cycles(case, amplitude, key.name("strain_amplitude")))
+}
+
+/// A shear that oscillates is there, nothing else turns it round, and it does so between steps.
+fn check_cycles(case: &Case, amplitude: f64, key: Key) -> Check {
+    positive(amplitude, key.clone())?;
+    let choice = || format!("strain_amplitude = {amplitude}");
+    let unfit = |needs: &str, found: String| {
+        fail(key.clone(), Problem::Unfit { choice: choice(), needs: needs.to_owned(), found })
+    };
+    if case.shear_rate == 0.0 {
+        return unfit("a shear rate that is not 0", "shear_rate = 0".to_owned());
     }
+    if let Some(at) = case.time.reverse_at {
+        return unfit("no time.reverse_at beside it", format!("reverse_at = {at}"));
+    }
+    let steps = case.steps_to(amplitude);
+    if steps < 0.5 || (steps - steps.round()).abs() > 1e-6 * steps {
+        return unfit("a whole number of steps for this strain", format!("{steps:.6}"));
+    }
+    Ok(())
 }
 
 fn check_contact(case: &Case, key: &Key) -> Check {

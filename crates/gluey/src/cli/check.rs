@@ -85,6 +85,7 @@ struct Trial {
 impl CheckArguments {
     /// Says what the run would be.
     pub fn run(&self) -> Result<(), Failure> {
+        self.manner.set_threads()?;
         let case = Case::load_with(&self.case, &self.set)?;
         let refused = |error: RunError| Failure::of_run(error, &self.case);
         memory::check(&case).map_err(|error| refused(error.into()))?;
@@ -106,13 +107,12 @@ impl CheckArguments {
 
     /// Makes the first steps of the run, whose results go away again.
     fn trial(&self, case: &Case) -> Result<Trial, Failure> {
-        self.manner.set_threads()?;
         let folder =
             tempfile::TempDir::new().map_err(|error| Failure::new(TrialError::Folder(error), None))?;
         let steps = case.step_count().min(TRIAL_STEPS);
         let mut short = case.clone();
         short.time.end = case.time.step * steps as f64;
-        (short.time.reverse_at, short.reference) = (None, None);
+        (short.time.reverse_at, short.time.strain_amplitude, short.reference) = (None, None, None);
         let reporter = Reporter::new("trial steps", self.manner.is_quiet());
         let clock = Clock { reporter, times: Mutex::default() };
         let options = RunOptions::csv(folder.path().join("trial.csv"));

@@ -30,7 +30,6 @@ pub struct Manner {
 impl Manner {
     /// Runs `case`, which was read from `file`.
     pub fn run(&self, case: &Case, options: &RunOptions, file: &Path) -> Result<RunReport, Failure> {
-        self.set_threads()?;
         let reporter = Reporter::new(&case.name, self.quiet);
         let outcome = gluey::run(case, options, &reporter as &dyn Progress);
         reporter.finish();
@@ -51,7 +50,8 @@ impl Manner {
         self.quiet
     }
 
-    /// Takes as many threads as were asked for.
+    /// Takes as many threads as were asked for; before any work, for threads are made once. Reading a case is
+    /// work where its particles are generated.
     pub fn set_threads(&self) -> Result<(), Failure> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = ThreadPoolBuilder::new().num_threads(threads as usize).build_global();

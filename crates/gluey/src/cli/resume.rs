@@ -74,6 +74,7 @@ impl From<ResumeError> for Failure {
 impl ResumeArguments {
     /// Runs to the end.
     pub fn run(&self) -> Result<(), Failure> {
+        self.manner.set_threads()?;
         let paths = self.find()?;
         let record = RunRecord::read(&paths.record()).map_err(ResumeError::from)?;
         if record.state == RunState::Complete {

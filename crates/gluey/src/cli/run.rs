@@ -69,6 +69,7 @@ pub struct RunArguments {
 impl RunArguments {
     /// Runs the case that they name, and tells what came out.
     pub fn run(&self) -> Result<(), Failure> {
+        self.manner.set_threads()?;
         let case = self.case()?;
         let options = self.options(&case);
         let report = self.manner.run(&case, &options, &self.case)?;

@@ -1,9 +1,10 @@
 //! The rheology of a sheared suspension as comma-separated values, a row whenever its stress was computed.
 //!
 //! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate.
-//! `viscosity` is by the stresslets of the particles, `viscosity_by_dissipation` by the power that fluid and
-//! films dissipate: their difference is an error of discretisation.
-//! `viscosity_of_films` is the share of films too thin for the mesh in the first. `particle_pressure` is
+//! `viscosity` is by the stresslets of the particles and by the forces of their contacts,
+//! `viscosity_by_dissipation` by the power that fluid and films dissipate: without contacts their difference
+//! is an error of discretisation. `viscosity_of_films` and, in 3D, `viscosity_of_contacts` are the shares of
+//! films too thin for the mesh and of contacts in the first. `particle_pressure` is
 //! `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
 use std::path::{Path, PathBuf};
@@ -13,13 +14,14 @@ use gluey_motion::MeanStress;
 use super::draft::{Draft, Mark, RowsError};
 use super::{OutputError, drafts};
 
-/// The first line in 2D; in 3D `N2` comes behind `N1`.
-const NAMES: [&str; 9] = [
+/// The first line in 3D; in 2D there is no `N2`, and forces of contacts have no unit of force.
+const NAMES: [&str; 10] = [
     "t",
     "strain",
     "viscosity",
     "viscosity_by_dissipation",
     "viscosity_of_films",
+    "viscosity_of_contacts",
     "N1",
     "N2",
     "particle_pressure",
@@ -91,7 +93,8 @@ pub fn rheology_path(csv: &Path) -> PathBuf {
 
 /// The first line.
 pub fn header<const D: usize>() -> String {
-    let names: Vec<&str> = NAMES.into_iter().filter(|name| D == 3 || *name != "N2").collect();
+    let is_there = |name: &&str| D == 3 || !["N2", "viscosity_of_contacts"].contains(name);
+    let names: Vec<&str> = NAMES.into_iter().filter(is_there).collect();
     names.join(",")
 }
 
@@ -106,7 +109,8 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
         stress.viscosity_by_dissipation(),
         stress.viscosity_of_films(),
     ];
-    let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]);
+    let contacts = stress.viscosity_of_contacts();
+    let normal = contacts.into_iter().chain(n1).chain(n2).chain([stress.particle_pressure()]);
     let numbers = first.into_iter().chain(normal).map(|number| format!("{number:.16e}"));
     let gap = row.smallest_gap_over_a.map_or(String::new(), |gap| format!("{gap:.16e}"));
     let cells: Vec<String> = numbers.chain([gap]).collect();
@@ -129,15 +133,16 @@ mod tests {
             viscosity: 2.0,
             of_bodies,
             of_films: of_bodies * 0.1,
+            of_contacts: Some(of_bodies * 0.5),
             dissipation: 1.25,
         };
         let row = Rheology { time: 1.0, strain: -0.5, stress: &stress, smallest_gap_over_a: Some(0.25) };
         let line = line(&row);
         let numbers: Vec<f64> =
             line.trim_end().split(',').map(|cell| cell.parse().expect("a number")).collect();
-        let expected = [1.0, -0.5, 2.5, 2.5, 0.15, -1.0, 2.0, 3.0, 0.25];
+        let expected = [1.0, -0.5, 3.25, 2.5, 0.15, 0.75, -1.5, 3.0, 4.5, 0.25];
         assert!(numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{numbers:?}");
         assert_eq!(numbers.len(), header::<3>().split(',').count());
-        assert_eq!(header::<2>().split(',').count(), numbers.len() - 1);
+        assert_eq!(header::<2>().split(',').count(), numbers.len() - 2);
     }
 }

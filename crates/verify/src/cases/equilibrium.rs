@@ -8,6 +8,7 @@ use gluey_suspension::Container;
 use gluey_suspension::packing::{Amount, Arrangement, Packing, PackingParams};
 
 use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::literature::{settling_lost_in_box, settling_of_spheres, viscosity_of_spheres};
 use crate::method::{METHODS, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
@@ -29,10 +30,6 @@ const SWEEPS: usize = 2000;
 /// Relative viscosity of discs in equilibrium: 18 discs, 12 configurations, spectral boundary integrals;
 /// standard errors 0.002, 0.006, 0.020, 0.03.
 const DISCS: [f64; 4] = [1.240, 1.601, 2.193, 3.19];
-/// Settling of a simple cubic lattice of small spheres: `K = 1 - 1.7601 phi^(1/3)` (Hasimoto 1959,
-/// 10.1017/S0022112059000222).
-const HASIMOTO: f64 = 1.7601;
-
 /// The chapter.
 pub const CASE: Case = Case {
     name: "equilibrium",
@@ -159,24 +156,6 @@ where
     Ok(mean(&velocities) * 6.0 * std::f64::consts::PI * bodies[0].bounding_radius())
 }
 
-/// Relative viscosity of hard spheres in equilibrium at high frequency (Riest, Eckert, Richtering and
-/// Naegele 2015, 10.1039/C4SM02816A).
-fn viscosity_of_spheres(phi: f64) -> f64 {
-    let s = phi * (1.0 + 0.95 * phi - 2.15 * phi * phi);
-    1.0 + 2.5 * phi * (1.0 + s) / (1.0 - phi * (1.0 + s))
-}
-
-/// Settling velocity of hard spheres in equilibrium, without memory.
-fn settling_of_spheres(phi: f64) -> f64 {
-    1.0 - 6.5464 * phi * (1.0 - phi * (3.348 - phi * (7.426 - phi * (10.034 - phi * 5.882))))
-}
-
-/// What a box of `count` spheres lacks of the settling velocity.
-fn settling_lost_in_box(phi: f64, count: usize) -> f64 {
-    let compressibility = (1.0 - phi).powi(4) / (1.0 + phi * (4.0 + phi * (4.0 - phi * (4.0 - phi))));
-    HASIMOTO * compressibility * (phi / count as f64).cbrt() / viscosity_of_spheres(phi)
-}
-
 /// Relative viscosity of discs or spheres.
 fn expected(dimension: usize, phi: f64) -> f64 {
     let place = FRACTIONS.iter().position(|&fraction| fraction == phi);
@@ -233,6 +212,7 @@ fn plot(tables: &Tables) -> Plot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::literature::HASIMOTO;
 
     /// Values of the formulas as they are tabulated.
     #[test]

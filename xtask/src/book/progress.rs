@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 use gluey::ProgressState;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::plan::RunKey;
-use crate::book::page::duration;
+use super::page::duration;
 
 /// Time between two lines of a run where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(20);
@@ -32,9 +31,9 @@ impl Board {
     }
 
     /// A run begins.
-    pub fn start(&self, key: RunKey) -> RunLine {
+    pub fn start(&self, name: &str) -> RunLine {
         let bar = self.bars.as_ref().map(|bars| bars.add(ProgressBar::new(0).with_style(style())));
-        let line = RunLine { name: key.name(), bar, last_line: Mutex::new(Instant::now()) };
+        let line = RunLine { name: name.to_owned(), bar, last_line: Mutex::new(Instant::now()) };
         match &line.bar {
             Some(bar) => bar.set_prefix(line.name.clone()),
             None => eprintln!("{}: started", line.name),

@@ -1,0 +1,61 @@
+//! Results with error bars beside curves of the literature.
+
+use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
+
+const FRAME_HEIGHT: f64 = 340.0;
+
+/// Solid lines for what was computed, in colours that stay apart for colour-blind readers; thinner ones lie
+/// on top, so that curves that coincide are all seen.
+const COMPUTED: [Stroke; 4] = [
+    Stroke { color: "#0b4f9e", width: 4.2, dashes: None },
+    Stroke { color: "#c8471b", width: 3.0, dashes: None },
+    Stroke { color: "#1b7f4d", width: 1.8, dashes: None },
+    Stroke { color: "#8a3ea0", width: 1.0, dashes: None },
+];
+/// Thin lines for what is known.
+const KNOWN: [Stroke; 3] = [
+    Stroke { color: "#111", width: 1.2, dashes: Some("2 2.5") },
+    Stroke { color: "#111", width: 1.2, dashes: Some("9 4") },
+    Stroke { color: "#111", width: 1.2, dashes: Some("9 3 2 3") },
+];
+
+/// A quantity with its error, at many places.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name in the legend.
+    pub label: String,
+    /// Place, mean, and half the length of its error bar.
+    pub points: Vec<(f64, f64, f64)>,
+}
+
+/// Series and known curves over a pair of axes; a logarithmic one leaves out what is not positive.
+pub fn draw(
+    x: &str,
+    y: &str,
+    is_logarithmic: bool,
+    series: &[Series],
+    known: Vec<(String, Vec<(f64, f64)>)>,
+) -> Canvas {
+    let mut curves: Vec<Curve> = Vec::new();
+    for ((label, points), stroke) in known.into_iter().zip(KNOWN) {
+        curves.push(Curve { label: Some(label), stroke, pieces: vec![points] });
+    }
+    for (series, stroke) in series.iter().zip(COMPUTED) {
+        let is_shown = |point: &&(f64, f64, f64)| !is_logarithmic || point.1 > 0.0;
+        let points: Vec<_> = series.points.iter().filter(is_shown).copied().collect();
+        let line = points.iter().map(|&(x, y, _)| (x, y)).collect();
+        curves.push(Curve { label: Some(series.label.clone()), stroke, pieces: vec![line] });
+        let bars = points.iter().filter(|(_, y, error)| *error > 0.0 && (!is_logarithmic || error < y));
+        let bars = bars.map(|&(x, y, error)| vec![(x, y - error), (x, y + error)]).collect();
+        curves.push(Curve { label: None, stroke, pieces: bars });
+    }
+    let points = || curves.iter().flat_map(|curve| curve.pieces.iter().flatten().copied());
+    let across = Axis::around(x, points().map(|point| point.0));
+    let (low, high) = (points().map(|p| p.1).reduce(f64::min), points().map(|p| p.1).reduce(f64::max));
+    let up = match is_logarithmic {
+        true => Axis::decades(y, low.unwrap_or(0.1), high.unwrap_or(1.0)),
+        false => Axis::around(y, points().map(|point| point.1)),
+    };
+    let chart = Chart { x: across, y: up, curves, notes: Vec::new(), marks: Vec::new() };
+    stack(&[chart], |_| FRAME_HEIGHT)
+}

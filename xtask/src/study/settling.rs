@@ -1,0 +1,104 @@
+//! Settling velocity of spheres against their fraction.
+
+use std::f64::consts::PI;
+
+use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
+
+use super::drawing::{Series, draw};
+use super::point::{Done, Point, PointError};
+use super::{Findings, Study};
+
+const FILE: &str = "settling.toml";
+const MODEL: &str = "equilibrium";
+
+pub const STUDY: Study = Study {
+    title: "Settling of spheres",
+    text: "Mean velocity of twenty equal spheres of equal weight in a periodic box without mean flow, at the first instant after they were \
+           at rest in equilibrium, over that of a single sphere: mean of many configurations with twice its standard error. What a box \
+           of twenty lacks is added by the correction of Ladd 1990 (10.1063/1.458830). Beside it: the polynomial through published \
+           simulations of the same, 1 &minus; 6.5464 &phi; (1 &minus; 3.348 &phi; + 7.426 &phi;&sup2; &minus; 10.034 &phi;&sup3; + 5.882 \
+           &phi;&#8308;), dilute suspensions (Batchelor 1972, 1 &minus; 6.55 &phi;), and experiments, whose particles have long left \
+           equilibrium (Richardson and Zaki 1954, (1 &minus; &phi;)<sup>4.65</sup>).",
+    points,
+    findings,
+};
+
+fn points(quick: bool) -> Vec<Point> {
+    let fractions = if quick { &[0.1, 0.3][..] } else { &[0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4][..] };
+    let seeds = if quick { 2 } else { 20 };
+    let mut points = Vec::new();
+    for &fraction in fractions {
+        for seed in 1..=seeds {
+            let point = Point::new(format!("{fraction}-{seed}"), MODEL, fraction, FILE);
+            points.push(point.with("suspension.volume_fraction", fraction).with("suspension.seed", seed));
+        }
+    }
+    points
+}
+
+/// Mean velocity of a first step along the weight over that of a single sphere.
+fn velocity(done: &Done) -> Result<f64, PointError> {
+    let (case, table) = (&done.case, &done.trajectory);
+    let weight = case.gravity.iter().flatten().copied().fold(0.0, |sum, x| sum + x.abs());
+    let mut sum = 0.0;
+    for (index, particle) in case.particles.iter().enumerate() {
+        let y = table.column(&format!("y{}", index + 1))?;
+        // A sphere of volume V settles at w V / (6 pi a).
+        let alone = weight * 4.0 / 3.0 * PI * particle.radius.powi(3) / (6.0 * PI * particle.radius);
+        sum += (y[0] - y[1]) / (case.time.step * alone);
+    }
+    Ok(sum / case.particles.len() as f64)
+}
+
+fn findings(done: &[Done]) -> Result<Findings, PointError> {
+    let mut fractions: Vec<f64> = done.iter().map(|run| run.point.at).collect();
+    fractions.dedup();
+    let (mut rows, mut in_box, mut corrected) = (Vec::new(), Vec::new(), Vec::new());
+    for phi in fractions {
+        let runs: Vec<&Done> = done.iter().filter(|run| run.point.at == phi).collect();
+        let velocities = runs.iter().map(|run| velocity(run)).collect::<Result<Vec<_>, _>>()?;
+        let (mean, error) = mean_and_error(&velocities);
+        let lost = settling_lost_in_box(phi, runs[0].case.particles.len());
+        let numbers = [phi, mean, mean + lost, error, settling_of_spheres(phi)].map(|x| format!("{x:.4}"));
+        rows.push([velocities.len().to_string()].into_iter().chain(numbers).collect());
+        in_box.push((phi, mean, 2.0 * error));
+        corrected.push((phi, mean + lost, 2.0 * error));
+    }
+    let series = [
+        Series { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
+        Series { label: "20 spheres in their box".to_owned(), points: in_box },
+    ];
+    let columns = vec!["configurations", "phi", "in_box", "corrected", "standard_error", "polynomial"];
+    let drawing = draw("volume fraction *φ*", "settling velocity", false, &series, known());
+    Ok(Findings { columns, rows, drawings: vec![("settling", drawing)], remarks: Vec::new() })
+}
+
+fn known() -> Vec<(String, Vec<(f64, f64)>)> {
+    let curve = |f: fn(f64) -> f64, last: u32| {
+        (0..=last).map(|k| (f64::from(k) / 100.0, f(f64::from(k) / 100.0))).collect()
+    };
+    vec![
+        ("equilibrium".to_owned(), curve(settling_of_spheres, 45)),
+        ("1 − 6.55 *φ*".to_owned(), curve(|phi| 1.0 - 6.55 * phi, 12)),
+        ("(1 − *φ*)^{4.65}".to_owned(), curve(|phi| (1.0 - phi).powf(4.65), 45)),
+    ]
+}
+
+/// Mean, and its standard error.
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+    (mean, (squares / (count * (count - 1.0).max(1.0))).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_have_their_errors() {
+        assert_eq!(mean_and_error(&[1.0, 3.0]), (2.0, 1.0));
+        assert_eq!(mean_and_error(&[2.0]), (2.0, 0.0));
+    }
+}

@@ -1,0 +1,148 @@
+//! Relative viscosity of sheared spheres against their fraction.
+
+use gluey_suspension::statistics::{Estimate, mser};
+use gluey_verify::literature::viscosity_of_spheres;
+
+use super::drawing::{Series, draw};
+use super::point::{Done, Point, PointError};
+use super::{Findings, Study};
+
+const FILE: &str = "viscosity.toml";
+const LUBRICATION: &str = "lubrication";
+const GLUEY: &str = "gluey";
+const INELASTIC: &str = "inelastic";
+const MODELS: [&str; 3] = [LUBRICATION, GLUEY, INELASTIC];
+
+/// Sheared frictionless spheres, read off the figures of Sierou and Brady (2002) and Gallier et al. (2014),
+/// which spread by 15 %.
+const SHEARED: [(f64, f64); 5] = [(0.1, 1.35), (0.2, 1.9), (0.3, 3.05), (0.4, 5.9), (0.45, 9.0)];
+
+pub const STUDY: Study = Study {
+    title: "Viscosity of sheared spheres",
+    text: "Twenty equal spheres in a box that is sheared for ever, from a configuration of equilibrium to a strain of six: relative \
+           viscosity and normal stress differences in the steady state, with 95 % intervals from block averages after the transient. \
+           Three models: lubrication forces in films thinner than the mesh and no contact; the gluey contact, and inelastic contact, \
+           both without lubrication forces, so that the flow knows of a film what the mesh resolves. The viscosity of the latter two is \
+           that of the tractions plus that of the contact forces, whose metric is Stokes drag. The same box and mesh at every fraction. \
+           Beside them: hard spheres in equilibrium (Riest et al. 2015, 10.1039/C4SM02816A), dilute suspensions in extension \
+           (Batchelor and Green 1972: 1 + 2.5 &phi; + 7.6 &phi;&sup2;), and sheared frictionless spheres (Sierou and Brady 2002, \
+           Gallier et al. 2014; read off their figures, which spread by 15 %).",
+    points,
+    findings,
+};
+
+fn points(quick: bool) -> Vec<Point> {
+    let fractions = if quick { &[0.1, 0.3][..] } else { &[0.05, 0.1, 0.2, 0.3, 0.4, 0.45][..] };
+    let mut points = Vec::new();
+    for &fraction in fractions {
+        for model in MODELS {
+            let point = Point::new(format!("{model}-{fraction}"), model, fraction, FILE)
+                .with("suspension.volume_fraction", fraction);
+            let point = with_model(point);
+            points.push(if quick { point.with("suspension.count", 12).with("time.end", 0.5) } else { point });
+        }
+    }
+    points
+}
+
+fn with_model(point: Point) -> Point {
+    match point.model {
+        LUBRICATION => point.with("contact.strategy", "none").with("flow.lubrication", "deficit"),
+        model => point.with("contact.strategy", model).with("flow.lubrication", "none"),
+    }
+}
+
+/// What is taken of the rheology: viscosity, share of contacts, normal stress differences.
+const COLUMNS: [&str; 4] = ["viscosity", "viscosity_of_contacts", "N1", "N2"];
+
+/// Means and half widths in the steady state, and the strain at which it begins.
+fn steady(done: &Done) -> Result<Option<(f64, Vec<Estimate>)>, PointError> {
+    let Some(table) = &done.rheology else { return Ok(None) };
+    let skip = mser(table.column("viscosity")?).length;
+    let strain = table.column("strain")?;
+    let mut estimates = Vec::new();
+    for name in COLUMNS {
+        let series = table.column(name)?.get(skip..).unwrap_or(&[]);
+        let Some(estimate) = Estimate::of(series) else { return Ok(None) };
+        estimates.push(estimate);
+    }
+    Ok(strain.get(skip).map(|&begin| (begin, estimates)))
+}
+
+fn findings(done: &[Done]) -> Result<Findings, PointError> {
+    let (mut rows, mut by_model) = (Vec::new(), MODELS.map(|_| (Vec::new(), Vec::new(), Vec::new())));
+    for run in done {
+        let Some((begin, estimates)) = steady(run)? else { continue };
+        let [eta, contacts, n1, n2] = [0, 1, 2, 3].map(|k| &estimates[k]);
+        let shown = |x: f64| format!("{x:.4}");
+        let smallest = run.report.min_gap_over_a.map_or(String::new(), |gap| format!("{gap:.1e}"));
+        let resolved = if eta.is_resolved { "yes" } else { "no" };
+        let numbers = [run.point.at, begin, eta.mean, eta.half_width, contacts.mean];
+        let numbers = numbers.into_iter().chain([n1.mean, n1.half_width, n2.mean, n2.half_width]).map(shown);
+        let ends = [resolved.to_owned(), smallest];
+        rows.push([run.point.model.to_owned()].into_iter().chain(numbers).chain(ends).collect());
+        if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
+            let (viscosities, firsts, seconds) = &mut by_model[place];
+            viscosities.push((run.point.at, eta.mean, eta.half_width));
+            firsts.push((run.point.at, n1.mean, n1.half_width));
+            seconds.push((run.point.at, n2.mean, n2.half_width));
+        }
+    }
+    let series = |take: fn(&(Points, Points, Points)) -> &Points| -> Vec<Series> {
+        let one = |(model, points): (&str, &(Points, Points, Points))| Series {
+            label: model.to_owned(),
+            points: take(points).clone(),
+        };
+        MODELS.into_iter().zip(&by_model).map(one).collect()
+    };
+    let (phi, excess) = ("volume fraction *φ*", "relative viscosity");
+    let first = draw(phi, "*N*_{1} / viscous stress", false, &series(|s| &s.1), Vec::new());
+    let second = draw(phi, "*N*_{2} / viscous stress", false, &series(|s| &s.2), Vec::new());
+    let columns = vec![
+        "model",
+        "phi",
+        "strain_skipped",
+        "viscosity",
+        "viscosity_half_width",
+        "viscosity_of_contacts",
+        "N1",
+        "N1_half_width",
+        "N2",
+        "N2_half_width",
+        "blocks_independent",
+        "min_gap_over_a",
+    ];
+    Ok(Findings {
+        columns,
+        rows,
+        drawings: vec![
+            ("viscosity", draw(phi, excess, false, &series(|s| &s.0), known())),
+            ("first-normal-stress", first),
+            ("second-normal-stress", second),
+        ],
+        remarks: remarks(),
+    })
+}
+
+type Points = Vec<(f64, f64, f64)>;
+
+fn known() -> Vec<(String, Vec<(f64, f64)>)> {
+    let curve = |f: fn(f64) -> f64, last: u32| {
+        (0..=last).map(|k| (f64::from(k) / 100.0, f(f64::from(k) / 100.0))).collect()
+    };
+    vec![
+        ("equilibrium".to_owned(), curve(viscosity_of_spheres, 46)),
+        ("1 + 2.5 *φ* + 7.6 *φ*^{2}".to_owned(), curve(|phi| 1.0 + 2.5 * phi + 7.6 * phi * phi, 30)),
+        ("sheared, frictionless".to_owned(), SHEARED.to_vec()),
+    ]
+}
+
+fn remarks() -> Vec<String> {
+    vec![
+        "What limits these numbers: twenty spheres feel their own images; intervals are those of one run, whose start is one configuration; \
+         where <code>blocks_independent</code> is <em>no</em> the run is too short for its interval. Contact forces of the gluey model \
+         stand for those of the film, in the metric of Stokes drag: their stress is that of the model, not of a film. A run of 200 \
+         spheres costs ten times as much."
+            .to_owned(),
+    ]
+}
