@@ -80,3 +80,8 @@ pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownLaw,
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The page of the book on contact in another program.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/tutorial/contact-elsewhere.md")]
+struct Tutorial;
