@@ -11,6 +11,7 @@ mod plot;
 mod recorded;
 mod resume;
 mod run;
+mod schema;
 mod summary;
 mod view;
 
@@ -28,6 +29,7 @@ use new::NewArguments;
 use plot::PlotArguments;
 use resume::ResumeArguments;
 use run::RunArguments;
+use schema::SchemaArguments;
 use view::ViewArguments;
 
 /// What `gluey --help` ends with; the exit codes are also in the README.
@@ -71,6 +73,8 @@ pub enum Command {
     Plot(PlotArguments),
     /// Write a new case file, with comments, to begin with.
     New(NewArguments),
+    /// The JSON schema of case files, with which editors complete and check them.
+    Schema(SchemaArguments),
     /// What a shell needs to complete arguments.
     Completions(CompletionsArguments),
 }
@@ -87,6 +91,7 @@ impl Command {
             Self::View(arguments) => arguments.run(),
             Self::Plot(arguments) => arguments.run(),
             Self::New(arguments) => arguments.run(),
+            Self::Schema(arguments) => arguments.run(),
             Self::Completions(arguments) => arguments.run::<Cli>(),
         }
     }

@@ -78,10 +78,13 @@ impl RunArguments {
     }
 
     fn case(&self) -> Result<Case, gluey::CaseError> {
-        let mut case = Case::load_with(&self.case, &self.set)?;
-        case.contact.strategy = self.strategy.unwrap_or(case.contact.strategy);
-        case.flow.formulation = self.formulation.unwrap_or(case.flow.formulation);
-        Ok(case)
+        let set = |option, path: &[&str], name: &dyn std::fmt::Display| {
+            Override::of_option(option, path, &name.to_string())
+        };
+        let strategy = self.strategy.map(|name| set("--strategy", &["contact", "strategy"], &name));
+        let formulation = self.formulation.map(|name| set("--formulation", &["flow", "formulation"], &name));
+        let overrides: Vec<Override> = self.set.iter().cloned().chain(strategy).chain(formulation).collect();
+        Case::load_with(&self.case, &overrides)
     }
 
     fn options(&self, case: &Case) -> RunOptions {
