@@ -37,6 +37,7 @@ mod particle;
 mod particle_problem;
 mod particles_file;
 mod schema;
+mod shown;
 mod suggest;
 mod suspension;
 mod validate;

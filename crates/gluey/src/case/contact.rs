@@ -1,11 +1,12 @@
 //! What a case says of contact.
 
-use gluey_contact::ContactParams;
+use gluey_contact::{
+    ContactLaw as Strategy, ContactParams, GammaUpdate as Memory, SolverKind as ContactSolver,
+};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::names::schema_of_names;
-use super::{ContactSolver, Memory, Strategy};
 
 /// Contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

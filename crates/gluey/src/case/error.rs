@@ -8,10 +8,10 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::VERSION;
-use super::form::shown;
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
+use super::shown::shown;
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -420,6 +420,24 @@ impl Problem {
             Self::UnknownName(name) => name.hint(),
             Self::NotFinite { .. } => "expected a finite number".into(),
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
+            Self::Particles(problem) => problem.hint(),
+            Self::NoParticles => {
+                "list them under lines `[[particles]]`, each with `position` and `radius`".into()
+            }
+            Self::MeshTooFine { finest, largest, .. } => {
+                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
+            }
+            Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
+            Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
+            Self::Unfit { choice, needs, .. } => format!("take {needs}, or do without {choice}"),
+            Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
+            _ => self.hint_at_places(),
+        }
+    }
+
+    /// Hint at right places of particles and sizes of boxes.
+    fn hint_at_places(&self) -> String {
+        match self {
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::TorqueCount { needed, .. } => format!("expected a list of length {needed}"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
@@ -438,17 +456,7 @@ impl Problem {
                 let (distance, needed) = (shown(*distance), shown(*contact_distance));
                 format!("the centres are {distance} apart, at least {needed} is needed")
             }
-            Self::Particles(problem) => problem.hint(),
-            Self::NoParticles => {
-                "list them under lines `[[particles]]`, each with `position` and `radius`".into()
-            }
-            Self::MeshTooFine { finest, largest, .. } => {
-                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
-            }
-            Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
-            Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
-            Self::Unfit { choice, needs, .. } => format!("take {needs}, or do without {choice}"),
-            Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
+            _ => String::new(),
         }
     }
 }

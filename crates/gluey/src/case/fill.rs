@@ -3,12 +3,17 @@
 use std::path::Path;
 
 use gluey_geom::{Dim, Space};
+use gluey_suspension::ball_volume;
 use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
 use super::error::{Key, Problem};
 use super::findings::{Findings, Violation};
 use super::particle_problem::ParticleProblem;
+use super::shown::shown;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
+
+/// So many particles can be generated: the range of `suspension.count`.
+const MOST_PARTICLES: f64 = 1e6;
 
 /// The parts of a case that its particles follow from.
 pub(super) const NEEDED: [&str; 6] =
@@ -58,6 +63,7 @@ fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) {
 }
 
 fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<ParticleSpec>, Violation> {
+    check_count(case, suspension, key)?;
     let params = suspension.params().or_else(|problem| fail(problem_key(&problem, key), problem))?;
     let packed = match case.dimension {
         2 => pack::<2>(case, &params),
@@ -67,6 +73,25 @@ fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<P
         let key = packing_key(&error).map_or(key.clone(), |name| key.name(name));
         fail(key, ParticleProblem::Packing(error))
     })
+}
+
+/// Refuses a radius that takes more particles than can be listed: they would fill the memory.
+fn check_count(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<(), Violation> {
+    let (Some(fraction), Some(radius), None) =
+        (suspension.volume_fraction, suspension.radius, suspension.count)
+    else {
+        return Ok(());
+    };
+    let volume = case.edges().iter().product::<f64>();
+    let unit = if case.dimension == 2 { ball_volume::<2>(1.0) } else { ball_volume::<3>(1.0) };
+    let least = (fraction * volume / unit / MOST_PARTICLES).powf(1.0 / case.dimension as f64);
+    match radius >= least {
+        true => Ok(()),
+        false => {
+            let range = format!("of {} or more, for at most {MOST_PARTICLES} particles", shown(least));
+            Err(Violation { key: key.name("radius"), problem: Problem::OutOfRange { found: radius, range } })
+        }
+    }
 }
 
 fn pack<const D: usize>(case: &Case, params: &PackingParams) -> Result<Vec<ParticleSpec>, PackingError>

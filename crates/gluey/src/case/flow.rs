@@ -14,7 +14,8 @@ pub struct FlowSpec {
     pub hydrodynamics: Hydrodynamics,
     /// How rigidity enters. Default: "paper".
     pub formulation: Formulation,
-    /// What acts in films that are too thin for the mesh. Default: "deficit" in `unfitted`, "none" elsewhere.
+    /// What acts in films that are too thin for the mesh. Default: "deficit" in `unfitted`, "none"
+    /// elsewhere.
     pub lubrication: Option<Lubrication>,
     /// How the equations are solved. Default: "auto".
     pub solver: Solver,
@@ -50,8 +51,8 @@ pub struct MeshSpec {
     #[schemars(range(max = 18))]
     pub coarsest_level: u32,
     /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
-    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities. Unit:
-    /// cells. Default: 2.
+    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
+    /// Unit: cells. Default: 2.
     #[schemars(range(min = 0, max = 1000))]
     pub band: f64,
 }
@@ -86,8 +87,8 @@ pub struct RigidDofsSpec {
     /// Default: -0.1 in 2D, -0.2 in 3D.
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
     pub offset: Option<f64>,
-    /// Cells in a gap are no larger than this part of the local distance between the surfaces, from 0.1 on; 0
-    /// leaves gaps alone. Unit: distance of the surfaces. Default: 1.
+    /// Cells in a gap are no larger than this part of the local distance between the surfaces, from 0.1 on;
+    /// 0 leaves gaps alone. Unit: distance of the surfaces. Default: 1.
     #[schemars(range(min = 0, max = 10))]
     pub gap_fraction: f64,
     /// Levels beyond that of the surfaces that gaps may use. Unit: levels. Default: in 2D 9, or what the tree

@@ -8,6 +8,7 @@ use super::Case;
 use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::names::UnknownName;
+use super::shown::shown;
 use super::suggest::{closest, synonym};
 
 /// Notes everything in `value`, which stands at `key`, that `schema` does not allow.
@@ -96,6 +97,8 @@ fn check_range(number: f64, schema: &Schema, key: &Key, findings: &mut Findings)
 /// Numbers that a key may have.
 #[derive(Clone, Copy, Debug, Default)]
 struct Range {
+    /// Whether only whole numbers are meant.
+    is_whole: bool,
     least: Option<f64>,
     above: Option<f64>,
     most: Option<f64>,
@@ -106,6 +109,7 @@ impl Range {
     fn of(schema: &Schema) -> Self {
         let number = |name: &str| schema.get(name).and_then(Schema::as_f64);
         Self {
+            is_whole: schema["type"] == "integer",
             least: number("minimum"),
             above: number("exclusiveMinimum"),
             most: number("maximum"),
@@ -125,7 +129,7 @@ impl Range {
         let upper = self.most.map(|end| (end, "to")).or(self.below.map(|end| (end, "less than")));
         match (lower, upper) {
             (Some((a, "from")), Some((b, "to"))) if b == a => format!("equal to {}", shown(a)),
-            (Some((a, "from")), Some((b, "to"))) if b == a + 1.0 => {
+            (Some((a, "from")), Some((b, "to"))) if self.is_whole && b == a + 1.0 => {
                 format!("equal to {} or {}", shown(a), shown(b))
             }
             (Some((a, "from")), Some((b, "to"))) => format!("from {} to {}", shown(a), shown(b)),
@@ -140,15 +144,6 @@ impl Range {
             (None, Some((b, _))) => format!("less than {}", shown(b)),
             (None, None) => "of any size".to_owned(),
         }
-    }
-}
-
-/// A number without a row of zeros, and without what rounding added to it.
-pub(super) fn shown(x: f64) -> String {
-    let rounded = format!("{x:.9e}").parse().unwrap_or(x);
-    match x.abs() {
-        1e-2..1e9 | 0.0 => f64::to_string(&rounded),
-        _ => format!("{rounded:e}"),
     }
 }
 

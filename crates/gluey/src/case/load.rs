@@ -34,8 +34,8 @@ impl Case {
     /// Checks a case given as text of which some keys are set otherwise; `file` is what errors call it.
     ///
     /// # Errors
-    /// [`CaseError::Invalid`] with all that is wrong: first syntax, then the version, then all keys and values
-    /// together with what does not fit together in the parts of the case whose keys and values are right.
+    /// [`CaseError::Invalid`] with all that is wrong: first syntax, then the version, then all keys and
+    /// values, with what does not fit together in the parts of the case whose keys and values are right.
     pub fn parse_with(text: &str, file: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, CaseError> {
         let source = Source { text, file: file.as_ref() };
         let tree = DeTable::parse(text).map_err(|error| source.syntax_error(&error))?;

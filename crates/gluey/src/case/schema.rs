@@ -85,3 +85,47 @@ fn choices_of_names(object: &mut Map<String, Value>, choices: &Value) {
     object.insert("enum".to_owned(), json!(each("const")));
     object.insert("x-taplo".to_owned(), json!({ "docs": { "enumValues": meanings } }));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the loader reads of a schema, and what only says something to people and editors. Numbers of
+    /// coordinates depend on the dimension, which no schema can say: they are checked with the case.
+    const READ: [&str; 10] = [
+        "type",
+        "properties",
+        "additionalProperties",
+        "required",
+        "items",
+        "enum",
+        "minimum",
+        "maximum",
+        "exclusiveMinimum",
+        "exclusiveMaximum",
+    ];
+    const TOLD: [&str; 8] =
+        ["$schema", "title", "description", "default", "x-taplo", "pattern", "minItems", "maxItems"];
+
+    fn check(schema: &Value, path: &str) {
+        let object = schema.as_object().expect("a schema is an object");
+        for keyword in object.keys() {
+            assert!(READ.contains(&&**keyword) || TOLD.contains(&&**keyword), "{path}: {keyword}");
+        }
+        assert!(object.contains_key("description"), "{path}");
+        if schema["type"] == "object" {
+            assert_eq!(schema["additionalProperties"], false, "{path}");
+        }
+        let parts = schema["properties"].as_object().into_iter().flatten();
+        parts.for_each(|(name, part)| check(part, &format!("{path}.{name}")));
+        if schema["items"]["type"] == "object" {
+            check(&schema["items"], &format!("{path}[]"));
+        }
+    }
+
+    /// Whatever an editor refuses by the schema the loader refuses too, unknown keys above all.
+    #[test]
+    fn the_loader_reads_all_of_the_schema() {
+        check(Case::schema(), "");
+    }
+}

@@ -13,12 +13,12 @@ use super::particle_problem::ParticleProblem;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SuspensionSpec {
-    /// Volume of the particles; in 2D their area. Unit: volume of the box, in 2D its area. Default: what follows
-    /// from `count` and `radius`.
+    /// Volume of the particles; in 2D their area. Unit: volume of the box, in 2D its area. Default: what
+    /// follows from `count` and `radius`.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub volume_fraction: Option<f64>,
     /// Number of particles. Unit: particles. Default: what follows from `volume_fraction` and `radius`.
-    #[schemars(range(min = 1, max = 2147483647))]
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub count: Option<usize>,
     /// Mean radius. Unit: length. Default: what follows from `volume_fraction` and `count`.
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -26,6 +26,7 @@ pub struct SuspensionSpec {
     /// How particles are arranged. Default: "equilibrium".
     pub arrangement: ArrangementName,
     /// Monte Carlo moves of each particle for `equilibrium`. Unit: moves. Default: 4000.
+    #[schemars(range(max = 1_000_000))]
     pub sweeps: Option<usize>,
     /// Seed of the random numbers. Unit: none. Default: 1.
     pub seed: u64,
@@ -72,8 +73,8 @@ pub struct RadiiSpec {
     /// Default: what follows from `large_number`.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub large_volume: Option<f64>,
-    /// `lognormal`: standard deviation of the logarithm of the radius; it is cut at three of them. Unit: none.
-    /// Default: none, it is needed there.
+    /// `lognormal`: standard deviation of the logarithm of the radius; it is cut at three of them. Unit:
+    /// none. Default: none, it is needed there.
     #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0))]
     pub deviation: Option<f64>,
 }
