@@ -8,6 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
@@ -107,13 +108,14 @@ fn no_checkpoint_panics() {
     let mut payload = Vec::new();
     ZlibDecoder::new(&rest[DIGEST..]).read_to_end(&mut payload).expect("a payload");
     assert!(signed(head, &payload).len() > 100 && go_on(&case, &options, &rows), "the good one is none");
-    let (mut random, mut reached) = (random(), [0; 3]);
+    let (mut random, mut reached, mut slowest) = (random(), [0; 3], 0.0f64);
     for number in 0..count {
         // Every fourth is a file that was damaged; the others look whole and hold something else.
         let mut bytes = if number % 4 == 0 { good.clone() } else { payload.clone() };
         (0..random.random_range(1..=3)).for_each(|_| mutate(&mut bytes, &mut random));
         let bytes = if number % 4 == 0 { bytes } else { signed(head, &bytes) };
         fs::write(&path, &bytes).expect("a file");
+        let start = Instant::now();
         let follow = || {
             let summary = CheckpointSummary::read(&path);
             match (summary, Checkpoint::<3>::read(&case, &path)) {
@@ -121,7 +123,9 @@ fn no_checkpoint_panics() {
                 _ => 0,
             }
         };
-        match catch_unwind(AssertUnwindSafe(follow)) {
+        let outcome = catch_unwind(AssertUnwindSafe(follow));
+        slowest = slowest.max(start.elapsed().as_secs_f64());
+        match outcome {
             Ok(stage) => reached[stage] += 1,
             Err(_) => {
                 let kept = std::env::temp_dir().join("gluey-fuzz.checkpoint");
@@ -130,7 +134,9 @@ fn no_checkpoint_panics() {
             }
         }
     }
-    println!("{reached:?} refused, read, gone on from");
+    let memory = gluey::memory::peak();
+    println!("{reached:?} refused, read, gone on from; slowest {slowest} s; memory {memory:?}");
+    assert!(slowest < 10.0 && memory.is_none_or(|bytes| bytes < 1_000_000_000), "{slowest} s, {memory:?}");
     assert!(reached[0] > 0 && reached[1] + reached[2] > 0, "{reached:?}");
 }
 
