@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Output;
+use std::process::{self, Output};
+use std::thread;
+use std::time::Duration;
 
 use assert_cmd::Command;
 use gluey::{RunRecord, RunState};
@@ -95,6 +97,31 @@ fn a_study_goes_on_where_it_was_and_takes_more_values() {
     let after = record(folder, "sweep/time.step=0.2");
     assert_eq!((after.state, after.resumed), (RunState::Complete, 1));
     assert!(fs::read(csv).expect("a trajectory") == whole, "another trajectory");
+}
+
+/// Ctrl-C ends the point that runs with a checkpoint, and begins no other.
+#[test]
+#[cfg(unix)]
+fn a_study_that_is_interrupted_goes_on() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let arguments = ["--set", "time.step=0.00005,0.1", "--checkpoint-every", "1000"];
+    let mut command = process::Command::new(env!("CARGO_BIN_EXE_gluey"));
+    command.current_dir(folder).args(["sweep", CASE]).args(arguments).stderr(process::Stdio::null());
+    let mut study = command.stdout(process::Stdio::piped()).spawn().expect("it runs");
+    let checkpoint = folder.join(format!("sweep/time.step=0.00005/{STEM}.checkpoint"));
+    while !checkpoint.exists() {
+        thread::sleep(Duration::from_millis(1));
+    }
+    let sent = process::Command::new("kill").args(["-INT", &study.id().to_string()]).status();
+    assert!(sent.expect("kill runs").success());
+    assert_eq!(study.wait().expect("it ends").code(), Some(130));
+    let table = fs::read_to_string(folder.join("sweep/sweep.csv")).expect("a table");
+    let states: Vec<&str> = table.lines().skip(1).filter_map(|line| line.split(',').nth(1)).collect();
+    assert_eq!(states, ["interrupted", "not run"]);
+    sweep(folder, &arguments, 0);
+    let record = record(folder, "sweep/time.step=0.00005");
+    assert_eq!((record.state, record.resumed, record.steps), (RunState::Complete, 1, 315_000));
 }
 
 #[test]
