@@ -267,7 +267,7 @@ fn generates_many(text: &str) -> bool {
     let Ok(table) = toml::from_str::<toml::Table>(text) else { return false };
     let Some(suspension) = table.get("suspension").and_then(toml::Value::as_table) else { return false };
     let number = |key: &str| suspension.get(key).and_then(toml::Value::as_integer);
-    !number("count").is_some_and(|count| count <= FEW_PARTICLES)
+    number("count").is_none_or(|count| count > FEW_PARTICLES)
         || number("sweeps").is_none_or(|sweeps| sweeps > FEW_SWEEPS)
 }
 
