@@ -59,10 +59,10 @@ enum Unfinished {
 impl SweepArguments {
     /// Runs the points that are not complete yet, and tells what came out of all.
     pub fn run(&self) -> Result<(), Failure> {
+        self.manner.set_threads()?;
         let points = points(&self.case, &self.set, &self.out).map_err(refused)?;
         let study = Study::new(&self.out, self.set.iter().map(|axis| axis.key.clone()).collect());
         let states = study.open(&points, self.force).map_err(refused)?;
-        self.manner.set_threads()?;
         let interrupt = interrupt_flag();
         let results = self.run_all(&points, &states, &interrupt);
         let rows = table(&self.set, &results);
