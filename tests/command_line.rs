@@ -78,7 +78,9 @@ fn cases_runs_and_checkpoints_say_what_they_are() {
 fn every_command_has_examples_and_exit_codes_are_told() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    for command in ["run", "resume", "check", "info", "analyse", "view", "view", "new", "completions"] {
+    for command in
+        ["run", "resume", "check", "info", "analyse", "view", "plot", "new", "completions", "schema", "sweep"]
+    {
         let help = told(folder, &[command, "--help"]);
         assert!(help.contains("Example") && help.contains(&format!("\n  gluey {command} ")), "{help}");
     }

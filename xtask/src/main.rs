@@ -1,11 +1,14 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
-//! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask keys`, `cargo xtask fuzz`,
+//! `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
 mod book;
 mod ci;
 mod figures;
+mod fuzz;
+mod keys;
 mod reproduce;
 mod study;
 mod tidy;
@@ -46,6 +49,10 @@ enum Task {
     },
     /// Time a step of a sheared suspension and print one line of JSON.
     BenchSuspension(bench_suspension::Options),
+    /// Write the reference of case files (docs/case-keys.md) and their JSON schema (data/case.schema.json).
+    Keys,
+    /// Try mutated case files, checkpoints and tables: none may panic, hang or fill the memory.
+    Fuzz(fuzz::Options),
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
     /// Formatting, lints, all tests and a quick reproduction of the figures.
@@ -103,6 +110,8 @@ fn main() -> ExitCode {
         Task::Study(arguments) => study(arguments),
         Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
         Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
+        Task::Keys => outcome(keys::write(&workspace_root())),
+        Task::Fuzz(options) => outcome(fuzz::run(&workspace_root(), &options)),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }

@@ -18,11 +18,17 @@
 
 mod box_and_strain;
 mod comparable;
+mod contact;
 mod error;
 mod fill;
 mod filled;
+mod findings;
+mod flow;
 mod forces;
+mod form;
+mod keys;
 mod load;
+mod locate;
 mod mesh;
 mod names;
 pub(crate) mod neighbours;
@@ -30,13 +36,18 @@ mod overrides;
 mod particle;
 mod particle_problem;
 mod particles_file;
+mod schema;
+mod shown;
 mod suggest;
 mod suspension;
 mod validate;
 
-pub use error::{CaseError, CaseIssue, Key, KeyPart, Problem};
+pub use contact::ContactSpec;
+pub use error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem};
+pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec, RigidDofsSpec};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
+pub use keys::CaseKey;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{
     ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, RadiiKind, Solver,
@@ -47,34 +58,47 @@ pub use particle::ParticleSpec;
 pub use particle_problem::ParticleProblem;
 pub use suspension::{RadiiSpec, SuspensionSpec};
 
-use gluey_contact::{ContactParams, Domain, Wall};
+use gluey_contact::{Domain, Wall};
 use gluey_geom::{Lattice, Vector};
-use gluey_stokes::PaperParams;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 /// The axis across the shear: the box has walls there.
 const WALLED_AXIS: usize = 1;
+
+/// Counts changes of the layout of case files: what was right under one number is read the same under it.
+pub const VERSION: u32 = 1;
 
 /// A complete, checked description of one run.
 ///
 /// Lengths and times are in the units of the box and of the shear rate; the viscosity of the fluid is 1. So
 /// forces are in units of the viscosity times a length squared over a time; in 2D, where they are those on a
 /// unit of depth, times a length over a time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
-    /// Name of the case, used for output files: letters, digits, `-` and `_`.
+    /// Version of the layout of case files that this one is written in. Unit: none. Default: 1.
+    #[serde(default = "present_version")]
+    #[schemars(range(min = 1, max = 1))]
+    pub version: u32,
+    /// Name of the case, used for output files: letters, digits, `-` and `_`, at most 64 of them.
+    #[schemars(regex(pattern = "^[A-Za-z0-9_-]{1,64}$"))]
     pub name: String,
-    /// Dimension of space, 2 or 3.
+    /// Dimension of space: discs or spheres. Unit: none.
+    #[schemars(range(min = 2, max = 3))]
     pub dimension: usize,
-    /// The imposed shear rate `gamma_dot`: the undisturbed velocity is `gamma_dot (y - y_mid) e_x`.
+    /// The imposed shear rate `gamma_dot`: the undisturbed velocity is `gamma_dot (y - y_mid) e_x`. Unit:
+    /// 1/time. Default: 1.
     #[serde(default = "one")]
     pub shear_rate: f64,
     /// Weight of the particles per unit of volume (in 2D: area), less that of the fluid: `(rho_s - rho_f) g`,
-    /// one coordinate per dimension. Nothing when absent. It is not reversed with the shear.
+    /// one coordinate per dimension. It is not reversed with the shear. Unit: viscosity/(length time).
+    /// Default: none.
+    #[schemars(length(min = 2, max = 3))]
     #[serde(default)]
     pub gravity: Option<Vec<f64>>,
-    /// Name of a reference solution to compare with, see [`crate::reference::NAMES`].
+    /// Name of a reference solution to compare with. Default: none.
+    #[schemars(schema_with = "references")]
     #[serde(default)]
     pub reference: Option<String>,
     /// The box of fluid.
@@ -88,7 +112,7 @@ pub struct Case {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suspension: Option<SuspensionSpec>,
     /// File of particles instead of a list, from the folder of the case file: comma-separated columns `x`,
-    /// `y` (`z` in 3D) and `radius` under a header with these names; absent once it was read.
+    /// `y` (`z` in 3D) and `radius` under a header with these names; absent once it was read. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub particles_file: Option<String>,
     /// Time stepping.
@@ -108,10 +132,11 @@ pub struct Case {
 }
 
 /// Rheology.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RheologySpec {
-    /// The stress of the suspension is computed and written every so many steps.
+    /// The stress of the suspension is computed and written every so many steps. Unit: steps. Default: 1.
+    #[schemars(range(min = 1))]
     pub every: usize,
 }
 
@@ -122,230 +147,43 @@ impl Default for RheologySpec {
 }
 
 /// The box of fluid.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DomainSpec {
-    /// Corner with the smallest coordinates; the origin when absent.
+    /// Corner with the smallest coordinates. Unit: length. Default: the origin.
+    #[schemars(length(min = 2, max = 3))]
     pub lower: Option<Vec<f64>>,
-    /// Corner with the largest coordinates; (1, 1[, 1]) when absent.
+    /// Corner with the largest coordinates. Unit: length. Default: (1, 1), in 3D (1, 1, 1).
+    #[schemars(length(min = 2, max = 3))]
     pub upper: Option<Vec<f64>>,
-    /// Condition on the boundary.
+    /// Condition on the boundary. Default: "couette".
     pub boundary: Boundary,
 }
 
 /// Time stepping.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpec {
-    /// Time step `dt > 0`.
+    /// Time step `dt`. Unit: time.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub step: f64,
-    /// End of the run; the last step ends at the first multiple of `step` that is not before it.
+    /// End of the run; the last step ends at the first multiple of `step` that is not before it. Unit: time.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
-    /// Scheme.
+    /// Scheme that moves the particles: of first or of second order. Default: "adams-bashforth-2".
     #[serde(default = "second_order")]
+    #[schemars(schema_with = "schemes")]
     pub scheme: Scheme,
-    /// The shear is reversed at the first step that starts at this time or later.
+    /// The shear is reversed at the first step that starts at this time or later. Unit: time. Default: never.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub reverse_at: Option<f64>,
     /// The shear oscillates: at a constant rate the strain goes to this value, to minus this value and back
     /// to 0, again and again. A whole number of steps makes up this strain; four times as many are a cycle.
+    /// Unit: none. Default: none, it does not oscillate.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub strain_amplitude: Option<f64>,
-}
-
-/// Contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ContactSpec {
-    /// The contact law, which keeps particles from overlapping.
-    pub strategy: Strategy,
-    /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
-    pub exact_gap: bool,
-    /// How gamma, the memory of a contact, is integrated: by the scheme that moves the particles
-    /// (`consistent`, the default: a contact ends within a step, and encounters are reversible to second
-    /// order) or as in the paper, whole steps at a time (`paper`).
-    pub memory: Memory,
-    /// Floor of gamma (< 0) for rough particles; none when absent.
-    pub gamma_min: Option<f64>,
-    /// Gap kept by the strategy `velocity-correction`, relative to the mean radius of the pair.
-    pub threshold: f64,
-    /// How contact forces are solved for: `auto` (a closed form for one contact, Uzawa's method for two, the
-    /// active set for more), `uzawa` (the paper's; slow for clusters), `accelerated` or `active-set`. All
-    /// give the same velocities.
-    pub solver: ContactSolver,
-    /// Residual at which contact forces are accepted, relative to the smallest radius (or the largest
-    /// displacement in a step, if that is larger): from 1e-15 to 1e-3. It is the overlap that is left.
-    pub tolerance: f64,
-}
-
-impl ContactSpec {
-    /// These parameters as the contact model takes them.
-    pub fn params(&self) -> ContactParams {
-        ContactParams {
-            law: self.strategy,
-            exact_gap: self.exact_gap,
-            gamma_update: self.memory,
-            gamma_min: self.gamma_min,
-            threshold: self.threshold,
-            solver: self.solver,
-            tolerance: self.tolerance,
-            ..ContactParams::default()
-        }
-    }
-}
-
-/// Flow.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct FlowSpec {
-    /// Who predicts the velocities.
-    pub hydrodynamics: Hydrodynamics,
-    /// How rigidity enters.
-    pub formulation: Formulation,
-    /// What acts in films that are too thin for the mesh; when absent, `deficit` in `unfitted` and `none`
-    /// elsewhere.
-    pub lubrication: Option<Lubrication>,
-    /// How the equations are solved.
-    pub solver: Solver,
-    /// Relative tolerance of the residual of a linear solve.
-    pub tolerance: f64,
-    /// The mesh.
-    pub mesh: MeshSpec,
-    /// Parameters of the `paper` formulation.
-    pub paper: PaperSpec,
-    /// Parameters of the `rigid-dofs` formulation.
-    #[serde(rename = "rigid-dofs")]
-    pub rigid_dofs: RigidDofsSpec,
-    /// Parameters of the `pair-mobility` model.
-    #[serde(rename = "pair-mobility")]
-    pub pair_mobility: PairMobilitySpec,
-}
-
-/// The 2^D-tree mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MeshSpec {
-    /// The cells at the surfaces have at least this many edges in a radius of the smallest particle; when
-    /// absent, what [`default_cells_per_radius`] gives.
-    pub cells_per_radius: Option<f64>,
-    /// Root cells of the tree along the shortest edge of the box, at least. Cells are halves of halves of
-    /// these: with 3 instead of 1 they may have 2/3 of the size.
-    pub root_cells: u32,
-    /// Cells are at most `2^-coarsest_level` of a root cell.
-    pub coarsest_level: u32,
-    /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
-    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
-    pub band: f64,
-}
-
-/// Parameters of the `paper` formulation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PaperSpec {
-    /// Viscosity of the particles over that of the fluid, `r`.
-    pub viscosity_ratio: f64,
-    /// Uzawa iterations per time step; with 1 the multiplier is never used, which is a penalty method and
-    /// called so in reports.
-    pub uzawa_steps: usize,
-    /// Step of the Uzawa iteration, `0 < rho < 4`.
-    pub rho: f64,
-    /// Width of the viscosity ramp inside the surface, in cells.
-    pub ramp: f64,
-    /// How the motion of a particle is taken from the field: `mean`, over the particle, or `center`, the
-    /// paper's equation 11.
-    pub velocity: ParticleVelocity,
-}
-
-/// Parameters of the `rigid-dofs` formulation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RigidDofsSpec {
-    /// A node is rigid where the signed distance (positive inside) is at least this many cells; when absent,
-    /// what [`gluey_stokes::default_offset`] gives.
-    pub offset: Option<f64>,
-    /// Cells in a gap are no larger than this fraction of the local distance between the surfaces; 0 leaves
-    /// gaps alone.
-    pub gap_fraction: f64,
-    /// Levels beyond that of the surfaces that gaps may use; when absent, what
-    /// [`default_gap_levels`] gives.
-    pub gap_levels: Option<u32>,
-}
-
-/// Parameters of the `pair-mobility` model.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PairMobilitySpec {
-    /// The mobility is evaluated at the gap plus this many radii, to imitate a solver that does not resolve
-    /// the film.
-    pub gap_offset: f64,
-}
-
-impl Default for ContactSpec {
-    fn default() -> Self {
-        let ContactParams { law: strategy, gamma_min, threshold, solver, tolerance, .. } =
-            ContactParams::default();
-        Self {
-            strategy,
-            exact_gap: true,
-            memory: Memory::Consistent,
-            gamma_min,
-            threshold,
-            solver,
-            tolerance,
-        }
-    }
-}
-
-impl Default for FlowSpec {
-    fn default() -> Self {
-        Self {
-            hydrodynamics: Hydrodynamics::default(),
-            formulation: Formulation::default(),
-            lubrication: None,
-            solver: Solver::default(),
-            tolerance: 1e-6,
-            mesh: MeshSpec::default(),
-            paper: PaperSpec::default(),
-            rigid_dofs: RigidDofsSpec::default(),
-            pair_mobility: PairMobilitySpec::default(),
-        }
-    }
-}
-
-impl Default for MeshSpec {
-    fn default() -> Self {
-        Self { cells_per_radius: None, root_cells: 1, coarsest_level: 3, band: 2.0 }
-    }
-}
-
-impl Default for PaperSpec {
-    fn default() -> Self {
-        let PaperParams { viscosity_ratio, uzawa_steps, rho, ramp, .. } = PaperParams::default();
-        Self { viscosity_ratio, uzawa_steps, rho, ramp, velocity: ParticleVelocity::Mean }
-    }
-}
-
-impl PaperSpec {
-    /// These parameters as the solver takes them.
-    pub fn params(&self) -> PaperParams {
-        PaperParams {
-            viscosity_ratio: self.viscosity_ratio,
-            ramp: self.ramp,
-            rho: self.rho,
-            uzawa_steps: self.uzawa_steps,
-            particle_velocity: match self.velocity {
-                ParticleVelocity::Mean => gluey_stokes::ParticleVelocity::WeightedMean,
-                ParticleVelocity::Center => gluey_stokes::ParticleVelocity::Center,
-            },
-            ..PaperParams::default()
-        }
-    }
-}
-
-impl Default for RigidDofsSpec {
-    fn default() -> Self {
-        Self { offset: None, gap_fraction: 1.0, gap_levels: None }
-    }
 }
 
 impl Case {
@@ -459,4 +297,16 @@ fn one() -> f64 {
 
 fn second_order() -> Scheme {
     Scheme::AdamsBashforth2
+}
+
+fn present_version() -> u32 {
+    VERSION
+}
+
+fn schemes(_: &mut SchemaGenerator) -> Schema {
+    names::schema_of_names(&[Scheme::Euler, Scheme::AdamsBashforth2])
+}
+
+fn references(_: &mut SchemaGenerator) -> Schema {
+    names::schema_of_names(crate::reference::NAMES)
 }

@@ -7,11 +7,14 @@ mod info;
 mod interrupt;
 mod manner;
 mod new;
+mod output;
 mod plot;
 mod recorded;
 mod resume;
 mod run;
+mod schema;
 mod summary;
+mod sweep;
 mod view;
 
 use std::path::PathBuf;
@@ -28,6 +31,8 @@ use new::NewArguments;
 use plot::PlotArguments;
 use resume::ResumeArguments;
 use run::RunArguments;
+use schema::SchemaArguments;
+use sweep::SweepArguments;
 use view::ViewArguments;
 
 /// What `gluey --help` ends with; the exit codes are also in the README.
@@ -59,6 +64,8 @@ pub enum Command {
     Run(RunArguments),
     /// Go on with a run that was interrupted, killed or stopped by an error.
     Resume(ResumeArguments),
+    /// Run a case with all combinations of values of some keys.
+    Sweep(SweepArguments),
     /// Check a case, and say what its run would be: unknowns, memory, time.
     Check(CheckArguments),
     /// What a case file, a checkpoint or a folder of results is, and how far it is.
@@ -71,6 +78,8 @@ pub enum Command {
     Plot(PlotArguments),
     /// Write a new case file, with comments, to begin with.
     New(NewArguments),
+    /// The JSON schema of case files, with which editors complete and check them.
+    Schema(SchemaArguments),
     /// What a shell needs to complete arguments.
     Completions(CompletionsArguments),
 }
@@ -81,12 +90,14 @@ impl Command {
         match self {
             Self::Run(arguments) => arguments.run(),
             Self::Resume(arguments) => arguments.run(),
+            Self::Sweep(arguments) => arguments.run(),
             Self::Check(arguments) => arguments.run(),
             Self::Info(arguments) => arguments.run(),
             Self::Analyse(arguments) => arguments.run(),
             Self::View(arguments) => arguments.run(),
             Self::Plot(arguments) => arguments.run(),
             Self::New(arguments) => arguments.run(),
+            Self::Schema(arguments) => arguments.run(),
             Self::Completions(arguments) => arguments.run::<Cli>(),
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use gluey::case::CaseIssue;
+use gluey::case::{CaseIssue, InvalidCase, Place};
 use gluey::{CaseError, CheckpointError, CheckpointSummary, ResultPaths, RowsError, RunError};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
@@ -14,7 +14,12 @@ pub struct Diagnosed {
     hint: Option<String>,
     source: Option<NamedSource<String>>,
     label: Option<LabeledSpan>,
+    /// What a case file has wrong, one by one.
+    related: Vec<Diagnosed>,
 }
+
+/// So many errors of a case file are shown one by one.
+const MOST_SHOWN: usize = 20;
 
 /// Shows long lines as they are: paths and numbers can be copied and searched for.
 pub fn install() {
@@ -25,20 +30,48 @@ pub fn install() {
 impl Diagnosed {
     /// Adds what helps with `error`, which came from running the case file `case`.
     pub fn new(error: RunError, case: &Path) -> Self {
-        let hint = hint(&error, case);
-        let issue = match &error {
-            RunError::Case(CaseError::Invalid(issue)) if !issue.text.is_empty() => Some(issue),
-            _ => None,
-        };
-        let source =
-            issue.map(|issue| NamedSource::new(issue.file.display().to_string(), issue.text.clone()));
-        let label = issue.map(|issue| label(issue));
-        Self { hint, source, label, error: Box::new(error) }
+        match error {
+            RunError::Case(CaseError::Invalid(invalid)) => Self::of_case(&invalid),
+            error => {
+                let hint = hint(&error, case);
+                Self::with_hint(error, hint)
+            }
+        }
+    }
+
+    /// Shows each issue with its line and what would be right.
+    fn of_case(invalid: &InvalidCase) -> Self {
+        let (count, shown) = (invalid.issues.len() + invalid.more, invalid.issues.len().min(MOST_SHOWN));
+        let mut issues: Vec<Self> =
+            invalid.issues[..shown].iter().map(|issue| Self::of_issue(invalid, issue)).collect();
+        match issues.pop() {
+            Some(issue) if count == 1 => issue,
+            last => {
+                let text = format!("{}: {count} errors", invalid.file.display());
+                let hint = (shown < count).then(|| format!("{} more are not shown", count - shown));
+                Self {
+                    related: issues.into_iter().chain(last).collect(),
+                    ..Self::with_hint(Text(text), hint)
+                }
+            }
+        }
+    }
+
+    fn of_issue(invalid: &InvalidCase, issue: &CaseIssue) -> Self {
+        let one =
+            InvalidCase { text: String::new(), issues: vec![issue.clone()], more: 0, ..invalid.clone() };
+        let diagnosed = Self::with_hint(one, Some(issue.problem.hint()));
+        let Place::Text { span, .. } = &issue.place else { return diagnosed };
+        Self {
+            source: Some(NamedSource::new(invalid.file.display().to_string(), invalid.text.clone())),
+            label: Some(LabeledSpan::new_with_span(Some("here".into()), span.clone())),
+            ..diagnosed
+        }
     }
 
     /// Any other error, and what to do about it.
     pub fn with_hint(error: impl std::error::Error + Send + Sync + 'static, hint: Option<String>) -> Self {
-        Self { hint, source: None, label: None, error: Box::new(error) }
+        Self { hint, source: None, label: None, related: Vec::new(), error: Box::new(error) }
     }
 }
 
@@ -70,8 +103,6 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
                                      (y), not from open sides"
                 .into()
         }
-        RunError::Case(CaseError::Invalid(issue)) => issue.problem.hint(),
-        RunError::Case(CaseError::Argument { problem, .. }) => problem.hint(),
         RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
@@ -133,9 +164,17 @@ impl From<CaseError> for Diagnosed {
     }
 }
 
-fn label(issue: &CaseIssue) -> LabeledSpan {
-    LabeledSpan::new_with_span(Some("here".into()), issue.span.clone())
+/// A message without a cause.
+#[derive(Debug)]
+struct Text(String);
+
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
 }
+
+impl std::error::Error for Text {}
 
 impl fmt::Display for Diagnosed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -156,6 +195,11 @@ impl Diagnostic for Diagnosed {
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
         self.source.as_ref().map(|source| source as &dyn SourceCode)
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        let related = self.related.iter().map(|issue| issue as &dyn Diagnostic);
+        (!self.related.is_empty()).then(|| Box::new(related) as Box<dyn Iterator<Item = &dyn Diagnostic>>)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {

@@ -36,6 +36,7 @@ pub mod reference;
 mod report;
 mod run;
 mod simulation;
+pub mod sweep;
 pub mod table;
 mod trajectory;
 pub mod view;

@@ -33,7 +33,7 @@ impl Reporter {
     /// A bar if there is a terminal to draw it on and `quiet` does not forbid it.
     pub fn new(name: &str, quiet: bool) -> Self {
         if quiet || !stderr().is_terminal() {
-            return Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()), quiet };
+            return Self::log(name, quiet);
         }
         let bar = ProgressBar::no_length().with_prefix(name.to_owned());
         let template = "{prefix} [{bar:30}] step {pos}/{len} {msg}";
@@ -42,6 +42,11 @@ impl Reporter {
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
         Self::Bar(bar)
+    }
+
+    /// Lines, whatever there is to draw on.
+    pub fn log(name: &str, quiet: bool) -> Self {
+        Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()), quiet }
     }
 
     /// Takes the bar off the screen.
@@ -124,6 +129,19 @@ pub fn print_json(value: &impl Serialize) {
 /// Prints lines of a name and what it stands for.
 pub fn print_lines(lines: &[(&str, String)]) {
     let text: String = lines.iter().map(|(name, value)| format!("{name:<12} {value}\n")).collect();
+    let _ = stdout().write_all(text.as_bytes());
+}
+
+/// Prints a table whose first row is its head; columns without any entry are left out.
+pub fn print_table(rows: &[Vec<String>]) {
+    let (head, body) = rows.split_first().map_or((&[][..], rows), |(head, body)| (&head[..], body));
+    let used: Vec<usize> = (0..head.len()).filter(|&k| body.iter().any(|row| !row[k].is_empty())).collect();
+    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
+    let line = |row: &Vec<String>| {
+        let cells = used.iter().map(|&k| format!("{:<width$}", row[k], width = width(k)));
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+    };
+    let text: String = rows.iter().map(line).collect();
     let _ = stdout().write_all(text.as_bytes());
 }
 

@@ -7,9 +7,11 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::VERSION;
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
+use super::shown::shown;
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -22,38 +24,29 @@ pub enum CaseError {
         /// Why.
         source: io::Error,
     },
-    /// The file was read, but something in it is wrong.
+    /// Something in the case is wrong.
     #[error(transparent)]
-    Invalid(Box<CaseIssue>),
-    /// The file may be as it should, but not what a command line sets in it.
-    #[error("--set {argument}: {}{problem}", at(key))]
-    Argument {
-        /// The argument.
-        argument: String,
-        /// The key that is wrong, where it is another one.
-        key: Key,
-        /// The error.
-        problem: Box<Problem>,
-    },
+    Invalid(Box<InvalidCase>),
 }
 
-fn at(key: &Key) -> String {
-    if key.is_root() { String::new() } else { format!("{key}: ") }
-}
-
-/// One thing that is wrong in a case file, and where.
+/// All that is wrong in a case. Displays as one line for each issue.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CaseIssue {
-    /// The file.
+pub struct InvalidCase {
+    /// The file; the name of a case that was not read from one.
     pub file: PathBuf,
     /// Its text.
     pub text: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column, from 1, in characters.
-    pub column: usize,
-    /// Bytes of `text` to point at.
-    pub span: Range<usize>,
+    /// What is wrong, in the order of the text.
+    pub issues: Vec<CaseIssue>,
+    /// Number of issues beyond these.
+    pub more: usize,
+}
+
+/// One thing that is wrong in a case, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaseIssue {
+    /// Where it was written.
+    pub place: Place,
     /// The key, e.g. `particles[1].radius`.
     pub key: Key,
     /// The value as written, when there is one.
@@ -62,19 +55,57 @@ pub struct CaseIssue {
     pub problem: Problem,
 }
 
+/// Where something of a case was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In the text of its file.
+    Text {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1, in characters.
+        column: usize,
+        /// Bytes of the text to point at.
+        span: Range<usize>,
+    },
+    /// In an argument of the command line.
+    Argument(String),
+    /// Nowhere: a program made it.
+    Value,
+}
+
+impl fmt::Display for InvalidCase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, issue) in self.issues.iter().enumerate() {
+            let file = self.file.display();
+            if index > 0 {
+                writeln!(f)?;
+            }
+            match &issue.place {
+                Place::Text { line, column, .. } => write!(f, "{file}:{line}:{column}: {issue}")?,
+                Place::Argument(argument) => write!(f, "{argument}: {issue}")?,
+                Place::Value => write!(f, "{file}: {issue}")?,
+            }
+        }
+        match self.more {
+            0 => Ok(()),
+            more => write!(f, "\nand {more} more"),
+        }
+    }
+}
+
+impl std::error::Error for InvalidCase {}
+
 impl fmt::Display for CaseIssue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: ", self.file.display(), self.line, self.column)?;
-        match (&self.key.is_root(), &self.value) {
-            (true, _) => {}
+        match (self.key.is_root(), &self.value) {
+            (true, Some(value)) => write!(f, "{value}: ")?,
+            (true, None) => {}
             (false, Some(value)) => write!(f, "{} = {value}: ", self.key)?,
             (false, None) => write!(f, "{}: ", self.key)?,
         }
         write!(f, "{}", self.problem)
     }
 }
-
-impl std::error::Error for CaseIssue {}
 
 /// A place in a case: names of tables and keys, indices of arrays.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -103,6 +134,19 @@ impl Key {
     /// The entry below this one in an array.
     pub fn index(&self, index: usize) -> Self {
         self.with(KeyPart::Index(index))
+    }
+
+    /// Whether it is particles, or something of one.
+    pub(crate) fn is_of_particles(&self) -> bool {
+        self.0.first() == Some(&KeyPart::Name("particles".to_owned()))
+    }
+
+    /// The last name in it, indices left out.
+    pub(crate) fn last_name(&self) -> Option<&str> {
+        self.0.iter().rev().find_map(|part| match part {
+            KeyPart::Name(name) => Some(name.as_str()),
+            KeyPart::Index(_) => None,
+        })
     }
 
     fn with(&self, part: KeyPart) -> Self {
@@ -149,6 +193,8 @@ pub enum Problem {
         name: String,
         /// The nearest known key.
         suggestion: Option<String>,
+        /// Tables that have this key, as a case file writes them: `[flow.mesh]`.
+        elsewhere: Vec<String>,
         /// All keys known here.
         known: Vec<String>,
     },
@@ -171,18 +217,21 @@ pub enum Problem {
     /// A name that is none of the known ones.
     #[error("{0}")]
     UnknownName(UnknownName),
-    /// Something serde has no better word for.
+    /// A case file of another layout.
+    #[error("layout {found} of case files is not known to this program, gluey {}", env!("CARGO_PKG_VERSION"))]
+    Version {
+        /// Its layout.
+        found: i64,
+    },
+    /// Something the parser has no better word for.
     #[error("{message}")]
     Malformed {
         /// Message of the parser.
         message: String,
     },
-    /// Neither 2 nor 3.
-    #[error("dimension {found} is not implemented")]
-    Dimension {
-        /// The dimension asked for.
-        found: usize,
-    },
+    /// A whole number beyond 64 bits.
+    #[error("too many digits for a whole number")]
+    TooManyDigits,
     /// NaN or infinite.
     #[error("{found} is not a finite number")]
     NotFinite {
@@ -196,14 +245,6 @@ pub enum Problem {
         found: f64,
         /// The range, in words: `greater than 0`.
         range: String,
-    },
-    /// A parameter that the solver refuses.
-    #[error("{found} is out of range")]
-    Parameter {
-        /// The value.
-        found: f64,
-        /// The range, in words: `must be larger than 1`.
-        wanted: &'static str,
     },
     /// A vector with another number of coordinates than the dimension.
     #[error("{found} coordinates in {dimension}D")]
@@ -264,7 +305,7 @@ pub enum Problem {
         axis: char,
     },
     /// A particle that sticks out of the box.
-    #[error("particle {particle} sticks out of the box by {excess:.6e} along {axis}")]
+    #[error("particle {particle} sticks out of the box by {} along {axis}", shown(*excess))]
     OutsideBox {
         /// Its number, from 1.
         particle: usize,
@@ -276,7 +317,7 @@ pub enum Problem {
         range: (f64, f64),
     },
     /// Two particles that overlap at the start.
-    #[error("particles {first} and {second} overlap at the start: gap {gap:.6e}{}", more(others))]
+    #[error("particles {first} and {second} overlap at the start: gap {}{}", shown(*gap), more(others))]
     Overlap {
         /// Number of the first particle, from 1.
         first: usize,
@@ -320,7 +361,7 @@ pub enum Problem {
         finest: u32,
     },
     /// More steps than can be counted or waited for.
-    #[error("{end} / {step} are {steps:.3e} steps")]
+    #[error("{} / {} are {steps:.3e} steps", shown(*end), shown(*step))]
     TooManySteps {
         /// End of the run.
         end: f64,
@@ -330,7 +371,7 @@ pub enum Problem {
         steps: f64,
     },
     /// A choice that does not go with the rest of the case.
-    #[error("\"{choice}\" needs {needs}, but the case has {found}")]
+    #[error("{choice} needs {needs}, but the case has {found}")]
     Unfit {
         /// The choice.
         choice: String,
@@ -348,9 +389,25 @@ impl Problem {
     /// Hint at values that would be right.
     pub fn hint(&self) -> String {
         match self {
-            Self::Syntax { .. } | Self::Malformed { .. } => "see the case format in the README".into(),
+            Self::Syntax { message } => syntax_hint(message).into(),
+            Self::Malformed { .. } => "see docs/case-keys.md for what is right".into(),
+            Self::TooManyDigits => {
+                "a whole number has at most 18 digits; with a point or an exponent, 1e20, it may be larger"
+                    .into()
+            }
+            Self::MissingKey { name, .. } if name == "particles" => {
+                "list them under lines `[[particles]]`, or generate them by `[suspension]`, or name a \
+                 `particles_file`"
+                    .into()
+            }
             Self::MissingKey { example, .. } => format!("add a line like `{example}`"),
-            Self::UnknownKey { suggestion, known, .. } => unknown_key_hint(suggestion.as_deref(), known),
+            Self::UnknownKey { suggestion, elsewhere, known, .. } => {
+                unknown_key_hint(suggestion.as_deref(), elsewhere, known)
+            }
+            Self::Version { found } if *found > i64::from(VERSION) => {
+                format!("it reads layout {VERSION}: take a newer gluey, or write the case in that layout")
+            }
+            Self::Version { .. } => format!("it reads layout {VERSION}: write `version = {VERSION}`"),
             Self::NoEntry { count: 0, .. } => {
                 "the case has no such list; particles can be set one by one where the \
                                                case lists them"
@@ -361,10 +418,26 @@ impl Problem {
             }
             Self::WrongType { expected, .. } => format!("expected {expected}"),
             Self::UnknownName(name) => name.hint(),
-            Self::Dimension { .. } => "dimension is 2 or 3".into(),
             Self::NotFinite { .. } => "expected a finite number".into(),
             Self::OutOfRange { range, .. } => format!("expected a number {range}"),
-            Self::Parameter { wanted, .. } => format!("it {wanted}"),
+            Self::Particles(problem) => problem.hint(),
+            Self::NoParticles => {
+                "list them under lines `[[particles]]`, each with `position` and `radius`".into()
+            }
+            Self::MeshTooFine { finest, largest, .. } => {
+                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
+            }
+            Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
+            Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
+            Self::Unfit { choice, needs, .. } => format!("take {needs}, or do without {choice}"),
+            Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
+            _ => self.hint_at_places(),
+        }
+    }
+
+    /// Hint at right places of particles and sizes of boxes.
+    fn hint_at_places(&self) -> String {
+        match self {
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
             Self::TorqueCount { needed, .. } => format!("expected a list of length {needed}"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
@@ -372,25 +445,18 @@ impl Problem {
                 "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than \
                  2^{FINEST_LEVEL}"
             ),
-            Self::TooBig { edge, .. } => format!("the radius must be less than {}", 0.5 * edge),
+            Self::TooBig { edge, .. } => format!("the radius must be less than {}", shown(0.5 * edge)),
             Self::PeriodTooShort { period, axis, .. } => {
-                format!("the radius must be at most {}, or the box longer along {axis}", 0.25 * period)
+                format!("the radius must be at most {}, or the box longer along {axis}", shown(0.25 * period))
             }
             Self::OutsideBox { axis, range, .. } => {
-                format!("{axis} of the centre must lie between {} and {}", range.0, range.1)
+                format!("{axis} of the centre must lie between {} and {}", shown(range.0), shown(range.1))
             }
             Self::Overlap { distance, contact_distance, .. } => {
-                format!("the centres are {distance} apart, at least {contact_distance} is needed")
+                let (distance, needed) = (shown(*distance), shown(*contact_distance));
+                format!("the centres are {distance} apart, at least {needed} is needed")
             }
-            Self::Particles(problem) => problem.hint(),
-            Self::NoParticles => "add a [[particles]] table with `position` and `radius`".into(),
-            Self::MeshTooFine { finest, largest, .. } => {
-                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
-            }
-            Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
-            Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
-            Self::Unfit { needs, .. } => format!("it needs {needs}"),
-            Self::BadName => "use letters, digits, `-` and `_`, at most 64 of them".into(),
+            _ => String::new(),
         }
     }
 }
@@ -407,10 +473,18 @@ fn more(others: &[(usize, usize)]) -> String {
     }
 }
 
-fn unknown_key_hint(suggestion: Option<&str>, known: &[String]) -> String {
+fn syntax_hint(message: &str) -> &'static str {
+    match message.contains("duplicate key") {
+        true => "every key and every line `[table]` stands once; only `[[particles]]` are repeated",
+        false => "a case has lines like `key = 0.5` and `key = \"text\"` below lines like `[table]`",
+    }
+}
+
+fn unknown_key_hint(suggestion: Option<&str>, elsewhere: &[String], known: &[String]) -> String {
     let known = known.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
-    match suggestion {
-        Some(near) => format!("did you mean `{near}`? Keys known here: {known}"),
-        None => format!("keys known here: {known}"),
+    match (suggestion, elsewhere) {
+        (Some(near), _) => format!("did you mean `{near}`? Keys known here: {known}"),
+        (None, []) => format!("keys known here: {known}"),
+        (None, tables) => format!("it is a key of {}; keys known here: {known}", tables.join(" and ")),
     }
 }

@@ -3,26 +3,24 @@
 use std::path::Path;
 
 use gluey_geom::{Dim, Space};
+use gluey_suspension::ball_volume;
 use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
-use super::error::{CaseError, Key, Problem};
+use super::error::{Key, Problem};
+use super::findings::{Findings, Violation};
 use super::particle_problem::ParticleProblem;
-use super::validate::{Check, Violation, check_surroundings};
+use super::shown::shown;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
 
-impl Case {
-    /// Makes the particles that `suspension` or `particles_file` describe, if one of them is there, and
-    /// forgets the description: a case made by a program is then as if it had been read. Files are looked for
-    /// in `folder`.
-    pub fn fill_particles(&mut self, folder: impl AsRef<Path>) -> Result<(), CaseError> {
-        let has_list = !self.particles.is_empty();
-        let filled = check_surroundings(self).and_then(|()| fill(self, has_list, folder.as_ref()));
-        filled.map_err(|violation| CaseError::of_value(&self.name, violation.key, violation.problem))
-    }
-}
+/// So many particles can be generated: the range of `suspension.count`.
+const MOST_PARTICLES: f64 = 1e6;
+
+/// The parts of a case that its particles follow from.
+pub(super) const NEEDED: [&str; 6] =
+    ["dimension", "domain", "flow", "particles", "suspension", "particles_file"];
 
 /// Makes the particles of a case whose surroundings are checked; `has_list` says whether it lists any.
-pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path) -> Check {
+pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path, findings: &mut Findings) {
     let root = Key::default();
     let sources = [
         (has_list, "[[particles]]"),
@@ -33,29 +31,39 @@ pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path) -> Check {
     match given[..] {
         [] => {
             let problem = Problem::MissingKey { name: "particles".into(), example: "[[particles]]" };
-            return Err(Violation { key: root.name("particles"), problem });
+            findings.add(root.name("particles"), problem);
         }
         [first, second, ..] => {
             let key = root.name(if case.suspension.is_some() { "suspension" } else { "particles_file" });
-            return fail(key, ParticleProblem::TwoSources { first, second });
+            findings.add(key, Problem::Particles(ParticleProblem::TwoSources { first, second }));
         }
-        [_] => {}
+        [_] => fill_from_one(case, folder, findings),
     }
+}
+
+fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) {
     if let Some(file) = &case.particles_file {
-        let read = particles_file::read(&folder.join(file), case.dimension);
-        case.particles = read.or_else(|problem| fail(root.name("particles_file"), problem))?;
-        case.particles_file = None;
+        match particles_file::read(&folder.join(file), case.dimension) {
+            Ok(particles) => (case.particles, case.particles_file) = (particles, None),
+            Err(problems) => problems.into_iter().for_each(|problem| {
+                findings.add(Key::default().name("particles_file"), Problem::Particles(problem));
+            }),
+        }
     }
     if let Some(suspension) = &case.suspension {
         let seed = suspension.seed;
-        case.particles = generate(case, suspension, &root.name("suspension"))?;
-        case.seed = Some(seed);
-        case.suspension = None;
+        match generate(case, suspension, &Key::default().name("suspension")) {
+            Ok(particles) => {
+                (case.particles, case.suspension) = (particles, None);
+                case.seed = Some(seed);
+            }
+            Err(Violation { key, problem }) => findings.add(key, problem),
+        }
     }
-    Ok(())
 }
 
 fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<ParticleSpec>, Violation> {
+    check_count(case, suspension, key)?;
     let params = suspension.params().or_else(|problem| fail(problem_key(&problem, key), problem))?;
     let packed = match case.dimension {
         2 => pack::<2>(case, &params),
@@ -65,6 +73,25 @@ fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<P
         let key = packing_key(&error).map_or(key.clone(), |name| key.name(name));
         fail(key, ParticleProblem::Packing(error))
     })
+}
+
+/// Refuses a radius that takes more particles than can be listed: they would fill the memory.
+fn check_count(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<(), Violation> {
+    let (Some(fraction), Some(radius), None) =
+        (suspension.volume_fraction, suspension.radius, suspension.count)
+    else {
+        return Ok(());
+    };
+    let volume = case.edges().iter().product::<f64>();
+    let unit = if case.dimension == 2 { ball_volume::<2>(1.0) } else { ball_volume::<3>(1.0) };
+    let least = (fraction * volume / unit / MOST_PARTICLES).powf(1.0 / case.dimension as f64);
+    match radius >= least {
+        true => Ok(()),
+        false => {
+            let range = format!("of {} or more, for at most {MOST_PARTICLES} particles", shown(least));
+            Err(Violation { key: key.name("radius"), problem: Problem::OutOfRange { found: radius, range } })
+        }
+    }
 }
 
 fn pack<const D: usize>(case: &Case, params: &PackingParams) -> Result<Vec<ParticleSpec>, PackingError>

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -31,11 +32,16 @@ impl UnknownName {
     }
 }
 
+/// A text that is one of `names`: of a type that other crates have.
+pub(super) fn schema_of_names<T: Serialize>(names: &[T]) -> Schema {
+    schemars::json_schema!({ "type": "string", "enum": names })
+}
+
 /// An enum whose variants have names: `Display`, `FromStr`, serde and the list of all of them.
 macro_rules! named {
     ($(#[$doc:meta])* $type:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $name:literal),+ $(,)? }) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
         pub enum $type {
             $($(#[$variant_doc])* #[serde(rename = $name)] $variant),+
         }

@@ -5,7 +5,8 @@ use std::str::FromStr;
 use thiserror::Error;
 use toml::{Table, Value};
 
-use super::error::{Key, KeyPart, Problem};
+use super::error::{CaseIssue, Key, KeyPart, Place, Problem};
+use super::form::type_name;
 
 /// A key of a case and the value it is to have instead of that of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +15,7 @@ pub struct Override {
     pub key: Key,
     /// The value.
     pub value: Value,
-    /// Both, as they were written.
+    /// The argument of the command line that sets it.
     pub text: String,
 }
 
@@ -45,24 +46,34 @@ impl FromStr for Override {
     /// (`particles.0.radius`, `particles[0].radius`); the value is one of TOML, where words need no quotes.
     fn from_str(text: &str) -> Result<Self, BadOverride> {
         let (key, value) = text.split_once('=').ok_or(BadOverride::NoValue)?;
-        Ok(Self { key: parse_key(key.trim())?, value: parse_value(value.trim())?, text: text.to_owned() })
+        let (key, value) = (parse_key(key.trim())?, parse_value(value.trim())?);
+        Ok(Self { key, value, text: format!("--set {text}") })
     }
 }
 
 impl Override {
-    /// Sets the key in the table of a case.
+    /// What an option of its own sets, such as `--strategy`: a name below these tables.
+    pub fn of_option(option: &str, path: &[&str], name: &str) -> Self {
+        let key = path.iter().fold(Key::default(), |key, part| key.name(part));
+        Self { key, value: Value::String(name.to_owned()), text: format!("{option} {name}") }
+    }
+
+    /// Sets the key in the table of a case, which stays as it is where that cannot be done.
     pub(super) fn apply(&self, table: &mut Table) -> Result<(), Problem> {
         let (last, path) = self.key.0.split_last().expect("a key has a part");
-        let mut place = Value::Table(std::mem::take(table));
-        let set = path
-            .iter()
-            .try_fold(&mut place, enter)
-            .and_then(|holder| enter(holder, last))
-            .map(|value| *value = self.value.clone());
+        let mut place = Value::Table(table.clone());
+        let holder = path.iter().try_fold(&mut place, enter)?;
+        *enter(holder, last)? = self.value.clone();
         if let Value::Table(changed) = place {
             *table = changed;
         }
-        set
+        Ok(())
+    }
+
+    /// What is wrong with `key` because of this.
+    pub(super) fn issue(&self, key: Key, problem: Problem) -> CaseIssue {
+        let key = if key == self.key { Key::default() } else { key };
+        CaseIssue { place: Place::Argument(self.text.clone()), key, value: None, problem }
     }
 
     /// Whether this key is `other`, above it or below it.
@@ -83,20 +94,9 @@ fn enter<'a>(holder: &'a mut Value, part: &KeyPart) -> Result<&'a mut Value, Pro
         }
         (KeyPart::Index(index), _) => Err(Problem::NoEntry { index: *index, count: 0 }),
         (KeyPart::Name(name), other) => Err(Problem::WrongType {
-            found: format!("no table with a key `{name}`, but {}", in_words(other)),
-            expected: "a key of the case".into(),
+            found: format!("{}, which has no key `{name}`", type_name(other)),
+            expected: "a key of the case, such as time.step or particles.0.radius".into(),
         }),
-    }
-}
-
-fn in_words(value: &Value) -> &'static str {
-    match value {
-        Value::String(_) => "a text",
-        Value::Integer(_) | Value::Float(_) => "a number",
-        Value::Boolean(_) => "true or false",
-        Value::Datetime(_) => "a date",
-        Value::Array(_) => "a list, whose entries are counted from 0",
-        Value::Table(_) => "a table",
     }
 }
 

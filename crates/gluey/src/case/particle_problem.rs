@@ -44,7 +44,7 @@ pub enum ParticleProblem {
         reason: String,
     },
     /// Something in the file of particles is wrong.
-    #[error("{}:{line}: found `{found}`", path.display())]
+    #[error("{}:{line}: {}", path.display(), found_or_nothing(found))]
     File {
         /// The file.
         path: PathBuf,
@@ -69,11 +69,17 @@ impl ParticleProblem {
             Self::RadiiKey { key, is_missing: true, .. } => format!("add `{key}`"),
             Self::RadiiKey { key, .. } => format!("leave out `{key}`"),
             Self::Packing(error) => packing_hint(error).into(),
-            Self::Unreadable { .. } => "the path is taken from the folder of the case file".into(),
+            Self::Unreadable { .. } => {
+                "name a text file with the columns x,y[,z],radius; its path begins in the folder of the case file".into()
+            }
             Self::File { wanted, .. } => format!("expected {wanted}"),
             Self::NotFilled => "call `Case::fill_particles`, or read the case by `Case::parse`".into(),
         }
     }
+}
+
+fn found_or_nothing(found: &str) -> String {
+    if found.is_empty() { "nothing is there".to_owned() } else { format!("found `{found}`") }
 }
 
 fn packing_hint(error: &PackingError) -> &'static str {

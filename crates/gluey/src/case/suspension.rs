@@ -1,6 +1,7 @@
 //! How a case describes particles that are to be generated.
 
 use gluey_suspension::packing::{Amount, Arrangement, DEFAULT_SWEEPS, LargeShare, PackingParams, Sizes};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::names::{ArrangementName, RadiiKind};
@@ -9,26 +10,33 @@ use super::particle_problem::ParticleProblem;
 /// Particles to generate. Two of `volume_fraction`, `count` and `radius` are given; the third follows from
 /// the box. With a fraction and a radius the number of particles is rounded, and the radii are adapted so
 /// that the fraction is met exactly.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SuspensionSpec {
-    /// Volume of the particles over that of the box; in 2D areas.
+    /// Volume of the particles; in 2D their area. Unit: volume of the box, in 2D its area. Default: what
+    /// follows from `count` and `radius`.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub volume_fraction: Option<f64>,
-    /// Number of particles.
+    /// Number of particles. Unit: particles. Default: what follows from `volume_fraction` and `radius`.
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub count: Option<usize>,
-    /// Mean radius.
+    /// Mean radius. Unit: length. Default: what follows from `volume_fraction` and `count`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// How particles are arranged; `equilibrium` when absent.
+    /// How particles are arranged. Default: "equilibrium".
     pub arrangement: ArrangementName,
-    /// Monte Carlo moves of each particle for `equilibrium`; when absent, [`DEFAULT_SWEEPS`].
+    /// Monte Carlo moves of each particle for `equilibrium`. Unit: moves. Default: 4000.
+    #[schemars(range(max = 1_000_000))]
     pub sweeps: Option<usize>,
-    /// Seed of the random numbers.
+    /// Seed of the random numbers. Unit: none. Default: 1.
     pub seed: u64,
-    /// Smallest gap between surfaces, walls included, in mean radii; 0.01 when absent.
+    /// Smallest gap between surfaces, walls included. Unit: mean radius. Default: 0.01.
+    #[schemars(range(min = 0, max = 1))]
     pub min_gap: f64,
-    /// Displacements from the sites of a lattice, relative to the largest that keep the smallest gap: 0 to 1.
+    /// Displacements from the sites of a lattice. Unit: the largest that keep the smallest gap. Default: 0.
+    #[schemars(range(min = 0, max = 1))]
     pub jitter: f64,
-    /// Distribution of the radii; equal when absent.
+    /// Distribution of the radii.
     pub radii: RadiiSpec,
 }
 
@@ -49,19 +57,25 @@ impl Default for SuspensionSpec {
 }
 
 /// Distribution of radii.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RadiiSpec {
-    /// `equal`, `bidisperse` or `lognormal`.
+    /// Kind of the distribution. Default: "equal".
     pub kind: RadiiKind,
-    /// `bidisperse`: the larger radius over the smaller one.
+    /// `bidisperse`: the larger radius. Unit: the smaller radius. Default: none, it is needed there.
+    #[schemars(range(max = 10), extend("exclusiveMinimum" = 1))]
     pub ratio: Option<f64>,
-    /// `bidisperse`: share of the number of particles that is large; half of it when this and `large_volume`
-    /// are absent.
+    /// `bidisperse`: how many particles are large. Unit: number of particles. Default: 0.5, without
+    /// `large_volume`.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub large_number: Option<f64>,
-    /// `bidisperse`: share of the volume of particles that is in large ones, instead of `large_number`.
+    /// `bidisperse`: volume of the large particles, instead of `large_number`. Unit: volume of all particles.
+    /// Default: what follows from `large_number`.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub large_volume: Option<f64>,
-    /// `lognormal`: standard deviation of the logarithm of the radius; it is cut at three of them.
+    /// `lognormal`: standard deviation of the logarithm of the radius; it is cut at three of them. Unit:
+    /// none. Default: none, it is needed there.
+    #[schemars(range(max = 0.5), extend("exclusiveMinimum" = 0))]
     pub deviation: Option<f64>,
 }
 

@@ -1,172 +1,149 @@
-//! Checks of a case beyond its types.
+//! What does not fit together in a case whose keys and values are right one by one.
 
-use gluey_stokes::StokesError;
-
-use super::Case;
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
-use super::mesh::MOST_ROOTS;
-use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, UnknownName};
+use super::findings::Findings;
+use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication};
 use super::neighbours::{Neighbours, nearer_than};
 use super::particle_problem::ParticleProblem;
-use crate::reference::{self, Reference};
-
-/// A value that makes no sense, and its key.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Violation {
-    pub key: Key,
-    pub problem: Problem,
-}
-
-pub(super) type Check = Result<(), Violation>;
+use super::{Case, fill};
+use crate::reference::Reference;
 
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// The first thing wrong with `case`, in the order of the file format.
-pub(super) fn check(case: &Case) -> Check {
-    check_surroundings(case)?;
+/// Notes what does not fit together before there are particles.
+pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     let root = Key::default();
-    check_particles(case, &root.name("particles"))?;
-    check_time(case, &root.name("time"))?;
-    check_contact(case, &root.name("contact"))?;
-    check_flow(case, &root.name("flow"))?;
-    check_reference(case, root.name("reference"))
-}
-
-/// The first thing wrong before the particles.
-pub(super) fn check_surroundings(case: &Case) -> Check {
-    let root = Key::default();
-    check_name(&case.name, root.name("name"))?;
-    if !(2..=3).contains(&case.dimension) {
-        return fail(root.name("dimension"), Problem::Dimension { found: case.dimension });
+    check_name(&case.name, root.name("name"), findings);
+    if findings.are_good(&["flow"]) {
+        check_force(&case.gravity, case, &root.name("gravity"), findings);
     }
-    finite(case.shear_rate, root.name("shear_rate"))?;
-    check_force(&case.gravity, case, &root.name("gravity"))?;
-    check_domain(case, &root.name("domain"))
+    if findings.are_good(&["domain"]) {
+        check_box(case, &root.name("domain"), findings);
+    }
+    if findings.are_good(&["domain", "flow"]) {
+        check_boundary(case, &root.name("domain"), findings);
+    }
+    if findings.are_good(&["time"]) {
+        check_time(case, &root.name("time"), findings);
+    }
 }
 
-fn check_name(name: &str, key: Key) -> Check {
+/// Notes what does not fit together in a case whose particles are there.
+pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
+    let root = Key::default();
+    if findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
+        check_particles(case, &root.name("particles"), findings);
+    }
+    if findings.are_good(&fill::NEEDED) && !case.particles.is_empty() {
+        check_flow(case, &root.name("flow"), findings);
+    }
+    if findings.is_empty() {
+        check_reference(case, root.name("reference"), findings);
+    }
+}
+
+fn check_name(name: &str, key: Key, findings: &mut Findings) {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    match !name.is_empty() && name.len() <= 64 && name.chars().all(fits) {
-        true => Ok(()),
-        false => fail(key, Problem::BadName),
+    if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
+        findings.add(key, Problem::BadName);
     }
 }
 
 /// A comparison with a reference of something else would look like an error of the run.
-fn check_reference(case: &Case, key: Key) -> Check {
-    let Some(name) = &case.reference else { return Ok(()) };
-    let Some(table) = Reference::named(name) else {
-        let known = reference::NAMES.iter().map(|&name| name.to_owned()).collect();
-        let unknown = UnknownName { what: "reference".to_owned(), found: name.clone(), known };
-        return fail(key, Problem::UnknownName(unknown));
+fn check_reference(case: &Case, key: Key, findings: &mut Findings) {
+    let Some((name, table)) = case.reference.as_ref().and_then(|name| Some((name, Reference::named(name)?)))
+    else {
+        return;
     };
-    match mismatch(case, &table) {
-        Some(Mismatch { needs, found }) => fail(key, Problem::Unfit { choice: name.clone(), needs, found }),
-        None => Ok(()),
+    if let Some(Mismatch { needs, found }) = mismatch(case, &table) {
+        findings.add(key, Problem::Unfit { choice: format!("\"{name}\""), needs, found });
     }
 }
 
-fn check_domain(case: &Case, key: &Key) -> Check {
-    coordinates(&case.lower(), case.dimension, key.name("lower"))?;
-    coordinates(&case.upper(), case.dimension, key.name("upper"))?;
+fn check_box(case: &Case, key: &Key, findings: &mut Findings) {
     let (lower, upper) = (case.lower(), case.upper());
-    for d in 0..case.dimension {
-        if upper[d] <= lower[d] {
-            let problem = Problem::EmptyBox { axis: AXES[d], lower: lower[d], upper: upper[d] };
-            return fail(key.name("upper"), problem);
+    let are_corners = [("lower", &lower), ("upper", &upper)]
+        .map(|(name, corner)| check_coordinates(corner, case.dimension, key.name(name), findings));
+    if are_corners == [true, true] {
+        for axis in (0..case.dimension).filter(|&axis| upper[axis] <= lower[axis]) {
+            let problem = Problem::EmptyBox { axis: AXES[axis], lower: lower[axis], upper: upper[axis] };
+            findings.add(key.name("upper"), problem);
         }
-    }
-    let roots = case.flow.mesh.root_cells;
-    if !(1..=MOST_ROOTS).contains(&roots) {
-        let key = Key::default().name("flow").name("mesh").name("root_cells");
-        return out_of_range(f64::from(roots), &format!("from 1 to {MOST_ROOTS}"), key);
-    }
-    check_sheared(case, key.name("boundary"))?;
-    match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes if case.root_cells().is_none() => {
-            fail(key.name("upper"), Problem::UnevenBox { edges: case.edges() })
-        }
-        _ => Ok(()),
     }
 }
 
-/// Boxes that are sheared for ever are those of one formulation.
-fn check_sheared(case: &Case, key: Key) -> Check {
+/// Boxes that are sheared for ever are those of one formulation; a mesh is made of cubes.
+fn check_boundary(case: &Case, key: &Key, findings: &mut Findings) {
     let (flow, needed) = (&case.flow, Formulation::Unfitted);
-    let choice = || Boundary::Sheared.name().to_owned();
-    if case.domain.boundary != Boundary::Sheared {
-        return Ok(());
-    }
-    if flow.hydrodynamics != Hydrodynamics::Stokes {
+    let unfit = |needs: String, found: &str| Problem::Unfit {
+        choice: format!("\"{}\"", Boundary::Sheared),
+        needs,
+        found: format!("\"{found}\""),
+    };
+    let (is_flow, is_sheared) =
+        (flow.hydrodynamics == Hydrodynamics::Stokes, case.domain.boundary == Boundary::Sheared);
+    if is_sheared && !is_flow {
         let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
-        return fail(
-            key,
-            Problem::Unfit { choice: choice(), needs, found: format!("\"{}\"", flow.hydrodynamics) },
-        );
-    }
-    if flow.formulation != needed {
+        findings.add(key.name("boundary"), unfit(needs, flow.hydrodynamics.name()));
+    } else if is_sheared && flow.formulation != needed {
         let needs = format!("flow.formulation = \"{needed}\"");
-        return fail(
-            key,
-            Problem::Unfit { choice: choice(), needs, found: format!("\"{}\"", flow.formulation) },
-        );
+        findings.add(key.name("boundary"), unfit(needs, flow.formulation.name()));
     }
-    if case.rheology.every == 0 {
-        return out_of_range(0.0, "of 1 or more", Key::default().name("rheology").name("every"));
+    if is_flow && case.root_cells().is_none() {
+        findings.add(key.name("upper"), Problem::UnevenBox { edges: case.edges() });
     }
-    Ok(())
 }
 
-fn check_particles(case: &Case, key: &Key) -> Check {
+fn check_particles(case: &Case, key: &Key, findings: &mut Findings) {
     if case.suspension.is_some() || case.particles_file.is_some() {
-        return fail(key.clone(), Problem::Particles(ParticleProblem::NotFilled));
+        return findings.add(key.clone(), Problem::Particles(ParticleProblem::NotFilled));
     }
     if case.particles.is_empty() {
-        return fail(key.clone(), Problem::NoParticles);
+        return findings.add(key.clone(), Problem::NoParticles);
     }
+    let mut can_meet = true;
     for (index, particle) in case.particles.iter().enumerate() {
         let key = key.index(index);
-        coordinates(&particle.position, case.dimension, key.name("position"))?;
-        positive(particle.radius, key.name("radius"))?;
-        check_force(&particle.force, case, &key.name("force"))?;
-        check_torque(&particle.torque, case, &key.name("torque"))?;
-        check_inside(case, index, &key)?;
+        check_force(&particle.force, case, &key.name("force"), findings);
+        check_torque(&particle.torque, case, &key.name("torque"), findings);
+        can_meet &= check_coordinates(&particle.position, case.dimension, key.name("position"), findings)
+            && check_inside(case, index, &key, findings);
     }
-    check_overlaps(case, key)
+    if can_meet {
+        check_overlaps(case, key, findings);
+    }
 }
 
-fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key) -> Check {
-    let Some(force) = force else { return Ok(()) };
-    coordinates(force, case.dimension, key.clone())?;
-    check_answered(case, key)
+fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut Findings) {
+    let Some(force) = force else { return };
+    check_coordinates(force, case.dimension, key.clone(), findings);
+    check_answered(case, key, findings);
 }
 
-fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key) -> Check {
-    let Some(torque) = torque else { return Ok(()) };
+fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut Findings) {
+    let Some(torque) = torque else { return };
     let (found, needed) = (torque.len(), if case.dimension == 2 { 1 } else { 3 });
     if found != needed {
-        return fail(key.clone(), Problem::TorqueCount { found, needed, dimension: case.dimension });
+        findings.add(key.clone(), Problem::TorqueCount { found, needed, dimension: case.dimension });
     }
-    torque.iter().enumerate().try_for_each(|(index, &value)| finite(value, key.index(index)))?;
-    check_answered(case, key)
+    check_answered(case, key, findings);
 }
 
 /// Only the finite-element flow answers to forces.
-fn check_answered(case: &Case, key: &Key) -> Check {
-    match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => Ok(()),
-        found => {
-            let choice = "forces and torques".to_owned();
-            let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
-            fail(key.clone(), Problem::Unfit { choice, needs, found: format!("\"{found}\"") })
-        }
+fn check_answered(case: &Case, key: &Key, findings: &mut Findings) {
+    let found = case.flow.hydrodynamics;
+    if found != Hydrodynamics::Stokes {
+        let choice = "a force".to_owned();
+        let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
+        findings.add(key.clone(), Problem::Unfit { choice, needs, found: format!("\"{found}\"") });
     }
 }
 
-fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
+/// Whether the particle has room in the box at all; notes it where it has not, or is not inside.
+fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -> bool {
     let particle = &case.particles[index];
     let (lower, upper) = (case.lower(), case.upper());
     for d in 0..case.dimension {
@@ -174,13 +151,15 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
         let range = (lower[d] + particle.radius, upper[d] - particle.radius);
         if range.0 >= range.1 {
             let (diameter, edge) = (2.0 * particle.radius, upper[d] - lower[d]);
-            return fail(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
+            findings.add(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
+            return false;
         }
         let range = match case.period(d) {
             Some(period) if 4.0 * particle.radius > period => {
                 let (particle, diameter) = (index + 1, 2.0 * particle.radius);
                 let problem = Problem::PeriodTooShort { particle, diameter, period, axis };
-                return fail(key.name("radius"), problem);
+                findings.add(key.name("radius"), problem);
+                return false;
             }
             // A particle may lie across a periodic border.
             Some(_) => (lower[d], upper[d]),
@@ -189,207 +168,122 @@ fn check_inside(case: &Case, index: usize, key: &Key) -> Check {
         let excess = (range.0 - particle.position[d]).max(particle.position[d] - range.1);
         if excess > 0.0 {
             let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
-            return fail(key.name("position"), problem);
+            findings.add(key.name("position"), problem);
         }
     }
-    Ok(())
+    true
 }
 
-fn check_overlaps(case: &Case, key: &Key) -> Check {
+fn check_overlaps(case: &Case, key: &Key, findings: &mut Findings) {
     let overlapping = nearer_than(case, 0.0);
     let Some(Neighbours { first, second, distance, contact_distance }) = overlapping.first().copied() else {
-        return Ok(());
+        return;
     };
     let others = overlapping[1..].iter().map(|pair| (pair.first + 1, pair.second + 1)).collect();
     let (gap, key) = (distance - contact_distance, key.index(second).name("position"));
     let (first, second) = (first + 1, second + 1);
-    fail(key, Problem::Overlap { first, second, gap, distance, contact_distance, others })
+    findings.add(key, Problem::Overlap { first, second, gap, distance, contact_distance, others });
 }
 
-fn check_time(case: &Case, key: &Key) -> Check {
+fn check_time(case: &Case, key: &Key, findings: &mut Findings) {
     let time = &case.time;
-    positive(time.step, key.name("step"))?;
-    positive(time.end, key.name("end"))?;
     let steps = time.end / time.step;
     if steps > MAX_STEPS {
         let problem = Problem::TooManySteps { end: time.end, step: time.step, steps };
-        return fail(key.name("step"), problem);
+        findings.add(key.name("step"), problem);
     }
-    time.reverse_at.map_or(Ok(()), |at| positive(at, key.name("reverse_at")))?;
-    time.strain_amplitude
-        .map_or(Ok(()), |amplitude| check_cycles(case, amplitude, key.name("strain_amplitude")))
+    if let Some(amplitude) = time.strain_amplitude
+        && findings.are_good(&["shear_rate"])
+    {
+        check_cycles(case, amplitude, key.name("strain_amplitude"), findings);
+    }
 }
 
 /// A shear that oscillates is there, nothing else turns it round, and it does so between steps.
-fn check_cycles(case: &Case, amplitude: f64, key: Key) -> Check {
-    positive(amplitude, key.clone())?;
-    let choice = || format!("strain_amplitude = {amplitude}");
-    let unfit = |needs: &str, found: String| {
-        fail(key.clone(), Problem::Unfit { choice: choice(), needs: needs.to_owned(), found })
+fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut Findings) {
+    let choice = format!("strain_amplitude = {amplitude}");
+    let mut unfit = |needs: &str, found: String| {
+        findings.add(key.clone(), Problem::Unfit { choice: choice.clone(), needs: needs.to_owned(), found });
     };
+    if let Some(at) = case.time.reverse_at {
+        unfit("no time.reverse_at beside it", format!("reverse_at = {at}"));
+    }
     if case.shear_rate == 0.0 {
         return unfit("a shear rate that is not 0", "shear_rate = 0".to_owned());
     }
-    if let Some(at) = case.time.reverse_at {
-        return unfit("no time.reverse_at beside it", format!("reverse_at = {at}"));
-    }
     let steps = case.steps_to(amplitude);
     if steps < 0.5 || (steps - steps.round()).abs() > 1e-6 * steps {
-        return unfit("a whole number of steps for this strain", format!("{steps:.6}"));
-    }
-    Ok(())
-}
-
-fn check_contact(case: &Case, key: &Key) -> Check {
-    let contact = &case.contact;
-    if !(contact.threshold >= 0.0 && contact.threshold < 1.0) {
-        return out_of_range(contact.threshold, "from 0 to less than 1", key.name("threshold"));
-    }
-    if !(1e-15..=1e-3).contains(&contact.tolerance) {
-        return out_of_range(contact.tolerance, "from 1e-15 to 1e-3", key.name("tolerance"));
-    }
-    match contact.gamma_min {
-        Some(floor) if !(floor < 0.0 && floor.is_finite()) => {
-            out_of_range(floor, "less than 0", key.name("gamma_min"))
-        }
-        _ => Ok(()),
+        unfit("a whole number of steps for this strain", format!("{steps:.6}"));
     }
 }
 
-fn check_flow(case: &Case, key: &Key) -> Check {
-    let flow = &case.flow;
-    between(flow.tolerance, 0.0, 0.1, key.name("tolerance"))?;
-    check_mesh(case, &key.name("mesh"))?;
-    check_paper(case, &key.name("paper"))?;
-    check_lubrication(case, key.name("lubrication"))?;
-    let offset = flow.pair_mobility.gap_offset;
-    if !(offset >= 0.0 && offset.is_finite()) {
-        return out_of_range(offset, "of 0 or more", key.name("pair-mobility").name("gap_offset"));
+fn check_flow(case: &Case, key: &Key, findings: &mut Findings) {
+    check_mesh(case, &key.name("mesh"), findings);
+    check_lubrication(case, key.name("lubrication"), findings);
+    let (key, fraction) = (key.clone(), case.flow.rigid_dofs.gap_fraction);
+    if fraction != 0.0 && fraction < 0.1 {
+        findings.out_of_range(key.name("rigid-dofs").name("gap_fraction"), fraction, "from 0.1 to 10, or 0");
     }
-    match flow.hydrodynamics {
-        Hydrodynamics::PairMobility => check_pair_mobility(case, key.name("hydrodynamics")),
-        Hydrodynamics::Stokes => Ok(()),
+    if case.flow.hydrodynamics == Hydrodynamics::PairMobility {
+        check_pair_mobility(case, key.name("hydrodynamics"), findings);
     }
 }
 
 /// Deficits are those of one formulation.
-fn check_lubrication(case: &Case, key: Key) -> Check {
+fn check_lubrication(case: &Case, key: Key, findings: &mut Findings) {
     let (flow, needed) = (&case.flow, Formulation::Unfitted);
     if case.lubrication() == Lubrication::None || flow.formulation == needed {
-        return Ok(());
+        return;
     }
-    let choice = Lubrication::Deficit.name().to_owned();
+    let choice = format!("\"{}\"", Lubrication::Deficit);
     let needs = format!("flow.formulation = \"{needed}\"");
-    fail(key, Problem::Unfit { choice, needs, found: format!("\"{}\"", flow.formulation) })
+    findings.add(key, Problem::Unfit { choice, needs, found: format!("\"{}\"", flow.formulation) });
 }
 
-fn check_mesh(case: &Case, key: &Key) -> Check {
-    let mesh = &case.flow.mesh;
-    if !(mesh.band >= 0.0 && mesh.band <= 1e3) {
-        return out_of_range(mesh.band, "from 0 to 1000", key.name("band"));
-    }
-    let cells = case.cells_per_radius();
-    if !(cells >= 1.0 && cells.is_finite()) {
-        return out_of_range(cells, "of 1 or more", key.name("cells_per_radius"));
-    }
+fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
     // An analytic model has no mesh to be too fine.
     let (Some(root_size), Some(finest), Some(level)) =
         (case.root_size(), case.finest_level(), case.surface_level())
     else {
-        return Ok(());
+        return;
     };
     if level > f64::from(finest) {
-        let radius = case.smallest_radius();
+        let (radius, cells_per_radius) = (case.smallest_radius(), case.cells_per_radius());
         let largest = radius / root_size * f64::from(1u32 << finest);
-        let problem = Problem::MeshTooFine { cells_per_radius: cells, radius, level, finest, largest };
-        return fail(key.name("cells_per_radius"), problem);
+        let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest, largest };
+        return findings.add(key.name("cells_per_radius"), problem);
     }
     let level = level as u32;
+    let (mesh, left) = (&case.flow.mesh, finest - level);
     if mesh.coarsest_level > level {
         let problem = Problem::CoarseTooFine { found: mesh.coarsest_level, finest: level };
-        return fail(key.name("coarsest_level"), problem);
+        findings.add(key.name("coarsest_level"), problem);
     }
-    check_rigid_dofs(case, finest - level)
-}
-
-/// `levels_left` is what the tree has beyond the level of the surfaces.
-fn check_rigid_dofs(case: &Case, levels_left: u32) -> Check {
-    let key = Key::default().name("flow").name("rigid-dofs");
-    let rigid = &case.flow.rigid_dofs;
-    between(rigid.offset.unwrap_or(0.0), -1.0, 1.0, key.name("offset"))?;
-    if rigid.gap_fraction != 0.0 && !(0.1..=10.0).contains(&rigid.gap_fraction) {
-        return out_of_range(rigid.gap_fraction, "from 0.1 to 10, or 0", key.name("gap_fraction"));
-    }
-    match rigid.gap_levels {
-        Some(levels) if levels > levels_left => {
-            let range = format!("from 0 to {levels_left} with surfaces this fine");
-            out_of_range(f64::from(levels), &range, key.name("gap_levels"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The solver knows the ranges of its parameters, which have the names of the keys.
-fn check_paper(case: &Case, key: &Key) -> Check {
-    match case.flow.paper.params().check() {
-        Err(StokesError::Parameter { name, value: found, wanted }) => {
-            finite(found, key.name(name))?;
-            fail(key.name(name), Problem::Parameter { found, wanted })
-        }
-        _ => Ok(()),
+    if let Some(levels) = case.flow.rigid_dofs.gap_levels.filter(|&levels| levels > left) {
+        let key = Key::default().name("flow").name("rigid-dofs").name("gap_levels");
+        findings.out_of_range(key, f64::from(levels), &format!("from 0 to {left} with surfaces this fine"));
     }
 }
 
 /// The analytic model knows two equal spheres in unbounded shear.
-fn check_pair_mobility(case: &Case, key: Key) -> Check {
-    let choice = Hydrodynamics::PairMobility.name().to_owned();
+fn check_pair_mobility(case: &Case, key: Key, findings: &mut Findings) {
+    let choice = format!("\"{}\"", Hydrodynamics::PairMobility);
     let needs = "dimension 3 and two particles of equal radius".to_owned();
     let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
     let found = match (case.dimension, radii.as_slice()) {
-        (3, [a, b]) if a == b => return Ok(()),
+        (3, [a, b]) if a == b => return,
         (3, [a, b]) => format!("radii {a} and {b}"),
         (3, _) => format!("{} particles", radii.len()),
         (dimension, _) => format!("dimension {dimension}"),
     };
-    fail(key, Problem::Unfit { choice, needs, found })
+    findings.add(key, Problem::Unfit { choice, needs, found });
 }
 
-fn coordinates(values: &[f64], dimension: usize, key: Key) -> Check {
-    if values.len() != dimension {
-        return fail(key, Problem::CoordinateCount { found: values.len(), dimension });
+/// Whether there is a coordinate for each axis; notes it where there is not.
+fn check_coordinates(values: &[f64], dimension: usize, key: Key, findings: &mut Findings) -> bool {
+    let found = values.len();
+    if found != dimension {
+        findings.add(key, Problem::CoordinateCount { found, dimension });
     }
-    values.iter().enumerate().try_for_each(|(index, &value)| finite(value, key.index(index)))
-}
-
-fn finite(value: f64, key: Key) -> Check {
-    match value.is_finite() {
-        true => Ok(()),
-        false => fail(key, Problem::NotFinite { found: value }),
-    }
-}
-
-fn positive(value: f64, key: Key) -> Check {
-    finite(value, key.clone())?;
-    match value > 0.0 {
-        true => Ok(()),
-        false => out_of_range(value, "greater than 0", key),
-    }
-}
-
-/// `lower < value < upper`.
-fn between(value: f64, lower: f64, upper: f64, key: Key) -> Check {
-    finite(value, key.clone())?;
-    match lower < value && value < upper {
-        true => Ok(()),
-        false => out_of_range(value, &format!("between {lower} and {upper}, without the ends"), key),
-    }
-}
-
-fn out_of_range(found: f64, range: &str, key: Key) -> Check {
-    finite(found, key.clone())?;
-    fail(key, Problem::OutOfRange { found, range: range.to_owned() })
-}
-
-fn fail(key: Key, problem: Problem) -> Check {
-    Err(Violation { key, problem })
+    found == dimension
 }

@@ -18,7 +18,7 @@ pub struct ViewArguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Show every Nth frame only.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::run::at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::output::at_least_one)]
     every: usize,
 }
 

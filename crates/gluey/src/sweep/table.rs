@@ -1,0 +1,63 @@
+//! The table of a study: a line for each point, with its values and the numbers of its report.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Axis;
+use crate::report::RunReport;
+
+/// What came out of a point.
+#[derive(Clone, Debug, Serialize)]
+pub struct PointResult {
+    /// Name of the point and of its folder.
+    pub name: String,
+    /// Values of the swept keys, as they were written.
+    pub values: BTreeMap<String, String>,
+    /// `complete`, `failed` or `interrupted`; `not run` where the study ended before.
+    pub state: &'static str,
+    /// Its report, where it is complete.
+    pub report: Option<RunReport>,
+    /// Why it failed, where it did.
+    pub error: Option<String>,
+}
+
+/// The head of the table and its lines: values of the keys, then `state`, then numbers of reports. Lengths
+/// named `_over_a` are in mean radii, `wall_s` in seconds.
+pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
+    let numbers = [
+        "steps",
+        "wall_s",
+        "cells",
+        "dofs",
+        "min_gap_over_a",
+        "end_gap_over_a",
+        "reversibility_error",
+        "end_gap_rel_error",
+        "max_abs_error_over_a",
+    ];
+    let keys = axes.iter().map(|axis| axis.key.clone());
+    let head = keys.chain(["state"].into_iter().chain(numbers).map(str::to_owned)).collect();
+    let line = |result: &PointResult| {
+        let values = axes.iter().map(|axis| result.values.get(&axis.key).cloned().unwrap_or_default());
+        let numbers = result.report.as_ref().map_or(vec![String::new(); numbers.len()], numbers_of);
+        values.chain([result.state.to_owned()]).chain(numbers).collect()
+    };
+    [head].into_iter().chain(results.iter().map(line)).collect()
+}
+
+/// In the order of the head.
+fn numbers_of(report: &RunReport) -> Vec<String> {
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
+    vec![
+        report.steps.to_string(),
+        format!("{:.3}", report.wall_s),
+        report.cells.to_string(),
+        report.dofs.to_string(),
+        number(report.min_gap_over_a),
+        number(report.end_gap_over_a),
+        number(report.reversibility_error),
+        number(report.end_gap_rel_error),
+        number(report.max_abs_error_over_a),
+    ]
+}
