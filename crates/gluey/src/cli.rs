@@ -8,10 +8,8 @@ mod interrupt;
 mod manner;
 mod new;
 mod plot;
-mod recorded;
 mod resume;
 mod run;
-mod summary;
 mod view;
 
 use std::path::PathBuf;
