@@ -1,11 +1,13 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
-//! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask python`, `cargo xtask tidy`,
+//! `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
 mod book;
 mod ci;
 mod figures;
+mod python;
 mod reproduce;
 mod study;
 mod tidy;
@@ -46,9 +48,15 @@ enum Task {
     },
     /// Time a step of a sheared suspension and print one line of JSON.
     BenchSuspension(bench_suspension::Options),
+    /// Install the Python package in a fresh environment and run its tests.
+    Python {
+        /// The interpreter, instead of the first python3 or python.
+        #[arg(long, value_name = "PROGRAM")]
+        python: Option<PathBuf>,
+    },
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
-    /// Formatting, lints, all tests and a quick reproduction of the figures.
+    /// Formatting, lints, all tests, those of the Python package and a quick reproduction of the figures.
     Ci,
 }
 
@@ -103,6 +111,7 @@ fn main() -> ExitCode {
         Task::Study(arguments) => study(arguments),
         Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
         Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
+        Task::Python { python } => outcome(python::run(&workspace_root(), python.as_deref())),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }

@@ -10,10 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use toml::{Table, Value};
 
-use crate::errors::{of_case, of_run};
-
-/// What errors call a case that was a dictionary.
-pub const DICTIONARY: &str = "dictionary";
+use crate::errors::{DICTIONARY, of_case, of_run};
 
 /// A checked case.
 #[pyclass(frozen, module = "gluey._gluey")]

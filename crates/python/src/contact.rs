@@ -10,6 +10,7 @@ use gluey_geom::{Dim, Lattice, Space, Twist};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, Row, array, of_vectors, vectors};
@@ -87,8 +88,7 @@ impl PairContact {
 
     /// Corrects the velocities of a step.
     fn correct<'py>(&self, py: Python<'py>, step: Step<'py>) -> PyResult<Corrected<'py>> {
-        // Waits without the interpreter, which the thread that has the model may need.
-        let mut model = py.detach(|| self.lock());
+        let mut model = self.lock(py);
         match &mut *model {
             Model::Plane(model) => correct(py, model, &step),
             Model::Space(model) => correct(py, model, &step),
@@ -97,7 +97,7 @@ impl PairContact {
 
     /// What the next step depends on.
     fn memory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let pairs = match &*py.detach(|| self.lock()) {
+        let pairs = match &*self.lock(py) {
             Model::Plane(model) => model.checkpoint().pairs,
             Model::Space(model) => model.checkpoint().pairs,
         };
@@ -108,7 +108,7 @@ impl PairContact {
     /// Goes on from what [`Self::memory`] gave.
     fn set_memory(&self, py: Python<'_>, memory: Memory<'_>) -> PyResult<()> {
         let state = memory.state()?;
-        let set = match &mut *py.detach(|| self.lock()) {
+        let set = match &mut *self.lock(py) {
             Model::Plane(model) => model.resume(state),
             Model::Space(model) => model.resume(state),
         };
@@ -117,7 +117,7 @@ impl PairContact {
 
     /// Tells that the flow was reversed.
     fn reverse(&self, py: Python<'_>) {
-        match &mut *py.detach(|| self.lock()) {
+        match &mut *self.lock(py) {
             Model::Plane(model) => model.reverse(),
             Model::Space(model) => model.reverse(),
         }
@@ -125,8 +125,9 @@ impl PairContact {
 }
 
 impl PairContact {
-    fn lock(&self) -> MutexGuard<'_, Model> {
-        self.model.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Waits without the interpreter, which the thread that has the model may need.
+    fn lock(&self, py: Python<'_>) -> MutexGuard<'_, Model> {
+        self.model.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -8,6 +8,9 @@ use gluey::{CaseError, CheckpointError, ResultPaths, ResumeError, RowsError, Run
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+/// What errors call a case that was a dictionary.
+pub const DICTIONARY: &str = "dictionary";
+
 /// An exception of this name in `gluey.errors`, with a text and what to do.
 pub fn exception(py: Python<'_>, class: &str, text: &str, hint: Option<&str>) -> PyErr {
     let made = py.import("gluey.errors").and_then(|errors| errors.getattr(class)?.call1((text, hint)));
@@ -24,8 +27,12 @@ fn with<'py, T: IntoPyObject<'py>>(py: Python<'py>, error: PyErr, name: &str, va
 
 /// An error with all its causes, one a line.
 pub fn in_full(error: &dyn Error) -> String {
-    let causes = std::iter::successors(error.source(), |cause| cause.source());
-    causes.fold(error.to_string(), |text, cause| format!("{text}\n  because {cause}"))
+    let (mut text, mut cause) = (error.to_string(), error.source());
+    while let Some(because) = cause {
+        text.push_str(&format!("\n  because {because}"));
+        cause = because.source();
+    }
+    text
 }
 
 /// Any error without advice as an exception of this name.
@@ -62,7 +69,7 @@ fn argument_text(argument: &str, at_root: bool, problem: &Problem, key: &str) ->
 
 /// Where something is wrong: line and column of a file or text, the key alone of a dictionary.
 fn place(issue: &CaseIssue) -> String {
-    if issue.file.as_os_str() != crate::case::DICTIONARY {
+    if issue.file.as_os_str() != DICTIONARY {
         return issue.to_string();
     }
     match (issue.key.is_root(), &issue.value) {

@@ -67,15 +67,25 @@ pub fn run(
     finish(py, case.inner().clone(), options, threads, &listener)
 }
 
-/// Goes on with the run in a folder, the one of this name if there are several.
+/// A run to go on with; a dictionary with these keys.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Which {
+    folder: PathBuf,
+    name: Option<String>,
+    previous: bool,
+}
+
+/// Goes on with a run.
 #[pyfunction]
 pub fn resume(
     py: Python<'_>,
-    (folder, name, previous): (PathBuf, Option<String>, bool),
+    which: Which,
     threads: Option<usize>,
     progress: Option<Bound<'_, PyAny>>,
     notice: Bound<'_, PyAny>,
 ) -> PyResult<(PathBuf, String)> {
+    let Which { folder, name, previous } = which;
     let found = Resumption::find(&folder, name.as_deref(), previous);
     let Resumption { case_file, options } = found.map_err(|error| of_resume(py, &error))?;
     let case = gluey::Case::load(case_file).map_err(|error| of_case(py, &error))?;

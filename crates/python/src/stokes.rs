@@ -8,6 +8,7 @@ use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_stokes::{Conditions, Flow, Prepared, StokesError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, array, of_matrices, of_spins, of_vectors, spins, vectors};
@@ -69,7 +70,7 @@ impl Stokes {
 
     /// The flow under some conditions.
     fn solve<'py>(&self, py: Python<'py>, drive: Drive<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut flows = py.detach(|| self.flows.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut flows = self.flows.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         match &mut *flows {
             Flows::Plane(around) => around.solve(py, self.threads, &drive),
             Flows::Space(around) => around.solve(py, self.threads, &drive),
@@ -78,7 +79,7 @@ impl Stokes {
 
     /// The mobility matrix, or the resistance matrix.
     fn matrix<'py>(&self, py: Python<'py>, resistance: bool) -> PyResult<Bound<'py, PyAny>> {
-        let mut flows = py.detach(|| self.flows.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut flows = self.flows.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         match &mut *flows {
             Flows::Plane(around) => around.matrix(py, self.threads, resistance),
             Flows::Space(around) => around.matrix(py, self.threads, resistance),
@@ -107,7 +108,7 @@ where
         let both = || vectors.iter().copied().zip(spins.iter().copied());
         let wrenches: Vec<_> = both().map(|(force, torque)| Wrench::<D> { force, torque }).collect();
         let twists: Vec<_> = both().map(|(velocity, spin)| Twist::<D> { velocity, spin }).collect();
-        let (rate, middle) = (drive.shear_rate, self.middle);
+        let (hold, rate, middle) = (drive.hold, drive.shear_rate, self.middle);
         let shear = move |x: &Vector<D>| {
             let mut u = Vector::zeros();
             u[0] = rate * (x[1] - middle);
@@ -118,7 +119,7 @@ where
         let solved = py.detach(|| {
             pool.install(|| {
                 let conditions = Conditions::boundary(&shear);
-                let conditions = match drive.hold {
+                let conditions = match hold {
                     true => conditions.with_twists(&twists),
                     false => conditions.with_wrenches(&wrenches),
                 };

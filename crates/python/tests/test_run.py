@@ -183,9 +183,9 @@ def test_results_are_not_replaced_unless_forced(tmp_path: Path) -> None:
 
 
 def test_a_run_that_fails_says_why_and_how_to_go_on(tmp_path: Path) -> None:
-    case = pair(end=40.0)
+    case = pair(end=40.0, flow={"formulation": "paper", "mesh": {"cells_per_radius": 1.9}})
     case["time"]["step"] = 0.5
-    case["particles"] = gluey.particles([[0.75, 0.75], [0.3, 0.3]], 0.12)
+    case["particles"] = gluey.particles([[0.7, 0.75], [0.3, 0.3]], 0.12)
     with pytest.raises(gluey.RunError, match="good steps\n  because particle 1 reached the boundary") as caught:
         gluey.run(case, tmp_path, progress=False)
     hint = caught.value.hint

@@ -7,6 +7,8 @@ from typing import Any, final
 from numpy import float64
 from numpy.typing import NDArray
 
+__all__ = ["Case", "PairContact", "Stokes", "__version__", "resume", "run"]
+
 __version__: str
 
 def run(
@@ -17,7 +19,7 @@ def run(
     notice: Callable[[str], object],
 ) -> tuple[Any, str]: ...
 def resume(
-    which: tuple[str, str | None, bool],
+    which: dict[str, Any],
     threads: int | None,
     progress: Callable[[dict[str, Any]], object] | None,
     notice: Callable[[str], object],

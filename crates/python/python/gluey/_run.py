@@ -134,8 +134,9 @@ def resume(
     RunError, Interrupted
         As :func:`run`, and RunError where there is nothing to go on with.
     """
+    which = {"folder": os.fspath(folder), "name": name, "previous": previous}
     with _Told(progress) as told:
-        where, stem = _gluey.resume((os.fspath(folder), name, previous), threads, told.progress, _warn)
+        where, stem = _gluey.resume(which, threads, told.progress, _warn)
     return Result(where, stem)
 
 
