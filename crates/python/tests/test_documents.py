@@ -67,9 +67,8 @@ def test_types_are_true(tmp_path: Path) -> None:
     pytest.importorskip("mypy", reason="mypy is not installed")
     config = tmp_path / "mypy.ini"
     config.write_text("[mypy]\nstrict = True\n")
-    package = str(Path(gluey.__file__).parent)
     for command in (
-        ["mypy", "--config-file", str(config), "--cache-dir", str(tmp_path / "cache"), package],
+        ["mypy", "--config-file", str(config), "--cache-dir", str(tmp_path / "cache"), "-p", "gluey"],
         ["mypy.stubtest", "--mypy-config-file", str(config), "gluey._gluey"],
     ):
         told = subprocess.run([sys.executable, "-m", *command], cwd=tmp_path, capture_output=True, text=True)
