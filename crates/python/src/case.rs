@@ -11,6 +11,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use toml::{Table, Value};
 
 use crate::errors::{DICTIONARY, of_case, of_run};
+use crate::pool::compute;
 
 /// A checked case.
 #[pyclass(frozen, module = "gluey._gluey")]
@@ -31,7 +32,7 @@ impl Case {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
         let overrides = read_overrides(overrides)?;
-        let loaded = py.detach(|| gluey::Case::load_with(path, &overrides));
+        let loaded = compute(py, None, || gluey::Case::load_with(path, &overrides))?;
         Ok(Self { inner: loaded.map_err(|error| of_case(py, &error))? })
     }
 
@@ -62,10 +63,10 @@ impl Case {
     /// What a run would be: numbers of a summary and of the first mesh.
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let case = &self.inner;
-        let size = py.detach(|| {
+        let size = compute(py, None, || {
             memory::check(case).map_err(RunError::from)?;
             MeshSize::of(case).map_err(|error| RunError::Flow(error.into()))
-        });
+        })?;
         let size = size.map_err(|error| of_run(py, &error))?;
         let CaseSummary { name, dimension, particles, volume_fraction, strategy, formulation, .. } =
             CaseSummary::of(case);
@@ -88,7 +89,7 @@ impl Case {
 
 impl Case {
     fn parsed(py: Python<'_>, text: &str, file: &Path, overrides: &[Override]) -> PyResult<Self> {
-        let parsed = py.detach(|| gluey::Case::parse_with(text, file, overrides));
+        let parsed = compute(py, None, || gluey::Case::parse_with(text, file, overrides))?;
         Ok(Self { inner: parsed.map_err(|error| of_case(py, &error))? })
     }
 }

@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, Row, array, of_vectors, vectors};
 use crate::errors::plain;
-use crate::pool::pool;
+use crate::pool::compute;
 
 /// What a correction gives: velocities, contacts and a report.
 type Corrected<'py> = (Bound<'py, PyAny>, Bound<'py, PyDict>, Bound<'py, PyDict>);
@@ -193,8 +193,7 @@ where
         dt: step.dt,
     };
     model.set_sliding(step.sliding.0, step.sliding.1);
-    let pool = pool(None)?;
-    let report = py.detach(|| pool.install(|| model.correct(&geometry, &mut twists)));
+    let report = compute(py, None, || model.correct(&geometry, &mut twists))?;
     let report = report.map_err(|error| plain(py, "ContactError", &error))?;
     let entry = |contact: &Contact| (contact.pair, contact.lambda, contact.gamma);
     let contacts = arrays(py, model.contacts().iter().map(entry).collect())?;

@@ -5,8 +5,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pyo3::PyErr;
 use pyo3::exceptions::PyRuntimeError;
+use pyo3::marker::Ungil;
+use pyo3::{PyErr, Python};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// As much as the main thread of a program has; unit: bytes.
@@ -21,6 +22,16 @@ pub fn pool(threads: Option<usize>) -> Result<Arc<ThreadPool>, PyErr> {
         Some(_) => build(threads),
         None => shared(),
     }
+}
+
+/// Computes on threads while the interpreter is free for others.
+pub fn compute<T: Send + Ungil>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce() -> T + Send + Ungil,
+) -> Result<T, PyErr> {
+    let pool = pool(threads)?;
+    Ok(py.detach(|| pool.install(work)))
 }
 
 fn shared() -> Result<Arc<ThreadPool>, PyErr> {

@@ -14,7 +14,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{Numbers, array, of_matrices, of_spins, of_vectors, spins, vectors};
 use crate::case::Case;
 use crate::errors::{of_run, plain};
-use crate::pool::pool;
+use crate::pool::compute;
 
 /// The flows around the particles of a case.
 #[pyclass(frozen, module = "gluey._gluey")]
@@ -54,17 +54,14 @@ impl Stokes {
     fn new(py: Python<'_>, case: &Case, threads: Option<usize>) -> PyResult<Self> {
         let case = case.inner();
         let middle = 0.5 * (case.lower()[1] + case.upper()[1]);
-        let pool = pool(threads)?;
-        let flows = py.detach(|| {
-            pool.install(|| -> Result<Flows, RunError> {
-                memory::check(case)?;
-                let failed = |error: gluey::FlowError| RunError::Flow(error.into());
-                Ok(match case.dimension {
-                    2 => Flows::Plane(Around { prepared: prepared_flow(case).map_err(failed)?, middle }),
-                    _ => Flows::Space(Around { prepared: prepared_flow(case).map_err(failed)?, middle }),
-                })
+        let flows = compute(py, threads, || -> Result<Flows, RunError> {
+            memory::check(case)?;
+            let failed = |error: gluey::FlowError| RunError::Flow(error.into());
+            Ok(match case.dimension {
+                2 => Flows::Plane(Around { prepared: prepared_flow(case).map_err(failed)?, middle }),
+                _ => Flows::Space(Around { prepared: prepared_flow(case).map_err(failed)?, middle }),
             })
-        });
+        })?;
         Ok(Self { threads, flows: Mutex::new(flows.map_err(|error| of_run(py, &error))?) })
     }
 
@@ -114,20 +111,17 @@ where
             u[0] = rate * (x[1] - middle);
             u
         };
-        let pool = pool(threads)?;
         let prepared = &mut self.prepared;
-        let solved = py.detach(|| {
-            pool.install(|| {
-                let conditions = Conditions::boundary(&shear);
-                let conditions = match hold {
-                    true => conditions.with_twists(&twists),
-                    false => conditions.with_wrenches(&wrenches),
-                };
-                let flow = prepared.solve(&conditions)?;
-                let moments = moments(prepared, &flow)?;
-                Ok((flow, moments))
-            })
-        });
+        let solved = compute(py, threads, || {
+            let conditions = Conditions::boundary(&shear);
+            let conditions = match hold {
+                true => conditions.with_twists(&twists),
+                false => conditions.with_wrenches(&wrenches),
+            };
+            let flow = prepared.solve(&conditions)?;
+            let moments = moments(prepared, &flow)?;
+            Ok((flow, moments))
+        })?;
         let (flow, moments) = solved.map_err(|error: StokesError| plain(py, "StokesError", &error))?;
         of_flow(py, &flow, moments)
     }
@@ -138,9 +132,9 @@ where
         threads: Option<usize>,
         resistance: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (pool, prepared) = (pool(threads)?, &mut self.prepared);
-        let matrix = py
-            .detach(|| pool.install(|| if resistance { prepared.resistance() } else { prepared.mobility() }));
+        let prepared = &mut self.prepared;
+        let matrix =
+            compute(py, threads, || if resistance { prepared.resistance() } else { prepared.mobility() })?;
         let matrix = matrix.map_err(|error| plain(py, "StokesError", &error))?;
         let shape = [matrix.nrows(), matrix.ncols()];
         array(py, matrix.transpose().as_slice().to_vec(), shape)

@@ -45,7 +45,8 @@ def run(
     ----------
     case
         A dictionary with the keys of a case file (arrays of numpy may stand for lists, None for what is
-        absent), TOML text, or the path of a case file. A text without a line break or ``=`` is a path.
+        absent), TOML text, or the path of a case file. A text without a line break or ``=`` is a path. A
+        ``particles_file`` is sought in the folder of the case file, or in the current one.
     out
         Folder for the results, which is made when missing. Without one they are only in memory; those of a
         run that does not come to its end stay in a temporary folder, which the error names.
@@ -63,7 +64,7 @@ def run(
     xyz
         Steps between frames in extended XYZ, which hold the velocities; None for no frames.
     vtk
-        Steps between files for ParaView; None for no files.
+        Steps between files for ParaView, in ``out``; None for no files.
     checkpoint_every, checkpoint_minutes
         Steps, and minutes, between checkpoints.
 
@@ -82,6 +83,8 @@ def run(
             raise ValueError(f"{name} = {number}: must be at least 1")
     if checkpoint_minutes is not None and not checkpoint_minutes > 0.0:
         raise ValueError(f"checkpoint_minutes = {checkpoint_minutes}: must be greater than 0")
+    if vtk is not None and out is None:
+        raise ValueError("vtk: files for ParaView need a folder that stays, out=")
     checked = load(case, overrides)
     folder = tempfile.mkdtemp(prefix="gluey-") if out is None else os.fspath(out)
     output = {

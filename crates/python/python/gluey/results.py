@@ -144,7 +144,8 @@ class Result:
         self.name = name
 
     def __repr__(self) -> str:
-        return f"<Result {self.name} in {self.folder}: {self.record.get('state')}>"
+        place = self.folder if self.folder.is_dir() else "memory"
+        return f"<Result {self.name} in {place}: {self.record.get('state')}>"
 
     def load(self) -> Result:
         """Reads everything but fields for ParaView, so that the files may go away."""
