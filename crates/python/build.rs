@@ -1,5 +1,5 @@
-//! On macOS a linker has to be told that Python's symbols are found when the module is loaded; maturin does so,
-//! `cargo build` does not.
+//! On macOS a linker has to be told that Python's symbols are found when the module is loaded; maturin does
+//! so, `cargo build` does not.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
