@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
@@ -99,6 +100,21 @@ def test_the_line_of_progress_ends(capsys: pytest.CaptureFixture[str]) -> None:
     line(state)
     line.close()
     assert capsys.readouterr().err == f"\r{describe(state)}\r{describe(state)}\n"
+
+
+def test_a_notebook_rewrites_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gluey._progress import Line
+
+    class ZMQInteractiveShell:
+        pass
+
+    class Shell:
+        get_ipython = ZMQInteractiveShell
+
+    stream = io.StringIO()
+    assert not Line(stream).rewrites
+    monkeypatch.setitem(sys.modules, "IPython", Shell)
+    assert Line(stream).rewrites
 
 
 def test_an_exception_of_progress_stops_the_run(tmp_path: Path) -> None:
@@ -238,6 +254,8 @@ def test_bad_arguments_are_refused(tmp_path: Path) -> None:
         gluey.check(pair(), overrides={"time..step": 0})
     with pytest.raises(ValueError, match="threads = 0"):
         gluey.run(pair(), threads=0)
+    with pytest.raises(ValueError, match="vtk: files for ParaView need a folder"):
+        gluey.run(pair(), vtk=1)
     with pytest.raises(ValueError, match="checkpoint_minutes"):
         gluey.run(pair(), checkpoint_minutes=0.0)
     with pytest.raises(gluey.RunError, match="no run is recorded there"):
