@@ -32,13 +32,6 @@ struct Step {
     variable: Option<(&'static str, &'static str)>,
 }
 
-/// The last steps, which take longest. The verification fails where a number is beyond its limit, the
-/// reproduction where a row does not hold and is no known disagreement.
-const LATER_STEPS: &[Step] = &[
-    Step::new("run --release --package xtask -- verify --quick --out target/verification-quick"),
-    Step::new("run --release --package xtask -- reproduce-figures --quick --out target/figures-quick"),
-];
-
 /// The steps before the Python package.
 const STEPS: &[Step] = &[
     Step::new("fmt --all --check"),
@@ -53,6 +46,13 @@ const STEPS: &[Step] = &[
     // Two crates that are never published need one without a version.
     Step::new("package --workspace --exclude gluey-verify --exclude xtask --no-verify --allow-dirty"),
     Step::new("test --release --workspace"),
+];
+
+/// The last steps, which take longest. The verification fails where a number is beyond its limit, the
+/// reproduction where a row does not hold and is no known disagreement.
+const LATER_STEPS: &[Step] = &[
+    Step::new("run --release --package xtask -- verify --quick --out target/verification-quick"),
+    Step::new("run --release --package xtask -- reproduce-figures --quick --out target/figures-quick"),
 ];
 
 /// The spelling checker, if it is there, and how to get it.

@@ -22,6 +22,9 @@ use crate::pool::pool;
 /// Time between looks for Ctrl-C, and at most between reports.
 const INTERVAL: Duration = Duration::from_millis(50);
 
+/// What is said at the first Ctrl-C.
+const STOPPING: &str = "stopping after this step; once more to stop waiting for it";
+
 /// Output of a run; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -51,8 +54,8 @@ impl Output {
     }
 }
 
-/// Runs a case to its end; `progress` is called with a dictionary, `notice` with a text. Gives the folder of
-/// the results and what the names of its files begin with.
+/// Runs a case to its end; `progress` is called with a dictionary, `notice` with a text and whether that is a
+/// warning. Gives the folder of the results and what the names of its files begin with.
 #[pyfunction]
 pub fn run(
     py: Python<'_>,
@@ -137,7 +140,7 @@ fn follow(
             (None, Err(error), _) | (_, Ok(()), Err(error)) => {
                 interrupt.store(true, Ordering::Relaxed);
                 if error.is_instance_of::<PyKeyboardInterrupt>(py) {
-                    listener.notice.call1(("stopping after this step; once more to stop waiting for it",))?;
+                    listener.notice.call1((STOPPING, false))?;
                 }
                 stopped = Some(error);
             }
@@ -197,7 +200,7 @@ impl Watch {
         let Told { state, notices } =
             std::mem::take(&mut *self.told.lock().unwrap_or_else(PoisonError::into_inner));
         for notice in notices {
-            listener.notice.call1((notice,))?;
+            listener.notice.call1((notice, true))?;
         }
         if let (Some(progress), Some(state)) = (&listener.progress, state) {
             let told = PyDict::new(py);

@@ -218,7 +218,7 @@ def test_what_a_run_came_upon_is_a_warning(tmp_path: Path) -> None:
         gluey.run(pair(end=20.0), out, progress=stop)
     with pytest.warns(gluey.GlueyWarning, match="left by earlier runs") as warned:
         gluey.run(pair(end=20.0), out, progress=False, overrides={"time.end": 20.0}, force=True)
-    assert warned
+    assert warned[0].filename == __file__
 
 
 def test_bad_cases_are_refused(tmp_path: Path) -> None:

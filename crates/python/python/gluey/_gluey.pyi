@@ -16,13 +16,13 @@ def run(
     output: dict[str, Any],
     threads: int | None,
     progress: Callable[[dict[str, Any]], object] | None,
-    notice: Callable[[str], object],
+    notice: Callable[[str, bool], object],
 ) -> tuple[Any, str]: ...
 def resume(
     which: dict[str, Any],
     threads: int | None,
     progress: Callable[[dict[str, Any]], object] | None,
-    notice: Callable[[str], object],
+    notice: Callable[[str, bool], object],
 ) -> tuple[Any, str]: ...
 @final
 class Case:

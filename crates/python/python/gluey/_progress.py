@@ -34,6 +34,7 @@ class Line:
     def close(self) -> None:
         """Leaves the line."""
         if self.width:
+            self.width = 0
             self.stream.write("\n")
             self.stream.flush()
 

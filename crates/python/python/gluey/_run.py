@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -97,7 +98,7 @@ def run(
     }
     with _Told(progress) as told:
         try:
-            where, name = _gluey.run(checked, output, threads, told.progress, _warn)
+            where, name = _gluey.run(checked, output, threads, told.progress, told.notice)
         except BaseException:
             if out is None and not any(Path(folder).glob("*.checkpoint")):
                 shutil.rmtree(folder, ignore_errors=True)
@@ -139,7 +140,7 @@ def resume(
     """
     which = {"folder": os.fspath(folder), "name": name, "previous": previous}
     with _Told(progress) as told:
-        where, stem = _gluey.resume(which, threads, told.progress, _warn)
+        where, stem = _gluey.resume(which, threads, told.progress, told.notice)
     return Result(where, stem)
 
 
@@ -223,6 +224,12 @@ class _Told:
         if self.line is not None:
             self.line.close()
 
-
-def _warn(text: str) -> None:
-    warnings.warn(text, GlueyWarning, stacklevel=4)
+    def notice(self, text: str, is_warning: bool) -> None:
+        """Says what is no part of the progress, on a line of its own."""
+        if self.line is not None:
+            self.line.close()
+        if is_warning:
+            # The caller of run or resume; the native part in between has no frame.
+            warnings.warn(text, GlueyWarning, stacklevel=3)
+        else:
+            print(text, file=sys.stderr, flush=True)
