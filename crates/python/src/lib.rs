@@ -10,6 +10,7 @@ mod contact;
 mod errors;
 mod pool;
 mod run;
+mod show;
 mod stokes;
 
 /// The native part of gluey.
@@ -21,6 +22,8 @@ mod _gluey {
     use crate::contact::PairContact;
     #[pymodule_export]
     use crate::run::{resume, run};
+    #[pymodule_export]
+    use crate::show::{analyse, plot, view};
     #[pymodule_export]
     use crate::stokes::Stokes;
 

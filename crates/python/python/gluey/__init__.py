@@ -10,7 +10,7 @@
 >>> result.positions.shape        # times, particles, axes
 (11, 2, 2)
 
-``run``, ``resume`` and ``check`` are those of the command line; ``Stokes`` has mobilities and resistances of
+``run``, ``resume``, ``check``, ``plot``, ``view`` and ``analyse`` are those of the command line; ``Stokes`` has mobilities and resistances of
 particles where they are, ``contact.PairContact`` the contact model without a fluid, and ``results`` reads what
 any run wrote, without gluey if need be.
 
@@ -21,6 +21,7 @@ In 2D forces and torques are those on a unit of depth.
 from . import contact, results
 from ._gluey import __version__
 from ._run import check, particles, resume, run
+from ._show import analyse, plot, view
 from ._stokes import Flow, Stokes
 from .errors import CaseError, ContactError, GlueyError, GlueyWarning, Interrupted, RunError, StokesError
 from .results import Result
@@ -37,10 +38,13 @@ __all__ = [
     "Stokes",
     "StokesError",
     "__version__",
+    "analyse",
     "check",
     "contact",
     "particles",
+    "plot",
     "results",
     "resume",
     "run",
+    "view",
 ]

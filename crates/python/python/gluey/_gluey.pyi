@@ -7,7 +7,7 @@ from typing import Any, final
 from numpy import float64
 from numpy.typing import NDArray
 
-__all__ = ["Case", "PairContact", "Stokes", "__version__", "resume", "run"]
+__all__ = ["Case", "PairContact", "Stokes", "__version__", "analyse", "plot", "resume", "run", "view"]
 
 __version__: str
 
@@ -24,6 +24,9 @@ def resume(
     progress: Callable[[dict[str, Any]], object] | None,
     notice: Callable[[str, bool], object],
 ) -> tuple[Any, str]: ...
+def plot(plot: dict[str, Any]) -> list[Any]: ...
+def view(folder: str, out: str | None, every: int) -> Any: ...
+def analyse(folder: str, out: str | None, reach: float, skip: int | None) -> str: ...
 @final
 class Case:
     @staticmethod
