@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::python::{self, PythonError};
+
 /// A step that did not pass.
 #[derive(Debug, thiserror::Error)]
 pub enum CiError {
@@ -17,6 +19,9 @@ pub enum CiError {
     /// It said no.
     #[error("`{0}` failed")]
     Step(String),
+    /// The Python package does not pass.
+    #[error(transparent)]
+    Python(PythonError),
 }
 
 /// A command of cargo, or of another program that may be missing.
@@ -27,8 +32,7 @@ struct Step {
     variable: Option<(&'static str, &'static str)>,
 }
 
-/// The steps; what takes longest comes last. The verification fails where a number is beyond its limit, the
-/// reproduction where a row does not hold and is no known disagreement.
+/// The steps before the Python package.
 const STEPS: &[Step] = &[
     Step::new("fmt --all --check"),
     Step::new("clippy --workspace --all-targets --release -- -D warnings"),
@@ -39,8 +43,14 @@ const STEPS: &[Step] = &[
     Step::new("check --release -p gluey-contact --no-default-features --features dim2"),
     Step::new("check --release -p gluey-contact --no-default-features --features dim3"),
     Step::new("check --release -p gluey-contact --no-default-features --features parallel,serde"),
-    Step::new("package --workspace --no-verify --allow-dirty"),
+    // Two crates that are never published need one without a version.
+    Step::new("package --workspace --exclude gluey-verify --exclude xtask --no-verify --allow-dirty"),
     Step::new("test --release --workspace"),
+];
+
+/// The last steps, which take longest. The verification fails where a number is beyond its limit, the
+/// reproduction where a row does not hold and is no known disagreement.
+const LATER_STEPS: &[Step] = &[
     Step::new("run --release --package xtask -- verify --quick --out target/verification-quick"),
     Step::new("run --release --package xtask -- reproduce-figures --quick --out target/figures-quick"),
 ];
@@ -67,11 +77,24 @@ impl Step {
     }
 }
 
-/// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, a quick
-/// verification and a quick reproduction; stops at the first failure.
+/// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, those of
+/// the Python package, a quick verification and a quick reproduction; stops at the first failure.
 pub fn run(root: &Path) -> Result<(), CiError> {
     check_spelling(root)?;
-    STEPS.iter().try_for_each(|step| step.run(root))
+    STEPS.iter().try_for_each(|step| step.run(root))?;
+    check_python(root)?;
+    LATER_STEPS.iter().try_for_each(|step| step.run(root))
+}
+
+/// The Python package, where there are Python and a package index; says so where there are not.
+fn check_python(root: &Path) -> Result<(), CiError> {
+    match python::run(root, None) {
+        Err(PythonError::Missing(what)) => {
+            eprintln!("the Python package is not tested: {what}");
+            Ok(())
+        }
+        other => other.map_err(CiError::Python),
+    }
 }
 
 /// Spelling, where the program for it is installed; says so where it is not.

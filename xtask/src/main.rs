@@ -1,6 +1,6 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
 //! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask keys`, `cargo xtask fuzz`,
-//! `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask python`, `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
@@ -9,6 +9,7 @@ mod ci;
 mod figures;
 mod fuzz;
 mod keys;
+mod python;
 mod reproduce;
 mod study;
 mod tidy;
@@ -53,9 +54,15 @@ enum Task {
     Keys,
     /// Try mutated case files, checkpoints and tables: none may panic, hang or fill the memory.
     Fuzz(fuzz::Options),
+    /// Install the Python package in a fresh environment and run its tests.
+    Python {
+        /// The interpreter, instead of the first python3 or python.
+        #[arg(long, value_name = "PROGRAM")]
+        python: Option<PathBuf>,
+    },
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
-    /// Formatting, lints, all tests and a quick reproduction of the figures.
+    /// Formatting, lints, all tests, those of the Python package and a quick reproduction of the figures.
     Ci,
 }
 
@@ -112,6 +119,7 @@ fn main() -> ExitCode {
         Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
         Task::Keys => outcome(keys::write(&workspace_root())),
         Task::Fuzz(options) => outcome(fuzz::run(&workspace_root(), &options)),
+        Task::Python { python } => outcome(python::run(&workspace_root(), python.as_deref())),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }

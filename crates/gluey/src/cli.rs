@@ -9,11 +9,9 @@ mod manner;
 mod new;
 mod output;
 mod plot;
-mod recorded;
 mod resume;
 mod run;
 mod schema;
-mod summary;
 mod sweep;
 mod view;
 

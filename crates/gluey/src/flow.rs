@@ -6,6 +6,7 @@
 
 mod estimate;
 mod fields;
+mod prepared;
 
 use std::time::Instant;
 
@@ -23,6 +24,7 @@ use thiserror::Error;
 use crate::case::{Case, Formulation, Lubrication, Solver};
 
 pub use estimate::{MeshEstimate, MeshSize};
+pub use prepared::prepared_flow;
 
 /// Why the finite-element flow failed.
 #[derive(Clone, Debug, PartialEq, Error)]

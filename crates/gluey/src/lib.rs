@@ -36,6 +36,7 @@ pub mod reference;
 mod report;
 mod run;
 mod simulation;
+pub mod summary;
 pub mod sweep;
 pub mod table;
 mod trajectory;
@@ -52,10 +53,12 @@ pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
 pub use run::{
-    Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths, RunError, RunOptions,
-    RunRecord, RunState, VtkOptions, XyzOptions, run,
+    FolderError, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths,
+    ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
+    recorded_runs, run,
 };
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
+pub use summary::CaseSummary;
 pub use trajectory::Row;
 
 /// The example of the README.

@@ -8,7 +8,9 @@ mod occupied;
 mod options;
 mod paths;
 mod record;
+mod recorded;
 mod recorder;
+mod resumption;
 mod stress;
 
 use std::path::Path;
@@ -23,6 +25,8 @@ pub use occupied::OccupiedError;
 pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
 pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
+pub use recorded::{FolderError, recorded_runs};
+pub use resumption::{ResumeError, Resumption};
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};

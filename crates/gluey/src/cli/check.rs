@@ -8,13 +8,12 @@ use std::time::Instant;
 use clap::Args;
 use gluey::case::Override;
 use gluey::flow::MeshSize;
-use gluey::{Case, Notice, Progress, ProgressState, RunError, RunOptions, memory};
+use gluey::{Case, CaseSummary, Notice, Progress, ProgressState, RunError, RunOptions, memory};
 use serde::Serialize;
 use thiserror::Error;
 
 use super::failure::Failure;
 use super::manner::Manner;
-use super::summary::CaseSummary;
 use crate::terminal::{Reporter, duration, print_lines};
 
 /// Steps of a trial.

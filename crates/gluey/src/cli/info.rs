@@ -4,13 +4,15 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use gluey::{Case, CheckpointSummary, RecordError, ResultPaths, RunRecord, RunState};
+use gluey::summary::shown;
+use gluey::{
+    Case, CaseSummary, CheckpointSummary, FolderError, RecordError, ResultPaths, RunRecord, RunState,
+    recorded_runs,
+};
 use serde::Serialize;
 use thiserror::Error;
 
 use super::failure::Failure;
-use super::recorded::{FolderError, recorded_runs};
-use super::summary::{CaseSummary, shown};
 use crate::terminal::{print_json, print_lines};
 
 /// Arguments of `gluey info`.

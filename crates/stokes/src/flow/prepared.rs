@@ -23,10 +23,31 @@ pub struct Prepared<'s, const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    solver: &'s mut FlowSolver<D>,
+    solver: Lent<'s, D>,
     problem: Problem<D>,
     /// Whether the solvers for free and for held bodies are prepared.
     is_ready: [bool; 2],
+}
+
+/// The solver of prepared flows: that of somebody else, or their own.
+enum Lent<'s, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    Borrowed(&'s mut FlowSolver<D>),
+    Owned(Box<FlowSolver<D>>),
+}
+
+impl<const D: usize> Lent<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn get(&mut self) -> &mut FlowSolver<D> {
+        match self {
+            Self::Borrowed(solver) => solver,
+            Self::Owned(solver) => solver,
+        }
+    }
 }
 
 impl<const D: usize> FlowSolver<D>
@@ -61,7 +82,20 @@ where
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'_, D>, StokesError> {
         let problem = self.problem(mesh, bodies)?;
-        Ok(Prepared { solver: self, problem, is_ready: [false; 2] })
+        Ok(Prepared { solver: Lent::Borrowed(self), problem, is_ready: [false; 2] })
+    }
+
+    /// The same for flows that are kept for longer than anything could be borrowed.
+    ///
+    /// # Errors
+    /// Those of [`FlowSolver::prepared`].
+    pub fn into_prepared(
+        mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+    ) -> Result<Prepared<'static, D>, StokesError> {
+        let problem = self.problem(mesh, bodies)?;
+        Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, is_ready: [false; 2] })
     }
 }
 
@@ -78,7 +112,7 @@ where
     pub fn solve(&mut self, conditions: &Conditions<'_, D>) -> Result<Flow<D>, StokesError> {
         self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
-        Ok(self.solver.solved(&self.problem, conditions, guess)?.0)
+        Ok(self.solver.get().solved(&self.problem, conditions, guess)?.0)
     }
 
     /// Holds or frees the bodies and prepares the solver for that, unless it is.
@@ -88,7 +122,7 @@ where
         problem.system.space.hold_twists(hold);
         let is_ready = &mut is_ready[usize::from(hold)];
         if !*is_ready {
-            solver.solver(problem).prepare(problem)?;
+            solver.get().solver(problem).prepare(problem)?;
             *is_ready = true;
         }
         Ok(())

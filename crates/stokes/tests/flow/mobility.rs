@@ -121,6 +121,17 @@ fn the_resistance_is_the_inverse_of_the_mobility() {
     resistance_inverts_mobility::<3>(SolverKind::Multigrid);
 }
 
+/// Flows that own their solver are those that borrow one.
+#[test]
+fn a_solver_may_be_kept_with_its_flows() {
+    let (kind, balls) = (SolverKind::Direct, unequal::<2>());
+    let refined = || mesh(&bands(level(2)), &balls);
+    let mut own = solver::<2>(RIGID, kind).into_prepared(refined(), &balls).unwrap();
+    let mut lender = solver::<2>(RIGID, kind);
+    assert_eq!(own.mobility(), prepared::<2>(&mut lender).mobility());
+    assert_eq!(own.resistance(), prepared::<2>(&mut lender).resistance());
+}
+
 /// One preparation for four flows, in any order, against four solvers.
 fn one_preparation_serves_all<const D: usize>(formulation: Formulation, kind: SolverKind)
 where

@@ -1,8 +1,9 @@
 //! What a case is, in a few numbers.
 
-use gluey::Case;
 use gluey_suspension::ball_volume;
 use serde::Serialize;
+
+use crate::case::Case;
 
 /// What a case is, in a few numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -87,8 +88,8 @@ mod tests {
     #[test]
     fn the_fraction_is_that_of_the_case() {
         for (text, fraction) in [
-            (include_str!("../../../../data/cases/suspension-2d.toml"), 0.3),
-            (include_str!("../../../../data/cases/suspension-3d.toml"), 0.2),
+            (include_str!("../../../data/cases/suspension-2d.toml"), 0.3),
+            (include_str!("../../../data/cases/suspension-3d.toml"), 0.2),
         ] {
             let case = Case::parse(text, "case.toml").unwrap_or_else(|error| panic!("{error}"));
             let found = CaseSummary::of(&case).volume_fraction;

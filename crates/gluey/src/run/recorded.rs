@@ -3,21 +3,33 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gluey::ResultPaths;
 use thiserror::Error;
+
+use super::paths::ResultPaths;
 
 /// A folder in which no run can be found.
 #[derive(Debug, Error)]
 pub enum FolderError {
     /// It cannot be listed.
     #[error("{}: cannot be read", folder.display())]
-    Read { folder: PathBuf, source: io::Error },
+    Read {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// It has no record of any run.
     #[error("{}: no run is recorded there (no file *-run.json)", folder.display())]
-    NoRun { folder: PathBuf },
+    NoRun {
+        /// The folder.
+        folder: PathBuf,
+    },
 }
 
 /// The runs, sorted by name; one at least.
+///
+/// # Errors
+/// [`FolderError`] if there is none.
 pub fn recorded_runs(folder: &Path) -> Result<Vec<ResultPaths>, FolderError> {
     let folder = folder.to_owned();
     match ResultPaths::in_folder(&folder) {

@@ -1,0 +1,22 @@
+//! Several flows around the particles of a case where they are at time 0.
+
+use gluey_geom::{Dim, Space, Vector};
+use gluey_stokes::Prepared;
+
+use super::{FlowError, stokes_flow};
+use crate::case::Case;
+
+/// Sets up flows around the particles of a checked case at time 0: for mobilities and resistances.
+///
+/// # Errors
+/// [`FlowError`] if the box cannot be meshed or a parameter is out of range.
+pub fn prepared_flow<const D: usize>(case: &Case) -> Result<Prepared<'static, D>, FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let flow = stokes_flow::<D>(case)?;
+    let centers = case.particles.iter().map(|particle| Vector::<D>::from_fn(|d, _| particle.position[d]));
+    let balls = flow.balls(centers);
+    let mesh = flow.mesh(&balls)?;
+    Ok(flow.solver.into_prepared(mesh, &balls)?)
+}

@@ -1,0 +1,126 @@
+//! How to go on with a run of which a folder holds the results.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::options::{RecordOptions, RunOptions};
+use super::paths::ResultPaths;
+use super::record::{RecordError, RunRecord, RunState};
+use super::recorded::{FolderError, recorded_runs};
+
+/// How to go on with a run: its case file and its options, at the places where its results are now.
+#[derive(Clone, Debug)]
+pub struct Resumption {
+    /// The case as it was run.
+    pub case_file: PathBuf,
+    /// The options of the run, with the checkpoint to go on from.
+    pub options: RunOptions,
+}
+
+/// There is nothing to resume.
+#[derive(Debug, Error)]
+pub enum ResumeError {
+    /// The folder has no runs.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// It has several.
+    #[error("{}: {} runs are recorded there: {}", folder.display(), names.len(), names.join(", "))]
+    Several {
+        /// The folder.
+        folder: PathBuf,
+        /// What the files of each begin with.
+        names: Vec<String>,
+    },
+    /// It has others.
+    #[error("{}: no run `{name}` is recorded there, but {}", folder.display(), names.join(", "))]
+    Unknown {
+        /// The folder.
+        folder: PathBuf,
+        /// The one that was asked for.
+        name: String,
+        /// What the files of each begin with.
+        names: Vec<String>,
+    },
+    /// The record cannot be read.
+    #[error("the record of the run cannot be used")]
+    Record(#[from] RecordError),
+    /// The run is complete.
+    #[error("{}: the run is complete ({steps} steps): nothing is left to do", record.display())]
+    Complete {
+        /// The record.
+        record: PathBuf,
+        /// Steps in all.
+        steps: usize,
+    },
+    /// There is no checkpoint, as when the run ended before its first one.
+    #[error("{}: there is no such checkpoint", checkpoint.display())]
+    NoCheckpoint {
+        /// The file that is not there.
+        checkpoint: PathBuf,
+        /// Whether the other generation is.
+        has_other: bool,
+        /// The case as it was run.
+        case_file: PathBuf,
+    },
+}
+
+impl Resumption {
+    /// Finds the run in `folder`, the one of this name if there are several, that goes on from its last
+    /// checkpoint or from the one before it.
+    ///
+    /// # Errors
+    /// [`ResumeError`] if there is no such run or checkpoint, or nothing left to do.
+    pub fn find(folder: &Path, name: Option<&str>, previous: bool) -> Result<Self, ResumeError> {
+        let paths = choose(folder, name)?;
+        let record = RunRecord::read(&paths.record())?;
+        if record.state == RunState::Complete {
+            return Err(ResumeError::Complete { record: paths.record(), steps: record.steps });
+        }
+        let (last, before) = (paths.checkpoint(), paths.previous_checkpoint());
+        let (checkpoint, other) = if previous { (before, last) } else { (last, before) };
+        if !checkpoint.exists() {
+            let (has_other, case_file) = (other.exists(), paths.case_file());
+            return Err(ResumeError::NoCheckpoint { checkpoint, has_other, case_file });
+        }
+        Ok(Self { case_file: paths.case_file(), options: options(&paths, record, checkpoint) })
+    }
+}
+
+/// The run of this name in a folder, or the only one.
+fn choose(folder: &Path, name: Option<&str>) -> Result<ResultPaths, ResumeError> {
+    let folder = folder.to_owned();
+    let runs = recorded_runs(&folder)?;
+    let names: Vec<String> = runs.iter().map(ResultPaths::stem).collect();
+    match (name, &runs[..]) {
+        (Some(name), _) => match runs.iter().find(|run| run.stem() == name) {
+            Some(run) => Ok(run.clone()),
+            None => Err(ResumeError::Unknown { folder, name: name.to_owned(), names }),
+        },
+        (None, [run]) => Ok(run.clone()),
+        (None, _) => Err(ResumeError::Several { folder, names }),
+    }
+}
+
+/// The options of the run that left `record`, at the places where its results are now.
+fn options(paths: &ResultPaths, record: RunRecord, checkpoint: PathBuf) -> RunOptions {
+    let recorded = record.options;
+    let (mut vtk, mut xyz) = (recorded.vtk, recorded.xyz);
+    if let Some(vtk) = &mut vtk {
+        vtk.folder = paths.vtk();
+    }
+    if let Some(xyz) = &mut xyz {
+        xyz.folder = paths.xyz();
+    }
+    RunOptions {
+        csv: paths.csv(),
+        vtk,
+        xyz,
+        checkpoint: Some(paths.checkpoint()),
+        checkpoint_every: recorded.checkpoint_every,
+        checkpoint_minutes: recorded.checkpoint_minutes,
+        record: Some(RecordOptions { force: false }),
+        resume: Some(checkpoint),
+        interrupt: None,
+    }
+}

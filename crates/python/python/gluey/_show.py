@@ -1,0 +1,108 @@
+"""What the command line makes of results: pictures, a page for the browser, tables of particles."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Iterable
+
+from . import _gluey
+
+
+def plot(
+    folder: str | os.PathLike[str],
+    *,
+    only: Iterable[str] = (),
+    frame: int | str | None = None,
+    formats: Iterable[str] = ("svg", "png"),
+    width_mm: float = 120.0,
+) -> list[Path]:
+    """Draws the results of every run in a folder, into ``<name>-plots`` beside them.
+
+    Parameters
+    ----------
+    folder
+        What runs wrote to.
+    only
+        What to draw: ``gaps``, ``trajectories``, ``rheology``; whatever there are results for when absent.
+    frame
+        The particles of a frame instead: ``"last"`` or the number of a step.
+    formats
+        ``svg``, ``png``.
+    width_mm
+        Width on paper, from 60 to 400 millimetres.
+
+    Returns
+    -------
+    list of Path
+        The pictures.
+
+    Raises
+    ------
+    GlueyError
+        If there is nothing to draw, or results cannot be read.
+    ValueError
+        For a name that is none, or a width out of its range.
+    """
+    if not 60.0 <= width_mm <= 400.0:
+        raise ValueError(f"width_mm = {width_mm}: must be a number from 60 to 400")
+    options = {
+        "folder": os.fspath(folder),
+        "only": list(only),
+        "frame": None if frame is None else str(frame),
+        "formats": list(formats),
+        "width_mm": float(width_mm),
+    }
+    return [Path(path) for path in _gluey.plot(options)]
+
+
+def view(folder: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, *, every: int = 1) -> Path:
+    """Writes a page that any browser opens without a network: turn, zoom and play the frames of a run.
+
+    Parameters
+    ----------
+    folder
+        What a run wrote to, or its files in extended XYZ.
+    out
+        The page; ``view.html`` in that folder when absent.
+    every
+        Show every so many frames only.
+
+    Raises
+    ------
+    GlueyError
+        If there are no frames.
+    """
+    if every < 1:
+        raise ValueError(f"every = {every}: must be at least 1")
+    return Path(_gluey.view(os.fspath(folder), None if out is None else os.fspath(out), every))
+
+
+def analyse(
+    folder: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    *,
+    reach: float = 0.05,
+    skip: int | None = None,
+) -> str:
+    """Makes tables of the frames of a run (gaps, contacts, clusters and fabric over time, g(r), S(k), profiles,
+    displacements) and gives a summary of means with confidence intervals. :func:`results.table` reads them.
+
+    Parameters
+    ----------
+    folder
+        What a run wrote to, or its files in extended XYZ.
+    out
+        Folder for the tables; ``folder`` when absent.
+    reach
+        Gap up to which particles count as in contact, in mean radii: from 0 to 10.
+    skip
+        Frames to leave out at the beginning, instead of the transient that is found.
+
+    Raises
+    ------
+    GlueyError
+        If there are no frames, or fewer than are to be left out.
+    """
+    where = None if out is None else os.fspath(out)
+    return _gluey.analyse(os.fspath(folder), where, float(reach), skip)

@@ -1,0 +1,68 @@
+//! What the command line makes of results: pictures, a page for the browser, tables of particles.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use gluey::analyse::AnalyseOptions;
+use gluey::plot::{FrameChoice, PlotOptions};
+use gluey::view::ViewOptions;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors::plain;
+use crate::pool::compute;
+
+/// What to draw; a dictionary with these keys.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Plot {
+    folder: PathBuf,
+    only: Vec<String>,
+    frame: Option<String>,
+    formats: Vec<String>,
+    width_mm: f64,
+}
+
+/// Draws the results in a folder and gives the paths of the pictures.
+#[pyfunction]
+pub fn plot(py: Python<'_>, plot: Plot) -> PyResult<Vec<PathBuf>> {
+    let options = PlotOptions {
+        folder: plot.folder,
+        frame: plot.frame.map(|frame| named::<FrameChoice>("frame", &frame)).transpose()?,
+        only: plot.only.iter().map(|name| named("only", name)).collect::<PyResult<_>>()?,
+        formats: plot.formats.iter().map(|name| named("formats", name)).collect::<PyResult<_>>()?,
+        width_mm: plot.width_mm,
+    };
+    told(py, compute(py, None, || gluey::plot::plot(&options))?)
+}
+
+/// Writes a page for the browser and gives its path.
+#[pyfunction]
+pub fn view(py: Python<'_>, folder: PathBuf, out: Option<PathBuf>, every: usize) -> PyResult<PathBuf> {
+    let options = ViewOptions { folder, out, every };
+    let viewed = told(py, compute(py, None, || gluey::view::view(&options))?)?;
+    Ok(viewed.page)
+}
+
+/// Writes tables of the frames in a folder and gives a summary.
+#[pyfunction]
+pub fn analyse(
+    py: Python<'_>,
+    folder: PathBuf,
+    out: Option<PathBuf>,
+    reach: f64,
+    skip: Option<usize>,
+) -> PyResult<String> {
+    let options = AnalyseOptions { folder, out, reach_over_a: reach, skip };
+    let summary = told(py, compute(py, None, || gluey::analyse::analyse(&options))?)?;
+    Ok(summary.to_string())
+}
+
+fn named<T: FromStr<Err = String>>(argument: &str, name: &str) -> PyResult<T> {
+    name.parse().map_err(|error| PyValueError::new_err(format!("{argument}: found {name:?}, {error}")))
+}
+
+fn told<T, E: Error>(py: Python<'_>, outcome: Result<T, E>) -> PyResult<T> {
+    outcome.map_err(|error| plain(py, "GlueyError", &error))
+}
