@@ -36,7 +36,7 @@ mod subset;
 pub mod vector;
 
 pub use affine::AffineConstraints;
-pub use dense::{BlockError, DenseSymmetric, invert_spd};
+pub use dense::{BlockError, DenseSymmetric, invert_spd, vectorised};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,

@@ -161,17 +161,10 @@ where
         }
         nodal[k as usize] = (1.0 / value) as f32;
     }
-    let (size, rigid) = (SurfaceCoupling::<D>::piece_size(), Dim::<D>::RIGID);
+    let rigid = Dim::<D>::RIGID;
     let mut blocks = vec![0.0; system.space.body_count() * rigid * rigid];
-    let mut dense = vec![0.0; size * size];
     for (piece, (_, body)) in surfaces.pieces().enumerate() {
-        surfaces.matrix(piece, &mut dense);
-        let first = size - rigid;
-        for i in 0..rigid {
-            for j in 0..rigid {
-                blocks[(body * rigid + i) * rigid + j] += dense[(first + i) * size + first + j];
-            }
-        }
+        surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
     }
     for (body, block) in blocks.chunks_exact_mut(rigid * rigid).enumerate() {
         let inverted = invert_spd(rigid, block);
