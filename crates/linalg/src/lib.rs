@@ -47,7 +47,9 @@ pub use krylov::{
 };
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
-pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval, WeakModes};
+pub use smoother::{
+    Chebyshev, ChebyshevParams, Guess, ModesWorkspace, SchwarzPatches, SpectralInterval, WeakModes, weak_modes,
+};
 pub use sparse::{
     BlockGroups, BlockPattern, LocalTerm, Pattern, Prolongation, SellMatrix, SparseError, SparseMatrix,
     SymmetricBlockMatrix,

@@ -52,7 +52,7 @@ where
 }
 
 /// The numbered nodes that nodes stand for: themselves, or the masters they hang on.
-struct NodeForms<'a, const D: usize> {
+pub struct NodeForms<'a, const D: usize> {
     nodes: &'a NumberedNodes<'a, D>,
     /// Hanging nodes and ghosts.
     constraints: Vec<&'a Constraint>,
@@ -61,7 +61,8 @@ struct NodeForms<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> NodeForms<'a, D> {
-    fn new(nodes: &'a NumberedNodes<'a, D>, ghosts: &'a [Constraint]) -> Self {
+    /// For a mesh with these ghosts.
+    pub fn new(nodes: &'a NumberedNodes<'a, D>, ghosts: &'a [Constraint]) -> Self {
         let constraints: Vec<&Constraint> = nodes.mesh.velocity.constraints().iter().chain(ghosts).collect();
         let mut constraint = vec![NONE; nodes.nodes.whole()];
         for (k, of) in constraints.iter().enumerate() {
@@ -71,7 +72,7 @@ impl<'a, const D: usize> NodeForms<'a, D> {
     }
 
     /// The terms of a cell, sorted by their rows.
-    fn of_cell(&self, cell: usize, terms: &mut Vec<LocalTerm>) {
+    pub fn of_cell(&self, cell: usize, terms: &mut Vec<LocalTerm>) {
         terms.clear();
         let nodes = &self.nodes.mesh.velocity;
         for (local, &node) in (0..).zip(nodes.cell(cell)) {
