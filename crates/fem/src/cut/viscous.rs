@@ -100,13 +100,13 @@ impl<const D: usize> ViscousMatrices<D> {
         let size = D * n;
         for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             let [here, there] = [[i, j], [j, i]].map(|pair| self.places.of(pair));
-            let on_diagonal = |d: usize| {
-                self.volume.of([d, d], [i, j]) - normal[d][d][here] - normal[d][d][there]
-            };
+            let on_diagonal =
+                |d: usize| self.volume.of([d, d], [i, j]) - normal[d][d][here] - normal[d][d][there];
             let diagonal = self.penalty[here] + (0..D).map(on_diagonal).sum::<f64>();
             for (a, b) in (0..D).flat_map(|a| (0..D).map(move |b| (a, b))) {
                 // The integral of `d_b phi_i d_a phi_j`.
-                let volume = if b >= a { self.volume.of([b, a], [i, j]) } else { self.volume.of([a, b], [j, i]) };
+                let volume =
+                    if b >= a { self.volume.of([b, a], [i, j]) } else { self.volume.of([a, b], [j, i]) };
                 let mut entry = volume - normal[a][b][here] - normal[b][a][there];
                 if a == b {
                     entry += diagonal;

@@ -131,8 +131,7 @@ where
             groups.push(terms.iter().map(|term: &LocalTerm| term.row as usize));
         }
         let groups: Vec<&[usize]> = groups.iter().collect();
-        let mut matrix =
-            SymmetricBlockMatrix::zeros(&Pattern::from_groups(batch.nodes.len(), &groups)?);
+        let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(batch.nodes.len(), &groups)?);
         let mut dense = vec![0.0; self.elements.size().pow(2)];
         let surfaces = self.elements.system().surfaces.as_deref();
         let mut viscous = surfaces.map(|surfaces| surfaces.viscous_matrices());

@@ -8,8 +8,8 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes, estimate_lambda_max,
-    invert_spd, vector,
+    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
+    estimate_lambda_max, invert_spd, vector,
 };
 
 use crate::error::{DiagonalError, StokesError};
