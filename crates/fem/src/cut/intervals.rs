@@ -25,7 +25,8 @@ pub struct Parts {
 
 impl Parts {
     /// Calls `visit(x, weight)` for the points of a composite Gauss rule on `[from, to]`, cut at the
-    /// breakpoints inside. Parts are no longer than twice their distance from a square root, wherever that is.
+    /// breakpoints inside. Parts are no longer than twice their distance from a square root, wherever
+    /// that is.
     pub fn for_each_point(
         &mut self,
         [from, to]: [f64; 2],

@@ -35,6 +35,7 @@ mod viscous;
 
 pub use ball::BallInCell;
 pub use flat::FlatInCell;
-pub use moments::{CutMoments, CutRules, POINTS, SurfaceMoments};
+pub use moments::{CutMoments, CutRules, SurfaceMoments};
+pub use polynomials::POINTS;
 pub use products::{Lines, Products};
 pub use viscous::{ViscousMatrices, ViscousWeights};

@@ -6,16 +6,14 @@
 //!
 //! `int_G f N_d = int_P d_d f - int_F_d1 f + int_F_d0 f`, `int_G f r.N = int_P div (f r) - faces`,
 //!
-//! where `r.N` is the radius `a` on the ball and the distance of the plane on a flat, whose own integrals rays
-//! give too. So the theorem holds in every cell to rounding, whatever the error of the rules.
+//! where `r.N` is the radius `a` on the ball and the distance of the plane on a flat, whose own integrals
+//! rays give too. So the theorem holds in every cell to rounding, whatever the error of the rules.
 
 use super::ball::BallInCell;
 use super::flat::FlatInCell;
+use super::polynomials::POINTS;
 use super::sections::{Body, Sections};
 use crate::element::gauss_cube;
-
-/// Gauss points per direction: their polynomials have degree 4 in each coordinate.
-pub const POINTS: usize = 5;
 
 /// Integrals of the Lagrange polynomials of a cell's Gauss points over what balls leave of it and over their
 /// surfaces, in units in which the cell is the unit cube. Points are numbered with x fastest.

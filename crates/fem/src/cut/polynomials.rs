@@ -1,8 +1,10 @@
 //! Polynomials of degree 4 on the unit interval: sums are taken with Legendre's, which make products cheap,
 //! and given for the Lagrange polynomials of the Gauss points.
 
-use super::moments::POINTS;
 use crate::element::gauss;
+
+/// Gauss points per direction: their polynomials have degree 4 in each coordinate.
+pub const POINTS: usize = 5;
 
 /// A number for every polynomial.
 pub type Line = [f64; POINTS];

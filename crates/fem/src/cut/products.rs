@@ -6,7 +6,7 @@
 
 use gluey_linalg::vectorised;
 
-use super::moments::POINTS;
+use super::polynomials::POINTS;
 use crate::element::{derivatives_1d, gauss, multi_index, node_count, values_1d};
 
 /// Nodes per direction, and pairs of them.

@@ -1,4 +1,4 @@
-//! Integrals over the part of a body in a cell, over its sections with the faces, and over its flats, by rays.
+//! Integrals over the part of a body in a cell, its sections with the faces, and its flats, by rays.
 
 use super::ball::BallInCell;
 use super::corners::HalfSpace;
@@ -6,8 +6,7 @@ use super::disc::Ray;
 use super::flat::FlatInCell;
 use super::frame::Frame;
 use super::intervals::Parts;
-use super::moments::POINTS;
-use super::polynomials::{Line, Polynomials, integrals, legendre};
+use super::polynomials::{Line, POINTS, Polynomials, integrals, legendre};
 use super::rays::{for_each_plane, for_each_ray};
 use super::slice::{Edge, Slice};
 use crate::element::gauss;

@@ -1,7 +1,7 @@
 //! The viscous matrices of cut cells, by products of shape functions.
 //!
-//! With the integrals `V_ab`, `N_ab` and `P` of `d_a phi_i d_b phi_j` over the fluid, of `phi_i d_a phi_j n_b`
-//! and of `beta phi_i phi_j` over the surface, Nitsche's form
+//! With the integrals `V_ab` of `d_a phi_i d_b phi_j` over the fluid, `N_ab` of `phi_i d_a phi_j n_b` and `P`
+//! of `beta phi_i phi_j` over the surface, Nitsche's form
 //!
 //! `int 2 eps(u):eps(v) - int (2 eps(u) n).v - int (2 eps(v) n).u + int beta u.v`
 //!
@@ -11,7 +11,7 @@
 
 use gluey_linalg::vectorised;
 
-use super::moments::POINTS;
+use super::polynomials::POINTS;
 use super::products::{Lines, Places, Products, add_products, pair_count};
 use crate::element::node_count;
 

@@ -15,8 +15,8 @@
 //! so a new stage loses nothing. The true residual decides when to stop, and reaches what double precision
 //! allows.
 //!
-//! `Gcr<f64, f64, f32>` takes its steps in double precision and keeps `Z` alone in single: a direction is what
-//! the preconditioner gave, rounded, and `C` are the images of rounded directions.
+//! `Gcr<f64, f64, f32>` takes its steps in double precision and keeps `Z` alone in single: a direction is
+//! what the preconditioner gave, rounded, and `C` are the images of rounded directions.
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};

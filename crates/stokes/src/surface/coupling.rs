@@ -1,5 +1,6 @@
 //! The operator of cut cells on reduced vectors: fluid, surfaces and the motions of bodies.
 
+use gluey_fem::Constraint;
 use gluey_fem::cells::{CellScalar, CutOperator, CutPiece};
 use gluey_fem::cut::{POINTS, ViscousMatrices, ViscousWeights};
 use gluey_fem::element::{gauss_cube, node_count, value};
@@ -79,14 +80,7 @@ where
             Subset::new(touched.len(), |node| touched[node])
         };
         let (nodes, pressures) = (touched(velocity), touched(pressure));
-        let mut forms = AffineConstraints::identity(velocity.node_count());
-        for ghost in &aggregates.velocity {
-            forms.set(ghost.node as usize, ghost.masters.iter().copied());
-        }
-        let mut of_cut = AffineConstraints::zeros(nodes.len(), velocity.node_count());
-        for (row, &node) in nodes.positions().iter().enumerate() {
-            of_cut.set(row, forms.terms(node as usize).iter().copied());
-        }
+        let of_cut = forms(&nodes, &aggregates.velocity);
         let masters = (0..nodes.len()).flat_map(|row| of_cut.terms(row)).map(|term| term.0);
         let mut boundary: Vec<u32> = masters.filter(|&node| velocity.is_on_boundary(node as usize)).collect();
         boundary.sort_unstable();
@@ -97,8 +91,11 @@ where
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
         let shear = discretisation.mesh.shear();
-        let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
-        let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
+        let of_pieces = || pieces.iter().map(|&piece| data.piece(piece));
+        let (wide, narrow) = rayon::join(
+            || CutOperator::new(of_pieces(), counts).sheared(shear),
+            || CutOperator::new(of_pieces(), counts).sheared(shear),
+        );
         drop(data);
         let discretisation = discretisation.clone();
         let mut roots = aggregates.roots.clone();
@@ -285,6 +282,17 @@ where
             q[node as usize] += back(load);
         }
     }
+}
+
+/// Some nodes in all nodes, of which ghosts take their values from others.
+fn forms(nodes: &Subset, ghosts: &[Constraint]) -> AffineConstraints {
+    let mut all = AffineConstraints::identity(nodes.whole());
+    ghosts.iter().for_each(|ghost| all.set(ghost.node as usize, ghost.masters.iter().copied()));
+    let mut forms = AffineConstraints::zeros(nodes.len(), nodes.whole());
+    for (row, &node) in nodes.positions().iter().enumerate() {
+        forms.set(row, all.terms(node as usize).iter().copied());
+    }
+    forms
 }
 
 /// The velocity at `arm` of a body of radius one that moves in unknown `k` of its twist.
