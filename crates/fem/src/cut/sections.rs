@@ -12,7 +12,7 @@ use super::slice::{Edge, Slice};
 use crate::element::gauss;
 
 /// Points of the rule on the parts of an angle.
-const RULE: usize = 6;
+const RULE: usize = 8;
 /// Points of a face, at most.
 const FACE: usize = POINTS * POINTS;
 
