@@ -36,7 +36,7 @@ mod subset;
 pub mod vector;
 
 pub use affine::AffineConstraints;
-pub use dense::{BlockError, DenseSymmetric, invert_spd};
+pub use dense::{BlockError, DenseSymmetric, invert_spd, vectorised};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
     Regularise, SolveReport, Symbolic,
@@ -47,7 +47,10 @@ pub use krylov::{
 };
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
-pub use smoother::{Chebyshev, ChebyshevParams, Guess, SchwarzPatches, SpectralInterval, WeakModes};
+pub use smoother::{
+    Chebyshev, ChebyshevParams, Guess, ModesWorkspace, SchwarzPatches, SpectralInterval, WeakModes,
+    weak_modes,
+};
 pub use sparse::{
     BlockGroups, BlockPattern, LocalTerm, Pattern, Prolongation, SellMatrix, SparseError, SparseMatrix,
     SymmetricBlockMatrix,

@@ -8,3 +8,11 @@ pub struct BallInCell<const D: usize> {
     /// Radius.
     pub radius: f64,
 }
+
+impl<const D: usize> BallInCell<D> {
+    /// The same ball of a cube.
+    pub(super) fn in_3d(&self) -> BallInCell<3> {
+        let center = std::array::from_fn(|d| self.center.get(d).copied().unwrap_or(0.0));
+        BallInCell { center, radius: self.radius }
+    }
+}

@@ -28,3 +28,25 @@ pub struct Ray {
     /// Width of the strip it stands for.
     pub weight: f64,
 }
+
+impl Disc {
+    /// The ray through the disc at an angle, for a part of the angle.
+    #[inline]
+    pub fn ray(&self, (sin, cos): (f64, f64), weight: f64) -> Ray {
+        let Self { along, across, radius, widths, lean } = self;
+        Ray {
+            at: across + widths[1] * radius * sin,
+            middle: along + lean * radius * sin,
+            half: widths[0] * radius * cos,
+            weight: weight * widths[1] * radius * cos,
+        }
+    }
+
+    /// The ray with this coordinate across, if it meets the disc.
+    pub fn ray_at(&self, at: f64) -> Option<Ray> {
+        let sin = (at - self.across) / (self.widths[1] * self.radius);
+        let cos = ((1.0 - sin) * (1.0 + sin)).sqrt();
+        // Exactly where it was wanted: a flat may lie there.
+        (sin.abs() < 1.0).then(|| Ray { at, ..self.ray((sin, cos), 0.0) })
+    }
+}

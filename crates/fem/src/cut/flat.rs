@@ -36,6 +36,13 @@ impl<const D: usize> FlatInCell<D> {
         &self.normal
     }
 
+    /// The axis along which `m` is largest.
+    pub(super) fn main_axis(&self) -> usize {
+        let largest =
+            |best: usize, d: usize| if self.normal[d].abs() > self.normal[best].abs() { d } else { best };
+        (1..D).fold(0, largest)
+    }
+
     /// The same half-space of a cube.
     pub(super) fn in_3d(&self) -> FlatInCell<3> {
         let normal = std::array::from_fn(|d| self.normal.get(d).copied().unwrap_or(0.0));

@@ -15,31 +15,48 @@ pub struct Breakpoint {
     pub is_root: bool,
 }
 
-/// Calls `visit(x, weight)` for the points of a composite Gauss rule on `[from, to]`, cut at the breakpoints
-/// inside. Parts are no longer than twice their distance from a square root, wherever that is.
-pub fn for_each_point(
-    [from, to]: [f64; 2],
-    breakpoints: &[Breakpoint],
-    rule: &[(f64, f64)],
-    mut visit: impl FnMut(f64, f64),
-) {
-    let mut cuts: Vec<f64> = breakpoints.iter().map(|b| b.at).filter(|at| from < *at && *at < to).collect();
-    cuts.extend([from, to]);
-    cuts.sort_by(f64::total_cmp);
-    let roots: Vec<f64> = breakpoints.iter().filter(|b| b.is_root).map(|b| b.at).collect();
-    let mut parts: Vec<[f64; 2]> = cuts.windows(2).rev().map(|pair| [pair[0], pair[1]]).collect();
-    while let Some(part) = parts.pop() {
-        let [start, end] = part;
-        let length = end - start;
-        let is_at = |x: f64| roots.iter().any(|root| (root - x).abs() <= AT_END);
-        let ends = [is_at(start), is_at(end)];
-        let beyond = |root: &f64| (root - end).max(start - root);
-        let distance = roots.iter().map(beyond).filter(|&d| d > AT_END).fold(f64::INFINITY, f64::min);
-        if length > AT_END && (length > LONGEST.min(2.0 * distance) || ends == [true; 2]) {
-            let middle = 0.5 * (start + end);
-            parts.extend([[middle, end], [start, middle]]);
-        } else {
-            rule.iter().map(|&point| mapped(part, ends, point)).for_each(|(x, weight)| visit(x, weight));
+/// Memory for the parts of an interval.
+#[derive(Debug, Default)]
+pub struct Parts {
+    breakpoints: Vec<Breakpoint>,
+    cuts: Vec<f64>,
+    parts: Vec<[f64; 2]>,
+}
+
+impl Parts {
+    /// Calls `visit(x, weight)` for the points of a composite Gauss rule on `[from, to]`, cut at the
+    /// breakpoints inside. Parts are no longer than twice their distance from a square root, wherever
+    /// that is.
+    pub fn for_each_point(
+        &mut self,
+        [from, to]: [f64; 2],
+        breakpoints: impl Iterator<Item = Breakpoint>,
+        rule: &[(f64, f64)],
+        mut visit: impl FnMut(f64, f64),
+    ) {
+        let Self { breakpoints: all, cuts, parts } = self;
+        all.clear();
+        all.extend(breakpoints);
+        cuts.clear();
+        cuts.extend(all.iter().map(|b| b.at).filter(|at| from < *at && *at < to));
+        cuts.extend([from, to]);
+        cuts.sort_unstable_by(f64::total_cmp);
+        all.retain(|b| b.is_root);
+        parts.clear();
+        parts.extend(cuts.windows(2).rev().map(|pair| [pair[0], pair[1]]));
+        while let Some(part) = parts.pop() {
+            let [start, end] = part;
+            let length = end - start;
+            let is_at = |x: f64| all.iter().any(|root| (root.at - x).abs() <= AT_END);
+            let ends = [is_at(start), is_at(end)];
+            let beyond = |root: &Breakpoint| (root.at - end).max(start - root.at);
+            let distance = all.iter().map(beyond).filter(|&d| d > AT_END).fold(f64::INFINITY, f64::min);
+            if length > AT_END && (length > LONGEST.min(2.0 * distance) || ends == [true; 2]) {
+                let middle = 0.5 * (start + end);
+                parts.extend([[middle, end], [start, middle]]);
+            } else {
+                rule.iter().map(|&point| mapped(part, ends, point)).for_each(|(x, weight)| visit(x, weight));
+            }
         }
     }
 }
@@ -67,7 +84,9 @@ mod tests {
         let rule = gauss(12);
         let integral = |breakpoints: &[Breakpoint]| {
             let mut sum = 0.0;
-            for_each_point([0.0, 1.0], breakpoints, &rule, |x, weight| sum += weight * f(x));
+            Parts::default().for_each_point([0.0, 1.0], breakpoints.iter().copied(), &rule, |x, weight| {
+                sum += weight * f(x)
+            });
             sum
         };
         let point = |at, is_root| Breakpoint { at, is_root };
@@ -75,7 +94,8 @@ mod tests {
             let mut sum = 0.0;
             for k in 0..20_000 {
                 let part = [k as f64 / 2e4, (k + 1) as f64 / 2e4];
-                for_each_point(part, &[], &rule, |x, weight| sum += weight * f(x));
+                Parts::default()
+                    .for_each_point(part, std::iter::empty(), &rule, |x, weight| sum += weight * f(x));
             }
             sum
         };

@@ -11,8 +11,9 @@
 //! costs what a cell with a viscosity of its own at each point costs, and the divergence theorem holds
 //! between its volume and its surfaces to rounding, which Nitsche's method needs.
 //!
-//! The integrals of `l_q` are taken along rays (`rays`): the places where a ray in direction `k` enters and
-//! leaves the ball give `n_k dS = -+dA`, its length inside the volume. Rays are parametrised by angles, in
+//! The integrals of `l_q` over the part of the ball in the cell and over its sections with faces are taken
+//! along rays (`rays`, `sections`); the divergence theorem gives those over the surface (`moments`). Rays are
+//! parametrised by angles, in
 //! which chords have no square roots, and cut where they begin to miss faces and edges of the cell
 //! (`intervals`). Planes may cut a ball flat: what they leave is convex, and a ray still enters and leaves it
 //! once (`slice`, `corners`). Compare Saye (2015, 10.1137/140966290), whose height functions these are for a
@@ -25,9 +26,16 @@ mod flat;
 mod frame;
 mod intervals;
 mod moments;
+mod polynomials;
+mod products;
 mod rays;
+mod sections;
 mod slice;
+mod viscous;
 
 pub use ball::BallInCell;
 pub use flat::FlatInCell;
-pub use moments::{CutMoments, POINTS, SurfaceMoments};
+pub use moments::{CutMoments, CutRules, SurfaceMoments};
+pub use polynomials::POINTS;
+pub use products::{Lines, Products};
+pub use viscous::{ViscousMatrices, ViscousWeights};

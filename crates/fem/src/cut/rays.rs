@@ -11,24 +11,16 @@ use super::ball::BallInCell;
 use super::corners::{self, HalfSpace};
 use super::disc::{Disc, Ray};
 use super::frame::Frame;
-use super::intervals::{Breakpoint, for_each_point};
+use super::intervals::{Breakpoint, Parts};
 use super::slice::Slice;
 
-/// The rays through the disc of `slice` that lie in the unit interval.
-pub fn for_each_ray(slice: &Slice, rule: &[(f64, f64)], mut visit: impl FnMut(Ray)) {
-    let Disc { along, across, radius, widths, lean } = slice.disc;
+/// The rays through the disc of `slice` that lie in the unit interval, by this rule.
+pub fn for_each_ray(slice: &Slice, (rule, parts): (&[(f64, f64)], &mut Parts), mut visit: impl FnMut(Ray)) {
+    let disc = &slice.disc;
     let corners = slice.ends_on_faces().chain(slice.corners());
-    let breakpoints: Vec<Breakpoint> = corners.map(|at| Breakpoint { at, is_root: false }).collect();
-    let range = angles(across, radius * widths[1]);
-    for_each_point(range, &breakpoints, rule, |angle, weight| {
-        let (sin, cos) = angle.sin_cos();
-        visit(Ray {
-            at: across + widths[1] * radius * sin,
-            middle: along + lean * radius * sin,
-            half: widths[0] * radius * cos,
-            weight: weight * widths[1] * radius * cos,
-        });
-    });
+    let breakpoints = corners.map(|at| Breakpoint { at, is_root: false });
+    let range = angles(disc.across, disc.radius * disc.widths[1]);
+    parts.for_each_point(range, breakpoints, rule, |angle, weight| visit(disc.ray(angle.sin_cos(), weight)));
 }
 
 /// Calls `visit(disc, z, width)` for the planes of rays across a ball, cut by these flats.
@@ -36,13 +28,13 @@ pub fn for_each_plane(
     ball: &BallInCell<3>,
     frame: &Frame,
     flats: &[HalfSpace],
-    rule: &[(f64, f64)],
+    (rule, parts): (&[(f64, f64)], &mut Parts),
     mut visit: impl FnMut(Disc, f64, f64),
 ) {
     let radius = ball.radius;
     let breakpoints = corners::breakpoints(radius, flats, &frame.faces(ball));
     let range = [0.0, 1.0].map(|face| (frame.height(ball, face) / radius).clamp(-1.0, 1.0).asin());
-    for_each_point(range, &breakpoints, rule, |angle, weight| {
+    parts.for_each_point(range, breakpoints.into_iter(), rule, |angle, weight| {
         let (sin, cos) = angle.sin_cos();
         let (disc, z) = frame.section(ball, radius * sin);
         // Better rounded than the root of a difference.

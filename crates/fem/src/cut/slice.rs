@@ -4,9 +4,8 @@
 //! first exit, each on the ball or on a flat. The moments of a plane change their form at the rays through
 //! corners, where two of circle, lines and faces meet.
 //!
-//! A surface element `dS` with the normal `n` is seen along an axis `d` of the cell as
-//! `dA = +-N_d dS'`, with the normal `N` and the element `dS'` in coordinates of the cell; and
-//! `dS = sum_d (A^-1 n)_d N_d dS'` for the shear `A` of the cell.
+//! The part `dA` of a plane across an axis `d` of the cell through which a flat with the covector `m` is seen
+//! belongs to the part `dA / |m_d|` of the flat.
 
 use super::disc::{Disc, Ray};
 
@@ -18,13 +17,13 @@ const SAME: f64 = 1e-13;
 /// A half-plane in a plane of rays: `n . (x, y) <= offset`, x along the rays. The normal is that of a flat,
 /// without its component across the plane.
 #[derive(Clone, Copy, Debug)]
-pub struct Line {
+pub struct Edge {
     /// Components along the rays and across them.
     pub normal: [f64; 2],
-    /// Component along the rays of `A^-1 n`.
-    pub slope: f64,
     /// Where the half-plane ends.
     pub offset: f64,
+    /// For a flat that is integrated over by these rays its number, and its part for one across the rays.
+    pub flat: Option<(usize, f64)>,
 }
 
 /// The section of a ball cut flat with a plane of rays.
@@ -33,7 +32,7 @@ pub struct Slice {
     /// The section of the ball.
     pub disc: Disc,
     /// Those of the flats.
-    pub lines: Vec<Line>,
+    pub edges: Vec<Edge>,
 }
 
 /// Where a ray enters or leaves.
@@ -41,30 +40,27 @@ pub struct Slice {
 pub struct End {
     /// Coordinate along the ray.
     pub at: f64,
-    /// Component along the ray of `A^-1 n` there, to the outside.
-    pub slope: f64,
+    /// See [`Edge::flat`]; nothing on the ball.
+    pub flat: Option<(usize, f64)>,
     /// Whether this piece of surface belongs to the cell.
     pub is_in_cell: bool,
 }
 
 impl Slice {
-    /// The ends of a ray through a ball with this radius and centre along the rays, if it meets what the
-    /// flats leave.
+    /// The ends of a ray, if it meets what the flats leave.
     ///
     /// A flat on a face of the cell belongs to the cell on its outer side, where the fluid is.
-    pub fn ends(&self, ray: &Ray, (center, radius): (f64, f64)) -> Option<[End; 2]> {
-        let on_ball = |sign: f64| {
-            let at = ray.middle + sign * ray.half;
-            End { at, slope: sign * (at - center) / radius, is_in_cell: 0.0 < at && at < 1.0 }
-        };
+    #[inline]
+    pub fn ends(&self, ray: &Ray) -> Option<[End; 2]> {
+        let on_ball = |sign: f64| End { at: ray.middle + sign * ray.half, flat: None, is_in_cell: false };
         let [mut entry, mut exit] = [-1.0, 1.0].map(on_ball);
-        for line in &self.lines {
-            // Infinite for a line along the rays, which keeps or drops the whole ray.
-            let at = (line.offset - line.normal[1] * ray.at) / line.normal[0].abs();
-            if line.normal[0] >= 0.0 && at < exit.at {
-                exit = End { at, slope: line.slope, is_in_cell: (0.0..1.0).contains(&at) };
-            } else if line.normal[0] < 0.0 && -at > entry.at {
-                entry = End { at: -at, slope: -line.slope, is_in_cell: 0.0 < -at && -at <= 1.0 };
+        for edge in &self.edges {
+            // Infinite for an edge along the rays, which keeps or drops the whole ray.
+            let at = (edge.offset - edge.normal[1] * ray.at) / edge.normal[0].abs();
+            if edge.normal[0] >= 0.0 && at < exit.at {
+                exit = End { at, flat: edge.flat, is_in_cell: (0.0..1.0).contains(&at) };
+            } else if edge.normal[0] < 0.0 && -at > entry.at {
+                entry = End { at: -at, flat: edge.flat, is_in_cell: 0.0 < -at && -at <= 1.0 };
             }
         }
         (entry.at <= exit.at).then_some([entry, exit])
@@ -72,15 +68,15 @@ impl Slice {
 
     /// Whether one of the lines leaves nothing of the disc.
     pub fn is_empty(&self) -> bool {
-        self.lines.iter().any(|line| self.distance(line) <= -self.disc.radius)
+        self.edges.iter().any(|line| self.distance(line) <= -self.disc.radius)
     }
 
     /// The angles of the rays through corners on lines, in ascending order.
     pub fn corners(&self) -> Vec<f64> {
         let mut angles = Vec::new();
-        for (k, line) in self.lines.iter().enumerate() {
+        for (k, line) in self.edges.iter().enumerate() {
             angles.extend(self.corners_on_circle(line));
-            for other in self.lines[k + 1..].iter().chain(&FACES) {
+            for other in self.edges[k + 1..].iter().chain(&FACES) {
                 angles.extend(meet(line, other).and_then(|point| self.angle(point)));
             }
         }
@@ -95,26 +91,26 @@ impl Slice {
     }
 
     /// Normal of a line in coordinates in which the section is round.
-    fn round_normal(&self, line: &Line) -> [f64; 2] {
+    fn round_normal(&self, line: &Edge) -> [f64; 2] {
         let (Disc { widths, lean, .. }, [x, y]) = (self.disc, line.normal);
         [x * widths[0], x * lean + y * widths[1]]
     }
 
     /// Distance of a line from the centre in the round section, positive if the centre is inside. Infinite
     /// for a flat parallel to the plane.
-    fn distance(&self, line: &Line) -> f64 {
+    fn distance(&self, line: &Edge) -> f64 {
         let ([x, y], [u, v]) = (line.normal, self.round_normal(line));
         (line.offset - x * self.disc.along - y * self.disc.across) / u.hypot(v)
     }
 
     /// The angles on the round section where a line cuts it; not numbers if it does not.
-    fn ends_on_line(&self, line: &Line) -> [f64; 2] {
+    fn ends_on_line(&self, line: &Edge) -> [f64; 2] {
         let [u, v] = self.round_normal(line);
         let half = (self.distance(line) / self.disc.radius).acos();
         [v.atan2(u) - half, v.atan2(u) + half]
     }
 
-    fn corners_on_circle(&self, line: &Line) -> impl Iterator<Item = f64> {
+    fn corners_on_circle(&self, line: &Edge) -> impl Iterator<Item = f64> {
         let Disc { along, across, radius, widths, lean } = self.disc;
         self.ends_on_line(line).into_iter().filter_map(move |angle| {
             let arm = [radius * angle.cos(), radius * angle.sin()];
@@ -126,11 +122,11 @@ impl Slice {
     /// The angle of the ray through a point of the section.
     fn angle(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let Disc { along, across, radius, widths, lean } = self.disc;
-        let is_inside = |line: &Line| line.normal[0] * x + line.normal[1] * y <= line.offset + SLACK;
+        let is_inside = |line: &Edge| line.normal[0] * x + line.normal[1] * y <= line.offset + SLACK;
         let second = (y - across) / widths[1];
         let first = (x - along - lean * second) / widths[0];
         let is_corner =
-            first.hypot(second) <= radius + SLACK && FACES.iter().chain(&self.lines).all(is_inside);
+            first.hypot(second) <= radius + SLACK && FACES.iter().chain(&self.edges).all(is_inside);
         is_corner.then(|| (second / radius).clamp(-1.0, 1.0).asin())
     }
 }
@@ -141,13 +137,13 @@ fn folded(angle: f64) -> f64 {
 }
 
 /// The faces of the cell that rays stand on.
-const FACES: [Line; 2] = [
-    Line { normal: [-1.0, 0.0], slope: -1.0, offset: 0.0 },
-    Line { normal: [1.0, 0.0], slope: 1.0, offset: 1.0 },
+const FACES: [Edge; 2] = [
+    Edge { normal: [-1.0, 0.0], offset: 0.0, flat: None },
+    Edge { normal: [1.0, 0.0], offset: 1.0, flat: None },
 ];
 
 /// Where two lines meet.
-fn meet(a: &Line, b: &Line) -> Option<[f64; 2]> {
+fn meet(a: &Edge, b: &Edge) -> Option<[f64; 2]> {
     let det = |[p, q]: [f64; 2], [r, s]: [f64; 2]| p * s - q * r;
     let area = det(a.normal, b.normal);
     let point = [

@@ -14,6 +14,9 @@
 //! smaller, `x` is updated and the residual computed anew, both in double precision. `Z`, `C` and `R` stay,
 //! so a new stage loses nothing. The true residual decides when to stop, and reaches what double precision
 //! allows.
+//!
+//! `Gcr<f64, f64, f32>` takes its steps in double precision and keeps `Z` alone in single: a direction is
+//! what the preconditioner gave, rounded, and `C` are the images of rounded directions.
 
 use super::basis::{Basis, Directions};
 use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
@@ -51,14 +54,15 @@ impl Default for GcrParams {
 /// `Gcr<f64, f32>` takes its steps in single precision, see [`Gcr::with_steps`]. It reaches the same true
 /// residual.
 #[derive(Clone, Debug)]
-pub struct Gcr<T, S = T> {
+pub struct Gcr<T, S = T, Z = S> {
     params: GcrParams,
     /// `b - A x`.
     residual: Vec<T>,
     /// The part of it that the steps of a stage have left, over its norm at their start.
     r: Vec<S>,
-    /// `Z`.
-    directions: Directions<S>,
+    /// `Z`, and the last of them as the operator takes it.
+    directions: Directions<Z>,
+    direction: Vec<S>,
     /// `C`.
     images: Basis<S>,
     /// `R`.
@@ -82,12 +86,21 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
     /// For a good preconditioner, with convergence in a few dozen iterations: rounded vectors no longer span
     /// a Krylov space, which delays convergence through hundreds of iterations.
     pub fn with_steps(params: GcrParams) -> Self {
+        Self::with_directions(params)
+    }
+}
+
+impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
+    /// A solver with an empty workspace that takes its steps in `S` and keeps the directions in `Z`, for a
+    /// preconditioner that is no more accurate than that.
+    pub fn with_directions(params: GcrParams) -> Self {
         let restart = params.restart.max(1);
         Self {
             params: GcrParams { restart, ..params },
             residual: Vec::new(),
             r: Vec::new(),
             directions: Directions::default(),
+            direction: Vec::new(),
             images: Basis::default(),
             triangle: Triangle::default(),
             coefficients: Vec::with_capacity(restart),
@@ -127,6 +140,7 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         self.history.clear();
         self.residual.resize(b.len(), T::ZERO);
         self.r.resize(b.len(), S::ZERO);
+        self.direction.resize(b.len(), S::ZERO);
         self.forget();
         let right_hand_side_norm = finite(vector::norm(b), 0)?;
         let norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
@@ -207,10 +221,12 @@ impl<T: Scalar, S: Scalar> Gcr<T, S> {
         m: &mut (impl Preconditioner<S> + ?Sized),
         from_image: bool,
     ) -> Option<f64> {
-        let Self { r, directions, images, triangle, coefficients, .. } = self;
+        let Self { r, directions, direction, images, triangle, coefficients, .. } = self;
         let source = if from_image { images.last() } else { &r[..] };
-        let z = directions.push_with(|z| m.apply(source, z));
-        a.apply(z, images.next());
+        m.apply(source, direction);
+        let kept = directions.push_with(|z| vector::convert(1.0, direction, z));
+        vector::convert(1.0, kept, direction);
+        a.apply(direction, images.next());
         let left = images.orthogonalise(r, |h| triangle.push(h));
         triangle.push(left.norm);
         // Not the other way round: a norm that is not a number goes on to the caller.

@@ -5,5 +5,5 @@ mod modes;
 mod schwarz;
 
 pub use chebyshev::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
-pub use modes::WeakModes;
+pub use modes::{ModesWorkspace, WeakModes, weak_modes};
 pub use schwarz::SchwarzPatches;

@@ -40,6 +40,13 @@ pub struct WeakModes<const B: usize> {
     z: Vec<f32>,
 }
 
+/// Memory for [`weak_modes`].
+#[derive(Clone, Debug, Default)]
+pub struct ModesWorkspace {
+    place: Vec<u32>,
+    dense: DenseSymmetric,
+}
+
 impl<const B: usize> WeakModes<B> {
     /// Those of `matrix` on these patches.
     ///
@@ -54,28 +61,37 @@ impl<const B: usize> WeakModes<B> {
             nodes
         });
         let patches: Jagged<u32> = ascending.collect();
-        let mut shares = vec![0u32; matrix.node_count()];
-        patches.items().iter().for_each(|&node| shares[node as usize] += 1);
-        let weights = patches.items().iter().map(|&node| 1.0 / shares[node as usize] as f32).collect();
         let full = matrix.diagonal();
-        let workspace = || (vec![u32::MAX; matrix.node_count()], DenseSymmetric::default());
-        let of_patch = |(place, dense): &mut (Vec<u32>, DenseSymmetric), patch: usize| {
-            modes_of(matrix, &full, &patches[patch], place, dense)
-        };
-        let found: Vec<Vec<f32>> = (0..patches.len())
+        let modes = (0..patches.len())
             .into_par_iter()
             .with_min_len(32)
-            .map_init(workspace, of_patch)
-            .collect::<Result<_, _>>()?;
+            .map_init(ModesWorkspace::default, |work, k| weak_modes(matrix, &full, &patches[k], work))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self::from_modes(patches, modes.iter(), &full))
+    }
+
+    /// From the nodes of the patches, ascending in each, what [`weak_modes`] gave for each, and the diagonal
+    /// of the matrix.
+    pub fn from_modes<'a>(
+        patches: Jagged<u32>,
+        found: impl Iterator<Item = &'a Vec<f32>> + Clone,
+        full: &[f64],
+    ) -> Self {
+        let mut shares = vec![0u32; full.len() / B];
+        patches.items().iter().for_each(|&node| shares[node as usize] += 1);
+        let weights = patches.items().iter().map(|&node| 1.0 / shares[node as usize] as f32).collect();
         let size = |patch: usize| patches[patch].len() * B;
-        let counts =
-            found.iter().enumerate().map(|(k, modes)| (modes.len() / size(k).max(1)) as u32).collect();
+        let counts = found.clone().enumerate().map(|(k, modes)| (modes.len() / size(k).max(1)) as u32);
+        let counts = counts.collect();
+        let mut modes = Vec::new();
+        modes.reserve_exact(found.clone().map(Vec::len).sum());
+        found.for_each(|own| modes.extend_from_slice(own));
         let in_patch = |k: usize| shares[k / B] > 0;
         let diagonal = full.iter().enumerate();
         let diagonal = diagonal.map(|(k, d)| if in_patch(k) { (OMEGA / d) as f32 } else { 0.0 }).collect();
         let largest = patches.iter().map(<[u32]>::len).max().unwrap_or(0) * B;
         let [r, z] = [(); 2].map(|()| Vec::with_capacity(largest));
-        Ok(Self { counts, modes: found.concat(), weights, diagonal, patches, r, z })
+        Self { counts, modes, weights, diagonal, patches, r, z }
     }
 
     /// `z = G r`.
@@ -107,14 +123,19 @@ impl<const B: usize> WeakModes<B> {
     }
 }
 
-/// The scaled modes of a patch, one after another.
-fn modes_of<const B: usize>(
+/// The modes of a patch, ascending nodes of a matrix with this diagonal, as [`WeakModes::from_modes`] takes
+/// them.
+///
+/// # Errors
+/// If the block is not positive definite.
+pub fn weak_modes<const B: usize>(
     matrix: &SymmetricBlockMatrix<B>,
     diagonal: &[f64],
     nodes: &[u32],
-    place: &mut [u32],
-    dense: &mut DenseSymmetric,
+    ModesWorkspace { place, dense }: &mut ModesWorkspace,
 ) -> Result<Vec<f32>, BlockError> {
+    // What is left in it is all `u32::MAX`.
+    place.resize(place.len().max(matrix.node_count()), u32::MAX);
     block_on(matrix, nodes, place, dense);
     let components = nodes.iter().flat_map(|&node| (0..B).map(move |c| node as usize * B + c));
     let roots: Vec<f64> = components.map(|k| 1.0 / diagonal[k].sqrt()).collect();

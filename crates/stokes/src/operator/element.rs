@@ -1,6 +1,7 @@
 //! Element matrices of the Stokes system: the viscous one, or the whole saddle.
 
 use gluey_fem::ReferenceMatrices;
+use gluey_fem::cut::ViscousMatrices;
 use gluey_geom::{Dim, Space};
 
 use super::system::StokesSystem;
@@ -139,6 +140,22 @@ where
         match source {
             Source::Cell { index, .. } => self.fill(index, matrix),
             Source::Piece { index, .. } => self.fill_piece(index, matrix),
+        }
+    }
+
+    /// Writes the matrix of a cell, or the velocities' part of that of a piece, row by row.
+    pub fn fill_velocities(
+        &self,
+        source: Source,
+        pieces: Option<&mut ViscousMatrices<D>>,
+        matrix: &mut [f64],
+    ) {
+        match (source, pieces, &self.system.surfaces) {
+            (Source::Piece { index, .. }, Some(with), Some(surfaces)) => {
+                surfaces.viscous_matrix(index, with, matrix);
+            }
+            (Source::Cell { index, .. }, ..) => self.fill(index, matrix),
+            _ => matrix.fill(0.0),
         }
     }
 

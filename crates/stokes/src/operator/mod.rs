@@ -11,7 +11,7 @@ mod viscous;
 pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, factorised};
 pub use cells::viscous_diagonal;
 pub use diagonal::{BlockDiagonal, block_diagonal, nodal_diagonal};
-pub use element::Elements;
+pub use element::{Elements, Source};
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
 pub use system::{StokesSystem, SystemOperator};
 pub use viscous::ViscousOperator;

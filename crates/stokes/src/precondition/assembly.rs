@@ -3,6 +3,7 @@
 use gluey_fem::Constraint;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockGroups, LocalTerm, Pattern, SparseError, SymmetricBlockMatrix};
+use rayon::prelude::*;
 
 use super::numbered::NumberedNodes;
 use crate::operator::Elements;
@@ -10,6 +11,9 @@ use crate::surface::SurfaceCoupling;
 
 /// Stands for the constraint of a node that has none.
 const NONE: u32 = u32::MAX;
+/// Matrices that are made at a time, and at least how many by one thread.
+const BATCH: usize = 64;
+const LEAST_SHARE: usize = 8;
 
 /// The sum of the matrices of cells on the numbered nodes.
 pub fn assemble_on_nodes<const D: usize>(
@@ -30,19 +34,25 @@ where
     }
     let groups: Vec<&[usize]> = groups.iter().collect();
     let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(nodes.nodes.len(), &groups)?);
-    let mut element = vec![0.0; elements.size().pow(2)];
-    let mut piece = vec![0.0; SurfaceCoupling::<D>::piece_size().pow(2)];
-    for source in sources {
-        forms.of_cell(source.cell(), &mut terms);
-        let dense = if source.is_piece() { &mut piece } else { &mut element };
-        elements.fill_source(source, dense);
-        matrix.add_local(&terms, dense);
+    let len = elements.size().pow(2);
+    let mut dense = vec![0.0; BATCH * len];
+    let surfaces = elements.system().surfaces.as_deref();
+    let workspace = || surfaces.map(SurfaceCoupling::viscous_matrices);
+    for batch in sources.chunks(BATCH) {
+        let pairs = batch.par_iter().zip(dense.par_chunks_exact_mut(len));
+        pairs.with_min_len(LEAST_SHARE).for_each_init(workspace, |with, (&source, dense)| {
+            elements.fill_velocities(source, with.as_mut(), dense);
+        });
+        for (source, dense) in batch.iter().zip(dense.chunks_exact(len)) {
+            forms.of_cell(source.cell(), &mut terms);
+            matrix.add_local(&terms, dense);
+        }
     }
     Ok(matrix)
 }
 
 /// The numbered nodes that nodes stand for: themselves, or the masters they hang on.
-struct NodeForms<'a, const D: usize> {
+pub struct NodeForms<'a, const D: usize> {
     nodes: &'a NumberedNodes<'a, D>,
     /// Hanging nodes and ghosts.
     constraints: Vec<&'a Constraint>,
@@ -51,7 +61,8 @@ struct NodeForms<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> NodeForms<'a, D> {
-    fn new(nodes: &'a NumberedNodes<'a, D>, ghosts: &'a [Constraint]) -> Self {
+    /// For a mesh with these ghosts.
+    pub fn new(nodes: &'a NumberedNodes<'a, D>, ghosts: &'a [Constraint]) -> Self {
         let constraints: Vec<&Constraint> = nodes.mesh.velocity.constraints().iter().chain(ghosts).collect();
         let mut constraint = vec![NONE; nodes.nodes.whole()];
         for (k, of) in constraints.iter().enumerate() {
@@ -61,7 +72,7 @@ impl<'a, const D: usize> NodeForms<'a, D> {
     }
 
     /// The terms of a cell, sorted by their rows.
-    fn of_cell(&self, cell: usize, terms: &mut Vec<LocalTerm>) {
+    pub fn of_cell(&self, cell: usize, terms: &mut Vec<LocalTerm>) {
         terms.clear();
         let nodes = &self.nodes.mesh.velocity;
         for (local, &node) in (0..).zip(nodes.cell(cell)) {

@@ -36,7 +36,7 @@ where
 {
     /// With steps in single and in double precision.
     single: Gcr<f64, f32>,
-    double: Gcr<f64>,
+    double: Gcr<f64, f64, f32>,
     /// See [`rounding_noise`].
     noise: f64,
     cycle: Option<VCycle<D>>,
@@ -53,7 +53,7 @@ where
         let params = GcrParams { max_iterations: 200, restart: 60, ..GcrParams::default() };
         Self {
             single: Gcr::with_steps(params),
-            double: Gcr::new(params),
+            double: Gcr::with_directions(params),
             noise: 0.0,
             cycle: None,
             schur: None,
@@ -150,7 +150,7 @@ where
 
 /// Solves `A x = b` with steps in `S` and returns the norms of the residuals.
 fn run<S: Scalar>(
-    krylov: &mut Gcr<f64, S>,
+    krylov: &mut Gcr<f64, S, f32>,
     a: &mut (impl LinOp<f64> + LinOp<S>),
     m: &mut impl Preconditioner<S>,
     b: &[f64],

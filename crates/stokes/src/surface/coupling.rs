@@ -1,9 +1,10 @@
 //! The operator of cut cells on reduced vectors: fluid, surfaces and the motions of bodies.
 
+use gluey_fem::Constraint;
 use gluey_fem::cells::{CellScalar, CutOperator, CutPiece};
-use gluey_fem::cut::POINTS;
+use gluey_fem::cut::{POINTS, ViscousMatrices, ViscousWeights};
 use gluey_fem::element::{gauss_cube, node_count, value};
-use gluey_geom::{Dim, Space};
+use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 use gluey_linalg::{AffineConstraints, Scalar, Subset};
 
@@ -15,6 +16,8 @@ use crate::space::{Discretisation, VelocitySpace};
 
 /// Pressure nodes of a cell, at most.
 const MOST_CORNERS: usize = 8;
+/// Unknowns of a twist, at most.
+const MOST_RIGID: usize = 6;
 
 /// `[A, -B^T; -B, 0]` of the cut cells.
 #[derive(Clone, Debug)]
@@ -22,6 +25,7 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The cut cells.
     pub cut: CutCells<D>,
     discretisation: Discretisation<D>,
+    viscosity: f64,
     roots: Vec<u32>,
     /// `beta h / eta` of each cut cell.
     penalties: Vec<f64>,
@@ -35,7 +39,8 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The velocity nodes and the pressure nodes of cut cells.
     nodes: Subset,
     pressures: Subset,
-    /// The pressure functions at the Gauss points of a cell.
+    /// The Gauss points of a cell, and the pressure functions there.
+    points: Vec<[f64; D]>,
     corner_values: Vec<[f64; MOST_CORNERS]>,
     wide: CutOperator<f64, D>,
     narrow: CutOperator<f32, D>,
@@ -75,14 +80,7 @@ where
             Subset::new(touched.len(), |node| touched[node])
         };
         let (nodes, pressures) = (touched(velocity), touched(pressure));
-        let mut forms = AffineConstraints::identity(velocity.node_count());
-        for ghost in &aggregates.velocity {
-            forms.set(ghost.node as usize, ghost.masters.iter().copied());
-        }
-        let mut of_cut = AffineConstraints::zeros(nodes.len(), velocity.node_count());
-        for (row, &node) in nodes.positions().iter().enumerate() {
-            of_cut.set(row, forms.terms(node as usize).iter().copied());
-        }
+        let of_cut = forms(&nodes, &aggregates.velocity);
         let masters = (0..nodes.len()).flat_map(|row| of_cut.terms(row)).map(|term| term.0);
         let mut boundary: Vec<u32> = masters.filter(|&node| velocity.is_on_boundary(node as usize)).collect();
         boundary.sort_unstable();
@@ -93,8 +91,11 @@ where
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
         let shear = discretisation.mesh.shear();
-        let wide = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
-        let narrow = CutOperator::new(pieces.iter().map(|&piece| data.piece(piece)), counts).sheared(shear);
+        let of_pieces = || pieces.iter().map(|&piece| data.piece(piece));
+        let (wide, narrow) = rayon::join(
+            || CutOperator::new(of_pieces(), counts).sheared(shear),
+            || CutOperator::new(of_pieces(), counts).sheared(shear),
+        );
         drop(data);
         let discretisation = discretisation.clone();
         let mut roots = aggregates.roots.clone();
@@ -106,6 +107,8 @@ where
         let corner_values = rule.iter().map(|(x, _)| std::array::from_fn(|q| corner(q, x))).collect();
         Ok(Self {
             discretisation,
+            viscosity,
+            points: rule.into_iter().map(|point| point.0).collect(),
             corner_values,
             roots,
             penalties,
@@ -149,6 +152,49 @@ where
     /// The matrix of a piece, row by row: velocities node by node, pressures, twist.
     pub fn matrix(&self, piece: usize, matrix: &mut [f64]) {
         self.wide.matrix(piece, matrix);
+    }
+
+    /// What the viscous matrices of pieces are made with.
+    pub fn viscous_matrices(&self) -> ViscousMatrices<D> {
+        ViscousMatrices::new(self.discretisation.mesh.shear())
+    }
+
+    /// The part of the matrix of a piece for velocities alone.
+    pub fn viscous_matrix(&self, piece: usize, with: &mut ViscousMatrices<D>, matrix: &mut [f64]) {
+        let (place, number) = self.pieces[piece];
+        let cell = &self.cut.cells[place as usize];
+        let surface = &cell.moments.surfaces[number as usize];
+        let weights = ViscousWeights {
+            volume: if number == 0 { &cell.moments.volume } else { &[] },
+            normal: &surface.normal,
+            area: &surface.area,
+            penalty: self.penalties[place as usize],
+        };
+        with.fill(&weights, self.stress(cell), matrix);
+    }
+
+    /// Adds the part of the matrix of a piece for the twist of its body, row by row.
+    pub fn add_twist_block(&self, piece: usize, block: &mut [f64]) {
+        let (place, number) = self.pieces[piece];
+        let (rigid, shear) = (Dim::<D>::RIGID, self.discretisation.mesh.shear());
+        let cell = &self.cut.cells[place as usize];
+        let ball = &cell.balls[number as usize];
+        let factor = self.stress(cell) * self.penalties[place as usize];
+        for (at, area) in self.points.iter().zip(&cell.moments.surfaces[number as usize].area) {
+            let from_center: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
+            let arm = in_space(shear, &from_center) / ball.radius;
+            let mut motions = [Vector::<D>::zeros(); MOST_RIGID];
+            (0..rigid).for_each(|k| motions[k] = unit_motion(k, &arm));
+            for (row, first) in block.chunks_exact_mut(rigid).zip(&motions) {
+                let weighted = first * (factor * area);
+                row.iter_mut().zip(&motions).for_each(|(sum, second)| *sum += weighted.dot(second));
+            }
+        }
+    }
+
+    /// What the forms on a cut cell are multiplied by, `eta h^(D-2)`.
+    fn stress(&self, cell: &CutCell<D>) -> f64 {
+        self.viscosity * self.discretisation.cell_size(cell.cell as usize).powi(D as i32 - 2)
     }
 
     /// Calls `visit(q, r, int p_q p_r)` for the pressures of a piece, whose fluid it is.
@@ -236,6 +282,30 @@ where
             q[node as usize] += back(load);
         }
     }
+}
+
+/// Some nodes in all nodes, of which ghosts take their values from others.
+fn forms(nodes: &Subset, ghosts: &[Constraint]) -> AffineConstraints {
+    let mut all = AffineConstraints::identity(nodes.whole());
+    ghosts.iter().for_each(|ghost| all.set(ghost.node as usize, ghost.masters.iter().copied()));
+    let mut forms = AffineConstraints::zeros(nodes.len(), nodes.whole());
+    for (row, &node) in nodes.positions().iter().enumerate() {
+        forms.set(row, all.terms(node as usize).iter().copied());
+    }
+    forms
+}
+
+/// The velocity at `arm` of a body of radius one that moves in unknown `k` of its twist.
+fn unit_motion<const D: usize>(k: usize, arm: &Vector<D>) -> Vector<D>
+where
+    Dim<D>: Space<D>,
+{
+    let mut twist = Twist::<D>::default();
+    match k.checked_sub(D) {
+        Some(k) => twist.spin[k] = 1.0,
+        None => twist.velocity[k] = 1.0,
+    }
+    twist.velocity_at(arm)
 }
 
 /// What pieces are made of.

@@ -1,6 +1,6 @@
 //! Which cells bodies cut, and the moments of those.
 
-use gluey_fem::cut::{BallInCell, CutMoments, FlatInCell};
+use gluey_fem::cut::{BallInCell, CutMoments, CutRules, FlatInCell};
 use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::Jagged;
@@ -82,10 +82,11 @@ impl<const D: usize> CutCells<D> {
         debug_assert_eq!(bodies.len(), flats.body_count());
         let tree = BallTree::new(bodies);
         let count = discretisation.mesh.cell_count();
+        let rules = CutRules::new(discretisation.mesh.shear());
         let examined: Vec<(CellState, Option<u32>, Option<CutCell<D>>)> = (0..count)
             .into_par_iter()
             .with_min_len(64)
-            .map(|cell| examine(discretisation, (&tree, flats), cell))
+            .map(|cell| examine(discretisation, (&tree, flats), &rules, cell))
             .collect();
         let mut new = Self {
             states: Vec::with_capacity(count),
@@ -120,14 +121,14 @@ impl<const D: usize> CutCells<D> {
 fn examine<const D: usize>(
     discretisation: &Discretisation<D>,
     bodies: (&BallTree<'_, D>, &Flats<D>),
+    rules: &CutRules<D>,
     cell: usize,
 ) -> (CellState, Option<u32>, Option<CutCell<D>>) {
     match near(discretisation, bodies, cell) {
         Near::None => (CellState::Fluid, None, None),
         Near::Covered(body) => (CellState::Solid, Some(body), None),
         Near::Cut(cutting) => {
-            let shear = discretisation.mesh.shear();
-            let moments = CutMoments::sheared(shear, cutting.iter().map(|cut| (&cut.ball, &cut.flats[..])));
+            let moments = rules.moments(cutting.iter().map(|cut| (&cut.ball, &cut.flats[..])));
             let state = match moments.fraction() {
                 share if share <= LEAST_SHARE => return (CellState::Solid, Some(cutting[0].body), None),
                 share if share < GOOD_SHARE => CellState::Bad,

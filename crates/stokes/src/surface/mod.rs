@@ -7,7 +7,6 @@ mod cut_cells;
 mod flats;
 mod load;
 mod penalty;
-mod products;
 mod shapes;
 mod strain;
 mod traction;

@@ -11,7 +11,7 @@
 //!
 //! In coordinates of the unit cube `mu h` is a number of the cut alone.
 
-use gluey_fem::cut::POINTS;
+use gluey_fem::cut::{Lines, POINTS, Products};
 use gluey_fem::element::{gauss_cube, node_count};
 use gluey_geom::Vector;
 use gluey_levelset::nearest_image;
@@ -20,7 +20,6 @@ use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
 use super::cut_cells::CutCells;
-use super::products::{Lines, Products};
 use crate::error::StokesError;
 use crate::space::Discretisation;
 
@@ -59,7 +58,7 @@ pub fn penalties<const D: usize>(
             moments.surfaces.iter().for_each(|part| surface.add(lines, &part.area));
         }
         let shear = discretisation.mesh.shear();
-        let [volume, surface] = [volume.sheared(shear), surface.sheared(shear)];
+        [&mut volume, &mut surface].into_iter().for_each(|products| products.shear(shear));
         // int 4 eps:eps on the surface to int 2 eps:eps in the volume.
         eigenvalue(&surface, &volume).map(|ratio| FACTOR * 2.0 * ratio)
     };

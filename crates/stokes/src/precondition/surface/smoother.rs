@@ -8,8 +8,8 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, SymmetricBlockMatrix,
-    WeakModes, estimate_lambda_max, invert_spd, vector,
+    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
+    estimate_lambda_max, invert_spd, vector,
 };
 
 use crate::error::{DiagonalError, StokesError};
@@ -19,6 +19,8 @@ use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::velocity::cell_lambda_max;
 use crate::space::around_finest_cells;
 use crate::surface::SurfaceCoupling;
+
+use super::roots::modes_and_diagonal;
 
 /// Steps of the sweep with the diagonal.
 const DEGREE: usize = 3;
@@ -64,9 +66,8 @@ where
         let system = elements.system();
         let near = near_surfaces(elements, surfaces);
         let nodes = NumberedNodes::new(system.discretisation(), |n| near[n] && system.space.is_free(n));
-        let matrix = assemble_on_nodes(&nodes, elements)?;
-        let blocks = Blocks::new(&nodes, &matrix, surfaces)?;
-        let mut diagonal = diagonal(elements, surfaces, &blocks.positions, &matrix)?;
+        let (blocks, near_surfaces) = Blocks::new(&nodes, elements, surfaces)?;
+        let mut diagonal = diagonal(elements, surfaces, &blocks.positions, &near_surfaces)?;
         let mut operator = ViscousOperator::new(system);
         let largest = SAFETY * estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
         let in_fluid = cell_lambda_max::<D>(&system.discretisation().reference());
@@ -118,23 +119,30 @@ impl<const D: usize> Blocks<D>
 where
     Dim<D>: Space<D>,
 {
+    /// The blocks, and the diagonal at their nodes.
     fn new(
         nodes: &NumberedNodes<'_, D>,
-        matrix: &SymmetricBlockMatrix<D>,
+        elements: &Elements<'_, D>,
         surfaces: &SurfaceCoupling<D>,
-    ) -> Result<Self, StokesError> {
+    ) -> Result<(Self, Vec<f64>), StokesError> {
         let number = |&node: &u32| nodes.nodes.number(node as usize).map(|number| number as u32);
         let block = |&root: &u32| -> Vec<u32> {
-            nodes.mesh.velocity.cell(root as usize).iter().filter_map(number).collect()
+            let mut block: Vec<u32> =
+                nodes.mesh.velocity.cell(root as usize).iter().filter_map(number).collect();
+            block.sort_unstable();
+            block
         };
         let blocks = surfaces.roots().iter().map(block);
-        let zeros = vec![0.0; matrix.node_count() * D];
-        let inverses = match D {
-            2 => SchwarzPatches::restricted(matrix, blocks, zeros.clone()).map(Inverses::Whole),
-            _ => WeakModes::new(matrix, blocks).map(Inverses::WeakModes),
+        let zeros = vec![0.0; nodes.nodes.len() * D];
+        let (inverses, diagonal) = if D == 2 {
+            let matrix = assemble_on_nodes(nodes, elements)?;
+            let patches = SchwarzPatches::restricted(&matrix, blocks, zeros.clone());
+            (Inverses::Whole(patches.map_err(StokesError::SurfaceBlock)?), matrix.diagonal())
+        } else {
+            let (modes, diagonal) = modes_and_diagonal(nodes, elements, blocks.collect())?;
+            (Inverses::WeakModes(modes), diagonal)
         };
-        let inverses = inverses.map_err(StokesError::SurfaceBlock)?;
-        Ok(Self { inverses, positions: nodes.positions(), r: zeros.clone(), z: zeros })
+        Ok((Self { inverses, positions: nodes.positions(), r: zeros.clone(), z: zeros }, diagonal))
     }
 }
 
@@ -143,7 +151,7 @@ fn diagonal<const D: usize>(
     elements: &Elements<'_, D>,
     surfaces: &SurfaceCoupling<D>,
     positions: &[u32],
-    matrix: &SymmetricBlockMatrix<D>,
+    near_surfaces: &[f64],
 ) -> Result<BlockDiagonal, StokesError>
 where
     Dim<D>: Space<D>,
@@ -154,24 +162,17 @@ where
     positions.iter().for_each(|&k| smoothed_in_fluid[k as usize / D] = false);
     let fluid = nodal_diagonal(&system.space, &system.cells, &smoothed_in_fluid);
     let mut nodal = fluid.map_err(StokesError::AtSurface)?;
-    for (&k, value) in positions.iter().zip(matrix.diagonal()) {
+    for (&k, &value) in positions.iter().zip(near_surfaces) {
         if value <= 0.0 || value.is_nan() {
             let source = DiagonalError::Node { node: k as usize / D, value };
             return Err(StokesError::AtSurface(source));
         }
         nodal[k as usize] = (1.0 / value) as f32;
     }
-    let (size, rigid) = (SurfaceCoupling::<D>::piece_size(), Dim::<D>::RIGID);
+    let rigid = Dim::<D>::RIGID;
     let mut blocks = vec![0.0; system.space.body_count() * rigid * rigid];
-    let mut dense = vec![0.0; size * size];
     for (piece, (_, body)) in surfaces.pieces().enumerate() {
-        surfaces.matrix(piece, &mut dense);
-        let first = size - rigid;
-        for i in 0..rigid {
-            for j in 0..rigid {
-                blocks[(body * rigid + i) * rigid + j] += dense[(first + i) * size + first + j];
-            }
-        }
+        surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
     }
     for (body, block) in blocks.chunks_exact_mut(rigid * rigid).enumerate() {
         let inverted = invert_spd(rigid, block);

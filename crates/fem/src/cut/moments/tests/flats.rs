@@ -48,7 +48,7 @@ fn errors<const D: usize>(
     count: u64,
     error: impl Fn(u64, &BallInCell<D>, &[FlatInCell<D>]) -> f64,
 ) -> Vec<f64> {
-    let rules = Rules::new(0.0);
+    let rules = CutRules::new(0.0);
     let mut errors = Vec::new();
     for (seed, ball) in (0..count).zip(balls::<D>(count)) {
         let flats = flats(seed, &ball);

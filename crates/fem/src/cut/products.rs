@@ -4,21 +4,24 @@
 //! one-dimensional factors that depend on a pair `(i_d, j_d)` each: one direction after another is summed up.
 //! The functions are those of a root some cells away.
 
-use gluey_fem::cut::POINTS;
-use gluey_fem::element::{derivatives_1d, gauss, multi_index, node_count, values_1d};
+use gluey_linalg::vectorised;
+
+use super::polynomials::POINTS;
+use crate::element::{derivatives_1d, gauss, multi_index, node_count, values_1d};
 
 /// Nodes per direction, and pairs of them.
 const NODES: usize = 3;
 const PAIRS: usize = NODES * NODES;
 
-/// Most numbers between two directions.
+/// Numbers between two directions, at most.
 const LONGEST: usize = POINTS * PAIRS * PAIRS;
 
 /// At each point the products of the functions of all pairs of nodes on a line.
-type Line = [[f64; PAIRS]; POINTS];
+type PairLine = [[f64; PAIRS]; POINTS];
 
 /// The lines of a cell by direction and by whether the first and the second function are derived.
-pub struct Lines<const D: usize>([[[Line; 2]; 2]; D]);
+#[derive(Clone, Debug)]
+pub struct Lines<const D: usize>([[[PairLine; 2]; 2]; D]);
 
 impl<const D: usize> Lines<D> {
     /// For the functions of a cell that lies this many cells before.
@@ -39,60 +42,77 @@ impl<const D: usize> Lines<D> {
 }
 
 /// `int d_a phi_i d_b phi_j` for `b <= a`.
+#[derive(Clone, Debug)]
 pub struct Products<const D: usize> {
-    /// A number for every pair of nodes, ordered by the pairs of their places in the first direction, then in
-    /// the second and so on.
+    /// A number for every pair of nodes, see [`Places`].
     planes: [[Vec<f64>; D]; D],
+    places: Places,
+}
+
+/// Where pairs of nodes are among the products: they are ordered by the pairs of their places in the first
+/// direction, then in the second and so on.
+#[derive(Clone, Debug)]
+pub struct Places {
     /// Where the pairs with each node as the first, and those with each node as the second, begin: the place
     /// of a pair is the sum of both.
     first: Vec<usize>,
     second: Vec<usize>,
 }
 
-impl<const D: usize> Products<D> {
-    /// No weights.
-    pub fn zeros() -> Self {
+impl Places {
+    /// Those of a cell.
+    pub fn new<const D: usize>() -> Self {
         let place = |node: usize, factor: usize| {
             multi_index::<D>(node, NODES).iter().fold(0, |place, k| place * PAIRS + factor * k)
         };
         let places = |factor: usize| (0..node_count::<D>(2)).map(|node| place(node, factor)).collect();
-        let plane = || vec![0.0; PAIRS.pow(D as u32)];
-        Self {
-            planes: std::array::from_fn(|_| std::array::from_fn(|_| plane())),
-            first: places(NODES),
-            second: places(1),
-        }
+        Self { first: places(NODES), second: places(1) }
+    }
+
+    /// The place of a pair.
+    #[inline(always)]
+    pub fn of(&self, [i, j]: [usize; 2]) -> usize {
+        self.first[i] + self.second[j]
+    }
+}
+
+/// Numbers of all pairs of nodes of a cell.
+pub const fn pair_count<const D: usize>() -> usize {
+    PAIRS.pow(D as u32)
+}
+
+impl<const D: usize> Products<D> {
+    /// No weights.
+    pub fn zeros() -> Self {
+        let plane = || vec![0.0; pair_count::<D>()];
+        Self { planes: std::array::from_fn(|_| std::array::from_fn(|_| plane())), places: Places::new::<D>() }
     }
 
     /// Adds what comes from weights of the points of a cell, x fastest.
-    pub fn add(&mut self, Lines(lines): &Lines<D>, weights: &[f64]) {
-        let [mut from, mut to] = [[0.0; LONGEST]; 2];
-        for a in 0..D {
-            for b in 0..=a {
-                let line = |d: usize| &lines[d][usize::from(a == d)][usize::from(b == d)];
-                let plane = &mut self.planes[a][b];
-                if D == 2 {
-                    contract::<1>(weights, line(1), cleared(&mut to, POINTS * PAIRS));
-                    contract::<PAIRS>(&to[..POINTS * PAIRS], line(0), plane);
-                    continue;
+    pub fn add(&mut self, lines: &Lines<D>, weights: &[f64]) {
+        vectorised(
+            #[inline(always)]
+            || {
+                for (a, b) in (0..D).flat_map(|a| (0..=a).map(move |b| (a, b))) {
+                    add_products(lines, [Some(a), Some(b)], weights, &mut self.planes[a][b]);
                 }
-                let lens = [POINTS * POINTS * PAIRS, POINTS * PAIRS * PAIRS];
-                contract::<1>(weights, line(2), cleared(&mut from, lens[0]));
-                contract::<PAIRS>(&from[..lens[0]], line(1), cleared(&mut to, lens[1]));
-                contract::<{ PAIRS * PAIRS }>(&to[..lens[1]], line(0), plane);
-            }
-        }
+            },
+        );
+    }
+
+    /// Clears all weights.
+    pub fn clear(&mut self) {
+        self.planes.iter_mut().flatten().for_each(|plane| plane.fill(0.0));
     }
 
     /// The same with derivatives in space, `d_1 - shear d_0` instead of `d_1`, where cells are sheared.
-    #[must_use]
-    pub fn sheared(mut self, shear: f64) -> Self {
+    pub fn shear(&mut self, shear: f64) {
         if shear == 0.0 {
-            return self;
+            return;
         }
         let (n, straight) = (node_count::<D>(2), self.planes[0][0].clone());
         let (crossed, mut second) = (self.planes[1][0].clone(), self.planes[1][1].clone());
-        let place = |i: usize, j: usize| self.first[i] + self.second[j];
+        let place = |i: usize, j: usize| self.places.of([i, j]);
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let mixed = crossed[place(i, j)] + crossed[place(j, i)];
             second[place(i, j)] += shear * (shear * straight[place(i, j)] - mixed);
@@ -103,31 +123,53 @@ impl<const D: usize> Products<D> {
             let to = if a == 1 { 0 } else { 1 };
             self.planes[a][to].iter_mut().zip(along).for_each(|(sum, along)| *sum -= shear * along);
         }
-        self
     }
 
     /// `int d_a phi_i d_b phi_j` for `b <= a`.
     #[inline]
     pub fn of(&self, [a, b]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
-        self.planes[a][b][self.first[i] + self.second[j]]
+        self.planes[a][b][self.places.of([i, j])]
     }
 }
 
-/// The beginning of an array, zero.
-fn cleared(array: &mut [f64; LONGEST], len: usize) -> &mut [f64] {
-    array[..len].fill(0.0);
-    &mut array[..len]
+/// Adds `sum_q w_q D_0 phi_i D_1 phi_j` for the derivatives `D_0`, `D_1` along an axis each, or the values.
+#[inline(always)]
+pub fn add_products<const D: usize>(
+    Lines(lines): &Lines<D>,
+    derived: [Option<usize>; 2],
+    weights: &[f64],
+    to: &mut [f64],
+) {
+    let line = |d: usize| {
+        let [a, b] = derived.map(|axis| usize::from(axis == Some(d)));
+        &lines[d][a][b]
+    };
+    let [mut first, mut second] = [[0.0; LONGEST]; 2];
+    if D == 2 {
+        let first = &mut first[..POINTS * PAIRS];
+        contract::<1>(weights, line(1), first);
+        return contract::<PAIRS>(first, line(0), to);
+    }
+    let first = &mut first[..POINTS * POINTS * PAIRS];
+    let second = &mut second[..POINTS * PAIRS * PAIRS];
+    contract::<1>(weights, line(2), first);
+    contract::<PAIRS>(first, line(1), second);
+    contract::<{ PAIRS * PAIRS }>(second, line(0), to);
 }
 
 /// Sums up the slowest direction of the points: `to[r, s, t] += sum_q from[q, r, t] line[q][s]` for `INNER`
 /// pairs `t` of the directions before.
-fn contract<const INNER: usize>(from: &[f64], line: &Line, to: &mut [f64]) {
+#[inline(always)]
+fn contract<const INNER: usize>(from: &[f64], line: &PairLine, to: &mut [f64]) {
     let (from, rest) = (from.as_chunks::<INNER>().0, from.len() / (POINTS * INNER));
-    for (k, to) in to.as_chunks_mut::<INNER>().0.iter_mut().enumerate() {
-        let (r, s) = (k / PAIRS, k % PAIRS);
-        for (q, factors) in line.iter().enumerate() {
-            let from = &from[q * rest + r];
-            (0..INNER).for_each(|t| to[t] += factors[s] * from[t]);
+    let rows = to.as_chunks_mut::<INNER>().0.as_chunks_mut::<PAIRS>().0;
+    for (r, rows) in rows.iter_mut().enumerate() {
+        let points: [&[f64; INNER]; POINTS] = std::array::from_fn(|q| &from[q * rest + r]);
+        for (s, to) in rows.iter_mut().enumerate() {
+            for t in 0..INNER {
+                let [a, b, c, d, e]: [f64; POINTS] = std::array::from_fn(|q| line[q][s] * points[q][t]);
+                to[t] += ((a + b) + (c + d)) + e;
+            }
         }
     }
 }
@@ -135,14 +177,14 @@ fn contract<const INNER: usize>(from: &[f64], line: &Line, to: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gluey_fem::element::{gauss_cube, gradient};
+    use crate::element::{gauss_cube, gradient};
 
     fn are_sums_over_the_points<const D: usize>(offset: [f64; D], shear: f64) {
         let rule = gauss_cube::<D>(POINTS);
         let weights: Vec<f64> = (0..rule.len()).map(|q| (3.0 * q as f64).sin()).collect();
         let mut products = Products::zeros();
         products.add(&Lines::new(offset), &weights);
-        let products = products.sheared(shear);
+        products.shear(shear);
         let slope = |node: usize, x: &[f64; D]| {
             let mut slope = gradient::<D>(2, node, &std::array::from_fn(|d| x[d] + offset[d]));
             slope[1] -= shear * slope[0];
