@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use gluey::case::{CaseIssue, Problem};
+use gluey::case::{CaseIssue, InvalidCase, Place};
 use gluey::{CaseError, CheckpointError, ResultPaths, ResumeError, RowsError, RunError};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -45,38 +45,40 @@ pub fn internal(what: &str) -> PyErr {
     PyRuntimeError::new_err(format!("gluey stopped by an internal error: {what}"))
 }
 
-/// A case that cannot be used, as `gluey.CaseError`.
+/// A case that cannot be used, as `gluey.CaseError`: all that is wrong, each with what would be right.
 pub fn of_case(py: Python<'_>, error: &CaseError) -> PyErr {
-    let (text, key, hint) = match error {
-        CaseError::Invalid(issue) => (place(issue), issue.key.to_string(), Some(issue.problem.hint())),
-        CaseError::Argument { argument, key, problem } => (
-            argument_text(argument, key.is_root(), problem, &key.to_string()),
-            key.to_string(),
-            Some(problem.hint()),
-        ),
+    let issues = match error {
+        CaseError::Invalid(invalid) => invalid.issues.iter().map(|issue| told(invalid, issue)).collect(),
         CaseError::Read { .. } => {
-            (in_full(error), String::new(), Some("give the path of a case file".into()))
+            vec![(String::new(), in_full(error), "give the path of a case file".to_owned())]
         }
     };
-    let raised = exception(py, "CaseError", &text, hint.as_deref());
-    with(py, raised, "key", key)
+    let mut lines: Vec<String> =
+        issues.iter().map(|(_, text, hint)| format!("{text}\n  hint: {hint}")).collect();
+    if let CaseError::Invalid(invalid) = error
+        && invalid.more > 0
+    {
+        lines.push(format!("and {} more", invalid.more));
+    }
+    let raised = exception(py, "CaseError", &lines.join("\n"), None);
+    let (key, _, hint) = issues.first().cloned().unwrap_or_default();
+    let raised = with(py, with(py, raised, "key", key), "hint", hint);
+    with(py, raised, "issues", issues)
 }
 
-fn argument_text(argument: &str, at_root: bool, problem: &Problem, key: &str) -> String {
-    let key = if at_root { String::new() } else { format!("{key}: ") };
-    format!("overrides, {argument}: {key}{problem}")
-}
-
-/// Where something is wrong: line and column of a file or text, the key alone of a dictionary.
-fn place(issue: &CaseIssue) -> String {
-    if issue.file.as_os_str() != DICTIONARY {
-        return issue.to_string();
-    }
-    match (issue.key.is_root(), &issue.value) {
-        (true, _) => issue.problem.to_string(),
-        (false, Some(value)) => format!("{} = {value}: {}", issue.key, issue.problem),
-        (false, None) => format!("{}: {}", issue.key, issue.problem),
-    }
+/// The key, the text with its place, and what would be right. A dictionary has no lines.
+fn told(invalid: &InvalidCase, issue: &CaseIssue) -> (String, String, String) {
+    let file = invalid.file.display();
+    let text = match &issue.place {
+        Place::Text { line, column, .. } if invalid.file.as_os_str() != DICTIONARY => {
+            format!("{file}:{line}:{column}: {issue}")
+        }
+        Place::Text { .. } | Place::Value => issue.to_string(),
+        Place::Argument(argument) => {
+            format!("overrides, {}: {issue}", argument.strip_prefix("--set ").unwrap_or(argument))
+        }
+    };
+    (issue.key.to_string(), text, issue.problem.hint())
 }
 
 /// Why a run did not come to its end, as `gluey.CaseError`, `gluey.Interrupted` or `gluey.RunError`.

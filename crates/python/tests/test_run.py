@@ -224,8 +224,8 @@ def test_what_a_run_came_upon_is_a_warning(tmp_path: Path) -> None:
 def test_bad_cases_are_refused(tmp_path: Path) -> None:
     cases: list[tuple[Any, str, str, str]] = [
         ({**pair(), "tme": 1}, "unknown key `tme`", "tme", "did you mean `time`"),
-        ({**pair(), "dimension": 4}, "dimension = 4", "dimension", "dimension is 2 or 3"),
-        (pair(particles=[]), "particles", "particles", "add a"),
+        ({**pair(), "dimension": 4}, "dimension = 4", "dimension", "2 or 3"),
+        (pair(particles=[]), "particles", "particles", "list them"),
         (pair(time={"step": -0.1, "end": 1.0}), r"time\.step = -0\.1", "time.step", "greater than 0"),
         (pair(time={"step": "x", "end": 1.0}), r"time\.step", "time.step", "a number"),
         ("name = 'x'\ndimension = 2\n", "text:1:1: .*missing key", "time", "add a line like"),
@@ -237,7 +237,12 @@ def test_bad_cases_are_refused(tmp_path: Path) -> None:
         error = caught.value
         assert isinstance(error, ValueError) and error.key == key, error
         assert error.hint is not None and hint in error.hint, error
-        assert str(error).endswith(f"\n  hint: {error.hint}")
+        assert f"\n  hint: {error.hint}" in str(error) and error.issues[0][0] == key
+    wrong = pair(time={"step": -0.1, "end": -1.0}, shear_rate=float("nan"))
+    with pytest.raises(gluey.CaseError) as caught:
+        gluey.check(wrong)
+    assert {key for key, _, _ in caught.value.issues} == {"shear_rate", "time.step", "time.end"}
+    assert str(caught.value).count("\n  hint: ") == 3
     overlapping = pair(particles=gluey.particles([[0.4, 0.5], [0.5, 0.5]], 0.12))
     with pytest.raises(gluey.CaseError, match="overlap"):
         gluey.run(overlapping, progress=False)

@@ -17,10 +17,15 @@ class GlueyError(Exception):
 
 
 class CaseError(GlueyError, ValueError):
-    """A case that makes no sense; particles count from 1 in the text, lists from 0 in the key."""
+    """A case that makes no sense; particles count from 1 in the text, lists from 0 in the key.
 
-    #: The key that is wrong, such as ``particles[1].radius``; empty for the case as a whole.
+    The text tells all that is wrong, each with what would be right; ``hint`` is that of the first.
+    """
+
+    #: The first key that is wrong, such as ``particles[1].radius``; empty for the case as a whole.
     key: str = ""
+    #: All that is wrong: key, text and hint of each.
+    issues: list[tuple[str, str, str]]
 
 
 class RunError(GlueyError, RuntimeError):
