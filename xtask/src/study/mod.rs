@@ -1,7 +1,7 @@
 //! `cargo xtask study NAME`: a table, pictures and a page from many runs of one case, beside the literature.
 //!
-//! Cases are those of `data/studies`. Points that are complete are not run again, and points that were stopped
-//! go on from their last checkpoint.
+//! Cases are those of `data/studies`. Points that are complete are not run again, and points that were
+//! stopped go on from their last checkpoint.
 
 mod drawing;
 mod page;
