@@ -63,7 +63,7 @@ impl Polynomials {
 
     /// From sums for Legendre polynomials to those for `l_i`, along lines of a block `stride` apart.
     pub fn convert(&self, block: &mut [f64], stride: usize) {
-        for start in (0..block.len()).filter(|k| k / stride % POINTS == 0) {
+        for start in (0..block.len()).filter(|k| (k / stride).is_multiple_of(POINTS)) {
             let old: Line = std::array::from_fn(|k| block[start + k * stride]);
             for (i, row) in self.coefficients.iter().enumerate() {
                 block[start + i * stride] = row.iter().zip(&old).map(|(c, p)| c * p).sum();
