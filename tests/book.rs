@@ -1,5 +1,5 @@
-//! The book: every page is in its summary, every link leads somewhere, every command and case of the pages for
-//! users works.
+//! The book: every page is in its summary, every link leads somewhere, every command and case of the pages
+//! for users works.
 
 use std::collections::BTreeSet;
 use std::fs;
