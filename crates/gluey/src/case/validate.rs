@@ -142,10 +142,12 @@ fn check_answered(case: &Case, key: &Key, findings: &mut Findings) {
     }
 }
 
-/// Whether the particle has room in the box at all; notes it where it has not, or is not inside.
+/// Notes where the particle has no room in the box, or is not inside. Whether it is in the box or near it:
+/// what lies at the end of the world cannot be looked for neighbours.
 fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -> bool {
     let particle = &case.particles[index];
     let (lower, upper) = (case.lower(), case.upper());
+    let mut is_near = true;
     for d in 0..case.dimension {
         let axis = AXES[d];
         let range = (lower[d] + particle.radius, upper[d] - particle.radius);
@@ -169,9 +171,10 @@ fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -
         if excess > 0.0 {
             let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
             findings.add(key.name("position"), problem);
+            is_near &= excess < upper[d] - lower[d];
         }
     }
-    true
+    is_near
 }
 
 fn check_overlaps(case: &Case, key: &Key, findings: &mut Findings) {
