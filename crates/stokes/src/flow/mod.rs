@@ -203,7 +203,7 @@ where
         let mut problem = self.problem(mesh, bodies)?;
         problem.system.space.hold_twists(conditions.hold_bodies());
         let assembled = Instant::now();
-        self.solver(&problem).prepare(&problem)?;
+        self.prepare(&mut problem)?;
         let prepared = Instant::now();
         let (guess, before) = self.initial_guess(&problem);
         let (mut flow, x) = self.solved(&problem, conditions, guess)?;
@@ -219,6 +219,28 @@ where
     fn problem(&mut self, mesh: TreeMesh<D>, bodies: &[Ball<D>]) -> Result<Problem<D>, StokesError> {
         let discretisation = self.discretised(mesh);
         Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
+    }
+
+    /// Prepares the solver for a problem; where the smoother finds a penalty too small, for one with larger
+    /// penalties instead. Whether it did so is told.
+    ///
+    /// # Errors
+    /// Those of [`SaddleSolver::prepare`].
+    fn prepare(&mut self, problem: &mut Problem<D>) -> Result<bool, StokesError> {
+        let mut method = self.method.clone();
+        let mut is_stiffened = false;
+        loop {
+            let error = match self.solver(problem).prepare(problem) {
+                Err(error @ (StokesError::SurfaceBlock(_) | StokesError::AtSurface(_))) => error,
+                other => return other.map(|_| is_stiffened),
+            };
+            method = method.stiffened().ok_or(error)?;
+            let hold = problem.system.space.holds_twists();
+            let discretisation = problem.discretisation().clone();
+            *problem = Problem::on(&discretisation, &problem.bodies, self.params.viscosity, method.as_ref())?;
+            problem.system.space.hold_twists(hold);
+            is_stiffened = true;
+        }
     }
 
     /// The solver for free bodies or for held ones.

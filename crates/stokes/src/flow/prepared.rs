@@ -120,10 +120,11 @@ where
         let hold = conditions.hold_bodies();
         let Self { solver, problem, is_ready } = self;
         problem.system.space.hold_twists(hold);
-        let is_ready = &mut is_ready[usize::from(hold)];
-        if !*is_ready {
-            solver.get().solver(problem).prepare(problem)?;
-            *is_ready = true;
+        if !is_ready[usize::from(hold)] {
+            if solver.get().prepare(problem)? {
+                *is_ready = [false; 2];
+            }
+            is_ready[usize::from(hold)] = true;
         }
         Ok(())
     }

@@ -73,7 +73,7 @@ impl Formulation {
                 Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
             }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
-            Self::Unfitted { lubrication } => Arc::new(unfitted::Unfitted { lubrication }),
+            Self::Unfitted { lubrication } => Arc::new(unfitted::Unfitted::new(lubrication)),
         }
     }
 

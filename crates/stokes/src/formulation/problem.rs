@@ -35,6 +35,11 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError>;
+
+    /// The same with penalties twice as large, where it has any and they may grow.
+    fn stiffened(&self) -> Option<Arc<dyn Method<D>>> {
+        None
+    }
 }
 
 /// A formulation on one mesh, beside its system.

@@ -23,11 +23,25 @@ use crate::surface::{Aggregates, CellState, CutCells, Flat, Flats, SurfaceCoupli
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
 
+/// Multiple of the largest local ratio in Nitsche's penalty, and what it may be doubled to where that is too
+/// little: the ratio of each root does not see bad cells next to each other whose ghosts have other roots.
+const PENALTY: f64 = 2.0;
+const LARGEST_PENALTY: f64 = 16.0;
+
 /// The formulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Unfitted {
     /// Treatment of films that are too thin for the mesh.
-    pub lubrication: Lubrication,
+    lubrication: Lubrication,
+    /// Multiple of the largest local ratio in Nitsche's penalty.
+    penalty: f64,
+}
+
+impl Unfitted {
+    /// The formulation with this treatment of films that are too thin for the mesh.
+    pub fn new(lubrication: Lubrication) -> Self {
+        Self { lubrication, penalty: PENALTY }
+    }
 }
 
 impl<const D: usize> Method<D> for Unfitted
@@ -45,9 +59,15 @@ where
             Lubrication::None => Vec::new(),
             Lubrication::Deficit => thin_films(bodies, discretisation.mesh.domain(), cell_size),
         };
-        let system = around(discretisation, bodies, &flats(&films, bodies.len(), cell_size), viscosity)?;
+        let flats = flats(&films, bodies.len(), cell_size);
+        let system = around(discretisation, bodies, &flats, viscosity, self.penalty)?;
         let system = if films.is_empty() { system } else { system.with_films(films, cell_size) };
         Ok((system, Arc::new(*self)))
+    }
+
+    fn stiffened(&self) -> Option<Arc<dyn Method<D>>> {
+        let penalty = 2.0 * self.penalty;
+        (penalty <= LARGEST_PENALTY).then(|| Arc::new(Self { penalty, ..*self }) as Arc<dyn Method<D>>)
     }
 }
 
@@ -64,12 +84,13 @@ fn flats<const D: usize>(films: &[Film<D>], body_count: usize, cell_size: f64) -
     Flats::grouped(body_count, sides)
 }
 
-/// The system around bodies that planes cut flat.
+/// The system around bodies that planes cut flat, with this multiple of the largest ratios as penalty.
 fn around<const D: usize>(
     discretisation: &Discretisation<D>,
     bodies: &[Ball<D>],
     flats: &Flats<D>,
     viscosity: f64,
+    penalty: f64,
 ) -> Result<StokesSystem<D>, StokesError>
 where
     Dim<D>: Space<D>,
@@ -83,7 +104,7 @@ where
     let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
     let pressure =
         PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
-    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, &aggregates)?;
+    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, (cut, penalty), &aggregates)?;
     Ok(StokesSystem::around_surfaces(space, pressure, viscosity, surfaces))
 }
 

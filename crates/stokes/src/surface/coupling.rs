@@ -60,7 +60,8 @@ impl<const D: usize> SurfaceCoupling<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The operator around `bodies` in a fluid of this viscosity.
+    /// The operator around `bodies` in a fluid of this viscosity, with this multiple of the largest ratios as
+    /// penalty.
     ///
     /// # Errors
     /// [`StokesError::NoPenalty`], see there.
@@ -68,7 +69,7 @@ where
         space: &VelocitySpace<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
-        cut: CutCells<D>,
+        (cut, penalty): (CutCells<D>, f64),
         aggregates: &Aggregates,
     ) -> Result<Self, StokesError> {
         let discretisation = space.discretisation();
@@ -86,7 +87,7 @@ where
         boundary.sort_unstable();
         boundary.dedup();
         let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
-        let penalties = penalties(discretisation, &cut, aggregates)?;
+        let penalties = penalties(discretisation, &cut, aggregates, penalty)?;
         let medium = (bodies, viscosity);
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];

@@ -16,8 +16,6 @@ pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
 pub use flats::{Flat, Flats};
 pub use load::{add_load_of_cut_cells, forces_on_bodies};
-#[cfg(test)]
-pub use penalty::FACTOR as NITSCHE_FACTOR;
 pub use shapes::slope;
 pub use strain::load_of_strain;
 pub use traction::first_moments;

@@ -2,12 +2,13 @@
 //!
 //! The form is positive if `beta` exceeds the largest ratio `lambda` of `int_G |2 eta eps(u) n|^2 / eta` to
 //! `int_F 2 eta eps(u):eps(u)` over the polynomials of a root, on the root and the bad cells that it carries
-//! (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem); twice that is safe where bad cells
-//! next to each other have different roots. Since `|eps n|^2 <= eps:eps`, the largest ratio `mu` of
+//! (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem). Bad cells next to each other whose
+//! ghosts have other roots may need more: hence a factor, 2 and doubled where a block of the smoother is not
+//! positive. Since `|eps n|^2 <= eps:eps`, the largest ratio `mu` of
 //! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products
 //! of gradients in the volume and on the surface:
 //!
-//! `beta = 2 mu eta`.
+//! `beta = factor mu eta`.
 //!
 //! In coordinates of the unit cube `mu h` is a number of the cut alone.
 
@@ -23,12 +24,10 @@ use super::cut_cells::CutCells;
 use crate::error::StokesError;
 use crate::space::Discretisation;
 
-/// Multiple of the eigenvalue.
-pub const FACTOR: f64 = 2.0;
 /// Share of the mean diagonal that is added to the strain energy: rigid motions have none.
 const SHIFT: f64 = 1e-9;
 
-/// `beta h / eta` of every cut cell.
+/// `beta h / eta` of every cut cell: `factor mu h`.
 ///
 /// # Errors
 /// [`StokesError::NoPenalty`] where the volume left by bodies is not that of a fluid.
@@ -36,6 +35,7 @@ pub fn penalties<const D: usize>(
     discretisation: &Discretisation<D>,
     cut: &CutCells<D>,
     aggregates: &Aggregates,
+    factor: f64,
 ) -> Result<Vec<f64>, StokesError> {
     let mut members: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(0..).collect();
     members.sort_unstable();
@@ -60,7 +60,7 @@ pub fn penalties<const D: usize>(
         let shear = discretisation.mesh.shear();
         [&mut volume, &mut surface].into_iter().for_each(|products| products.shear(shear));
         // int 4 eps:eps on the surface to int 2 eps:eps in the volume.
-        eigenvalue(&surface, &volume).map(|ratio| FACTOR * 2.0 * ratio)
+        eigenvalue(&surface, &volume).map(|ratio| factor * 2.0 * ratio)
     };
     let values: Vec<Result<f64, BlockError>> = clusters.par_iter().map(of_cluster).collect();
     let mut penalties = vec![0.0; cut.cells.len()];

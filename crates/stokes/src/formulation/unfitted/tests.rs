@@ -8,7 +8,7 @@ use gluey_linalg::LinOp;
 use super::*;
 use crate::operator::SystemOperator;
 use crate::solver::{DirectSolver, SaddleSolver};
-use crate::surface::{Flat, NITSCHE_FACTOR};
+use crate::surface::Flat;
 
 /// One body in the unit box.
 struct Case<const D: usize> {
@@ -49,12 +49,8 @@ where
 
     fn problem(&self) -> Problem<D> {
         let bodies = [self.ball];
-        let system = around(&self.discretisation(), &bodies, &self.flats, 1.0).unwrap();
-        Problem {
-            system,
-            bodies: bodies.to_vec(),
-            rigidity: Arc::new(Unfitted { lubrication: Lubrication::None }),
-        }
+        let system = around(&self.discretisation(), &bodies, &self.flats, 1.0, PENALTY).unwrap();
+        Problem { system, bodies: bodies.to_vec(), rigidity: Arc::new(Unfitted::new(Lubrication::None)) }
     }
 
     /// The flow with these values on the boundary.
@@ -262,7 +258,7 @@ where
     let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + normal * (side * radius), radius));
     let distance = radius - 0.5 * width * mesh.size(level);
     let flats = [1.0, -1.0].map(|side| Some(Flat { normal: normal * side, distance }));
-    let system = around(&Discretisation::new(mesh), &bodies, &flats.into_iter().collect(), 1.0)?;
+    let system = around(&Discretisation::new(mesh), &bodies, &flats.into_iter().collect(), 1.0, PENALTY)?;
     let surfaces = system.surfaces.unwrap();
     Ok((0..surfaces.cut.cells.len()).map(|place| surfaces.penalty(place)).fold(0.0, f64::max))
 }
@@ -279,7 +275,7 @@ where
         let middle = Vector::from_fn(|d, _| 0.5 + 0.3 * cell * (x * (1.0 + d as f64)).sin());
         for width in [1.0, 1.5] {
             let largest = penalty_around_slab(level, [middle, normal.normalize()], radius, width).unwrap();
-            let largest = largest / NITSCHE_FACTOR;
+            let largest = largest / PENALTY;
             assert!(largest < 88.0, "{D}D, {k}: {largest}");
         }
     }
