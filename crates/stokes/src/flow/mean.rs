@@ -6,15 +6,18 @@ use gluey_fem::element::{gauss_cube, multi_index, node_count, value};
 use gluey_geom::{Dim, Space, Vector};
 
 use crate::formulation::Problem;
-use crate::space::Discretisation;
-use crate::surface::{CellState, CutCells};
+use crate::space::{Discretisation, VelocitySpace};
+use crate::surface::{CellState, CutCells, SurfaceCoupling};
 
-/// Takes from a velocity (nodal values, then twists) its mean over fluid and bodies.
-pub fn remove_mean<const D: usize>(problem: &Problem<D>, velocity: &mut [f64])
+/// The mean over fluid and bodies of a velocity (nodal values, then twists) around surfaces.
+pub fn mean_velocity<const D: usize>(
+    problem: &Problem<D>,
+    surfaces: &SurfaceCoupling<D>,
+    velocity: &[f64],
+) -> Vector<D>
 where
     Dim<D>: Space<D>,
 {
-    let Some(surfaces) = &problem.system.surfaces else { return };
     let space = &problem.system.space;
     let discretisation = problem.discretisation();
     let weights = fluid_weights(discretisation, &discretisation.velocity, &surfaces.cut);
@@ -31,14 +34,25 @@ where
         sum += space.twist(velocity, body).velocity * share;
         volume += share;
     }
-    let mean = sum / volume;
-    let nodal = space.full_dim();
-    for u in velocity[..nodal].chunks_exact_mut(D) {
-        (0..D).for_each(|c| u[c] -= mean[c]);
+    sum / volume
+}
+
+/// Takes `by` from the velocities of all bodies and of the nodes that are `moved`.
+pub fn subtract<const D: usize>(
+    space: &VelocitySpace<D>,
+    velocity: &mut [f64],
+    by: &Vector<D>,
+    moved: impl Fn(usize) -> bool,
+) where
+    Dim<D>: Space<D>,
+{
+    let (nodal, _) = velocity.split_at_mut(space.full_dim());
+    for (_, u) in nodal.chunks_exact_mut(D).enumerate().filter(|(node, _)| moved(*node)) {
+        (0..D).for_each(|c| u[c] -= by[c]);
     }
-    for body in 0..problem.bodies.len() {
+    for body in 0..space.body_count() {
         let mut twist = space.twist(velocity, body);
-        twist.velocity -= mean;
+        twist.velocity -= by;
         space.set_twist(velocity, body, &twist);
     }
 }

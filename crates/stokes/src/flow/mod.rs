@@ -267,8 +267,12 @@ where
         let multiplier = problem.rigidity.solve(problem, &data, &mut x, &mut solve)?;
         let mut pressure = problem.pressure_and_films(&x);
         let mut velocity = problem.velocity(&lift, &x);
-        if !problem.system.space.is_anchored() {
-            mean::remove_mean(problem, &mut velocity);
+        if let (false, Some(surfaces)) = (problem.system.space.is_anchored(), &problem.system.surfaces) {
+            let space = &problem.system.space;
+            let mean = mean::mean_velocity(problem, surfaces, &velocity);
+            mean::subtract(space, &mut velocity, &mean, |_| true);
+            // Guesses made of solutions would let what no equation determines grow from step to step.
+            mean::subtract(space, &mut x, &mean, |node| space.is_free(node));
         }
         let twists = problem.twists(&velocity)?;
         let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
