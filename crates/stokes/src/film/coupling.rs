@@ -18,7 +18,7 @@ use gluey_linalg::{Jagged, Scalar};
 use nalgebra::Matrix2;
 
 use super::deficit::Deficits;
-use super::near::Film;
+use super::near::{Film, Heights};
 use crate::space::VelocitySpace;
 
 /// Rows of the films' forces `g` in the Stokes system, `s B V - g`.
@@ -68,13 +68,13 @@ where
     /// Modes of a film: the normal one, sliding and rolling in each direction across it.
     pub const MODES: usize = 1 + 2 * (D - 1);
 
-    /// The forces of `films` that are widened on cells of this size, on the velocities of `space` in a fluid
-    /// of this viscosity.
-    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, cell_size: f64, viscosity: f64) -> Self {
+    /// The forces of `films` that are widened to these heights, on the velocities of `space` in a fluid of
+    /// this viscosity.
+    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, heights: &Heights, viscosity: f64) -> Self {
         let (mut rows, mut inverses, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
         let mut kinds = Vec::with_capacity(films.len());
         for film in &films {
-            let shape = film.shape(film.height(cell_size));
+            let shape = film.shape(film.height(heights));
             let modes = modes::<D>(film, &shape.resolved::<D>(), &shape.deficits::<D>());
             for mode in &modes {
                 let scale = (viscosity * mode.lacks).sqrt();

@@ -5,12 +5,17 @@ use gluey_levelset::{Ball, BallTree, Body};
 
 use super::deficit::FilmShape;
 
-/// Thickness in cells to which films between bodies are widened.
-const BETWEEN_BODIES: f64 = 1.25;
-/// The same at walls, on which faces of cells lie: there the mesh resolves thinner ones.
-const AT_WALLS: f64 = 0.4;
 /// Films thinner than this share of their `A`, also where bodies overlap, resist like one of this thickness.
 const THINNEST: f64 = 1e-9;
+
+/// Thicknesses to which films are widened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heights {
+    /// Between bodies.
+    pub between_bodies: f64,
+    /// At walls, on which faces of cells lie: there the mesh resolves thinner films.
+    pub at_walls: f64,
+}
 
 /// What is on the other side of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,9 +79,9 @@ impl<const D: usize> Film<D> {
         of_smaller * 0.5 * (1.0 + ratio)
     }
 
-    /// The thickness to which it is widened on cells of this size.
-    pub fn height(&self, cell_size: f64) -> f64 {
-        cell_size * if self.partner.is_wall() { AT_WALLS } else { BETWEEN_BODIES }
+    /// The one of these to which it is widened.
+    pub fn height(&self, heights: &Heights) -> f64 {
+        if self.partner.is_wall() { heights.at_walls } else { heights.between_bodies }
     }
 
     /// The body on a side, the first or its partner; `None` for a wall.
@@ -137,10 +142,10 @@ impl<const D: usize> Film<D> {
     }
 }
 
-/// The films that are widened on cells of this size.
-pub fn thin_films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, cell_size: f64) -> Vec<Film<D>> {
-    let mut films = films(bodies, domain, AT_WALLS.max(BETWEEN_BODIES) * cell_size);
-    films.retain(|film| film.gap < film.height(cell_size));
+/// The films that are widened to these heights.
+pub fn thin_films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, heights: &Heights) -> Vec<Film<D>> {
+    let mut films = films(bodies, domain, heights.at_walls.max(heights.between_bodies));
+    films.retain(|film| film.gap < film.height(heights));
     films
 }
 

@@ -12,7 +12,7 @@ use gluey_levelset::Ball;
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
-use crate::film::{Film, Lubrication, thin_films};
+use crate::film::{Film, Heights, Lubrication, thin_films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
@@ -54,14 +54,12 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
-        let cell_size = discretisation.finest_cell_size();
-        let films = match self.lubrication {
-            Lubrication::None => Vec::new(),
-            Lubrication::Deficit => thin_films(bodies, discretisation.mesh.domain(), cell_size),
-        };
-        let flats = flats(&films, bodies.len(), cell_size);
+        let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
+        let films = thin_films(bodies, discretisation.mesh.domain(), &heights);
+        let flats = flats(&films, bodies.len(), &heights);
         let system = around(discretisation, bodies, &flats, viscosity, self.penalty)?;
-        let system = if films.is_empty() { system } else { system.with_films(films, cell_size) };
+        let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
+        let system = if lubricates { system.with_films(films, &heights) } else { system };
         Ok((system, Arc::new(*self)))
     }
 
@@ -71,10 +69,10 @@ where
     }
 }
 
-/// The planes that widen films on cells of this size.
-fn flats<const D: usize>(films: &[Film<D>], body_count: usize, cell_size: f64) -> Flats<D> {
+/// The planes that widen films to these heights.
+fn flats<const D: usize>(films: &[Film<D>], body_count: usize, heights: &Heights) -> Flats<D> {
     let sides = films.iter().flat_map(|film| {
-        let distances = film.flats(film.height(cell_size));
+        let distances = film.flats(film.height(heights));
         let side = move |side: usize, sign: f64| {
             let flat = Flat { normal: film.normal * sign, distance: distances[side] };
             film.side(side).map(|body| (body, flat))

@@ -13,7 +13,7 @@ use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
-use crate::film::{Film, FilmCoupling};
+use crate::film::{Film, FilmCoupling, Heights};
 use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
@@ -75,9 +75,9 @@ where
         }
     }
 
-    /// The same with the forces of `films` that are widened on cells of this size.
-    pub(crate) fn with_films(self, films: Vec<Film<D>>, cell_size: f64) -> Self {
-        let films = FilmCoupling::new(&self.space, films, cell_size, self.viscosity);
+    /// The same with the forces of `films` that are widened to these heights.
+    pub(crate) fn with_films(self, films: Vec<Film<D>>, heights: &Heights) -> Self {
+        let films = FilmCoupling::new(&self.space, films, heights, self.viscosity);
         Self { films: Some(Arc::new(films)), ..self }
     }
 

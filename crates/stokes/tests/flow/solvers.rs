@@ -3,7 +3,7 @@
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Flow, FlowSolver, Formulation, SolverKind};
+use gluey_stokes::{Flow, FlowSolver, Formulation, Lubrication, SolverKind};
 
 use crate::support::{
     RIGID, SOLVERS, UNFITTED, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
@@ -115,6 +115,25 @@ fn iterations_do_not_grow_with_resolution_or_the_number_of_spheres() {
     let uniform = TreeMesh::uniform(Aabb::unit(), [1; 3], [false; 3], 4).unwrap();
     let flow = solve(params(RIGID, SolverKind::Multigrid, 1e-8), uniform, &lattice, &couette);
     assert!(flow.iteration_count <= 24, "{}", flow.iteration_count);
+}
+
+/// A cluster of eight spheres that touch, at a/h = 1.6: with forces of films and without them the solver sees
+/// slabs, not films.
+#[test]
+fn iterations_do_not_grow_where_spheres_touch() {
+    for lubrication in [Lubrication::Deficit, Lubrication::None] {
+        let count = |gap: f64| {
+            let place = |k: usize, d: usize| 0.1 * (1.0 + 0.5 * gap) * ((k >> d & 1) as f64 * 2.0 - 1.0);
+            let offset = [0.503, 0.517, 0.489];
+            let ball = |k: usize| Ball::new(Vector::<3>::from_fn(|d, _| offset[d] + place(k, d)), 0.1);
+            let balls: Vec<Ball<3>> = (0..8).map(ball).collect();
+            let uniform = TreeMesh::uniform(Aabb::unit(), [1; 3], [false; 3], 4).unwrap();
+            let params = params(Formulation::Unfitted { lubrication }, SolverKind::Multigrid, 1e-8);
+            solve(params, uniform, &balls, &couette).iteration_count
+        };
+        let counts = [0.4, 0.1, 1e-2, 1e-6].map(count);
+        assert!(counts.iter().all(|&c| c <= 38), "{lubrication:?}: {counts:?}");
+    }
 }
 
 /// Everything a flow is made of, as bits.

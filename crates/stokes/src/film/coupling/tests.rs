@@ -5,7 +5,7 @@ use gluey_geom::{Aabb, Spin, Twist};
 use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
-use super::super::thin_films;
+use super::super::{Lubrication, thin_films};
 use super::*;
 use crate::space::Discretisation;
 
@@ -31,8 +31,9 @@ where
     Dim<D>: Space<D>,
 {
     let space = space_of(bodies);
-    let films = thin_films(bodies, &Aabb::unit(), cell_size);
-    let coupling = FilmCoupling::new(&space, films, cell_size, 1.0);
+    let heights = Lubrication::Deficit.heights::<D>(cell_size);
+    let films = thin_films(bodies, &Aabb::unit(), &heights);
+    let coupling = FilmCoupling::new(&space, films, &heights, 1.0);
     (space, coupling)
 }
 
