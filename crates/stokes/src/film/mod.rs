@@ -3,9 +3,9 @@
 //! A film of thickness `g` in the middle has the profile `H(r) = g + r^2 / A`, with `2/A = 1/a + 1/b` for
 //! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of about a cell
 //! ([`Lubrication::heights`]) both bodies are cut flat there (`crate::surface`), so that the mesh sees the
-//! profile `max(G, H)` and resolves it at any gap. Removing solid lowers every resistance, so what the mesh then lacks, the
-//! *deficit*, is never negative; lubrication theory gives it ([`deficits`]), as a force between the two
-//! surfaces that is proportional to their relative motion and implicit in their velocities
+//! profile `max(G, H)` and resolves it at any gap. Removing solid lowers every resistance, so what the mesh
+//! then lacks, the *deficit*, is never negative; lubrication theory gives it ([`deficits`]), as a force
+//! between the two surfaces that is proportional to their relative motion and implicit in their velocities
 //! ([`FilmCoupling`]).
 
 mod coupling;
@@ -18,9 +18,9 @@ pub use near::{Film, Heights, Partner, films, thin_films};
 /// Treatment of films between bodies that are too thin for the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lubrication {
-    /// None. In 2D the mesh sees them as they are, and too weak where they are thinner than a tenth of a cell.
-    /// In 3D it sees them no thinner than 0.6 cells: on coarse levels, where bodies have no film between
-    /// them, corrections would be too large by the ratio of the film's resistance to theirs.
+    /// None. In 2D the mesh sees them as they are, and too weak where they are thinner than a tenth of a
+    /// cell. In 3D it sees those between bodies no thinner than 0.6 cells: on coarse levels, where bodies have
+    /// no film between them, corrections would be too large by the ratio of the film's resistance to theirs.
     None,
     /// The mesh sees them widened to about a cell; lubrication theory gives the resistance that is missing.
     Deficit,
