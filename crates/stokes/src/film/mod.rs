@@ -19,8 +19,9 @@ pub use near::{Film, Heights, Partner, films, thin_films};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lubrication {
     /// None. In 2D the mesh sees them as they are, and too weak where they are thinner than a tenth of a
-    /// cell. In 3D it sees those between bodies no thinner than 0.6 cells: on coarse levels, where bodies have
-    /// no film between them, corrections would be too large by the ratio of the film's resistance to theirs.
+    /// cell. In 3D it sees those between bodies no thinner than 0.6 cells: on coarse levels, where bodies
+    /// have no film between them, corrections would be too large by the ratio of the film's resistance to
+    /// theirs.
     None,
     /// The mesh sees them widened to about a cell; lubrication theory gives the resistance that is missing.
     Deficit,
