@@ -28,7 +28,7 @@ mod norms;
 mod number;
 mod plot;
 mod set_up;
-mod statistics;
+pub mod statistics;
 mod verdict;
 
 pub use case::{CPU_TIME, Case, Extent, Row, Table, Tables, Task, VerifyError};

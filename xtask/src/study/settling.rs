@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
+use gluey_verify::statistics::{mean, scatter};
 
 use super::drawing::{Series, draw};
 use super::point::{Done, Point, PointError};
@@ -57,7 +58,7 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
     for phi in fractions {
         let runs: Vec<&Done> = done.iter().filter(|run| run.point.at == phi).collect();
         let velocities = runs.iter().map(|run| velocity(run)).collect::<Result<Vec<_>, _>>()?;
-        let (mean, error) = mean_and_error(&velocities);
+        let (mean, error) = (mean(&velocities), scatter(&velocities) / (velocities.len() as f64).sqrt());
         let lost = settling_lost_in_box(phi, runs[0].case.particles.len());
         let numbers = [phi, mean, mean + lost, error, settling_of_spheres(phi)].map(|x| format!("{x:.4}"));
         rows.push([velocities.len().to_string()].into_iter().chain(numbers).collect());
@@ -82,23 +83,4 @@ fn known() -> Vec<(String, Vec<(f64, f64)>)> {
         ("1 − 6.55 *φ*".to_owned(), curve(|phi| 1.0 - 6.55 * phi, 12)),
         ("(1 − *φ*)^{4.65}".to_owned(), curve(|phi| (1.0 - phi).powf(4.65), 45)),
     ]
-}
-
-/// Mean, and its standard error.
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
-    (mean, (squares / (count * (count - 1.0).max(1.0))).sqrt())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn means_have_their_errors() {
-        assert_eq!(mean_and_error(&[1.0, 3.0]), (2.0, 1.0));
-        assert_eq!(mean_and_error(&[2.0]), (2.0, 0.0));
-    }
 }
