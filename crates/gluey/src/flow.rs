@@ -313,6 +313,7 @@ where
             dof_count: flow.discretisation.dof_count(),
             solve_count: flow.solve_count,
             iteration_count: flow.iteration_count,
+            residual: flow.residual,
             phases: vec![("mesh and assembly", assembly), ("solver set-up", preparation), ("solve", solve)],
         }
     }

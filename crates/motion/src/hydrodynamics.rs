@@ -99,6 +99,8 @@ pub struct FlowStatistics {
     pub solve_count: usize,
     /// Krylov iterations, or refinement sweeps of a direct solver, over all solves.
     pub iteration_count: usize,
+    /// Norm of the last solve's residual over that of its right-hand side.
+    pub residual: f64,
     /// Seconds spent in each named phase (mesh, assembly, factorisation, ...), in order.
     pub phases: Vec<(&'static str, f64)>,
 }

@@ -83,6 +83,8 @@ where
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
     pub iteration_count: usize,
+    /// Norm of the last solve's residual over that of its right-hand side.
+    pub residual: f64,
     /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
     pub fine_operator_applications: f64,
     /// Where the time went.
@@ -138,11 +140,15 @@ where
 struct Effort {
     solve_count: usize,
     iteration_count: usize,
+    residual: f64,
     fine_operator_applications: f64,
 }
 
 impl Effort {
-    fn add(&mut self, report: &SolveReport) {
+    /// A solve for the right-hand side `b`.
+    fn add(&mut self, report: &SolveReport, b: &[f64]) {
+        let norm = gluey_linalg::vector::norm(b);
+        self.residual = report.residuals.last().filter(|_| norm > 0.0).map_or(0.0, |last| last / norm);
         self.solve_count += 1;
         self.iteration_count += report.iterations;
         self.fine_operator_applications += report.fine_operator_applications;
@@ -260,7 +266,7 @@ where
         let tolerance = self.params.tolerance;
         let solver = self.solver(problem);
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
-            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
+            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?, b);
             Ok(())
         };
         let data = Data { lift: &lift, b: &b };
@@ -292,6 +298,7 @@ where
             films: problem.film_forces(&x),
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,
+            residual: effort.residual,
             fine_operator_applications: effort.fine_operator_applications,
             times: PhaseTimes::default(),
         };
