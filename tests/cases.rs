@@ -109,8 +109,8 @@ fn every_case_runs_its_first_steps() {
         let rows = fs::read_to_string(&csv).expect("a trajectory");
         assert_eq!(rows.lines().count(), 1 + 3);
         assert!(rows.lines().skip(1).all(|row| row.split(',').all(|cell| cell.parse::<f64>().is_ok())));
-        // Near pairs of many particles and the rheology have files of their own.
-        let files = 1 + usize::from(case.particles.len() > 9) + usize::from(case.is_sheared());
+        // What steps cost, near pairs of many particles and the rheology have files of their own.
+        let files = 2 + usize::from(case.particles.len() > 9) + usize::from(case.is_sheared());
         let found = fs::read_dir(csv.parent().expect("a folder")).expect("it").count();
         assert_eq!(found, files, "something is left over");
     }

@@ -176,7 +176,7 @@ fn no_row_is_lost_to_twenty_kills() {
         resumed += usize::from(resume);
         let after = rows(folder);
         for (path, lines) in &before {
-            let complete = in_folder(folder, ".csv");
+            let complete = path.with_extension("");
             let kept = [path, &complete].into_iter().filter_map(|path| after.get(path));
             assert!(
                 kept.into_iter().any(|kept| kept.starts_with(lines)),
@@ -196,6 +196,18 @@ fn no_row_is_lost_to_twenty_kills() {
     assert!(read("out") == read("whole"), "the run that was killed ends otherwise");
 }
 
+/// The file, or where it tells of what steps cost the columns that are the same on every run.
+fn without_seconds(path: &Path) -> Vec<u8> {
+    let bytes = fs::read(path).expect("a file");
+    if !path.to_string_lossy().ends_with("-solver.csv") {
+        return bytes;
+    }
+    let text = String::from_utf8(bytes).expect("text");
+    let kept = text.lines().next().expect("a header").split(',').filter(|name| !name.ends_with("_s")).count();
+    let lines = text.lines().map(|line| line.split(',').take(kept).collect::<Vec<_>>().join(","));
+    lines.collect::<Vec<_>>().join("\n").into_bytes()
+}
+
 /// All results of a run, by name, but those that tell of times and what a kill cut short.
 fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let is_left_out = |path: &Path| {
@@ -211,7 +223,7 @@ fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
             match folder.join(&path) {
                 full if full.is_dir() => folders.push(path),
                 _ if is_left_out(&path) => {}
-                full => drop(found.insert(path, fs::read(full).expect("a file"))),
+                full => drop(found.insert(path, without_seconds(&full))),
             }
         }
     }
@@ -252,4 +264,72 @@ fn a_killed_run_is_resumed_by_its_folder() {
     let (code, stderr) = resume(&[]);
     assert_eq!(code, Some(1));
     assert!(stderr.contains("the run is complete (100000 steps)"), "{stderr}");
+}
+
+/// How often a run is killed: six times, or as the environment says.
+fn kill_count() -> usize {
+    std::env::var("GLUEY_KILLS").map_or(6, |text| text.parse().expect("GLUEY_KILLS is a whole number"))
+}
+
+/// The case of `a_killed_run_ends_as_one_that_was_not`: twelve discs, which list near pairs and have a
+/// rheology.
+const DISCS: &str = "name = \"discs\"\ndimension = 2\ndomain = { boundary = \"sheared\" }\n\
+    suspension = { volume_fraction = 0.2, count = 12, seed = 3, min_gap = 0.05 }\n\
+    contact = { strategy = \"gluey\" }\ntime = { step = 0.05, end = 2.0 }\n\
+    [flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 2.0\ncoarsest_level = 2\n";
+
+/// Killed again and again, with a checkpoint and frames at every step, so that these are often cut short.
+/// Trajectory, gaps, rheology, cost of the steps (but for the seconds) and frames are those of a run that
+/// was not, and nothing else is left.
+#[test]
+fn a_killed_run_ends_as_one_that_was_not() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    fs::write(folder.join("discs.toml"), DISCS).expect("a file");
+    let command = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
+        command.current_dir(folder).args(arguments).stdout(Stdio::null());
+        command
+    };
+    let options = ["--checkpoint-every", "1", "--vtk", "1", "--xyz", "1"];
+    let run = |out| [&["run", "discs.toml", "--out", out][..], &options[..]].concat();
+    let start = Instant::now();
+    let whole = command(&run("whole")).output().expect("it runs");
+    assert!(whole.status.success(), "{}", String::from_utf8_lossy(&whole.stderr));
+    let whole_ms = start.elapsed().as_millis() as u64;
+    let (mut next, mut kills) = (numbers(11), 0);
+    let count = kill_count();
+    while kills < count {
+        let is_begun = folder.join("out/discs-gluey-unfitted.checkpoint").exists();
+        let again = if is_begun { vec!["resume", "out"] } else { [&run("out")[..], &["--force"]].concat() };
+        let mut child = command(&again).stderr(Stdio::null()).spawn().expect("it runs");
+        // Short enough that the run hardly ends before the last kill.
+        sleep(Duration::from_millis(20 + next(2 * whole_ms / count as u64 + 1)));
+        child.kill().expect("killed");
+        if child.wait().expect("it ends").success() {
+            break;
+        }
+        kills += 1;
+    }
+    assert!(2 * kills >= count, "the run ended after {kills} of {count} kills");
+    println!("{kills} kills of a run of {whole_ms} ms");
+    let last = command(&["resume", "out"]).output().expect("it runs");
+    let stderr = String::from_utf8_lossy(&last.stderr);
+    assert!(last.status.success() || stderr.contains("the run is complete"), "{stderr}");
+    same_results(&folder.join("out"), &folder.join("whole"));
+}
+
+/// The same files with the same bytes, and no half file but for rows of starts before the first checkpoint.
+fn same_results(killed: &Path, whole: &Path) {
+    let (killed_files, whole_files) = (results(killed), results(whole));
+    assert_eq!(killed_files.keys().collect::<Vec<_>>(), whole_files.keys().collect::<Vec<_>>());
+    for (path, bytes) in &whole_files {
+        assert!(killed_files[path] == *bytes, "{} differs", path.display());
+    }
+    for kind in ["", "discs-gluey-unfitted-vtk", "discs-gluey-unfitted-xyz"] {
+        for entry in fs::read_dir(killed.join(kind)).expect("a folder") {
+            let name = entry.expect("an entry").file_name().into_string().expect("text");
+            assert!(!name.contains(".partial-") || name.contains(".csv.partial-"), "{name} is left");
+        }
+    }
 }

@@ -123,6 +123,23 @@ fn results_are_drawn() {
     assert!(png.starts_with(b"\x89PNG") && png[16..20] == 1275u32.to_be_bytes());
 }
 
+/// Without a mesh there are no iterations of the flow, and the picture is drawn only if asked for.
+#[test]
+fn the_cost_of_steps_is_drawn() {
+    let folder = TempDir::new().expect("a folder");
+    succeeds(folder.path(), &["run", CASE]);
+    let stdout = succeeds(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
+    let drawn = |stdout: &str| fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
+    let svg = drawn(&stdout);
+    assert!(svg.contains("seconds per step") && !svg.contains("iterations per step"), "{stdout}");
+    let table = folder.path().join(format!("out/{STEM}-solver.csv"));
+    let text = fs::read_to_string(&table).expect("a table");
+    assert!(text.contains(",0,0,0,0,"), "{text}");
+    fs::write(&table, text.replace(",0,0,0,0,", ",64,900,2,7,")).expect("a file");
+    let stdout = succeeds(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
+    assert!(drawn(&stdout).contains("iterations per step"), "{stdout}");
+}
+
 #[test]
 fn particles_of_a_frame_are_drawn() {
     let folder = run_with_frames();
@@ -151,10 +168,14 @@ fn results_that_are_missing_or_malformed_are_named() {
     fails(folder.path(), &["plot", "."], &["a.csv: 1 rows", "at least 2"]);
     write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.6,0.5,0.1\n");
     fails(folder.path(), &["plot", ".", "--only", "rheology"], &["a-rheology.csv: not there", "sheared"]);
+    fails(folder.path(), &["plot", ".", "--only", "solver"], &["a-solver.csv: not there"]);
     write("a-rheology.csv", "t,strain,viscosity\n0,0,2\n1,1,2\n");
     fails(folder.path(), &["plot", "."], &["a-rheology.csv: column `viscosity_by_dissipation` is missing"]);
     write("a-gaps.csv", "t,i,j,gap_over_a,partner\n0,1,2,0.5,ghost\n");
     fails(folder.path(), &["plot", ".", "--only", "gaps"], &["a-gaps.csv: line 2: expected 5 numbers"]);
     let (code, _, stderr) = gluey(folder.path(), &["plot", ".", "--only", "speed"]);
-    assert!(code == Some(2) && stderr.contains("expected one of gaps, trajectories, rheology"), "{stderr}");
+    assert!(
+        code == Some(2) && stderr.contains("expected one of gaps, trajectories, rheology, solver"),
+        "{stderr}"
+    );
 }

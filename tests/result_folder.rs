@@ -66,6 +66,30 @@ fn results_of_other_runs_are_not_replaced() {
     fails(folder, &["run", CASE], &["no record of their run"]);
 }
 
+/// With `--force` no frame of the old run stays among those of the new one; files of others do.
+#[test]
+fn frames_of_a_replaced_run_go() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    succeeds(folder, &["run", CASE, "--vtk", "10", "--xyz", "10"]);
+    let vtk = folder.join(format!("out/{STEM}-vtk"));
+    fs::write(vtk.join("view.pvsm"), "of a user").expect("a file");
+    succeeds(folder, &["run", CASE, "--force", "--vtk", "100"]);
+    let frames = |kind: &str| {
+        let entries = fs::read_dir(folder.join(format!("out/{STEM}-{kind}"))).expect("a folder");
+        let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("text"));
+        let mut names: Vec<String> = names.filter(|name| !name.ends_with(".lock")).collect();
+        names.sort();
+        names
+    };
+    let particles: Vec<String> =
+        frames("vtk").into_iter().filter(|name| name.starts_with("particles-")).collect();
+    let expected = [0, 100, 200, 300].map(|step| format!("particles-{step:06}.vtu"));
+    assert_eq!(particles, expected);
+    assert!(frames("xyz").is_empty(), "{:?}", frames("xyz"));
+    assert!(vtk.join("view.pvsm").exists(), "a file of the user went");
+}
+
 #[test]
 fn arguments_are_named_in_errors() {
     let folder = TempDir::new().expect("a folder");

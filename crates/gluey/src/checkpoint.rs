@@ -25,7 +25,7 @@ use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
@@ -44,6 +44,8 @@ where
     pub output: CsvMarks,
     /// How far that of the rheology had come, where there is one.
     pub rheology: Option<Mark>,
+    /// How far that of the solver had come.
+    pub solver: Mark,
     /// Wall time so far, phase by phase.
     pub phases: PhaseTable,
     /// Wall time so far, in seconds.

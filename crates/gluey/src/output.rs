@@ -1,11 +1,12 @@
 //! Files of a run on disk. Nothing appears under its final name before it is complete, nothing is deleted
-//! that the run did not make, and what another run is writing is not touched.
+//! that a run did not make, and what another run is writing is not touched.
 
 mod claim;
 pub mod csv;
 mod draft;
 mod pvd;
 pub mod rheology;
+pub mod solver_log;
 pub mod vtk;
 pub mod xyz;
 
@@ -49,6 +50,12 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 /// The name of draft `number` of `path`: what it is called while it is not complete.
 fn draft_path(path: &Path, number: u32) -> PathBuf {
     with_suffix(path, &format!(".partial-{number}"))
+}
+
+/// The name of the complete file, if `name` is that of a draft.
+pub(crate) fn undrafted(name: &str) -> Option<&str> {
+    let (complete, number) = name.rsplit_once(".partial-")?;
+    number.parse::<u32>().is_ok().then_some(complete)
 }
 
 /// Creates the first draft of `path` that is not there yet.

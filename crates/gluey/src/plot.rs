@@ -1,14 +1,16 @@
-//! Pictures of the results of a run, as SVG and PNG: gaps against time, paths, rheology against strain.
+//! Pictures of the results of a run, as SVG and PNG: gaps against time, paths, rheology against strain, what
+//! the steps cost.
 //!
 //! ```text
 //! gaps           against time: of all pairs of up to nine particles, else the smallest and all near ones
 //! trajectories   y against x; in 3D also z against x
 //! rheology       relative viscosity and normal stresses against strain
+//! solver         iterations and seconds of each phase of a step against time
 //! particles      those of a frame that is asked for, with their images, coloured by speed
 //! ```
 //!
-//! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv` and `<stem>-xyz` and go to
-//! `<stem>-plots`.
+//! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv`, `<stem>-solver.csv` and
+//! `<stem>-xyz` and go to `<stem>-plots`.
 
 mod error;
 mod figure;
@@ -102,6 +104,7 @@ fn draw(figure: Figure, results: &Results, options: &PlotOptions) -> Result<Opti
         Figure::Gaps => figures::gaps(results, options.width_mm, is_named),
         Figure::Trajectories => figures::trajectories(results, options.width_mm).map(Some),
         Figure::Rheology => figures::rheology(results, options.width_mm, is_named),
+        Figure::Solver => figures::solver(results, options.width_mm, is_named),
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod checkpoint_file;
 mod error;
+mod leftovers;
 mod occupied;
 mod options;
 mod paths;
@@ -34,6 +35,7 @@ use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
+use crate::output::solver_log::{self, SolverLog, SolverRow};
 use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::output::{Claim, OutputError};
@@ -54,6 +56,7 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     crate::memory::check(case)?;
     let _claims = claim_outputs(options, progress)?;
     occupied::check_free(case, options)?;
+    leftovers::remove(options)?;
     match case.dimension {
         2 => run_2d(case, options, progress),
         _ => run_3d(case, options, progress),
@@ -98,6 +101,7 @@ where
     measures: Measures<D>,
     csv: CsvWriter<D>,
     rheology: Option<RheologyWriter>,
+    solver: SolverLog,
     vtk: Option<(usize, FrameWriter<D>)>,
     xyz: Option<(usize, XyzWriter)>,
     checkpoints: Option<CheckpointFile>,
@@ -127,12 +131,13 @@ where
         let mut simulation = simulation(case, hydrodynamics);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
+        drafts.extend(solver_log::earlier_drafts(&options.csv)?);
         if case.has_rheology() {
             drafts.extend(rheology::earlier_drafts(&options.csv)?);
         }
         let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
         let mut rheology = None;
-        let csv = match &options.resume {
+        let (csv, solver) = match &options.resume {
             None => {
                 if case.has_rheology() {
                     rheology = Some(RheologyWriter::create::<D>(&options.csv)?);
@@ -140,14 +145,15 @@ where
                 if !drafts.is_empty() {
                     progress.notice(&Notice::EarlierDrafts { drafts });
                 }
-                CsvWriter::create(&options.csv, case.particles.len())?
+                (CsvWriter::create(&options.csv, case.particles.len())?, SolverLog::create(&options.csv)?)
             }
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?;
                 wall_before_s = checkpoint.wall_s;
                 let mark = checkpoint.rheology.as_ref();
                 rheology = mark.map(|mark| RheologyWriter::resume(&options.csv, mark)).transpose()?;
-                go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?
+                let solver = SolverLog::resume(&options.csv, &checkpoint.solver, &checkpoint.phases)?;
+                (go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?, solver)
             }
         };
         let first_step = simulation.step_index();
@@ -163,6 +169,7 @@ where
             measures,
             csv,
             rheology,
+            solver,
             vtk,
             xyz,
             checkpoints,
@@ -192,6 +199,7 @@ where
         let flow = self.simulation.statistics();
         self.csv.finish()?;
         self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
+        self.solver.finish()?;
         Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
     }
 
@@ -217,7 +225,21 @@ where
         let start = Instant::now();
         self.write()?;
         self.simulation.phases_mut().add("output", start.elapsed().as_secs_f64());
-        Ok(())
+        self.log_effort()
+    }
+
+    /// Writes down what the step took so far; the motion that ends it counts with the next.
+    fn log_effort(&mut self) -> Result<(), RunError> {
+        let (simulation, step) = (&self.simulation, self.simulation.step_index());
+        let row = SolverRow {
+            step,
+            time: simulation.time(),
+            strain: self.case.strain_after(step),
+            flow: &simulation.statistics(),
+            contact: simulation.contact_report(),
+            phases: simulation.phases(),
+        };
+        Ok(self.solver.write(&row)?)
     }
 
     fn write(&mut self) -> Result<(), RunError> {
@@ -315,6 +337,7 @@ where
                 state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
                 output: self.csv.marks(),
                 rheology: self.rheology.as_ref().map(RheologyWriter::mark),
+                solver: self.solver.mark(),
                 phases: self.simulation.phases().clone(),
                 wall_s: self.wall_s(),
             });
@@ -327,6 +350,7 @@ where
         let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
         self.csv.sync()?;
         self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
+        self.solver.sync()?;
         self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
         file.write(checkpoint, self.case, self.progress)?;
         let step = checkpoint.state.step;

@@ -1,6 +1,8 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
-use gluey_contact::{BodyStep, Contact, ContactError, ContactModel, ContactState, MemoryError};
+use gluey_contact::{
+    BodyStep, Contact, ContactError, ContactModel, ContactReport, ContactState, MemoryError,
+};
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
 use gluey_motion::{
     Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, ResumeError, Scheme,
@@ -48,6 +50,7 @@ where
     poses: Vec<Pose<D>>,
     drift: Vec<Twist<D>>,
     twists: Vec<Twist<D>>,
+    contact_report: ContactReport,
     phases: PhaseTable,
 }
 
@@ -195,6 +198,7 @@ where
             contact,
             drift: vec![Twist::default(); count],
             twists: vec![Twist::default(); count],
+            contact_report: ContactReport::default(),
             phases: PhaseTable::default(),
         }
     }
@@ -269,7 +273,8 @@ where
             dt: self.dt,
         };
         let (contact, twists) = (&mut self.contact, &mut self.twists);
-        self.phases
+        self.contact_report = self
+            .phases
             .time("contact", || contact.correct_bodies(&body_step, twists))
             .map_err(|source| StepError::Contact { step, time, source })?;
         Ok(())
@@ -327,6 +332,11 @@ where
     /// Pairs in contact at the last correction.
     pub fn contacts(&self) -> &[Contact] {
         self.contact.contacts()
+    }
+
+    /// Effort and outcome of the last correction.
+    pub fn contact_report(&self) -> &ContactReport {
+        &self.contact_report
     }
 
     /// Flow fields of the last prediction.

@@ -14,7 +14,7 @@ use crate::terminal;
 pub struct PlotArguments {
     /// Folder of a run.
     folder: PathBuf,
-    /// What to draw: gaps, trajectories, rheology; whatever there are results for when absent.
+    /// What to draw: gaps, trajectories, rheology, solver; whatever there are results for when absent.
     #[arg(long, value_name = "FIGURE", value_delimiter = ',')]
     only: Vec<Figure>,
     /// Draw the particles of a frame that was written with --xyz: last, or the number of a step.

@@ -161,6 +161,25 @@ impl Draft {
         Ok(())
     }
 
+    /// Adds a line that begins with `fixed`, the same whenever it is computed, and ends with `varying`, which
+    /// is not. Where a resumed run catches up, the line on disk stays as it was.
+    pub fn write_varying(&mut self, fixed: &str, varying: &str) -> Result<(), RowsError> {
+        if self.on_disk == self.bytes {
+            return self.write(&format!("{fixed}{varying}\n"));
+        }
+        let failed = |error| OutputError::new(&self.path, "read the file", error);
+        let mut found = Vec::new();
+        BufReader::new(&self.file).read_until(b'\n', &mut found).map_err(failed)?;
+        if !found.starts_with(fixed.as_bytes()) {
+            return Err(RowsError::Differs { path: self.path.clone(), line: self.lines + 1 });
+        }
+        self.hasher.update(&found);
+        self.bytes += found.len() as u64;
+        self.lines += 1;
+        (&self.file).seek(SeekFrom::Start(self.bytes)).map_err(failed)?;
+        Ok(())
+    }
+
     /// Demands that the next bytes on disk are `expected`.
     fn compare(&mut self, expected: &[u8]) -> Result<(), RowsError> {
         self.buffer.resize(expected.len(), 0);
@@ -296,6 +315,30 @@ mod tests {
             other => panic!("{other:?}"),
         }
         assert_eq!(read(&draft_path(&complete, 1)), "t\n0\n1\n2\n");
+    }
+
+    #[test]
+    fn a_line_that_varies_stays_as_it_was_written_first() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let complete = folder.path().join("t.csv");
+        let mut draft = Draft::create(&complete).expect("a file");
+        draft.write("n,s\n").expect("a line");
+        let mark = draft.mark();
+        draft.write("1,0.5\n2,0.25\n3").expect("lines");
+        let mut draft = Draft::resume(&complete, &mark).expect("marked");
+        draft.write_varying("1,", "7").expect("as before");
+        match draft.write_varying("5,", "7") {
+            Err(RowsError::Differs { line: 3, .. }) => {}
+            other => panic!("{other:?}"),
+        }
+        let mut draft = Draft::resume(&complete, &mark).expect("marked");
+        for (fixed, varying) in [("1,", "8"), ("2,", "8"), ("3,", "8")] {
+            draft.write_varying(fixed, varying).expect("as before, then new");
+        }
+        let end = draft.mark();
+        draft.finish().expect("complete");
+        assert_eq!(read(&complete), "n,s\n1,0.5\n2,0.25\n3,8\n");
+        assert!(holds(&complete, &end).expect("a file"), "the digest is not that of the file");
     }
 
     #[test]

@@ -11,11 +11,13 @@ pub enum Figure {
     Trajectories,
     /// Stress against strain.
     Rheology,
+    /// What the steps cost against time.
+    Solver,
 }
 
 impl Figure {
     /// All, in the order in which they are drawn.
-    pub const ALL: [Self; 3] = [Self::Gaps, Self::Trajectories, Self::Rheology];
+    pub const ALL: [Self; 4] = [Self::Gaps, Self::Trajectories, Self::Rheology, Self::Solver];
 
     /// Name in files and options.
     pub fn as_str(self) -> &'static str {
@@ -23,6 +25,7 @@ impl Figure {
             Self::Gaps => "gaps",
             Self::Trajectories => "trajectories",
             Self::Rheology => "rheology",
+            Self::Solver => "solver",
         }
     }
 }

@@ -7,6 +7,7 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, PALETTE, PIXELS_PER_MM, S
 use super::error::PlotError;
 use super::figure::Figure;
 use super::read::{Results, Source};
+use crate::output::solver_log::PHASES;
 use crate::table::TableError;
 
 /// Many curves that are not told apart.
@@ -149,6 +150,45 @@ fn against_strain(
     }
     let y = Axis::around(label, points(&curves).map(|point| point.1).collect::<Vec<_>>());
     Ok(chart(Axis::around("strain *γ*", strain.iter().copied()), y, curves))
+}
+
+/// Iterations, where there are linear systems to solve, and below them seconds of each phase against time.
+/// Runs without such systems are drawn only if asked for.
+pub fn solver(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<Canvas>, PlotError> {
+    let Some(source) = results.solver(is_needed)? else { return Ok(None) };
+    let solves = source.column("solves")?.iter().any(|&count| count > 0.0);
+    if !solves && !is_needed {
+        return Ok(None);
+    }
+    let stroke = |phase: usize| PALETTE.get(phase).copied().unwrap_or(FAINT);
+    let phases = PHASES.iter().enumerate().map(|(k, (phase, column))| (*column, Some(*phase), stroke(k)));
+    let mut charts = vec![of_steps(&source, "seconds per step", phases)?];
+    if solves {
+        // Without names of their own: in the strokes of the phases that they belong to.
+        let of_phase = |name: &str| stroke(PHASES.iter().position(|(phase, _)| *phase == name).unwrap_or(0));
+        let iterations = [("iterations", "solve"), ("contact_iterations", "contact")]
+            .map(|(column, phase)| (column, None, of_phase(phase)));
+        charts.insert(0, of_steps(&source, "iterations per step", iterations.into_iter())?);
+    }
+    Ok(Some(stacked(&charts, width_mm)))
+}
+
+/// Columns against time, with their names and strokes, but those that are zero throughout.
+fn of_steps<'a>(
+    source: &Source,
+    label: &str,
+    columns: impl Iterator<Item = (&'a str, Option<&'a str>, Stroke)>,
+) -> Result<Chart, PlotError> {
+    let t = source.column("t")?;
+    let mut curves = Vec::new();
+    for (name, label, stroke) in columns {
+        let values = source.column(name)?;
+        if values.iter().any(|&value| value != 0.0) {
+            curves.push(curve(label.map(str::to_owned), stroke, t, values));
+        }
+    }
+    let values: Vec<f64> = points(&curves).map(|point| point.1).chain([0.0]).collect();
+    Ok(chart(Axis::around("time *t*", t.iter().copied()), Axis::around(label, values), curves))
 }
 
 /// A curve through points, interrupted where there is no number.

@@ -72,6 +72,19 @@ impl Results {
         }
     }
 
+    /// What the steps cost; an error where it is needed and not there.
+    pub fn solver(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
+        let (path, figure) = (self.beside("-solver.csv"), Figure::Solver);
+        match (path.exists(), is_needed) {
+            (true, _) => Ok(Some(read(path)?.with_rows(figure)?)),
+            (false, false) => Ok(None),
+            (false, true) => {
+                let hint = "a run writes it beside its trajectory";
+                Err(PlotError::Missing { path, figure, hint })
+            }
+        }
+    }
+
     /// The trajectory.
     pub fn csv(&self) -> PathBuf {
         self.paths.csv()

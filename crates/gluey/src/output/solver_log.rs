@@ -1,0 +1,150 @@
+//! What each step cost, as comma-separated values: a row per step, beside the trajectory.
+//!
+//! The columns up to `contact_iterations` are the same on every run of a case. The rest are seconds of wall
+//! time since the row before, phase by phase; `output_s` is that of the step's own rows and frames. A resumed
+//! run keeps the seconds of rows that an earlier one had written.
+
+use std::path::{Path, PathBuf};
+
+use gluey_contact::ContactReport;
+use gluey_motion::FlowStatistics;
+
+use super::draft::{Draft, Mark, RowsError};
+use super::{OutputError, drafts};
+use crate::phases::PhaseTable;
+
+/// What is the same on every run.
+const FACTS: &str = "step,t,strain,cells,unknowns,solves,iterations,residual,\
+     contact_pairs,active_contacts,contact_iterations";
+
+/// Phases of a step, as [`PhaseTable`] names them, and the columns of their seconds.
+pub const PHASES: [(&str, &str); 7] = [
+    ("mesh and assembly", "mesh_and_assembly_s"),
+    ("solver set-up", "solver_set_up_s"),
+    ("solve", "solve_s"),
+    ("flow", "other_flow_s"),
+    ("contact", "contact_s"),
+    ("motion", "motion_s"),
+    ("output", "output_s"),
+];
+
+/// A step, and what it took.
+#[derive(Clone, Copy, Debug)]
+pub struct SolverRow<'a> {
+    /// Steps done before.
+    pub step: usize,
+    /// Time.
+    pub time: f64,
+    /// Shear strain so far, less what was sheared back.
+    pub strain: f64,
+    /// The flow.
+    pub flow: &'a FlowStatistics,
+    /// The correction for contact.
+    pub contact: &'a ContactReport,
+    /// Wall time since the run began, this step's included.
+    pub phases: &'a PhaseTable,
+}
+
+/// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-solver.csv` beside the trajectory.
+#[derive(Debug)]
+pub struct SolverLog {
+    draft: Draft,
+    /// Wall time up to the last row.
+    before: [f64; PHASES.len()],
+}
+
+impl SolverLog {
+    /// Starts the file beside the trajectory `csv`.
+    pub fn create(csv: &Path) -> Result<Self, RowsError> {
+        let mut draft = Draft::create(&solver_log_path(csv))?;
+        draft.write(&format!("{FACTS},{}\n", PHASES.map(|(_, column)| column).join(",")))?;
+        Ok(Self { draft, before: Default::default() })
+    }
+
+    /// Goes on with the file at `mark`, after so much wall time.
+    pub(crate) fn resume(csv: &Path, mark: &Mark, phases: &PhaseTable) -> Result<Self, RowsError> {
+        Ok(Self { draft: Draft::resume(&solver_log_path(csv), mark)?, before: seconds(phases) })
+    }
+
+    /// Adds one row, which is with the operating system when this returns.
+    pub fn write(&mut self, row: &SolverRow<'_>) -> Result<(), RowsError> {
+        let now = seconds(row.phases);
+        let spent = now.iter().zip(self.before).map(|(now, before)| format!("{:.6}", now - before));
+        let spent: Vec<String> = spent.collect();
+        self.before = now;
+        self.draft.write_varying(&facts(row), &spent.join(","))
+    }
+
+    /// How far the file has come.
+    pub(crate) fn mark(&self) -> Mark {
+        self.draft.mark()
+    }
+
+    /// Makes sure that what the file holds outlives a power failure.
+    pub(crate) fn sync(&self) -> Result<(), OutputError> {
+        self.draft.sync()
+    }
+
+    /// Gives the complete file its name.
+    pub fn finish(self) -> Result<(), OutputError> {
+        self.draft.finish()
+    }
+}
+
+/// Drafts that earlier runs left.
+pub(crate) fn earlier_drafts(csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    drafts(&solver_log_path(csv))
+}
+
+/// The file beside a trajectory.
+pub fn solver_log_path(csv: &Path) -> PathBuf {
+    let mut name = csv.file_stem().unwrap_or_default().to_owned();
+    name.push("-solver.csv");
+    csv.with_file_name(name)
+}
+
+/// What is the same on every run, with the comma behind it.
+fn facts(row: &SolverRow<'_>) -> String {
+    let SolverRow { step, time, strain, flow, contact, .. } = row;
+    let FlowStatistics { cell_count, dof_count, solve_count, iteration_count, residual, .. } = flow;
+    let ContactReport { pair_count, active_count, iterations, .. } = contact;
+    format!(
+        "{step},{time:.16e},{strain:.16e},{cell_count},{dof_count},{solve_count},{iteration_count},\
+         {residual:.3e},{pair_count},{active_count},{iterations},"
+    )
+}
+
+/// Seconds of each phase, none where it has not occurred.
+fn seconds(phases: &PhaseTable) -> [f64; PHASES.len()] {
+    PHASES.map(|(phase, _)| {
+        let found = phases.rows().iter().find(|(name, _)| name == phase);
+        found.map_or(0.0, |(_, seconds)| *seconds)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_are_those_since_the_row_before() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let csv = folder.path().join("t.csv");
+        let (flow, contact) =
+            (FlowStatistics { iteration_count: 9, ..Default::default() }, Default::default());
+        let mut phases = PhaseTable::default();
+        let mut log = SolverLog::create(&csv).expect("a file");
+        for step in 0..2 {
+            phases.add("solve", 1.5 + step as f64);
+            let (time, strain) = (step as f64, 0.0);
+            let row = SolverRow { step, time, strain, flow: &flow, contact: &contact, phases: &phases };
+            log.write(&row).expect("a row");
+        }
+        log.finish().expect("complete");
+        let text = std::fs::read_to_string(solver_log_path(&csv)).expect("a file");
+        let table = crate::table::Table::parse(&text).expect("a table");
+        assert_eq!(table.column("solve_s"), Ok(&[1.5, 2.5][..]));
+        assert_eq!(table.column("iterations"), Ok(&[9.0, 9.0][..]));
+        assert_eq!(table.column("output_s"), Ok(&[0.0, 0.0][..]));
+    }
+}

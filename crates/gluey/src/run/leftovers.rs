@@ -1,0 +1,77 @@
+//! Takes away what earlier runs of the same name left and nothing can use any more.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use super::options::RunOptions;
+use super::paths::ResultPaths;
+use crate::output::{OutputError, drafts, undrafted};
+
+/// Series of frames, by the beginnings of their names.
+const SERIES: [&str; 3] = ["fields", "particles", "contacts"];
+
+/// Removes half files that killed runs left, and the frames of a run that this one replaces. Rows are never
+/// among them, nor any file that no run writes. The results are claimed: no other run writes them now.
+pub(super) fn remove(options: &RunOptions) -> Result<(), OutputError> {
+    let Some(record) = options.record else { return Ok(()) };
+    let paths = ResultPaths::of_csv(&options.csv);
+    for whole in [paths.record(), paths.case_file(), paths.checkpoint(), paths.previous_checkpoint()] {
+        drafts(&whole)?.iter().try_for_each(|draft| remove_file(draft))?;
+    }
+    let replaces = record.force && options.resume.is_none();
+    [paths.vtk(), paths.xyz()].iter().try_for_each(|folder| remove_frames(folder, replaces))
+}
+
+/// Removes half frames from a folder, and whole ones if asked to; the folder itself stays.
+fn remove_frames(folder: &Path, whole: bool) -> Result<(), OutputError> {
+    let list =
+        || -> io::Result<Vec<_>> { fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect() };
+    let names = match list() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        listed => listed.map_err(|error| OutputError::new(folder, "list the folder", error))?,
+    };
+    for name in names.iter().filter_map(|name| name.to_str()) {
+        let complete = undrafted(name);
+        if is_frame(complete.unwrap_or(name)) && (whole || complete.is_some()) {
+            remove_file(&folder.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a run gives such names to frames (`fields-000100.vtu`, `particles-000100.xyz.gz`) or to their
+/// collections (`fields.pvd`).
+fn is_frame(name: &str) -> bool {
+    let Some((stem, extension)) = name.split_once('.') else { return false };
+    let is_number = |step: &str| step.len() >= 6 && step.bytes().all(|byte| byte.is_ascii_digit());
+    match extension {
+        "pvd" => SERIES.contains(&stem),
+        "vtu" | "xyz" | "xyz.gz" => {
+            stem.split_once('-').is_some_and(|(series, step)| SERIES.contains(&series) && is_number(step))
+        }
+        _ => false,
+    }
+}
+
+fn remove_file(path: &Path) -> Result<(), OutputError> {
+    fs::remove_file(path).map_err(|error| OutputError::new(path, "remove what an earlier run left", error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_told_from_other_files() {
+        for frame in ["fields-000000.vtu", "contacts.pvd", "particles-1234567.xyz", "particles-000020.xyz.gz"]
+        {
+            assert!(is_frame(frame), "{frame}");
+        }
+        for other in
+            ["notes.pvd", "fields-final.vtu", "particles-1.xyz", "state.pvsm", "fields", "x-000000.vtu"]
+        {
+            assert!(!is_frame(other), "{other}");
+        }
+    }
+}
