@@ -85,7 +85,7 @@ pub enum ContactError {
         /// Number of walls.
         count: usize,
     },
-    /// A remembered contact whose particles are far apart.
+    /// A remembered contact whose particles are not where the last step left them.
     #[error(
         "the gap of {pair}, which were in contact, is now {gap}: positions must not be wrapped into the period"
     )]

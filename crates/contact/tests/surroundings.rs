@@ -164,3 +164,34 @@ fn wrapped_positions_are_noticed() {
     let ContactError::Wrapped { pair, gap } = error else { panic!("{error}") };
     assert_eq!((pair, gap), (PairKey::new(0, 1), 4.0));
 }
+
+/// With the forces of two steps in the impulse a contact that was pulled open remembers a force that fades.
+/// Meanwhile its particles go far, here beyond half of the period.
+#[test]
+fn a_contact_that_was_pulled_open_goes_its_way() {
+    let mut contact =
+        PairContact::new(ContactParams::default()).within(Domain::default().with_period(0, 8.0));
+    let (dt, speed) = (0.1, 1.0);
+    let mut positions = [at(2.0, 0.0), at(4.01, 0.0)];
+    let mut last = [at(0.0, 0.0); 2];
+    let mut farthest = 0.0_f64;
+    for n in 0..40 {
+        let predicted = if n < 4 { speed } else { -speed };
+        let mut twists =
+            [1.0, -1.0].map(|sign| Twist::<2> { velocity: at(sign * predicted, 0.0), ..Twist::default() });
+        // Adams-Bashforth, after one step of Euler.
+        let [now, before] = if n == 0 { [dt, 0.0] } else { [1.5 * dt, -0.5 * dt] };
+        let drift = last.map(|velocity| velocity * before);
+        let (radii, velocity_weight) = (&[1.0; 2], now);
+        let step = StepGeometry { positions: &positions, radii, drift: &drift, velocity_weight, dt };
+        contact.correct(&step, &mut twists).unwrap_or_else(|error| panic!("step {n}: {error}"));
+        for (i, twist) in twists.iter().enumerate() {
+            positions[i] += twist.velocity * now + drift[i];
+            last[i] = twist.velocity;
+        }
+        if !contact.contacts().is_empty() {
+            farthest = farthest.max(positions[1].x - positions[0].x - 2.0);
+        }
+    }
+    assert!(farthest > 2.0, "nothing was remembered beyond a gap of {farthest}");
+}
