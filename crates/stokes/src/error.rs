@@ -61,6 +61,22 @@ pub enum StokesError {
         /// Index of the cell in the mesh.
         cell: usize,
     },
+    /// The velocity block lacks positivity in a cell, whatever its penalty.
+    #[error(
+        "the penalty of cell {cell} at body {} was raised {rounds} times, and its surface still takes {share:.2} of the \
+         strain energy around it: refine the mesh",
+        body + 1
+    )]
+    WeakSurface {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// Index of the cell in the mesh.
+        cell: usize,
+        /// What the tractions on the surface take, over the strain energy around the cell.
+        share: f64,
+        /// How often the penalty was raised.
+        rounds: usize,
+    },
     /// Cells of different sizes meet at a surface.
     #[error("the surface of body {} meets cells of different sizes: refine the mesh around it", body + 1)]
     CoarseSurface {

@@ -85,9 +85,9 @@ where
 /// Part of the period by which a gap is not what the last step left.
 const FAR: f64 = 0.25;
 
-/// Whether a remembered contact still is where the last step left it. A gap that has opened says nothing: with
-/// the forces of two steps in the impulse, what a contact remembers fades over many steps after it opened.
-/// A record that was resumed has no gap to compare with.
+/// Whether a remembered contact still is where the last step left it. A gap that has opened says nothing:
+/// with the forces of two steps in the impulse, what a contact remembers fades over many steps after it
+/// opened. A record that was resumed has no gap to compare with.
 fn check_known<const D: usize>(
     state: &PairState,
     expected: Option<f64>,

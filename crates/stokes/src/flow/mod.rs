@@ -5,6 +5,7 @@ mod mean;
 mod prepared;
 mod refinement;
 mod stress;
+mod trusted;
 mod warm_start;
 
 use std::sync::Arc;
@@ -19,6 +20,7 @@ use crate::film::{FilmForce, Lubrication};
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, symmetric};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
+use trusted::Trusted;
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given};
@@ -209,10 +211,11 @@ where
         let mut problem = self.problem(mesh, bodies)?;
         problem.system.space.hold_twists(conditions.hold_bodies());
         let assembled = Instant::now();
-        self.prepare(&mut problem)?;
+        let mut method = self.method.clone();
+        self.prepare(&mut problem, &mut method)?;
         let prepared = Instant::now();
         let (guess, before) = self.initial_guess(&problem);
-        let (mut flow, x) = self.solved(&problem, conditions, guess)?;
+        let Trusted { mut flow, x, .. } = self.trusted(&mut problem, &mut method, conditions, &guess)?;
         self.keep_for_next(&problem, &x, &flow.pressure, before);
         flow.times = PhaseTimes {
             assembly: (assembled - start).as_secs_f64(),
@@ -227,40 +230,19 @@ where
         Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
     }
 
-    /// Prepares the solver for a problem; where the smoother finds a penalty too small, for one with larger
-    /// penalties instead. Whether it did so is told.
-    ///
-    /// # Errors
-    /// Those of [`SaddleSolver::prepare`].
-    fn prepare(&mut self, problem: &mut Problem<D>) -> Result<bool, StokesError> {
-        let mut method = self.method.clone();
-        let mut is_stiffened = false;
-        loop {
-            let error = match self.solver(problem).prepare(problem) {
-                Err(error @ (StokesError::SurfaceBlock(_) | StokesError::AtSurface(_))) => error,
-                other => return other.map(|_| is_stiffened),
-            };
-            method = method.stiffened().ok_or(error)?;
-            let hold = problem.system.space.holds_twists();
-            let discretisation = problem.discretisation().clone();
-            *problem = Problem::on(&discretisation, &problem.bodies, self.params.viscosity, method.as_ref())?;
-            problem.system.space.hold_twists(hold);
-            is_stiffened = true;
-        }
-    }
-
     /// The solver for free bodies or for held ones.
     fn solver(&mut self, problem: &Problem<D>) -> &mut Box<dyn SaddleSolver<D> + Send> {
         &mut self.solvers[usize::from(problem.system.space.holds_twists())]
     }
 
-    /// The flow under some conditions from the guess `x`, and the reduced vector it belongs to.
+    /// The flow under some conditions from the guess `x`, which becomes the reduced vector that it belongs
+    /// to.
     fn solved(
         &mut self,
         problem: &Problem<D>,
         conditions: &Conditions<'_, D>,
-        mut x: Vec<f64>,
-    ) -> Result<(Flow<D>, Vec<f64>), StokesError> {
+        x: &mut [f64],
+    ) -> Result<Flow<D>, StokesError> {
         let (lift, b) = conditions.data(problem)?;
         let mut effort = Effort::default();
         let tolerance = self.params.tolerance;
@@ -270,19 +252,19 @@ where
             Ok(())
         };
         let data = Data { lift: &lift, b: &b };
-        let multiplier = problem.rigidity.solve(problem, &data, &mut x, &mut solve)?;
-        let mut pressure = problem.pressure_and_films(&x);
-        let mut velocity = problem.velocity(&lift, &x);
+        let multiplier = problem.rigidity.solve(problem, &data, x, &mut solve)?;
+        let mut pressure = problem.pressure_and_films(x);
+        let mut velocity = problem.velocity(&lift, x);
         if let (false, Some(surfaces)) = (problem.system.space.is_anchored(), &problem.system.surfaces) {
             let space = &problem.system.space;
             let mean = mean::mean_velocity(problem, surfaces, &velocity);
             mean::subtract(space, &mut velocity, &mean, |_| true);
             // Guesses made of solutions would let what no equation determines grow from step to step.
-            mean::subtract(space, &mut x, &mean, |node| space.is_free(node));
+            mean::subtract(space, x, &mean, |node| space.is_free(node));
         }
         let twists = problem.twists(&velocity)?;
         let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
-        let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], &x));
+        let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
         let stress = stress.transpose()?;
         velocity.truncate(problem.system.space.full_dim());
         pressure.truncate(problem.system.pressure.dim());
@@ -295,14 +277,14 @@ where
             wrenches,
             strain: conditions.strain,
             stress,
-            films: problem.film_forces(&x),
+            films: problem.film_forces(x),
             solve_count: effort.solve_count,
             iteration_count: effort.iteration_count,
             residual: effort.residual,
             fine_operator_applications: effort.fine_operator_applications,
             times: PhaseTimes::default(),
         };
-        Ok((flow, x))
+        Ok(flow)
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.

@@ -7,6 +7,8 @@
 //! system `M` is the block of the inverse matrix that belongs to the twists, so both hold but for the
 //! tolerance of the solves.
 
+use std::sync::Arc;
+
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
@@ -15,7 +17,7 @@ use nalgebra::DMatrix;
 use super::conditions::Conditions;
 use super::{Flow, FlowSolver, film_moments};
 use crate::error::StokesError;
-use crate::formulation::{Problem, symmetric_and_traceless};
+use crate::formulation::{Method, Problem, symmetric_and_traceless};
 
 /// Bodies on a mesh with the linear solvers for them: as many flows as wanted, each from a guess of zero and
 /// none dependent on those before.
@@ -25,6 +27,8 @@ where
 {
     solver: Lent<'s, D>,
     problem: Problem<D>,
+    /// The formulation, with penalties as the flows so far want them.
+    method: Arc<dyn Method<D>>,
     /// Whether the solvers for free and for held bodies are prepared.
     is_ready: [bool; 2],
 }
@@ -82,7 +86,8 @@ where
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'_, D>, StokesError> {
         let problem = self.problem(mesh, bodies)?;
-        Ok(Prepared { solver: Lent::Borrowed(self), problem, is_ready: [false; 2] })
+        let method = self.method.clone();
+        Ok(Prepared { solver: Lent::Borrowed(self), problem, method, is_ready: [false; 2] })
     }
 
     /// The same for flows that are kept for longer than anything could be borrowed.
@@ -95,7 +100,8 @@ where
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'static, D>, StokesError> {
         let problem = self.problem(mesh, bodies)?;
-        Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, is_ready: [false; 2] })
+        let method = self.method.clone();
+        Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, method, is_ready: [false; 2] })
     }
 }
 
@@ -112,16 +118,22 @@ where
     pub fn solve(&mut self, conditions: &Conditions<'_, D>) -> Result<Flow<D>, StokesError> {
         self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
-        Ok(self.solver.get().solved(&self.problem, conditions, guess)?.0)
+        let Self { solver, problem, method, is_ready } = self;
+        let trusted = solver.get().trusted(problem, method, conditions, &guess)?;
+        if trusted.is_raised {
+            *is_ready = [false; 2];
+            is_ready[usize::from(conditions.hold_bodies())] = true;
+        }
+        Ok(trusted.flow)
     }
 
     /// Holds or frees the bodies and prepares the solver for that, unless it is.
     fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
         let hold = conditions.hold_bodies();
-        let Self { solver, problem, is_ready } = self;
+        let Self { solver, problem, method, is_ready } = self;
         problem.system.space.hold_twists(hold);
         if !is_ready[usize::from(hold)] {
-            if solver.get().prepare(problem)? {
+            if solver.get().prepare(problem, method)? {
                 *is_ready = [false; 2];
             }
             is_ready[usize::from(hold)] = true;

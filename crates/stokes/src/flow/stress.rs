@@ -8,17 +8,12 @@
 //! the power that the flow dissipates, `<sigma>:E = Phi / V`, which is computed from the strains of the fluid
 //! and the forces of films: another route to the viscosity.
 
-use gluey_fem::cut::POINTS;
-use gluey_fem::element::{gauss_cube, node_count};
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Dim, Matrix, Space};
 use rayon::prelude::*;
 
 use super::mean::{fluid_weights, mean_of};
 use crate::formulation::Problem;
-use crate::surface::{CellState, slope};
-
-/// Gauss points per direction for products of strains in whole cells.
-const STRAIN_POINTS: usize = 3;
+use crate::surface::StrainEnergy;
 
 /// What the bodies add to the stress, and the power that is dissipated.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,31 +43,9 @@ where
     Dim<D>: Space<D>,
 {
     let Some(surfaces) = &problem.system.surfaces else { return 0.0 };
-    let (discretisation, cut) = (problem.discretisation(), &surfaces.cut);
-    let shear = discretisation.mesh.shear();
-    let slopes = |points: usize| -> Vec<(f64, Vec<Vector<D>>)> {
-        let of_point = |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| slope(shear, i, x)).collect();
-        gauss_cube::<D>(points).iter().map(|(x, weight)| (*weight, of_point(x))).collect()
-    };
-    let (whole, fine) = (slopes(STRAIN_POINTS), slopes(POINTS));
-    let of_cell = |cell: usize| -> f64 {
-        let weights = cut.cut(cell).map(|cut| &cut.moments.volume);
-        if weights.is_none() && cut.states[cell] != CellState::Fluid {
-            return 0.0;
-        }
-        let points = if weights.is_some() { &fine } else { &whole };
-        let h = discretisation.cell_size(cell);
-        let nodes = discretisation.velocity.cell(cell);
-        let of_point = |(q, (weight, slopes)): (usize, &(f64, Vec<Vector<D>>))| {
-            let mut twice = strain * (2.0 * h);
-            for (&node, slope) in nodes.iter().zip(slopes) {
-                let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
-                twice += u * slope.transpose() + slope * u.transpose();
-            }
-            weights.map_or(*weight, |weights| weights[q]) * twice.norm_squared()
-        };
-        0.5 * h.powi(D as i32 - 2) * points.iter().enumerate().map(of_point).sum::<f64>()
-    };
+    let cut = &surfaces.cut;
+    let energy = StrainEnergy::new(problem.discretisation(), cut);
+    let of_cell = |cell: usize| energy.in_cell(cell, velocity, strain);
     let cells: Vec<f64> = (0..cut.states.len()).into_par_iter().with_min_len(256).map(of_cell).collect();
     problem.system.viscosity() * cells.iter().sum::<f64>()
 }

@@ -18,7 +18,9 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace};
-use crate::surface::{CellState, CutCells, add_load_of_cut_cells, forces_on_bodies, load_of_strain};
+use crate::surface::{
+    CellState, CutCells, WeakCell, add_load_of_cut_cells, forces_on_bodies, load_of_strain,
+};
 
 /// A formulation with what it keeps from mesh to mesh.
 pub trait Method<const D: usize>: Send + Sync
@@ -38,6 +40,11 @@ where
 
     /// The same with penalties twice as large, where it has any and they may grow.
     fn stiffened(&self) -> Option<Arc<dyn Method<D>>> {
+        None
+    }
+
+    /// The same with larger penalties in some cells, where it has any.
+    fn raised(&self, _cells: &[WeakCell]) -> Option<Arc<dyn Method<D>>> {
         None
     }
 }
@@ -93,6 +100,12 @@ where
         _undisturbed: &Matrix<D>,
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         Err(StokesError::Unsupported { what: "stresslets" })
+    }
+
+    /// The cells whose penalty is too small for a velocity that [`Problem::velocity`] gave, relative to a
+    /// linear flow with this strain.
+    fn weak_cells(&self, _: &Problem<D>, _velocity: &[f64], _strain: &Matrix<D>) -> Vec<WeakCell> {
+        Vec::new()
     }
 
     /// See [`StokesSystem::residual`]. Here so that who calls it does not compile the operators anew.

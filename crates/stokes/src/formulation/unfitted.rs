@@ -18,7 +18,10 @@ use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
-use crate::surface::{Aggregates, CellState, CutCells, Flat, Flats, SurfaceCoupling, first_moments};
+use crate::surface::{
+    Aggregates, CellState, CutCells, Flat, Flats, PenaltyFactor, SurfaceCoupling, WeakCell, first_moments,
+    weak_cells,
+};
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
 const OFFSET: f64 = -0.1;
@@ -29,18 +32,18 @@ const PENALTY: f64 = 2.0;
 const LARGEST_PENALTY: f64 = 16.0;
 
 /// The formulation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Unfitted {
     /// Treatment of films that are too thin for the mesh.
     lubrication: Lubrication,
     /// Multiple of the largest local ratio in Nitsche's penalty.
-    penalty: f64,
+    penalty: PenaltyFactor,
 }
 
 impl Unfitted {
     /// The formulation with this treatment of films that are too thin for the mesh.
     pub fn new(lubrication: Lubrication) -> Self {
-        Self { lubrication, penalty: PENALTY }
+        Self { lubrication, penalty: PenaltyFactor::new(PENALTY) }
     }
 }
 
@@ -57,15 +60,20 @@ where
         let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
         let films = thin_films(bodies, discretisation.mesh.domain(), &heights);
         let flats = flats(&films, bodies.len(), &heights);
-        let system = around(discretisation, bodies, &flats, viscosity, self.penalty)?;
+        let system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
         let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
         let system = if lubricates { system.with_films(films, &heights) } else { system };
-        Ok((system, Arc::new(*self)))
+        Ok((system, Arc::new(self.clone())))
     }
 
     fn stiffened(&self) -> Option<Arc<dyn Method<D>>> {
-        let penalty = 2.0 * self.penalty;
-        (penalty <= LARGEST_PENALTY).then(|| Arc::new(Self { penalty, ..*self }) as Arc<dyn Method<D>>)
+        let penalty = self.penalty.doubled(LARGEST_PENALTY)?;
+        Some(Arc::new(Self { penalty, ..*self }))
+    }
+
+    fn raised(&self, cells: &[WeakCell]) -> Option<Arc<dyn Method<D>>> {
+        let factors = cells.iter().map(|weak| (weak.cell, weak.factor()));
+        Some(Arc::new(Self { penalty: self.penalty.clone().raised(factors), ..*self }))
     }
 }
 
@@ -88,7 +96,7 @@ fn around<const D: usize>(
     bodies: &[Ball<D>],
     flats: &Flats<D>,
     viscosity: f64,
-    penalty: f64,
+    penalty: &PenaltyFactor,
 ) -> Result<StokesSystem<D>, StokesError>
 where
     Dim<D>: Space<D>,
@@ -150,6 +158,11 @@ where
         let Some(surfaces) = &system.surfaces else { return Ok(Vec::new()) };
         let fields = (fields, undisturbed);
         Ok(first_moments(surfaces, &system.space, bodies, system.viscosity(), fields))
+    }
+
+    fn weak_cells(&self, problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {
+        let surfaces = problem.system.surfaces.as_ref();
+        surfaces.map_or_else(Vec::new, |surfaces| weak_cells(surfaces, velocity, strain))
     }
 
     /// Aggregates change from step to step, but what they change is small.

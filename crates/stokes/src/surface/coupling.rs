@@ -10,7 +10,7 @@ use gluey_linalg::{AffineConstraints, Scalar, Subset};
 
 use super::aggregates::Aggregates;
 use super::cut_cells::{CutCell, CutCells, in_space};
-use super::penalty::penalties;
+use super::penalty::{PenaltyFactor, penalties};
 use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
 
@@ -69,7 +69,7 @@ where
         space: &VelocitySpace<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
-        (cut, penalty): (CutCells<D>, f64),
+        (cut, penalty): (CutCells<D>, &PenaltyFactor),
         aggregates: &Aggregates,
     ) -> Result<Self, StokesError> {
         let discretisation = space.discretisation();
@@ -122,6 +122,11 @@ where
             pressures,
             cut,
         })
+    }
+
+    /// The mesh with its nodes.
+    pub fn discretisation(&self) -> &Discretisation<D> {
+        &self.discretisation
     }
 
     /// Cell and body of each piece.

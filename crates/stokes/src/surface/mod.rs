@@ -4,18 +4,22 @@
 mod aggregates;
 mod coupling;
 mod cut_cells;
+mod energy;
 mod flats;
 mod load;
 mod penalty;
 mod shapes;
 mod strain;
 mod traction;
+mod weak;
 
 pub use aggregates::Aggregates;
 pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
 pub use cut_cells::{CellState, CutCells};
+pub use energy::StrainEnergy;
 pub use flats::{Flat, Flats};
 pub use load::{add_load_of_cut_cells, forces_on_bodies};
-pub use shapes::slope;
+pub use penalty::PenaltyFactor;
 pub use strain::load_of_strain;
 pub use traction::first_moments;
+pub use weak::{WeakCell, weak_cells};

@@ -4,13 +4,15 @@
 //! `int_F 2 eta eps(u):eps(u)` over the polynomials of a root, on the root and the bad cells that it carries
 //! (Annavarapu, Hautefeuille and Dolbow 2012 for the local eigenproblem). Bad cells next to each other whose
 //! ghosts have other roots may need more: hence a factor, 2 and doubled where a block of the smoother is not
-//! positive. Since `|eps n|^2 <= eps:eps`, the largest ratio `mu` of
-//! `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no less than `lambda`, and takes the same products
-//! of gradients in the volume and on the surface:
+//! positive, and raised in single cells where a computed flow shows that it is too small (`weak.rs`). Since
+//! `|eps n|^2 <= eps:eps`, the largest ratio `mu` of `int_G 4 eps(u):eps(u)` to `int_F 2 eps(u):eps(u)` is no
+//! less than `lambda`, and takes the same products of gradients in the volume and on the surface:
 //!
 //! `beta = factor mu eta`.
 //!
 //! In coordinates of the unit cube `mu h` is a number of the cut alone.
+
+use std::collections::BTreeMap;
 
 use gluey_fem::cut::{Lines, POINTS, Products};
 use gluey_fem::element::{gauss_cube, node_count};
@@ -27,6 +29,38 @@ use crate::space::Discretisation;
 /// Share of the mean diagonal that is added to the strain energy: rigid motions have none.
 const SHIFT: f64 = 1e-9;
 
+/// Multiple of the largest local ratios in the penalty.
+#[derive(Clone, Debug)]
+pub struct PenaltyFactor {
+    everywhere: f64,
+    /// What it is multiplied by in some cells of the mesh.
+    raised: BTreeMap<u32, f64>,
+}
+
+impl PenaltyFactor {
+    /// The same everywhere.
+    pub fn new(everywhere: f64) -> Self {
+        Self { everywhere, raised: BTreeMap::new() }
+    }
+
+    /// Twice as large everywhere, if that is no more than `largest`.
+    pub fn doubled(&self, largest: f64) -> Option<Self> {
+        let everywhere = 2.0 * self.everywhere;
+        (everywhere <= largest).then(|| Self { everywhere, raised: self.raised.clone() })
+    }
+
+    /// Multiplied by a factor in each of these cells.
+    #[must_use]
+    pub fn raised(mut self, cells: impl Iterator<Item = (u32, f64)>) -> Self {
+        cells.for_each(|(cell, factor)| *self.raised.entry(cell).or_insert(1.0) *= factor);
+        self
+    }
+
+    fn of_cell(&self, cell: u32) -> f64 {
+        self.everywhere * self.raised.get(&cell).unwrap_or(&1.0)
+    }
+}
+
 /// `beta h / eta` of every cut cell: `factor mu h`.
 ///
 /// # Errors
@@ -35,7 +69,7 @@ pub fn penalties<const D: usize>(
     discretisation: &Discretisation<D>,
     cut: &CutCells<D>,
     aggregates: &Aggregates,
-    factor: f64,
+    factor: &PenaltyFactor,
 ) -> Result<Vec<f64>, StokesError> {
     let mut members: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(0..).collect();
     members.sort_unstable();
@@ -60,7 +94,7 @@ pub fn penalties<const D: usize>(
         let shear = discretisation.mesh.shear();
         [&mut volume, &mut surface].into_iter().for_each(|products| products.shear(shear));
         // int 4 eps:eps on the surface to int 2 eps:eps in the volume.
-        eigenvalue(&surface, &volume).map(|ratio| factor * 2.0 * ratio)
+        eigenvalue(&surface, &volume).map(|ratio| 2.0 * ratio)
     };
     let values: Vec<Result<f64, BlockError>> = clusters.par_iter().map(of_cluster).collect();
     let mut penalties = vec![0.0; cut.cells.len()];
@@ -69,7 +103,9 @@ pub fn penalties<const D: usize>(
             let first = &cut.cells[cluster[0].1 as usize];
             StokesError::NoPenalty { body: first.bodies[0] as usize, cell: first.cell as usize }
         })?;
-        cluster.iter().for_each(|&(_, k)| penalties[k as usize] = value);
+        cluster
+            .iter()
+            .for_each(|&(_, k)| penalties[k as usize] = factor.of_cell(cut.cells[k as usize].cell) * value);
     }
     Ok(penalties)
 }

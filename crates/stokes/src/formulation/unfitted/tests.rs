@@ -49,7 +49,8 @@ where
 
     fn problem(&self) -> Problem<D> {
         let bodies = [self.ball];
-        let system = around(&self.discretisation(), &bodies, &self.flats, 1.0, PENALTY).unwrap();
+        let system =
+            around(&self.discretisation(), &bodies, &self.flats, 1.0, &PenaltyFactor::new(PENALTY)).unwrap();
         Problem { system, bodies: bodies.to_vec(), rigidity: Arc::new(Unfitted::new(Lubrication::None)) }
     }
 
@@ -258,7 +259,13 @@ where
     let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + normal * (side * radius), radius));
     let distance = radius - 0.5 * width * mesh.size(level);
     let flats = [1.0, -1.0].map(|side| Some(Flat { normal: normal * side, distance }));
-    let system = around(&Discretisation::new(mesh), &bodies, &flats.into_iter().collect(), 1.0, PENALTY)?;
+    let system = around(
+        &Discretisation::new(mesh),
+        &bodies,
+        &flats.into_iter().collect(),
+        1.0,
+        &PenaltyFactor::new(PENALTY),
+    )?;
     let surfaces = system.surfaces.unwrap();
     Ok((0..surfaces.cut.cells.len()).map(|place| surfaces.penalty(place)).fold(0.0, f64::max))
 }

@@ -1,0 +1,106 @@
+//! Flows whose penalties are large enough: where the smoother or the flow shows that they are not, the problem
+//! is set up again with larger ones.
+
+use std::sync::Arc;
+
+use gluey_geom::{Dim, Space};
+use gluey_linalg::KrylovError;
+
+use super::conditions::Conditions;
+use super::{Effort, Flow, FlowSolver};
+use crate::error::StokesError;
+use crate::formulation::{Method, Problem};
+
+/// How often penalties are raised for one flow, at most.
+const MOST_ROUNDS: usize = 6;
+
+/// A flow whose penalties are large enough, and the reduced vector it belongs to.
+pub(super) struct Trusted<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub flow: Flow<D>,
+    pub x: Vec<f64>,
+    /// Whether the problem has got larger penalties for it.
+    pub is_raised: bool,
+}
+
+impl<const D: usize> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Prepares the solver for a problem; where the smoother finds a penalty too small, for one with larger
+    /// penalties instead. Whether it did so is told.
+    ///
+    /// # Errors
+    /// Those of [`SaddleSolver::prepare`].
+    pub(super) fn prepare(
+        &mut self,
+        problem: &mut Problem<D>,
+        method: &mut Arc<dyn Method<D>>,
+    ) -> Result<bool, StokesError> {
+        let mut is_stiffened = false;
+        loop {
+            let error = match self.solver(problem).prepare(problem) {
+                Err(error @ (StokesError::SurfaceBlock(_) | StokesError::AtSurface(_))) => error,
+                other => return other.map(|_| is_stiffened),
+            };
+            *method = method.stiffened().ok_or(error)?;
+            self.rebuild(problem, method.as_ref())?;
+            is_stiffened = true;
+        }
+    }
+
+    /// The same problem with another method.
+    fn rebuild(&self, problem: &mut Problem<D>, method: &dyn Method<D>) -> Result<(), StokesError> {
+        let hold = problem.system.space.holds_twists();
+        let discretisation = problem.discretisation().clone();
+        *problem = Problem::on(&discretisation, &problem.bodies, self.params.viscosity, method)?;
+        problem.system.space.hold_twists(hold);
+        Ok(())
+    }
+
+    /// The flow under some conditions from a guess; where it, or what a solver without convergence has of it,
+    /// shows that penalties are too small, the flow with larger ones.
+    ///
+    /// # Errors
+    /// Those of the solver, [`StokesError::WeakSurface`].
+    pub(super) fn trusted(
+        &mut self,
+        problem: &mut Problem<D>,
+        method: &mut Arc<dyn Method<D>>,
+        conditions: &Conditions<'_, D>,
+        guess: &[f64],
+    ) -> Result<Trusted<D>, StokesError> {
+        let mut wasted = Effort::default();
+        for rounds in 0.. {
+            let mut x = guess.to_vec();
+            let solved = self.solved(problem, conditions, &mut x);
+            let weak = match &solved {
+                Ok(flow) => problem.rigidity.weak_cells(problem, &flow.velocity, &flow.strain),
+                Err(StokesError::Krylov(KrylovError::NotConverged { .. })) => {
+                    let velocity = problem.velocity(&conditions.data(problem)?.0, &x);
+                    problem.rigidity.weak_cells(problem, &velocity, &conditions.strain)
+                }
+                Err(_) => Vec::new(),
+            };
+            let Some(first) = weak.first() else {
+                let mut flow = solved?;
+                flow.solve_count += wasted.solve_count;
+                flow.iteration_count += wasted.iteration_count;
+                return Ok(Trusted { flow, x, is_raised: rounds > 0 });
+            };
+            let [cell, body] = [first.cell, first.body].map(|index| index as usize);
+            let error = StokesError::WeakSurface { body, cell, share: first.share, rounds };
+            let raised = method.raised(&weak).filter(|_| rounds < MOST_ROUNDS);
+            if let Ok(flow) = &solved {
+                wasted.solve_count += flow.solve_count;
+                wasted.iteration_count += flow.iteration_count;
+            }
+            *method = raised.ok_or_else(|| solved.err().unwrap_or(error))?;
+            self.rebuild(problem, method.as_ref())?;
+            self.prepare(problem, method)?;
+        }
+        unreachable!("the rounds are limited")
+    }
+}
