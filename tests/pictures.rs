@@ -179,3 +179,20 @@ fn results_that_are_missing_or_malformed_are_named() {
         "{stderr}"
     );
 }
+
+#[test]
+fn frames_become_an_animation() {
+    let folder = run_with_frames();
+    let stdout = succeeds(folder.path(), &["plot", "out", "--animation", "--pixels", "150", "--rate", "20"]);
+    assert_eq!(stdout.trim(), format!("out/{STEM}-plots/particles.gif"));
+    let file = fs::File::open(folder.path().join(stdout.trim())).expect("an animation");
+    let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a header");
+    assert_eq!(decoder.width(), 150);
+    let mut count = 0;
+    while let Some(frame) = decoder.read_next_frame().expect("a frame") {
+        assert_eq!((frame.delay, frame.width), (5, 150));
+        count += 1;
+    }
+    let frames = fs::read_dir(folder.path().join(format!("out/{STEM}-xyz"))).expect("frames").count();
+    assert_eq!(count, frames);
+}

@@ -179,3 +179,23 @@ fn reports_are_for_people_for_programs_or_for_nobody() {
     let failed = failed.current_dir(folder).args(["run", CASE, "--json"]).output().expect("it runs");
     assert!(!failed.status.success() && failed.stdout.is_empty() && !failed.stderr.is_empty());
 }
+
+#[test]
+fn a_log_says_when_a_run_began_and_how_it_ended() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let log = || fs::read_to_string(folder.join(format!("out/{STEM}.log"))).expect("a log");
+    let (code, stderr) = gluey(folder, &["run", CASE, "--set", "time.step=0.05", "--verbose"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    let record = RunRecord::read(&folder.join(format!("out/{STEM}-run.json"))).expect("a record");
+    let lines = |text: &str, of: &str| text.lines().filter(|line| line.contains(of)).count();
+    assert_eq!(lines(&stderr, "contacts act"), record.steps + 1, "{stderr}");
+    let text = log();
+    let [first, .., last] = text.lines().collect::<Vec<_>>()[..] else { panic!("{text}") };
+    assert!(first.contains("pair-3d-mobility") && first.starts_with(&record.started[..17]), "{text}");
+    assert!(last.ends_with(&format!("complete after {} steps", record.steps)), "{text}");
+    // Another run begins another log.
+    succeeds(folder, &["run", CASE, "--force", "--set", "time.step=0.1"]);
+    assert_eq!(lines(&log(), "complete after"), 1, "{}", log());
+    assert!(log().contains(&format!("complete after {} steps", record.steps / 2)), "{}", log());
+}

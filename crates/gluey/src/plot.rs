@@ -6,12 +6,14 @@
 //! trajectories   y against x; in 3D also z against x
 //! rheology       relative viscosity and normal stresses against strain
 //! solver         iterations and seconds of each phase of a step against time
-//! particles      those of a frame that is asked for, with their images, coloured by speed
+//! particles      those of a frame that is asked for, or of all frames as an animation, with their images,
+//!                coloured by speed
 //! ```
 //!
 //! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv`, `<stem>-solver.csv` and
 //! `<stem>-xyz` and go to `<stem>-plots`.
 
+mod animation;
 mod error;
 mod figure;
 mod figures;
@@ -23,6 +25,7 @@ use std::str::FromStr;
 
 use gluey_pictures::Canvas;
 
+pub use animation::AnimationOptions;
 pub use error::PlotError;
 pub use figure::Figure;
 pub use snapshot::FrameChoice;
@@ -67,6 +70,8 @@ pub struct PlotOptions {
     pub folder: PathBuf,
     /// A frame whose particles to draw, instead of all that is not in `only`.
     pub frame: Option<FrameChoice>,
+    /// An animation of all frames, instead of all that is not in `only`.
+    pub animation: Option<AnimationOptions>,
     /// What to draw; what there are results for when empty and no frame is named.
     pub only: Vec<Figure>,
     /// How to write it.
@@ -81,9 +86,15 @@ pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
     if let Some(frame) = options.frame {
         let (canvas, stem) = snapshot::snapshot(&options.folder, frame, options.width_mm)?;
         written.extend(write(&canvas, &stem, &options.formats)?);
-        if options.only.is_empty() {
-            return Ok(written);
-        }
+    }
+    if let Some(animation) = options.animation {
+        let (bytes, path) = animation::animation(&options.folder, animation)?;
+        prepare_folder_of(&path)?;
+        write_atomically(&path, &bytes)?;
+        written.push(path);
+    }
+    if options.only.is_empty() && (options.frame.is_some() || options.animation.is_some()) {
+        return Ok(written);
     }
     for results in read::results_in(&options.folder)? {
         for figure in Figure::ALL {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::output::solver_log::SolverRow;
+
 /// Where a run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProgressState<'a> {
@@ -20,10 +22,34 @@ pub struct ProgressState<'a> {
     pub left_s: Option<f64>,
 }
 
+impl fmt::Display for ProgressState<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let left = self.left_s.map_or("?".into(), duration);
+        let rate = match self.left_s {
+            Some(left) if left > 0.0 => format!("{:.3}", (self.steps - self.step) as f64 / left),
+            _ => "?".into(),
+        };
+        write!(f, "t = {:.3}, {rate} steps/s, {left} left, {}", self.time, self.phase)
+    }
+}
+
+/// A time one waits, in words.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
 /// Receives reports while a run goes on, a few times a step.
 pub trait Progress: Sync {
     /// Takes note of where the run is; called from the thread of the run, and expected to return at once.
     fn report(&self, state: &ProgressState<'_>);
+
+    /// Takes note of what the flow and the contacts of a step took; called as [`Progress::report`] is.
+    fn step(&self, _: &SolverRow<'_>) {}
 
     /// Takes note of something that is no error but should be known; called as [`Progress::report`] is.
     fn notice(&self, _: &Notice) {}
@@ -98,4 +124,16 @@ pub struct Silent;
 
 impl Progress for Silent {
     fn report(&self, _: &ProgressState<'_>) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_given_in_units_one_can_wait_in() {
+        assert_eq!(duration(3.4), "3 s");
+        assert_eq!(duration(125.0), "2 min 05 s");
+        assert_eq!(duration(3720.0), "1 h 02 min");
+    }
 }

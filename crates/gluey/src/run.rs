@@ -5,6 +5,7 @@
 mod checkpoint_file;
 mod error;
 mod leftovers;
+mod log;
 mod occupied;
 mod options;
 mod paths;
@@ -44,6 +45,7 @@ use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
+use log::Log;
 use recorder::Recorder;
 use stress::with_contacts;
 
@@ -57,10 +59,13 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     let _claims = claim_outputs(options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(options)?;
-    match case.dimension {
-        2 => run_2d(case, options, progress),
-        _ => run_3d(case, options, progress),
-    }
+    let log = Log::begin(case, options, progress)?;
+    let outcome = match case.dimension {
+        2 => run_2d(case, options, &log),
+        _ => run_3d(case, options, &log),
+    };
+    log.end(&outcome);
+    outcome
 }
 
 fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
@@ -239,6 +244,7 @@ where
             contact: simulation.contact_report(),
             phases: simulation.phases(),
         };
+        self.progress.step(&row);
         Ok(self.solver.write(&row)?)
     }
 

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use gluey::analyse::Summary;
+use gluey::output::solver_log::SolverRow;
 use gluey::view::Viewed;
 use gluey::{Notice, Progress, ProgressState, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -15,18 +16,21 @@ use serde::Serialize;
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Shows where a run is.
-pub enum Reporter {
-    /// On a terminal.
+pub struct Reporter {
+    name: String,
+    surface: Surface,
+    /// Time of the last step, if each is told.
+    steps: Option<Mutex<Instant>>,
+}
+
+/// What progress is shown on.
+enum Surface {
+    /// A terminal.
     Bar(ProgressBar),
-    /// Into a file or pipe.
-    Log {
-        /// Name of the run.
-        name: String,
-        /// Time of the last line.
-        last: Mutex<Instant>,
-        /// Whether only what should be known is told, not where the run is.
-        quiet: bool,
-    },
+    /// A file or pipe, with the time of the last line.
+    Log(Mutex<Instant>),
+    /// Nothing: only what should be known is told, not where the run is.
+    Nothing,
 }
 
 impl Reporter {
@@ -41,71 +45,70 @@ impl Reporter {
         bar.set_style(
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
-        Self::Bar(bar)
+        Self { name: name.to_owned(), surface: Surface::Bar(bar), steps: None }
     }
 
     /// Lines, whatever there is to draw on.
     pub fn log(name: &str, quiet: bool) -> Self {
-        Self::Log { name: name.to_owned(), last: Mutex::new(Instant::now()), quiet }
+        let surface = if quiet { Surface::Nothing } else { Surface::Log(Mutex::new(Instant::now())) };
+        Self { name: name.to_owned(), surface, steps: None }
+    }
+
+    /// The same with a line for each step, if asked for.
+    pub fn verbose(self, is_verbose: bool) -> Self {
+        Self { steps: is_verbose.then(|| Mutex::new(Instant::now())), ..self }
     }
 
     /// Takes the bar off the screen.
     pub fn finish(&self) {
-        if let Self::Bar(bar) = self {
+        if let Surface::Bar(bar) = &self.surface {
             bar.finish_and_clear();
+        }
+    }
+
+    /// Writes a line, above the bar where there is one.
+    fn line(&self, line: &str) {
+        match &self.surface {
+            Surface::Bar(bar) => bar.suspend(|| say(line)),
+            Surface::Log(_) | Surface::Nothing => say(&format!("{}: {line}", self.name)),
         }
     }
 }
 
 impl Progress for Reporter {
     fn report(&self, state: &ProgressState<'_>) {
-        match self {
-            Self::Bar(bar) => {
+        match &self.surface {
+            Surface::Bar(bar) => {
                 bar.set_length(state.steps as u64);
                 bar.set_position(state.step as u64);
-                bar.set_message(summary(state));
+                bar.set_message(state.to_string());
             }
-            Self::Log { quiet: true, .. } => {}
-            Self::Log { name, last, .. } => {
+            Surface::Nothing => {}
+            Surface::Log(last) => {
                 let Ok(mut last) = last.lock() else { return };
                 if last.elapsed() >= LOG_INTERVAL {
                     *last = Instant::now();
-                    say(&format!("{name}: step {}/{} {}", state.step, state.steps, summary(state)));
+                    self.line(&format!("step {}/{}, {state}", state.step, state.steps));
                 }
             }
         }
     }
 
+    fn step(&self, row: &SolverRow<'_>) {
+        let Some(Ok(mut last)) = self.steps.as_ref().map(Mutex::lock) else { return };
+        let seconds = last.elapsed().as_secs_f64();
+        *last = Instant::now();
+        self.line(&format!("{row}, {seconds:.3} s"));
+    }
+
     fn notice(&self, notice: &Notice) {
-        match self {
-            Self::Bar(bar) => bar.suspend(|| say(&notice.to_string())),
-            Self::Log { name, .. } => say(&format!("{name}: {notice}")),
-        }
+        self.line(&notice.to_string());
     }
 }
 
 /// Writes a line for people. That nobody listens any more, as when a terminal was closed, must not end a run.
 pub fn say(line: &str) {
     let _ = writeln!(stderr(), "{line}");
-}
-
-fn summary(state: &ProgressState<'_>) -> String {
-    let left = state.left_s.map_or("?".into(), duration);
-    let rate = match state.left_s {
-        Some(left) if left > 0.0 => format!("{:.3}", (state.steps - state.step) as f64 / left),
-        _ => "?".into(),
-    };
-    format!("t = {:.3}, {rate} steps/s, {left} left, {}", state.time, state.phase)
-}
-
-/// A time one waits, in words.
-pub fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-    }
 }
 
 /// Prints what came out, and where the time went.
@@ -165,16 +168,4 @@ pub fn print_viewed(viewed: &Viewed) {
 pub fn print_pictures(pictures: &[PathBuf]) {
     let lines: String = pictures.iter().map(|picture| format!("{}\n", picture.display())).collect();
     let _ = stdout().write_all(lines.as_bytes());
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_are_given_in_units_one_can_wait_in() {
-        assert_eq!(duration(3.4), "3 s");
-        assert_eq!(duration(125.0), "2 min 05 s");
-        assert_eq!(duration(3720.0), "1 h 02 min");
-    }
 }

@@ -50,6 +50,11 @@ impl Canvas {
         Self { width, height, body: String::new(), defined: BTreeSet::new() }
     }
 
+    /// Width in SVG pixels.
+    pub(crate) fn width(&self) -> f64 {
+        self.width
+    }
+
     /// Height in SVG pixels.
     pub fn height(&self) -> f64 {
         self.height
@@ -130,15 +135,21 @@ impl Canvas {
 
     /// The drawing as a PNG picture, drawn with the bundled fonts only.
     pub fn png(&self) -> Result<Vec<u8>, PngError> {
+        let picture = self.pixels(PNG_ZOOM)?;
+        picture.encode_png().map_err(|error| PngError::Encoding(error.to_string()))
+    }
+
+    /// The drawing with so many pixels per SVG pixel, on white.
+    pub(crate) fn pixels(&self, zoom: f32) -> Result<Pixmap, PngError> {
         let mut options = usvg::Options { font_family: "Libertinus Serif".to_owned(), ..Default::default() };
         options.fontdb_mut().load_font_data(REGULAR.to_vec());
         options.fontdb_mut().load_font_data(ITALIC.to_vec());
         let tree = usvg::Tree::from_str(&self.inline_svg(), &options)?;
-        let size = tree.size().to_int_size().scale_by(PNG_ZOOM).ok_or(PngError::Size(0, 0))?;
+        let size = tree.size().to_int_size().scale_by(zoom).ok_or(PngError::Size(0, 0))?;
         let mut pixels =
             Pixmap::new(size.width(), size.height()).ok_or(PngError::Size(size.width(), size.height()))?;
-        resvg::render(&tree, Transform::from_scale(PNG_ZOOM, PNG_ZOOM), &mut pixels.as_mut());
-        pixels.encode_png().map_err(|error| PngError::Encoding(error.to_string()))
+        resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixels.as_mut());
+        Ok(pixels)
     }
 
     fn document(&self, style: &str) -> String {

@@ -7,15 +7,18 @@
 //!
 //! Not for interactive charts.
 
+mod animation;
 mod ball;
 mod canvas;
 mod chart;
 mod palette;
 mod text;
 
+pub use animation::{Animation, Still};
 pub use ball::{Ball, Rgb, color_scale};
 pub use canvas::{Canvas, FONT_FAMILY, PIXELS_PER_MM, PngError, font_faces};
 pub use chart::{Axis, Chart, Curve, Mark, Stroke, WIDTH, equal_aspect_height, stack, stack_to_width};
+pub use gif::EncodingError;
 pub use palette::PALETTE;
 
 /// The example of the README.

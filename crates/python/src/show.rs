@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use gluey::analyse::AnalyseOptions;
-use gluey::plot::{FrameChoice, PlotOptions};
+use gluey::plot::{AnimationOptions, FrameChoice, PlotOptions};
 use gluey::view::ViewOptions;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -20,6 +20,9 @@ pub struct Plot {
     folder: PathBuf,
     only: Vec<String>,
     frame: Option<String>,
+    animation: bool,
+    pixels: u32,
+    rate: f64,
     formats: Vec<String>,
     width_mm: f64,
 }
@@ -30,6 +33,7 @@ pub fn plot(py: Python<'_>, plot: Plot) -> PyResult<Vec<PathBuf>> {
     let options = PlotOptions {
         folder: plot.folder,
         frame: plot.frame.map(|frame| named::<FrameChoice>("frame", &frame)).transpose()?,
+        animation: plot.animation.then_some(AnimationOptions { pixels: plot.pixels, rate: plot.rate }),
         only: plot.only.iter().map(|name| named("only", name)).collect::<PyResult<_>>()?,
         formats: plot.formats.iter().map(|name| named("formats", name)).collect::<PyResult<_>>()?,
         width_mm: plot.width_mm,

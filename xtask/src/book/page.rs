@@ -41,16 +41,6 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Seconds for people: `8 s`, `3 min 20 s`, `1 h 05 min`.
-pub fn duration(seconds: f64) -> String {
-    let whole = seconds.max(0.0).round() as u64;
-    match whole {
-        0..60 => format!("{whole} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,12 +52,5 @@ mod tests {
         assert_eq!(number(Some(4.03e-4)), "4.03·10<sup>−4</sup>");
         assert_eq!(number(Some(0.0)), "0");
         assert_eq!(number(None), "–");
-    }
-
-    #[test]
-    fn durations_read_like_speech() {
-        assert_eq!(duration(8.4), "8 s");
-        assert_eq!(duration(200.0), "3 min 20 s");
-        assert_eq!(duration(3900.0), "1 h 05 min");
     }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use gluey::ProgressState;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::page::duration;
+use gluey::progress::duration;
 
 /// Time between two lines of a run where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(20);

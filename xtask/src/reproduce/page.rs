@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
+use gluey::progress::duration;
 use gluey_verify::Outcome;
 
 use super::findings::{self, Table};
 use super::plan::FigureName;
 use super::summary::{self, Summary};
 use super::verdict::{self, Kind, Row};
-use crate::book::page::{self, duration, escape, number};
+use crate::book::page::{self, escape, number};
 use gluey_pictures::Canvas;
 
 /// A figure with what is said about it.

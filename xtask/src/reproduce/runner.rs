@@ -6,8 +6,9 @@ use gluey::case::{Memory, ParticleVelocity};
 use gluey::{Case, CaseError, Formulation, RunError, RunOptions, RunReport, Strategy};
 
 use super::plan::{Approach, CaseName, RunKey, quick_settings};
+use crate::book::chain;
 use crate::book::progress::Board;
-use crate::book::{chain, page::duration};
+use gluey::progress::duration;
 
 /// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact
 /// solution.

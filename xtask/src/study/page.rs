@@ -5,7 +5,8 @@ use std::fmt::Write;
 use super::point::Done;
 use super::{Findings, Study};
 use crate::book::Failure;
-use crate::book::page::{self, duration, escape};
+use crate::book::page::{self, escape};
+use gluey::progress::duration;
 
 /// What a study took.
 pub struct Effort {

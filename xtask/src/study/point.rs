@@ -11,8 +11,8 @@ use gluey::{
 use thiserror::Error;
 
 use crate::book::chain;
-use crate::book::page::duration;
 use crate::book::progress::Board;
+use gluey::progress::duration;
 
 /// Minutes between checkpoints.
 const CHECKPOINT_MINUTES: f64 = 2.0;

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use gluey::progress::duration;
 use gluey_verify::{Judged, Outcome};
 
 use super::{Book, Chapter};
-use crate::book::page::{self, duration, escape, number};
+use crate::book::page::{self, escape, number};
 
 /// The page.
 pub fn html(book: &Book) -> String {

@@ -8,13 +8,14 @@ use std::time::Instant;
 use clap::Args;
 use gluey::case::Override;
 use gluey::flow::MeshSize;
+use gluey::progress::duration;
 use gluey::{Case, CaseSummary, Notice, Progress, ProgressState, RunError, RunOptions, memory};
 use serde::Serialize;
 use thiserror::Error;
 
 use super::failure::Failure;
 use super::manner::Manner;
-use crate::terminal::{Reporter, duration, print_lines};
+use crate::terminal::{Reporter, print_lines};
 
 /// Steps of a trial.
 const TRIAL_STEPS: usize = 4;

@@ -22,6 +22,9 @@ pub struct Manner {
     /// Print no progress and no report, only warnings and errors.
     #[arg(long)]
     quiet: bool,
+    /// Print a line for each step: unknowns, iterations, residual, contacts, seconds.
+    #[arg(long, short, conflicts_with = "quiet")]
+    verbose: bool,
     /// Print the report as JSON; nothing else goes to standard output.
     #[arg(long)]
     json: bool,
@@ -30,10 +33,20 @@ pub struct Manner {
 impl Manner {
     /// Runs `case`, which was read from `file`.
     pub fn run(&self, case: &Case, options: &RunOptions, file: &Path) -> Result<RunReport, Failure> {
-        let reporter = Reporter::new(&case.name, self.quiet);
+        let reporter = self.reporter(&case.name);
         let outcome = gluey::run(case, options, &reporter as &dyn Progress);
         reporter.finish();
         outcome.map_err(|error| Failure::of_run(error, file))
+    }
+
+    /// What shows where a run of this name is.
+    pub fn reporter(&self, name: &str) -> Reporter {
+        Reporter::new(name, self.quiet).verbose(self.verbose)
+    }
+
+    /// The same in lines, whatever there is to draw on.
+    pub fn log(&self, name: &str) -> Reporter {
+        Reporter::log(name, self.quiet).verbose(self.verbose)
     }
 
     /// Says what came out: to programs as JSON, to people by `print`.

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 use clap::Args;
+use gluey::progress::duration;
 use gluey::sweep::{Axis, Point, PointResult, PointState, Study, SweepError, points, table};
 use gluey::{RunError, RunReport};
 use thiserror::Error;
@@ -15,7 +16,7 @@ use super::failure::{Failure, INTERRUPTED};
 use super::interrupt::interrupt_flag;
 use super::manner::Manner;
 use super::output::{OutputArguments, at_least_one};
-use crate::terminal::{Reporter, duration, print_table, say};
+use crate::terminal::{print_table, say};
 
 /// Arguments of `gluey sweep`.
 #[derive(Debug, Args)]
@@ -121,8 +122,8 @@ impl SweepArguments {
         let force = *state == PointState::OtherCase;
         let options = self.output.options(&point.paths, force, resume, interrupt.clone());
         let reporter = match self.jobs {
-            1 => Reporter::new(&point.name, self.manner.is_quiet()),
-            _ => Reporter::log(&point.name, self.manner.is_quiet()),
+            1 => self.manner.reporter(&point.name),
+            _ => self.manner.log(&point.name),
         };
         let ran = gluey::run(&point.case, &options, &reporter);
         reporter.finish();

@@ -4,6 +4,7 @@
 //! time since the row before, phase by phase; `output_s` is that of the step's own rows and frames. A resumed
 //! run keeps the seconds of rows that an earlier one had written.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use gluey_contact::ContactReport;
@@ -43,6 +44,19 @@ pub struct SolverRow<'a> {
     pub contact: &'a ContactReport,
     /// Wall time since the run began, this step's included.
     pub phases: &'a PhaseTable,
+}
+
+impl fmt::Display for SolverRow<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let FlowStatistics { dof_count, iteration_count, residual, .. } = self.flow;
+        let ContactReport { pair_count, active_count, .. } = self.contact;
+        write!(
+            f,
+            "step {}, t = {:.4}: {dof_count} unknowns, {iteration_count} iterations to {residual:.1e}, \
+             {active_count} of {pair_count} contacts act",
+            self.step, self.time
+        )
+    }
 }
 
 /// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-solver.csv` beside the trajectory.

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use gluey_pictures::PngError;
+use gluey_pictures::{EncodingError, PngError};
 use thiserror::Error;
 
 use super::figure::Figure;
@@ -83,6 +83,14 @@ pub enum PlotError {
         path: PathBuf,
         /// Why.
         source: PngError,
+    },
+    /// An animation could not be made.
+    #[error("{}: cannot be animated", path.display())]
+    Animation {
+        /// The animation.
+        path: PathBuf,
+        /// Why.
+        source: EncodingError,
     },
     /// A picture could not be written.
     #[error(transparent)]

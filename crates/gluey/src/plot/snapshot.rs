@@ -57,10 +57,10 @@ pub fn snapshot(folder: &Path, choice: FrameChoice, width_mm: f64) -> Result<(Ca
     let one = [file.clone()];
     let width = width_mm * PIXELS_PER_MM;
     let canvas = match dimension(&one)? {
-        2 => Scene::of(&read_frames::<2>(&one)?[0]).draw(width),
-        _ => Scene::of(&read_frames::<3>(&one)?[0]).draw(width),
+        2 => Scene::of(&read_frames::<2>(&one)?[0]).draw_alone(width),
+        _ => Scene::of(&read_frames::<3>(&one)?[0]).draw_alone(width),
     };
-    Ok((canvas, place(file)))
+    Ok((canvas, beside_pictures(file)))
 }
 
 /// The number in `particles-<step>.xyz`.
@@ -74,7 +74,7 @@ fn stem(file: &Path) -> String {
 }
 
 /// Beside the other pictures of the run: `<stem>-plots/particles-<step>` for `<stem>-xyz`.
-fn place(file: &Path) -> PathBuf {
+pub(super) fn beside_pictures(file: &Path) -> PathBuf {
     let folder = file.parent().unwrap_or(Path::new(""));
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let plots = match name.strip_suffix("-xyz") {
@@ -92,8 +92,31 @@ struct Seen {
     is_image: bool,
 }
 
+/// What has room in a drawing: the sides of a rectangle, and the largest speed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    left: f64,
+    right: f64,
+    low: f64,
+    high: f64,
+    fast: f64,
+}
+
+impl View {
+    /// What has room for two of them.
+    pub fn around(self, other: Self) -> Self {
+        Self {
+            left: self.left.min(other.left),
+            right: self.right.max(other.right),
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            fast: self.fast.max(other.fast),
+        }
+    }
+}
+
 /// What is seen of a frame.
-struct Scene {
+pub(super) struct Scene {
     is_flat: bool,
     balls: Vec<Seen>,
     /// Edges of the box, and whether they are periodic borders of the plane.
@@ -102,7 +125,8 @@ struct Scene {
 }
 
 impl Scene {
-    fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
+    /// What is seen of this frame.
+    pub fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
     where
         Dim<D>: Space<D>,
     {
@@ -121,20 +145,30 @@ impl Scene {
         Self { is_flat: D == 2, balls, edges: edges(&container), caption }
     }
 
-    fn draw(&self, width: f64) -> Canvas {
+    /// What has room for all of it.
+    pub fn view(&self) -> View {
         let room = |axis: usize, sign: f64| {
             let balls = self.balls.iter().map(|ball| sign * ball.at[axis] + ball.radius);
             let ends = self.edges.iter().flat_map(|(ends, _)| ends.map(|end| sign * end[axis]));
             sign * balls.chain(ends).fold(f64::NEG_INFINITY, f64::max)
         };
-        let ([left, low], [right, high]) = ([room(0, -1.0), room(1, -1.0)], [room(0, 1.0), room(1, 1.0)]);
+        let fast = self.balls.iter().map(|ball| ball.speed).fold(0.0, f64::max);
+        View { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), fast }
+    }
+
+    fn draw_alone(&self, width: f64) -> Canvas {
+        self.draw(&self.view(), width)
+    }
+
+    /// A drawing that has room for this view.
+    pub fn draw(&self, view: &View, width: f64) -> Canvas {
+        let View { left, right, low, high, fast } = *view;
         // Not higher than wide.
         let scale = (width - 2.0 * MARGIN) / (right - left).max(high - low);
         let shift = MARGIN.max(0.5 * (width - scale * (right - left)));
         let on_paper = |at: [f64; 3]| (shift + scale * (at[0] - left), MARGIN + scale * (high - at[1]));
         let height = scale * (high - low) + MARGIN + LEGEND;
         let mut canvas = Canvas::new(width, height);
-        let fast = self.largest_speed();
         self.draw_edges(&mut canvas, on_paper, false);
         for ball in &self.balls {
             canvas.ball(&Ball {
@@ -146,7 +180,7 @@ impl Scene {
             });
         }
         self.draw_edges(&mut canvas, on_paper, true);
-        self.draw_legend(&mut canvas, width, height - LEGEND);
+        self.draw_legend(&mut canvas, fast, (width, height - LEGEND));
         canvas
     }
 
@@ -161,18 +195,14 @@ impl Scene {
         }
     }
 
-    fn draw_legend(&self, canvas: &mut Canvas, width: f64, top: f64) {
+    fn draw_legend(&self, canvas: &mut Canvas, fast: f64, (width, top): (f64, f64)) {
         let (y, length) = (top + 22.0, 0.3 * width);
         canvas.text(MARGIN, y + 9.0, 15.0, "start", "speed");
         let left = MARGIN + 46.0;
         canvas.color_bar((left, y), (length, 10.0));
         canvas.text(left, y + 25.0, 13.0, "start", "0");
-        canvas.text(left + length, y + 25.0, 13.0, "end", &format!("{:.3}", self.largest_speed()));
+        canvas.text(left + length, y + 25.0, 13.0, "end", &format!("{fast:.3}"));
         canvas.text(width - MARGIN, y + 9.0, 15.0, "end", &self.caption);
-    }
-
-    fn largest_speed(&self) -> f64 {
-        self.balls.iter().map(|ball| ball.speed).fold(0.0, f64::max)
     }
 }
 
@@ -241,6 +271,6 @@ mod tests {
         assert!("first".parse::<FrameChoice>().is_err());
         let file = Path::new("out/pair-xyz/particles-000012.xyz.gz");
         assert_eq!(step_of(file), Some(12));
-        assert_eq!(place(file), Path::new("out/pair-plots/particles-000012"));
+        assert_eq!(beside_pictures(file), Path::new("out/pair-plots/particles-000012"));
     }
 }

@@ -78,6 +78,11 @@ impl ResultPaths {
         self.with(RECORD)
     }
 
+    /// The log, lines for people.
+    pub fn log(&self) -> PathBuf {
+        self.with(".log")
+    }
+
     /// The last checkpoint.
     pub fn checkpoint(&self) -> PathBuf {
         self.with(".checkpoint")

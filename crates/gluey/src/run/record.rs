@@ -207,7 +207,13 @@ impl RecordedOptions {
     }
 }
 
-/// Seconds since 1970 as a date and time in UTC (RFC 3339).
-fn now() -> String {
+/// An error with all its causes.
+pub(super) fn in_full(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+}
+
+/// The date and time in UTC (RFC 3339), to seconds.
+pub(super) fn now() -> String {
     humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::error::RunError;
 use super::options::RunOptions;
 use super::paths::ResultPaths;
-use super::record::{RunRecord, RunState};
+use super::record::{RunRecord, RunState, in_full};
 use crate::case::Case;
 use crate::output::{OutputError, write_atomically};
 use crate::progress::{Notice, Progress};
@@ -74,12 +74,6 @@ impl Recorder {
         }
         outcome
     }
-}
-
-/// An error with all its causes.
-fn in_full(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |cause| cause.source());
-    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 fn write_case(case: &Case, record: &RunRecord, paths: &ResultPaths) -> Result<(), OutputError> {

@@ -14,6 +14,9 @@ def plot(
     *,
     only: Iterable[str] = (),
     frame: int | str | None = None,
+    animation: bool = False,
+    pixels: int = 720,
+    rate: float = 12.0,
     formats: Iterable[str] = ("svg", "png"),
     width_mm: float = 120.0,
 ) -> list[Path]:
@@ -24,9 +27,15 @@ def plot(
     folder
         What runs wrote to.
     only
-        What to draw: ``gaps``, ``trajectories``, ``rheology``; whatever there are results for when absent.
+        What to draw: ``gaps``, ``trajectories``, ``rheology``, ``solver``; whatever there are results for when absent.
     frame
         The particles of a frame instead: ``"last"`` or the number of a step.
+    animation
+        The particles of all frames instead, as ``particles.gif``.
+    pixels
+        Pixels across of the animation, from 100 to 4000.
+    rate
+        Frames a second of the animation, from 0.1 to 50.
     formats
         ``svg``, ``png``.
     width_mm
@@ -46,10 +55,17 @@ def plot(
     """
     if not 60.0 <= width_mm <= 400.0:
         raise ValueError(f"width_mm = {width_mm}: must be a number from 60 to 400")
+    if not 100 <= pixels <= 4000:
+        raise ValueError(f"pixels = {pixels}: must be a whole number from 100 to 4000")
+    if not 0.1 <= rate <= 50.0:
+        raise ValueError(f"rate = {rate}: must be a number from 0.1 to 50")
     options = {
         "folder": os.fspath(folder),
         "only": list(only),
         "frame": None if frame is None else str(frame),
+        "animation": bool(animation),
+        "pixels": int(pixels),
+        "rate": float(rate),
         "formats": list(formats),
         "width_mm": float(width_mm),
     }

@@ -1,0 +1,66 @@
+//! An animation of the particles of all frames of a run.
+
+use std::path::{Path, PathBuf};
+
+use gluey_geom::{Dim, Space};
+use gluey_pictures::{Animation, Canvas, Still};
+use rayon::prelude::*;
+
+use super::error::PlotError;
+use super::snapshot::{Scene, View, beside_pictures};
+use crate::analyse::frames::{dimension, frame_files, read_frames};
+use crate::output::xyz::XyzFrame;
+
+/// Width of the drawings in SVG pixels: the size of their text, whatever their pixels.
+const WIDTH: f64 = 600.0;
+/// Frames that are drawn before they are written.
+const BATCH: usize = 32;
+
+/// What an animation is like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnimationOptions {
+    /// Pixels across.
+    pub pixels: u32,
+    /// Frames a second.
+    pub rate: f64,
+}
+
+/// The animation of all frames of a run as a GIF, and its path: the same scale and the same colours in all.
+pub(super) fn animation(folder: &Path, options: AnimationOptions) -> Result<(Vec<u8>, PathBuf), PlotError> {
+    let files = frame_files(folder)?;
+    let path = beside_pictures(&files[0]).with_file_name("particles.gif");
+    let bytes = match dimension(&files)? {
+        2 => animated(&read_frames::<2>(&files)?, options, &path)?,
+        _ => animated(&read_frames::<3>(&files)?, options, &path)?,
+    };
+    Ok((bytes, path))
+}
+
+fn animated<const D: usize>(
+    frames: &[XyzFrame<D>],
+    options: AnimationOptions,
+    path: &Path,
+) -> Result<Vec<u8>, PlotError>
+where
+    Dim<D>: Space<D>,
+{
+    let views = frames.par_iter().map(|frame| Scene::of(frame).view());
+    let Some(view) = views.reduce_with(View::around) else { return Ok(Vec::new()) };
+    let still = |canvas: &Canvas| {
+        let still = Still::new(canvas, options.pixels);
+        still.map_err(|source| PlotError::Png { path: path.to_owned(), source })
+    };
+    let failed = |source| PlotError::Animation { path: path.to_owned(), source };
+    let mut animation: Option<Animation> = None;
+    for batch in frames.chunks(BATCH) {
+        let draw = |frame: &XyzFrame<D>| still(&Scene::of(frame).draw(&view, WIDTH));
+        let stills = batch.par_iter().map(draw).collect::<Result<Vec<Still>, _>>()?;
+        for still in stills {
+            match &mut animation {
+                None => animation = Some(Animation::new(still, options.rate).map_err(failed)?),
+                Some(animation) => animation.push(still).map_err(failed)?,
+            }
+        }
+    }
+    animation.map_or(Ok(Vec::new()), |animation| animation.into_bytes().map_err(failed))
+}

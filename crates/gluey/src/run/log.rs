@@ -1,0 +1,99 @@
+//! The log of a run, `<stem>.log` beside its results: when it began and went on, where it was every so often,
+//! what it came upon, and how it ended. Lines for people, each with its time in UTC.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use super::error::RunError;
+use super::options::RunOptions;
+use super::paths::ResultPaths;
+use super::record::{in_full, now};
+use crate::case::Case;
+use crate::output::OutputError;
+use crate::output::solver_log::SolverRow;
+use crate::progress::{Notice, Progress, ProgressState};
+use crate::report::RunReport;
+
+/// Time between two lines about where a run is.
+const INTERVAL: Duration = Duration::from_secs(10);
+
+/// Hands on what a run tells, and writes it down.
+pub(super) struct Log<'a> {
+    listener: &'a dyn Progress,
+    file: Option<Mutex<Lines>>,
+}
+
+struct Lines {
+    file: File,
+    told: Instant,
+}
+
+impl Lines {
+    /// That a line is lost, as on a full disk, is no reason to end a run: its rows are.
+    fn add(&mut self, line: &str) {
+        let _ = writeln!(self.file, "{} {line}", now());
+    }
+}
+
+impl<'a> Log<'a> {
+    /// Begins the log of a run that leaves a record, or goes on with that of the run that is resumed.
+    pub fn begin(case: &Case, options: &RunOptions, listener: &'a dyn Progress) -> Result<Self, OutputError> {
+        if options.record.is_none() {
+            return Ok(Self { listener, file: None });
+        }
+        let path = ResultPaths::of_csv(&options.csv).log();
+        let mut open = OpenOptions::new();
+        let opened = match &options.resume {
+            Some(_) => open.create(true).append(true).open(&path),
+            None => open.create(true).write(true).truncate(true).open(&path),
+        };
+        let file = opened.map_err(|error| OutputError::new(&path, "begin the log", error))?;
+        let mut lines = Lines { file, told: Instant::now() };
+        lines.add(&beginning(case, options.resume.as_deref()));
+        Ok(Self { listener, file: Some(Mutex::new(lines)) })
+    }
+
+    /// Writes how the run ended.
+    pub fn end(&self, outcome: &Result<RunReport, RunError>) {
+        self.add(&match outcome {
+            Ok(report) => format!("complete after {} steps", report.steps),
+            Err(error) => in_full(error),
+        });
+    }
+
+    fn add(&self, line: &str) {
+        if let Some(Ok(mut lines)) = self.file.as_ref().map(Mutex::lock) {
+            lines.add(line);
+        }
+    }
+}
+
+impl Progress for Log<'_> {
+    fn report(&self, state: &ProgressState<'_>) {
+        self.listener.report(state);
+        let Some(Ok(mut lines)) = self.file.as_ref().map(Mutex::lock) else { return };
+        if lines.told.elapsed() >= INTERVAL {
+            lines.told = Instant::now();
+            lines.add(&format!("step {}/{}, {state}", state.step, state.steps));
+        }
+    }
+
+    fn step(&self, row: &SolverRow<'_>) {
+        self.listener.step(row);
+    }
+
+    fn notice(&self, notice: &Notice) {
+        self.listener.notice(notice);
+        self.add(&notice.to_string());
+    }
+}
+
+fn beginning(case: &Case, resumed: Option<&Path>) -> String {
+    let (version, threads) = (env!("CARGO_PKG_VERSION"), rayon::current_num_threads());
+    let (name, steps) = (&case.name, case.step_count());
+    let from = resumed.map_or_else(String::new, |path| format!(", goes on from {}", path.display()));
+    format!("gluey {version}: {name}, {steps} steps, {threads} threads{from}")
+}
