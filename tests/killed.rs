@@ -213,7 +213,7 @@ fn without_seconds(path: &Path) -> Vec<u8> {
 fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let is_left_out = |path: &Path| {
         let name = path.to_string_lossy();
-        let parts = ["-run.json", ".checkpoint", ".lock", ".partial-"];
+        let parts = ["-run.json", ".log", ".checkpoint", ".lock", ".partial-"];
         parts.iter().any(|part| name.contains(part))
     };
     let mut folders = vec![PathBuf::new()];
