@@ -197,5 +197,51 @@ fn a_log_says_when_a_run_began_and_how_it_ended() {
     // Another run begins another log.
     succeeds(folder, &["run", CASE, "--force", "--set", "time.step=0.1"]);
     assert_eq!(lines(&log(), "complete after"), 1, "{}", log());
-    assert!(log().contains(&format!("complete after {} steps", record.steps / 2)), "{}", log());
+    assert!(log().contains(&format!("complete after {} steps", record.steps.div_ceil(2))), "{}", log());
+}
+
+/// Names of the files in a folder of frames, sorted.
+fn frames(folder: &Path, label: &str) -> Vec<String> {
+    let entries = fs::read_dir(folder.join(format!("out/{STEM}-{label}"))).expect("a folder");
+    let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("a name"));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_case_has_streams_of_frames_with_intervals_of_their_own() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let streams = r#"
+        [[output]]
+        kind = "xyz"
+        every_strain = 0.25
+        compression = 0
+        [[output]]
+        kind = "vtk"
+        label = "coarse"
+        every = 60
+        [[output]]
+        kind = "xyz"
+        label = "often"
+        every = 10
+    "#;
+    let text = fs::read_to_string(CASE).expect("a case") + streams;
+    fs::write(folder.join("case.toml"), text).expect("a case");
+    let run = ["run", "case.toml", "--set", "time.step=0.1", "--set", "time.end=12"];
+    succeeds(folder, &run);
+    // Steps of 0.1 get to strains of 0.25, 0.5, 0.75, 1, ... in turn.
+    let of_strain = frames(folder, "xyz");
+    let expected = [0, 3, 5, 8, 10, 13].map(|step| format!("particles-{step:06}.xyz"));
+    assert_eq!(of_strain[..6], expected);
+    assert_eq!(of_strain.len(), 49);
+    let of_steps: Vec<String> = (0..=12).map(|frame| format!("particles-{:06}.xyz.gz", 10 * frame)).collect();
+    assert_eq!(frames(folder, "often"), of_steps);
+    let coarse = frames(folder, "coarse");
+    assert_eq!(coarse.iter().filter(|name| name.starts_with("particles-")).count(), 3, "{coarse:?}");
+    // An option takes the place of the stream in the same folder; frames of the run before are gone.
+    succeeds(folder, &[&run[..], &["--force", "--xyz", "40"]].concat());
+    assert_eq!(frames(folder, "xyz"), [0, 40, 80, 120].map(|step| format!("particles-{step:06}.xyz")));
+    assert_eq!(frames(folder, "often"), of_steps);
 }

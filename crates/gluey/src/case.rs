@@ -32,6 +32,7 @@ mod locate;
 mod mesh;
 mod names;
 pub(crate) mod neighbours;
+mod output;
 mod overrides;
 mod particle;
 mod particle_problem;
@@ -50,9 +51,10 @@ pub use gluey_motion::Scheme;
 pub use keys::CaseKey;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{
-    ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, ParticleVelocity, RadiiKind, Solver,
-    UnknownName,
+    ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, OutputKind, ParticleVelocity,
+    RadiiKind, Solver, UnknownName,
 };
+pub use output::{Interval, OutputSpec};
 pub use overrides::{BadOverride, Override};
 pub use particle::ParticleSpec;
 pub use particle_problem::ParticleProblem;
@@ -126,6 +128,9 @@ pub struct Case {
     /// Rheology, in a box that is sheared for ever.
     #[serde(default)]
     pub rheology: RheologySpec,
+    /// Streams of frames to write, for ParaView, OVITO and others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub output: Vec<OutputSpec>,
     /// Seed of the particles that were generated; no key of a case file.
     #[serde(skip)]
     pub seed: Option<u64>,

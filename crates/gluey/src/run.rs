@@ -4,6 +4,7 @@
 
 mod checkpoint_file;
 mod error;
+mod frames;
 mod leftovers;
 mod log;
 mod occupied;
@@ -37,14 +38,13 @@ use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::solver_log::{self, SolverLog, SolverRow};
-use crate::output::vtk::{Frame, FrameWriter, VtkWriter};
-use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::output::{Claim, OutputError};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
+use frames::{Frames, StreamOptions};
 use log::Log;
 use recorder::Recorder;
 use stress::with_contacts;
@@ -56,9 +56,9 @@ const ROUNDING: f64 = 1e-10;
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
     crate::memory::check(case)?;
-    let _claims = claim_outputs(options, progress)?;
+    let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
-    leftovers::remove(options)?;
+    leftovers::remove(case, options)?;
     let log = Log::begin(case, options, progress)?;
     let outcome = match case.dimension {
         2 => run_2d(case, options, &log),
@@ -83,11 +83,11 @@ fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<
 }
 
 /// Makes sure before the first step that files can be written, and that no other run writes them.
-fn claim_outputs(options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
-    let vtk = options.vtk.as_ref().map(|vtk| vtk.folder.as_path());
-    let xyz = options.xyz.as_ref().map(|xyz| xyz.folder.as_path());
-    let results = [Some(options.csv.as_path()), options.checkpoint.as_deref(), vtk, xyz];
-    let claims = results.into_iter().flatten().map(Claim::new).collect::<Result<Vec<_>, _>>()?;
+fn claim_outputs(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
+    let streams = StreamOptions::of_run(case, options);
+    let results = [Some(options.csv.as_path()), options.checkpoint.as_deref()];
+    let results = results.into_iter().flatten().chain(streams.iter().map(|stream| stream.folder.as_path()));
+    let claims = results.map(Claim::new).collect::<Result<Vec<_>, _>>()?;
     for lock in claims.iter().filter_map(Claim::unguarded) {
         progress.notice(&Notice::NotLocked { lock: lock.to_owned() });
     }
@@ -107,8 +107,7 @@ where
     csv: CsvWriter<D>,
     rheology: Option<RheologyWriter>,
     solver: SolverLog,
-    vtk: Option<(usize, FrameWriter<D>)>,
-    xyz: Option<(usize, XyzWriter)>,
+    frames: Frames<D>,
     checkpoints: Option<CheckpointFile>,
     recorder: Option<Recorder>,
     /// The run before the step that is being done, where checkpoints are written.
@@ -162,8 +161,7 @@ where
             }
         };
         let first_step = simulation.step_index();
-        let vtk = options.vtk.as_ref().map(|vtk| vtk_writer(vtk, first_step, case.time.step)).transpose()?;
-        let xyz = options.xyz.as_ref().map(xyz_writer).transpose()?;
+        let frames = Frames::create(case, options, first_step)?;
         let recorder = Recorder::begin(case, options, first_step)?;
         let (started, last_good) = (Instant::now(), None);
         Ok(Self {
@@ -175,8 +173,7 @@ where
             csv,
             rheology,
             solver,
-            vtk,
-            xyz,
+            frames,
             checkpoints,
             recorder,
             last_good,
@@ -198,10 +195,10 @@ where
     }
 
     /// Gives all files their names.
-    fn complete(mut self) -> Result<RunReport, RunError> {
-        self.vtk.take().map_or(Ok(()), |(_, frames)| frames.finish())?;
+    fn complete(self) -> Result<RunReport, RunError> {
         let wall_s = self.wall_s();
         let flow = self.simulation.statistics();
+        self.frames.finish()?;
         self.csv.finish()?;
         self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
         self.solver.finish()?;
@@ -262,24 +259,7 @@ where
         }
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
-        match &mut self.vtk {
-            Some((every, frames)) if step.is_multiple_of(*every) => {
-                let (contacts, fields) = (simulation.contacts(), None);
-                let frame = Frame { step, time, particles, twists, contacts, domain, fields };
-                frames.write(&frame, simulation.fields())?;
-            }
-            _ => {}
-        }
-        match &self.xyz {
-            Some((every, writer)) if step.is_multiple_of(*every) => {
-                let strain = self.case.strain_after(step);
-                let container = self.case.container();
-                let height = container.bounds().extent()[1];
-                let container = container.tilted(simulation.strain() * height);
-                writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
-            }
-            _ => {}
-        }
+        self.frames.write(self.case, simulation)?;
         Ok(())
     }
 
@@ -357,7 +337,7 @@ where
         self.csv.sync()?;
         self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
         self.solver.sync()?;
-        self.vtk.as_mut().map_or(Ok(()), |(_, frames)| frames.flush())?;
+        self.frames.flush()?;
         file.write(checkpoint, self.case, self.progress)?;
         let step = checkpoint.state.step;
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.reached(step))
@@ -434,26 +414,6 @@ where
         height: case.upper()[1] - case.lower()[1],
         stress_every: case.rheology.every,
     })
-}
-
-/// The writer of frames and its interval.
-fn xyz_writer(options: &XyzOptions) -> Result<(usize, XyzWriter), OutputError> {
-    Ok((options.every.max(1), XyzWriter::create(&options.folder, options.gzip)?))
-}
-
-/// The writer and its interval; of the steps done, those with files stay listed.
-fn vtk_writer<const D: usize>(
-    options: &VtkOptions,
-    step: usize,
-    dt: f64,
-) -> Result<(usize, FrameWriter<D>), OutputError>
-where
-    Dim<D>: Space<D>,
-{
-    let every = options.every.max(1);
-    let done: Vec<(usize, f64)> = (0..step).step_by(every).map(|step| (step, step as f64 * dt)).collect();
-    let writer = VtkWriter::create(&options.folder, &done)?.encoded(options.encoding);
-    Ok((every, FrameWriter::new(writer)?))
 }
 
 /// The particles of a checked case.

@@ -126,7 +126,7 @@ mod tests {
     fn every_key_states_its_unit_and_its_default() {
         let keys = Case::keys();
         assert!(keys.len() > 50, "{}", keys.len());
-        let needed = ["name", "dimension", "position", "radius", "step", "end"];
+        let needed = ["name", "dimension", "position", "radius", "step", "end", "kind"];
         for key in &keys {
             let is_number = key.values.contains("number");
             assert_eq!(key.unit.is_some(), is_number, "{key:?}");

@@ -32,6 +32,12 @@ impl UnknownName {
     }
 }
 
+/// Whether a name can be part of that of a file: letters, digits, `-` and `_`, at most 64 of them.
+pub(super) fn is_file_name(name: &str) -> bool {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    !name.is_empty() && name.len() <= 64 && name.chars().all(fits)
+}
+
 /// A text that is one of `names`: of a type that other crates have.
 pub(super) fn schema_of_names<T: Serialize>(names: &[T]) -> Schema {
     schemars::json_schema!({ "type": "string", "enum": names })
@@ -112,6 +118,17 @@ named! {
         Stokes = "stokes",
         /// Two equal spheres in unbounded shear flow (Batchelor and Green 1972); 3D only.
         PairMobility = "pair-mobility",
+    }
+}
+
+named! {
+    /// Format of a stream of frames.
+    OutputKind, "kind" {
+        /// Flow, particles and contacts for ParaView, VTK and meshio.
+        #[default]
+        Vtk = "vtk",
+        /// Particles in extended XYZ, for OVITO and ASE.
+        Xyz = "xyz",
     }
 }
 

@@ -3,8 +3,9 @@
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::findings::Findings;
-use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication};
+use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
 use super::neighbours::{Neighbours, nearer_than};
+use super::output::check_output;
 use super::particle_problem::ParticleProblem;
 use super::{Case, fill};
 use crate::reference::Reference;
@@ -29,6 +30,9 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     if findings.are_good(&["time"]) {
         check_time(case, &root.name("time"), findings);
     }
+    if findings.are_good(&["output", "shear_rate"]) {
+        check_output(case, &root.name("output"), findings);
+    }
 }
 
 /// Notes what does not fit together in a case whose particles are there.
@@ -46,8 +50,7 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
 }
 
 fn check_name(name: &str, key: Key, findings: &mut Findings) {
-    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
+    if !is_file_name(name) {
         findings.add(key, Problem::BadName);
     }
 }

@@ -4,8 +4,10 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use super::frames::StreamOptions;
 use super::options::RunOptions;
 use super::paths::ResultPaths;
+use crate::case::Case;
 use crate::output::{OutputError, drafts, undrafted};
 
 /// Series of frames, by the beginnings of their names.
@@ -13,14 +15,18 @@ const SERIES: [&str; 3] = ["fields", "particles", "contacts"];
 
 /// Removes half files that killed runs left, and the frames of a run that this one replaces. Rows are never
 /// among them, nor any file that no run writes. The results are claimed: no other run writes them now.
-pub(super) fn remove(options: &RunOptions) -> Result<(), OutputError> {
+pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), OutputError> {
     let Some(record) = options.record else { return Ok(()) };
     let paths = ResultPaths::of_csv(&options.csv);
     for whole in [paths.record(), paths.case_file(), paths.checkpoint(), paths.previous_checkpoint()] {
         drafts(&whole)?.iter().try_for_each(|draft| remove_file(draft))?;
     }
     let replaces = record.force && options.resume.is_none();
-    [paths.vtk(), paths.xyz()].iter().try_for_each(|folder| remove_frames(folder, replaces))
+    let streams = StreamOptions::of_run(case, options).into_iter().map(|stream| stream.folder);
+    let mut folders: Vec<_> = [paths.vtk(), paths.xyz()].into_iter().chain(streams).collect();
+    folders.sort();
+    folders.dedup();
+    folders.iter().try_for_each(|folder| remove_frames(folder, replaces))
 }
 
 /// Removes half frames from a folder, and whole ones if asked to; the folder itself stays.

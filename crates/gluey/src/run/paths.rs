@@ -102,12 +102,17 @@ impl ResultPaths {
 
     /// The folder of files for ParaView.
     pub fn vtk(&self) -> PathBuf {
-        self.with("-vtk")
+        self.frames("vtk")
     }
 
     /// The folder of files in extended XYZ.
     pub fn xyz(&self) -> PathBuf {
-        self.with("-xyz")
+        self.frames("xyz")
+    }
+
+    /// The folder of a stream of frames with this label.
+    pub fn frames(&self, label: &str) -> PathBuf {
+        self.with(&format!("-{label}"))
     }
 
     fn with(&self, suffix: &str) -> PathBuf {

@@ -1,0 +1,129 @@
+//! What a case says of frames to write.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::{Deserialize, Serialize};
+
+use super::Case;
+use super::error::{Key, Problem};
+use super::findings::Findings;
+use super::names::{self, OutputKind};
+use crate::output::vtk::Precision;
+
+/// A stream of frames, beside the tables that every run writes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSpec {
+    /// Format of the frames.
+    pub kind: OutputKind,
+    /// The frames go to the folder `<run>-<label>` beside the trajectory: letters, digits, `-` and `_`, at most
+    /// 64 of them, other than those of the other streams. Default: the kind.
+    #[serde(default)]
+    #[schemars(regex(pattern = "^[A-Za-z0-9_-]{1,64}$"))]
+    pub label: Option<String>,
+    /// A frame every so many steps. Unit: steps. Default: none, `every_strain` says when.
+    #[serde(default)]
+    #[schemars(range(min = 1))]
+    pub every: Option<usize>,
+    /// A frame whenever the sheared distance has grown by so much strain, forth or back, at the first step that
+    /// gets there. Unit: none. Default: none, `every` says when.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub every_strain: Option<f64>,
+    /// Whether the flow on the mesh is written (kind `vtk`), or particles and contacts alone. Default: true.
+    #[serde(default = "yes")]
+    pub fields: bool,
+    /// Compression, from 0 (none) over 1 (fast) to 9 (small); of kind `xyz` 0 or any. Unit: none. Default: 1.
+    #[serde(default = "fast")]
+    #[schemars(range(min = 0, max = 9))]
+    pub compression: u32,
+    /// Precision of kind `vtk`: as computed (`f64`) or half the size (`f32`). Default: "f64".
+    #[serde(default = "double")]
+    #[schemars(schema_with = "precisions")]
+    pub precision: Precision,
+}
+
+/// When a frame is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Interval {
+    /// Every so many steps.
+    Steps(usize),
+    /// Whenever the strain, forth or back, has grown by this.
+    Strain(f64),
+}
+
+impl OutputSpec {
+    /// What its folder is called behind the name of the run.
+    pub fn label(&self) -> &str {
+        self.label.as_deref().unwrap_or(self.kind.name())
+    }
+
+    /// When its frames are written; every step if nothing is said, which no checked case does.
+    pub fn interval(&self) -> Interval {
+        match (self.every, self.every_strain) {
+            (None, Some(strain)) => Interval::Strain(strain),
+            (every, _) => Interval::Steps(every.unwrap_or(1)),
+        }
+    }
+}
+
+impl Interval {
+    /// Whether there is a frame at the beginning of this step of the case.
+    pub fn is_due(self, case: &Case, step: usize) -> bool {
+        match self {
+            Self::Steps(every) => step.is_multiple_of(every.max(1)),
+            Self::Strain(every) => {
+                let a_step = case.shear_rate.abs() * case.time.step / every;
+                let frames = |step: usize| (a_step * step as f64 + 1e-9).floor();
+                step == 0 || frames(step) > frames(step - 1)
+            }
+        }
+    }
+}
+
+/// Notes streams without or with two intervals, and those that would write over each other.
+pub(super) fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
+    for (index, output) in case.output.iter().enumerate() {
+        let key = key.index(index);
+        let mut unfit = |name: &str, choice: String, needs: &str, found: String| {
+            findings.add(key.name(name), Problem::Unfit { choice, needs: needs.to_owned(), found });
+        };
+        let choice = format!("output {}", index + 1);
+        match (output.every, output.every_strain) {
+            (None, None) => unfit("kind", choice, "either `every` or `every_strain`", "neither".to_owned()),
+            (Some(_), Some(_)) => {
+                unfit("every", choice, "either `every` or `every_strain`", "both".to_owned())
+            }
+            (None, Some(_)) if case.shear_rate == 0.0 => {
+                let needs = "a shear rate that is not 0";
+                unfit("every_strain", "every_strain".to_owned(), needs, "shear_rate = 0".to_owned());
+            }
+            _ => {}
+        }
+        let label = output.label();
+        let before = case.output[..index].iter().position(|other| other.label() == label);
+        if let Some(before) = before {
+            let name = if output.label.is_some() { "label" } else { "kind" };
+            let found = format!("that of output {}", before + 1);
+            unfit(name, format!("label = \"{label}\""), "a label of its own", found);
+        }
+        if !names::is_file_name(label) {
+            findings.add(key.name("label"), Problem::BadName);
+        }
+    }
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn fast() -> u32 {
+    1
+}
+
+fn double() -> Precision {
+    Precision::Double
+}
+
+fn precisions(_: &mut SchemaGenerator) -> Schema {
+    names::schema_of_names(&[Precision::Double, Precision::Single])
+}

@@ -1,0 +1,151 @@
+//! The streams of frames of a run: those of the case, and those that the options ask for.
+
+use std::path::{Path, PathBuf};
+
+use gluey_contact::{ContactModel, PairContact};
+use gluey_geom::{Dim, Space};
+
+use super::options::{RunOptions, VtkOptions, XyzOptions};
+use super::paths::ResultPaths;
+use crate::case::{Case, Interval, OutputKind};
+use crate::output::OutputError;
+use crate::output::vtk::{Frame, FrameWriter, VtkEncoding, VtkWriter};
+use crate::output::xyz::{XyzFrame, XyzWriter};
+use crate::simulation::Simulation;
+
+/// A stream of frames that a run is to write.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct StreamOptions {
+    pub folder: PathBuf,
+    interval: Interval,
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Format {
+    Vtk { encoding: VtkEncoding, with_fields: bool },
+    Xyz { gzip: bool },
+}
+
+impl StreamOptions {
+    /// All streams of a run. One that the options ask for takes the place of the case's with its folder.
+    pub fn of_run(case: &Case, options: &RunOptions) -> Vec<Self> {
+        let paths = ResultPaths::of_csv(&options.csv);
+        let asked = [options.vtk.as_ref().map(Self::vtk), options.xyz.as_ref().map(Self::xyz)];
+        let asked: Vec<Self> = asked.into_iter().flatten().collect();
+        let of_case = case.output.iter().map(|output| Self {
+            folder: paths.frames(output.label()),
+            interval: output.interval(),
+            format: match output.kind {
+                OutputKind::Vtk => Format::Vtk {
+                    encoding: VtkEncoding { compression: output.compression, precision: output.precision },
+                    with_fields: output.fields,
+                },
+                OutputKind::Xyz => Format::Xyz { gzip: output.compression > 0 },
+            },
+        });
+        let others = of_case.filter(|stream| asked.iter().all(|other| other.folder != stream.folder));
+        others.chain(asked.iter().cloned()).collect()
+    }
+
+    fn vtk(options: &VtkOptions) -> Self {
+        let format = Format::Vtk { encoding: options.encoding, with_fields: true };
+        Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
+    }
+
+    fn xyz(options: &XyzOptions) -> Self {
+        let format = Format::Xyz { gzip: options.gzip };
+        Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
+    }
+}
+
+/// The streams of a run that is going on.
+pub(super) struct Frames<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    streams: Vec<(Interval, Stream<D>)>,
+}
+
+enum Stream<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    Vtk { writer: FrameWriter<D>, with_fields: bool },
+    Xyz(XyzWriter),
+}
+
+impl<const D: usize> Frames<D>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+{
+    /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
+    pub fn create(case: &Case, options: &RunOptions, step: usize) -> Result<Self, OutputError> {
+        let stream = |stream: StreamOptions| {
+            let StreamOptions { folder, interval, format } = stream;
+            let opened = match format {
+                Format::Xyz { gzip } => Stream::Xyz(XyzWriter::create(&folder, gzip)?),
+                Format::Vtk { encoding, with_fields } => {
+                    let writer = vtk_writer(case, &folder, interval, step)?.encoded(encoding);
+                    Stream::Vtk { writer: FrameWriter::new(writer)?, with_fields }
+                }
+            };
+            Ok((interval, opened))
+        };
+        let streams = StreamOptions::of_run(case, options).into_iter().map(stream);
+        Ok(Self { streams: streams.collect::<Result<_, _>>()? })
+    }
+
+    /// Writes what is due of the simulation as it is.
+    pub fn write<H>(
+        &mut self,
+        case: &Case,
+        simulation: &Simulation<D, H, PairContact<D>>,
+    ) -> Result<(), OutputError>
+    where
+        H: gluey_motion::Hydrodynamics<D>,
+    {
+        let (step, time) = (simulation.step_index(), simulation.time());
+        let (particles, twists) = (simulation.particles(), simulation.twists());
+        for (_, stream) in self.streams.iter_mut().filter(|(interval, _)| interval.is_due(case, step)) {
+            match stream {
+                Stream::Vtk { writer, with_fields } => {
+                    let (contacts, domain) = (simulation.contacts(), simulation.contact().domain());
+                    let frame = Frame { step, time, particles, twists, contacts, domain, fields: None };
+                    writer.write(&frame, with_fields.then(|| simulation.fields()).flatten())?;
+                }
+                Stream::Xyz(writer) => {
+                    let container = case.container();
+                    let height = container.bounds().extent()[1];
+                    let container = container.tilted(simulation.strain() * height);
+                    let strain = case.strain_after(step);
+                    writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns when all frames are on disk.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        self.streams.iter_mut().try_for_each(|(_, stream)| match stream {
+            Stream::Vtk { writer, .. } => writer.flush(),
+            Stream::Xyz(_) => Ok(()),
+        })
+    }
+
+    /// Ends all streams when their frames are on disk.
+    pub fn finish(self) -> Result<(), OutputError> {
+        self.streams.into_iter().try_for_each(|(_, stream)| match stream {
+            Stream::Vtk { writer, .. } => writer.finish(),
+            Stream::Xyz(_) => Ok(()),
+        })
+    }
+}
+
+fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, OutputError> {
+    let done = (0..step).filter(|&step| interval.is_due(case, step));
+    let done: Vec<(usize, f64)> = done.map(|step| (step, step as f64 * case.time.step)).collect();
+    VtkWriter::create(folder, &done)
+}
