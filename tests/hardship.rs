@@ -1,5 +1,6 @@
-//! What machines do to a run: disks that are full, limits, threads that panic. The last checkpoint stays whole,
-//! the message names the file, and what is gone on with ends with the bits of a run that nothing stopped.
+//! What machines do to a run: disks that are full, limits, threads that panic. The last checkpoint stays
+//! whole, the message names the file, and what is gone on with ends with the bits of a run that nothing
+//! stopped.
 #![cfg(unix)]
 
 use std::fs;
@@ -154,7 +155,7 @@ fn a_case_beyond_a_limit_of_memory_is_refused() {
 fn a_case_beyond_the_limit_of_the_shell_is_refused() {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("discs.toml"), DISCS).expect("a file");
-    let fine = "--set flow.mesh.cells_per_radius=400.0";
+    let fine = "--set flow.mesh.cells_per_radius=1000.0";
     let output = shell(folder.path(), &format!("ulimit -v 1000000; $GLUEY run discs.toml {fine}"));
     assert_eq!(output.status.code(), Some(1));
     says(&output, &["of memory; ", " MB are there", "fewer cells per radius"]);

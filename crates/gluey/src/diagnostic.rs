@@ -119,9 +119,23 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
-        RunError::Case(CaseError::Read { .. }) => "give the path of a case file".into(),
+        RunError::Case(CaseError::Read { path, .. }) => unread_hint(path),
         _ => return None,
     })
+}
+
+/// What may have been meant by a path that is no case file.
+fn unread_hint(path: &Path) -> String {
+    let with_ending = path.with_added_extension("toml");
+    if with_ending.is_file() {
+        return format!("did you mean {}?", with_ending.display());
+    }
+    let more = match (path.is_dir(), path.exists()) {
+        (true, _) => format!("; to go on with a run: gluey resume {}", path.display()),
+        (_, true) => String::new(),
+        _ => "; `gluey new NAME` writes one to begin with".into(),
+    };
+    format!("give the path of a case file{more}")
 }
 
 /// Whether there is no more room: on the disk, in what a user may take of it, or in a file.
