@@ -1,5 +1,5 @@
-//! The examples run, and what the tutorial (docs/tutorial/suspension-solver.md) says of them holds for the first
-//! steps.
+//! The examples run, and what the tutorial (docs/tutorial/suspension-solver.md) says of them holds for the
+//! first steps.
 
 #[path = "../crates/gluey/examples/suspension_solver.rs"]
 mod suspension_solver;
@@ -19,8 +19,8 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
     std::iter::from_fn(|| lines.next().and_then(numbers)).collect()
 }
 
-/// The encounter goes on to time 2, when the line of centres has not yet turned by 90 degrees. The page has the
-/// same numbers, to the digits it shows.
+/// The encounter goes on to time 2, when the line of centres has not yet turned by 90 degrees. The page has
+/// the same numbers, to the digits it shows.
 #[test]
 fn soft_discs_overlap_and_those_with_contact_or_a_film_do_not() {
     let gaps = methods().map(|method| {
