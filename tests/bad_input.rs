@@ -133,6 +133,20 @@ fn files_that_cannot_be_read() {
     let (code, stderr) = gluey(folder.path(), &["run", "nowhere.toml"]);
     assert_eq!(code, Some(1));
     assert!(stderr.contains("nowhere.toml: cannot be read"), "{stderr}");
+    assert!(stderr.contains("`gluey new NAME` writes one"), "{stderr}");
+    fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
+    fs::create_dir(folder.path().join("out")).expect("a folder");
+    for (arguments, expected) in [
+        (["run", "case"], "did you mean case.toml?"),
+        (["check", "out"], "to go on with a run: gluey resume out"),
+        (["plot", "case.toml"], "give the folder that a run wrote to"),
+        (["view", "elsewhere"], "give the folder that a run wrote to"),
+        (["analyse", "elsewhere"], "give the folder that a run wrote to"),
+    ] {
+        let (code, stderr) = gluey(folder.path(), &arguments);
+        assert_eq!(code, Some(1));
+        assert!(stderr.contains(expected), "{stderr}");
+    }
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).expect("a file");
     let (code, stderr) = gluey(folder.path(), &["run", "binary.toml"]);
     assert_eq!(code, Some(1));

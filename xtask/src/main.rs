@@ -1,6 +1,6 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
 //! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask keys`, `cargo xtask fuzz`,
-//! `cargo xtask python`, `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask python`, `cargo xtask mdbook`, `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
@@ -9,6 +9,7 @@ mod ci;
 mod figures;
 mod fuzz;
 mod keys;
+mod mdbook;
 mod python;
 mod reproduce;
 mod study;
@@ -59,6 +60,12 @@ enum Task {
         /// The interpreter, instead of the first python3 or python.
         #[arg(long, value_name = "PROGRAM")]
         python: Option<PathBuf>,
+    },
+    /// Prepare the pages of the book for mdBook, which calls this (docs/book.toml).
+    #[command(hide = true)]
+    Mdbook {
+        /// What mdBook asks.
+        words: Vec<OsString>,
     },
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
@@ -120,6 +127,7 @@ fn main() -> ExitCode {
         Task::Keys => outcome(keys::write(&workspace_root())),
         Task::Fuzz(options) => outcome(fuzz::run(&workspace_root(), &options)),
         Task::Python { python } => outcome(python::run(&workspace_root(), python.as_deref())),
+        Task::Mdbook { words } => outcome(mdbook::run(&words)),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }

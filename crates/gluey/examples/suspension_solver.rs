@@ -25,7 +25,8 @@ fn shear(x: &Vector<2>) -> Vector<2> {
 
 /// One way to compute the encounter.
 pub struct Method {
-    name: &'static str,
+    /// What it is, as it is printed.
+    pub name: &'static str,
     formulation: Formulation,
     refinement: Refinement,
     has_contact: bool,
@@ -48,9 +49,10 @@ pub fn methods() -> [Method; 3] {
 
 /// Where the pair is at one time.
 pub struct Instant {
-    time: f64,
+    /// In units of the inverse shear rate.
+    pub time: f64,
     /// Angle of the line of centres below the x axis, in degrees.
-    angle: f64,
+    pub angle: f64,
     /// Gap between the surfaces, in radii.
     pub gap: f64,
     /// Memory of the contact, in squares of the radius.

@@ -120,7 +120,8 @@ pub struct AnalyseArguments {
 
 impl AnalyseArguments {
     fn run(&self) -> Result<(), Failure> {
-        let summary = gluey::analyse::analyse(&self.options()).map_err(|error| Failure::new(error, None))?;
+        let summary = gluey::analyse::analyse(&self.options())
+            .map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_summary(&summary);
         Ok(())
     }

@@ -1,10 +1,11 @@
 //! Errors as the terminal shows them: what, where in the case file, and what would be right.
 
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
-use gluey::{CaseError, CheckpointError, CheckpointSummary, ResultPaths, RowsError, RunError};
+use gluey::{CaseError, CheckpointError, CheckpointSummary, OutputError, ResultPaths, RowsError, RunError};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -83,10 +84,19 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
             format!("to go on: {}", go_on(checkpoint))
         }
         RunError::Stopped { checkpoint, cause, .. } => {
-            let cure = hint(cause, case).map_or(String::new(), |cure| format!("{cure}; "));
+            let cure = match &**cause {
+                RunError::Output(error) if is_full(error) => Some("make room on that disk".into()),
+                RunError::Output(_) => Some("see to it that the file can be written".into()),
+                cause => hint(cause, case),
+            };
+            let cure = cure.map_or(String::new(), |cure| format!("{cure}; "));
             format!("{cure}then, to go on: {}", go_on(checkpoint))
         }
+        RunError::Output(error) if is_full(error) => full_disk_hint(error),
         RunError::Output(_) => "choose a folder that can be written to with --out DIR".into(),
+        RunError::Panicked { .. } => {
+            "this is a fault of gluey, not of the case: report it with the case file and the lines above".into()
+        }
         RunError::InUse(_) => {
             "wait until that run has ended, end it, or write elsewhere with --out DIR".into()
         }
@@ -103,12 +113,47 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
                                      (y), not from open sides"
                 .into()
         }
+        RunError::TooLarge(too_large) if too_large.limit.is_some() => {
+            "raise --memory-limit, or take fewer cells per radius (flow.mesh.cells_per_radius)".into()
+        }
         RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
-        RunError::Case(CaseError::Read { .. }) => "give the path of a case file".into(),
+        RunError::Case(CaseError::Read { path, .. }) => unread_hint(path),
         _ => return None,
     })
+}
+
+/// What may have been meant by a path that is no case file.
+fn unread_hint(path: &Path) -> String {
+    let with_ending = path.with_added_extension("toml");
+    if with_ending.is_file() {
+        return format!("did you mean {}?", with_ending.display());
+    }
+    let more = match (path.is_dir(), path.exists()) {
+        (true, _) => format!("; to go on with a run: gluey resume {}", path.display()),
+        (_, true) => String::new(),
+        _ => "; `gluey new NAME` writes one to begin with".into(),
+    };
+    format!("give the path of a case file{more}")
+}
+
+/// Whether there is no more room: on the disk, in what a user may take of it, or in a file.
+fn is_full(error: &OutputError) -> bool {
+    matches!(error.source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
+}
+
+/// What to do about a full disk: an older checkpoint may still be there.
+fn full_disk_hint(error: &OutputError) -> String {
+    let folder = error.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    let runs = ResultPaths::in_folder(folder).unwrap_or_default();
+    match runs.iter().any(|run| run.checkpoint().exists()) {
+        true => format!(
+            "make room on that disk; then, to go on from the last checkpoint: gluey resume {}",
+            folder.display()
+        ),
+        false => "make room on that disk, or choose a folder on another one with --out DIR".into(),
+    }
 }
 
 /// The command that goes on from `from`, which is `checkpoint` or the one before it.

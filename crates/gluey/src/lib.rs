@@ -65,3 +65,18 @@ pub use trajectory::Row;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The example of the README of the repository.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct ReadmeOfAll;
+
+/// The page of the book on another contact law.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/tutorial/contact-law.md")]
+struct ContactLawTutorial;
+
+/// The page of the book on another flow.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/tutorial/hydrodynamics.md")]
+struct HydrodynamicsTutorial;

@@ -15,20 +15,33 @@ const MOST_UNKNOWNS: f64 = u32::MAX as f64;
 /// A case that needs more memory than there is.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error(
-    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {:.1} GB of memory; {}",
-    .estimate.cell_count, .estimate.unknown_count, .estimate.bytes / 1e9, there(*.available)
+    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {} of memory; {}",
+    .estimate.cell_count, .estimate.unknown_count, size(.estimate.bytes), there(*.available, *.limit)
 )]
 pub struct TooLarge {
     /// Size of its mesh.
     pub estimate: MeshEstimate,
     /// Bytes there are, if that is known.
     pub available: Option<u64>,
+    /// Bytes it may take, if that was limited.
+    pub limit: Option<u64>,
 }
 
-fn there(available: Option<u64>) -> String {
-    match available {
-        Some(bytes) => format!("{:.1} GB are there", bytes as f64 / 1e9),
-        None => "at most 2^32 - 1 can be numbered".into(),
+fn there(available: Option<u64>, limit: Option<u64>) -> String {
+    match (available, limit) {
+        (_, Some(limit)) if available.is_none_or(|bytes| limit <= bytes) => {
+            format!("the limit is {}", size(limit as f64))
+        }
+        (Some(bytes), _) => format!("{} are there", size(bytes as f64)),
+        (None, _) => "at most 2^32 - 1 can be numbered".into(),
+    }
+}
+
+/// An amount of memory in words.
+pub fn size(bytes: f64) -> String {
+    match bytes {
+        ..1e9 => format!("{:.0} MB", bytes / 1e6),
+        _ => format!("{:.1} GB", bytes / 1e9),
     }
 }
 
@@ -38,9 +51,18 @@ fn there(available: Option<u64>) -> String {
 /// # Errors
 /// [`TooLarge`] with the size expected.
 pub fn check(case: &Case) -> Result<(), TooLarge> {
+    check_within(case, None)
+}
+
+/// The same, where no more than `limit` bytes may be taken however much there is.
+///
+/// # Errors
+/// [`TooLarge`] with the size expected.
+pub fn check_within(case: &Case, limit: Option<u64>) -> Result<(), TooLarge> {
     let available = available();
+    let least = available.into_iter().chain(limit).min();
     match MeshEstimate::of(case) {
-        Some(estimate) if !fits(&estimate, available) => Err(TooLarge { estimate, available }),
+        Some(estimate) if !fits(&estimate, least) => Err(TooLarge { estimate, available, limit }),
         _ => Ok(()),
     }
 }
@@ -50,14 +72,27 @@ fn fits(estimate: &MeshEstimate, available: Option<u64>) -> bool {
     enough && estimate.unknown_count <= MOST_UNKNOWNS
 }
 
-/// Bytes this process may still take: what the machine has left, and what its control groups leave it. Linux
-/// only.
+/// Bytes this process may still take: what the machine has left, and what its control groups and the limit of
+/// its address space (`ulimit -v`) leave it. Linux only.
 pub fn available() -> Option<u64> {
     let read = |path: &Path| fs::read_to_string(path).ok();
     let machine = read(Path::new("/proc/meminfo")).and_then(|text| bytes_of("MemAvailable:", &text));
     let groups = read(Path::new("/proc/self/cgroup")).unwrap_or_default();
     let limits = group_folders(&groups).into_iter().filter_map(|folder| group_rest(&folder, read));
-    machine.into_iter().chain(limits).min()
+    let of_shell = read(Path::new("/proc/self/limits")).zip(read(Path::new("/proc/self/status")));
+    let of_shell = of_shell.and_then(|(limits, status)| address_space_rest(&limits, &status));
+    machine.into_iter().chain(limits).chain(of_shell).min()
+}
+
+/// The share of an address space that can be filled: allocators and threads reserve more than they use.
+const FILLED: f64 = 0.75;
+
+/// What the limit of the address space leaves to be filled; `None` without a limit.
+fn address_space_rest(limits: &str, status: &str) -> Option<u64> {
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit: u64 = line.split_whitespace().next()?.parse().ok()?;
+    let rest = limit.saturating_sub(bytes_of("VmSize:", status).unwrap_or(0));
+    Some((FILLED * rest as f64) as u64)
 }
 
 /// The most bytes this process has held so far. Linux only.
@@ -144,6 +179,22 @@ mod tests {
         assert_eq!(group_rest("g", files("1000\n", "3000\n")), Some(0));
         assert_eq!(group_rest("g", files("max\n", "3000\n")), None);
         assert_eq!(group_rest("h", files("1000\n", "300\n")), None);
+    }
+
+    #[test]
+    fn a_shell_leaves_part_of_its_limit_less_what_is_mapped() {
+        let limits = |soft: &str| {
+            format!("Limit  Soft Limit\nMax address space         {soft}      unlimited      bytes\n")
+        };
+        let status = "VmPeak:\t  900 kB\nVmSize:\t  100 kB\n";
+        assert_eq!(address_space_rest(&limits("1024000"), status), Some(691_200));
+        assert_eq!(address_space_rest(&limits("unlimited"), status), None);
+        assert_eq!(address_space_rest("", status), None);
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!((size(20.4e6), size(2.04e9)), ("20 MB".to_owned(), "2.0 GB".to_owned()));
     }
 
     #[test]

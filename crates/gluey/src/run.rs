@@ -16,6 +16,8 @@ mod recorder;
 mod resumption;
 mod stress;
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -55,7 +57,7 @@ const ROUNDING: f64 = 1e-10;
 /// Runs `case`, writes what `options` ask for and reports to `progress`.
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
-    crate::memory::check(case)?;
+    crate::memory::check_within(case, options.memory_limit)?;
     let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
@@ -186,7 +188,7 @@ where
 
     /// Runs to the end.
     fn finish(mut self) -> Result<RunReport, RunError> {
-        let outcome = self.all_steps().map_err(|error| self.keep_last_good(error));
+        let outcome = self.steps_or_panic().map_err(|error| self.keep_last_good(error));
         let Some(recorder) = self.recorder.take() else { return outcome.and_then(|()| self.complete()) };
         let done = self.last_good.as_ref().map(|checkpoint| checkpoint.state.step);
         let step = done.unwrap_or(self.simulation.step_index());
@@ -203,6 +205,16 @@ where
         self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
         self.solver.finish()?;
         Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
+    }
+
+    /// All steps. A panic of this or any other thread ends them as an error does; what it left half done is
+    /// not used, for checkpoints are of the step before.
+    fn steps_or_panic(&mut self) -> Result<(), RunError> {
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.all_steps()));
+        outcome.unwrap_or_else(|payload| {
+            let (step, time) = (self.simulation.step_index(), self.simulation.time());
+            Err(RunError::Panicked { step, time, message: panic_message(payload.as_ref()) })
+        })
     }
 
     fn all_steps(&mut self) -> Result<(), RunError> {
@@ -346,7 +358,10 @@ where
     /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good
     /// step.
     fn keep_last_good(&mut self, error: RunError) -> RunError {
-        let is_curable = matches!(error, RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_));
+        let is_curable = matches!(
+            error,
+            RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_) | RunError::Panicked { .. }
+        );
         let step = self.last_good.as_ref().map_or(0, |checkpoint| checkpoint.state.step);
         let Some(path) = self.options.checkpoint.clone().filter(|_| is_curable && step > 0) else {
             return error;
@@ -372,6 +387,12 @@ where
     fn wall_s(&self) -> f64 {
         self.wall_before_s + self.started.elapsed().as_secs_f64()
     }
+}
+
+/// What a panic said.
+fn panic_message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no message").to_owned()
 }
 
 /// Brings a simulation and its measures to where `checkpoint`, which was read from `path`, is, and gives the

@@ -23,8 +23,9 @@ def blocks(path: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", [ROOT / "README.md", HERE / "README.md"], ids=["repository", "package"])
-def test_readme_blocks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["README.md", "crates/python/README.md", "docs/python.md"])
+def test_blocks_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = ROOT / name
     found = blocks(path)
     assert found, f"{path} has no block of Python"
     monkeypatch.chdir(tmp_path)

@@ -8,6 +8,7 @@ use std::time::Instant;
 use clap::Args;
 use gluey::case::Override;
 use gluey::flow::MeshSize;
+use gluey::memory::size;
 use gluey::progress::duration;
 use gluey::{Case, CaseSummary, Notice, Progress, ProgressState, RunError, RunOptions, memory};
 use serde::Serialize;
@@ -88,7 +89,7 @@ impl CheckArguments {
         self.manner.set_threads()?;
         let case = Case::load_with(&self.case, &self.set)?;
         let refused = |error: RunError| Failure::of_run(error, &self.case);
-        memory::check(&case).map_err(|error| refused(error.into()))?;
+        memory::check_within(&case, self.manner.memory_limit()).map_err(|error| refused(error.into()))?;
         let size = MeshSize::of(&case).map_err(|error| refused(RunError::Flow(error.into())))?;
         let available = memory::available();
         let trial = (!self.no_trial).then(|| self.trial(&case)).transpose()?;
@@ -190,23 +191,11 @@ impl Check {
     }
 }
 
-fn size(bytes: f64) -> String {
-    match bytes {
-        ..1e9 => format!("{:.0} MB", bytes / 1e6),
-        _ => format!("{:.1} GB", bytes / 1e9),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
     use super::*;
-
-    #[test]
-    fn sizes_have_units() {
-        assert_eq!((size(20.4e6), size(2.04e9)), ("20 MB".to_owned(), "2.0 GB".to_owned()));
-    }
 
     #[test]
     fn a_run_goes_on_at_the_pace_of_its_trial() {

@@ -1,5 +1,7 @@
 //! How a command ends that does not come to its end.
 
+use std::path::Path;
+
 use gluey::{CaseError, RunError};
 
 use crate::diagnostic::Diagnosed;
@@ -18,9 +20,15 @@ pub struct Failure {
 
 impl Failure {
     /// A failure of a run, or an interrupt.
-    pub fn of_run(error: RunError, case: &std::path::Path) -> Self {
+    pub fn of_run(error: RunError, case: &Path) -> Self {
         let exit_code = if matches!(error, RunError::Interrupted { .. }) { INTERRUPTED } else { 1 };
         Self { diagnostic: Box::new(Diagnosed::new(error, case)), exit_code }
+    }
+
+    /// A failure to show the results in `folder`, which may be none.
+    pub fn of_results(error: impl std::error::Error + Send + Sync + 'static, folder: &Path) -> Self {
+        let hint = "give the folder that a run wrote to, the DIR of its --out";
+        Self::new(error, (!folder.is_dir()).then(|| hint.to_owned()))
     }
 
     /// Any other failure, and what to do about it.

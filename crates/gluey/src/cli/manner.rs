@@ -19,6 +19,9 @@ pub struct Manner {
     /// Threads, instead of one per processor; results do not depend on them.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
     threads: Option<u32>,
+    /// Refuse a case whose first mesh is expected to take more than so many gigabytes.
+    #[arg(long, value_name = "GB", value_parser = gigabytes)]
+    memory_limit: Option<u64>,
     /// Print no progress and no report, only warnings and errors.
     #[arg(long)]
     quiet: bool,
@@ -34,7 +37,8 @@ impl Manner {
     /// Runs `case`, which was read from `file`.
     pub fn run(&self, case: &Case, options: &RunOptions, file: &Path) -> Result<RunReport, Failure> {
         let reporter = self.reporter(&case.name);
-        let outcome = gluey::run(case, options, &reporter as &dyn Progress);
+        let options = RunOptions { memory_limit: self.memory_limit, ..options.clone() };
+        let outcome = gluey::run(case, &options, &reporter as &dyn Progress);
         reporter.finish();
         outcome.map_err(|error| Failure::of_run(error, file))
     }
@@ -58,6 +62,11 @@ impl Manner {
         }
     }
 
+    /// The most bytes that a case may be expected to take.
+    pub fn memory_limit(&self) -> Option<u64> {
+        self.memory_limit
+    }
+
     /// Whether only warnings and errors are told.
     pub fn is_quiet(&self) -> bool {
         self.quiet
@@ -69,5 +78,13 @@ impl Manner {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
         pool.map_err(|error| Failure::new(error, Some("take fewer --threads".to_owned())))
+    }
+}
+
+/// Bytes of so many gigabytes.
+fn gigabytes(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok((number * 1e9) as u64),
+        _ => Err("must be a number of gigabytes, greater than 0".into()),
     }
 }

@@ -59,6 +59,7 @@ impl OutputArguments {
             record: Some(RecordOptions { force }),
             resume,
             interrupt: Some(interrupt),
+            ..RunOptions::default()
         }
     }
 }

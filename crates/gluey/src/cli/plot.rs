@@ -43,7 +43,8 @@ pub struct PlotArguments {
 impl PlotArguments {
     /// Draws.
     pub fn run(&self) -> Result<(), Failure> {
-        let pictures = gluey::plot::plot(&self.options()).map_err(|error| Failure::new(error, None))?;
+        let pictures =
+            gluey::plot::plot(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_pictures(&pictures);
         Ok(())
     }

@@ -9,7 +9,7 @@ use std::thread;
 use clap::Args;
 use gluey::progress::duration;
 use gluey::sweep::{Axis, Point, PointResult, PointState, Study, SweepError, points, table};
-use gluey::{RunError, RunReport};
+use gluey::{RunError, RunOptions, RunReport};
 use thiserror::Error;
 
 use super::failure::{Failure, INTERRUPTED};
@@ -120,7 +120,10 @@ impl SweepArguments {
             return self.result(point, "not run", None);
         }
         let force = *state == PointState::OtherCase;
-        let options = self.output.options(&point.paths, force, resume, interrupt.clone());
+        let options = RunOptions {
+            memory_limit: self.manner.memory_limit(),
+            ..self.output.options(&point.paths, force, resume, interrupt.clone())
+        };
         let reporter = match self.jobs {
             1 => self.manner.reporter(&point.name),
             _ => self.manner.log(&point.name),

@@ -25,7 +25,8 @@ pub struct ViewArguments {
 impl ViewArguments {
     /// Writes the page.
     pub fn run(&self) -> Result<(), Failure> {
-        let viewed = gluey::view::view(&self.options()).map_err(|error| Failure::new(error, None))?;
+        let viewed =
+            gluey::view::view(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_viewed(&viewed);
         Ok(())
     }

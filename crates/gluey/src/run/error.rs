@@ -59,6 +59,16 @@ pub enum RunError {
         /// How far.
         excess: f64,
     },
+    /// The program is at fault: something that it takes for granted did not hold, in any of its threads.
+    #[error("an internal error in step {step} (t = {time}): {message}")]
+    Panicked {
+        /// Steps done.
+        step: usize,
+        /// Time.
+        time: f64,
+        /// What did not hold.
+        message: String,
+    },
     /// The run was asked to stop.
     #[error("interrupted after step {step} of {steps} (t = {time})")]
     Interrupted {

@@ -12,6 +12,7 @@ use super::options::RunOptions;
 use super::paths::ResultPaths;
 use super::record::{in_full, now};
 use crate::case::Case;
+use crate::memory;
 use crate::output::OutputError;
 use crate::output::solver_log::SolverRow;
 use crate::progress::{Notice, Progress, ProgressState};
@@ -59,7 +60,7 @@ impl<'a> Log<'a> {
     /// Writes how the run ended.
     pub fn end(&self, outcome: &Result<RunReport, RunError>) {
         self.add(&match outcome {
-            Ok(report) => format!("complete after {} steps", report.steps),
+            Ok(report) => ending(report),
             Err(error) => in_full(error),
         });
     }
@@ -89,6 +90,19 @@ impl Progress for Log<'_> {
         self.listener.notice(notice);
         self.add(&notice.to_string());
     }
+}
+
+/// What came out of a run, and what it took.
+fn ending(report: &RunReport) -> String {
+    let total: f64 = report.phases.iter().map(|(_, seconds)| seconds).sum();
+    let share = |seconds: f64| 100.0 * seconds / total.max(f64::MIN_POSITIVE);
+    let phases = report.phases.iter().map(|(name, seconds)| format!("{name} {:.1} %", share(*seconds)));
+    let memory = memory::peak().map_or(String::new(), |bytes| format!("{}; ", memory::size(bytes as f64)));
+    let (steps, wall_s) = (report.steps, report.wall_s);
+    format!(
+        "complete after {steps} steps in {wall_s:.2} s; {memory}{}",
+        phases.collect::<Vec<_>>().join(", ")
+    )
 }
 
 fn beginning(case: &Case, resumed: Option<&Path>) -> String {

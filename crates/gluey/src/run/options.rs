@@ -29,6 +29,8 @@ pub struct RunOptions {
     pub resume: Option<PathBuf>,
     /// Set from outside to stop after the current step.
     pub interrupt: Option<Arc<AtomicBool>>,
+    /// The most bytes that the case may be expected to take, beside what there is.
+    pub memory_limit: Option<u64>,
 }
 
 /// How a run is recorded: see [`super::RunRecord`].

@@ -121,6 +121,6 @@ fn options(paths: &ResultPaths, record: RunRecord, checkpoint: PathBuf) -> RunOp
         checkpoint_minutes: recorded.checkpoint_minutes,
         record: Some(RecordOptions { force: false }),
         resume: Some(checkpoint),
-        interrupt: None,
+        ..RunOptions::default()
     }
 }
