@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use gluey::output::vtk::{Frame, Precision, VtkEncoding, VtkWriter};
+use gluey::output::vtk::{Frame, Precision, VtkEncoding, VtkWriter, read_fields, read_particles};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
@@ -85,7 +85,9 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
         fields: Some(&fields),
     };
     writer.write(&frame).expect("files");
-    let piece = read(&folder.path().join("fields-000040.vtu"));
+    let path = folder.path().join("fields-000040.vtu");
+    assert_eq!(read_fields::<D>(&path).expect("what was written"), fields);
+    let piece = read(&path);
 
     assert_eq!(piece.cells.types, [cell_type]);
     let points: Vec<f64> = piece.points.cast_into().expect("numbers");
@@ -180,7 +182,9 @@ fn particles_and_contacts() {
     };
     writer.write(&frame).expect("files");
 
-    let piece = read(&folder.path().join("particles-000000.vtu"));
+    let path = folder.path().join("particles-000000.vtu");
+    assert_eq!(read_particles::<2>(&path).expect("what was written"), particles);
+    let piece = read(&path);
     assert_eq!(piece.cells.types, [CellType::Vertex; 3]);
     assert_eq!(numbers(&piece.data.point, "radius"), [0.05, 0.060000000000000005, 0.07]);
     assert_eq!(numbers(&piece.data.point, "velocity")[3..6], [0.1, -0.2, 0.0]);

@@ -6,19 +6,28 @@
 //! trajectories   y against x; in 3D also z against x
 //! rheology       relative viscosity and normal stresses against strain
 //! solver         iterations and seconds of each phase of a step against time
+//! contacts       contacts of a particle, largest cluster and fabric against strain
+//! correlations   g(r), g(theta) near contact, S(k)
+//! profiles       fraction and velocity across the shear
+//! diffusion      mean squares of the displacements beside the shear, and the lines that fit them
 //! particles      those of a frame that is asked for, or of all frames as an animation, with their images,
-//!                coloured by speed
+//!                coloured by speed, spin or gap
+//! flow           of a frame with fields that is asked for, with arrows and particles
 //! ```
 //!
 //! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv`, `<stem>-solver.csv` and
-//! `<stem>-xyz` and go to `<stem>-plots`.
+//! `<stem>-xyz` and go to `<stem>-plots`; from `contacts` on of the tables of `gluey analyse`, and to
+//! `structure-plots`.
 
 mod animation;
 mod error;
 mod figure;
 mod figures;
+mod flow;
+mod look;
 mod read;
 mod snapshot;
+mod structure;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -28,10 +37,12 @@ use gluey_pictures::Canvas;
 pub use animation::AnimationOptions;
 pub use error::PlotError;
 pub use figure::Figure;
+pub use flow::{FlowOptions, Quantity, SliceChoice};
+pub use look::{Coloring, Look, Viewpoint};
 pub use snapshot::FrameChoice;
 
 use crate::output::{prepare_folder_of, write_atomically};
-use read::Results;
+use read::{Results, Tables};
 
 /// How a picture is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,8 +79,12 @@ impl FromStr for Format {
 pub struct PlotOptions {
     /// Folder of results.
     pub folder: PathBuf,
-    /// A frame whose particles to draw, instead of all that is not in `only`.
+    /// A frame whose particles to draw, or whose flow, instead of all that is not in `only`.
     pub frame: Option<FrameChoice>,
+    /// The flow of the frame, the last one if none is named, instead of its particles.
+    pub flow: Option<FlowOptions>,
+    /// How particles are shown in pictures of frames and in animations.
+    pub look: Look,
     /// An animation of all frames, instead of all that is not in `only`.
     pub animation: Option<AnimationOptions>,
     /// What to draw; what there are results for when empty and no frame is named.
@@ -83,29 +98,60 @@ pub struct PlotOptions {
 /// Draws the results of every run in a folder and gives the paths of the pictures.
 pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
     let mut written = Vec::new();
-    if let Some(frame) = options.frame {
-        let (canvas, stem) = snapshot::snapshot(&options.folder, frame, options.width_mm)?;
+    let PlotOptions { folder, width_mm, .. } = options;
+    let picture = match (options.flow, options.frame) {
+        (Some(flow), frame) => Some(flow::flow(folder, flow, frame, *width_mm)?),
+        (None, Some(frame)) => Some(snapshot::snapshot(folder, frame, &options.look, *width_mm)?),
+        (None, None) => None,
+    };
+    let is_of_frames = picture.is_some() || options.animation.is_some();
+    if let Some((canvas, stem)) = picture {
         written.extend(write(&canvas, &stem, &options.formats)?);
     }
     if let Some(animation) = options.animation {
-        let (bytes, path) = animation::animation(&options.folder, animation)?;
+        let (bytes, path) = animation::animation(folder, animation, &options.look)?;
         prepare_folder_of(&path)?;
         write_atomically(&path, &bytes)?;
         written.push(path);
     }
-    if options.only.is_empty() && (options.frame.is_some() || options.animation.is_some()) {
+    if options.only.is_empty() && is_of_frames {
         return Ok(written);
     }
-    for results in read::results_in(&options.folder)? {
-        for figure in Figure::ALL {
-            let is_wanted = options.only.is_empty() || options.only.contains(&figure);
-            if is_wanted && let Some(canvas) = draw(figure, &results, options)? {
+    let tables = Tables::new(&options.folder);
+    for results in runs(options, &tables)? {
+        for figure in wanted(options).filter(|figure| !figure.is_of_structure()) {
+            if let Some(canvas) = draw(figure, &results, options)? {
                 let stem = results.plots().join(figure.as_str());
                 written.extend(write(&canvas, &stem, &options.formats)?);
             }
         }
     }
+    for figure in wanted(options).filter(|figure| figure.is_of_structure()) {
+        if let Some(canvas) =
+            structure::draw(figure, &tables, options.width_mm, options.only.contains(&figure))?
+        {
+            let stem = tables.plots().join(figure.as_str());
+            written.extend(write(&canvas, &stem, &options.formats)?);
+        }
+    }
     Ok(written)
+}
+
+/// The runs to draw; a folder that has the tables of `gluey analyse` needs none, nor do pictures of them.
+fn runs(options: &PlotOptions, tables: &Tables<'_>) -> Result<Vec<Results>, PlotError> {
+    let only = &options.only;
+    if !only.is_empty() && only.iter().all(|figure| figure.is_of_structure()) {
+        return Ok(Vec::new());
+    }
+    match read::results_in(&options.folder) {
+        Err(PlotError::NoResults { .. }) if only.is_empty() && tables.are_there() => Ok(Vec::new()),
+        found => found,
+    }
+}
+
+fn wanted(options: &PlotOptions) -> impl Iterator<Item = Figure> {
+    let is_wanted = |figure: &Figure| options.only.is_empty() || options.only.contains(figure);
+    Figure::ALL.into_iter().filter(is_wanted)
 }
 
 /// A picture; none where there is nothing for it and it was not asked for by name.
@@ -116,6 +162,7 @@ fn draw(figure: Figure, results: &Results, options: &PlotOptions) -> Result<Opti
         Figure::Trajectories => figures::trajectories(results, options.width_mm).map(Some),
         Figure::Rheology => figures::rheology(results, options.width_mm, is_named),
         Figure::Solver => figures::solver(results, options.width_mm, is_named),
+        Figure::Contacts | Figure::Correlations | Figure::Profiles | Figure::Diffusion => Ok(None),
     }
 }
 
@@ -123,7 +170,10 @@ fn draw(figure: Figure, results: &Results, options: &PlotOptions) -> Result<Opti
 fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf>, PlotError> {
     let mut paths = Vec::new();
     for format in formats {
-        let path = stem.with_extension(format.extension());
+        // Names may have a dot in a number: nothing is an extension of theirs.
+        let mut path = stem.as_os_str().to_owned();
+        path.push(format!(".{}", format.extension()));
+        let path = PathBuf::from(path);
         let bytes = match format {
             Format::Svg => canvas.svg_for_print().into_bytes(),
             Format::Png => canvas.png().map_err(|source| PlotError::Png { path: path.clone(), source })?,

@@ -58,6 +58,11 @@ impl Table {
         Ok(Self { names, columns })
     }
 
+    /// Number of rows.
+    pub fn row_count(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
     /// The column of this name, if there is one.
     pub fn find(&self, name: &str) -> Option<&[f64]> {
         self.names.iter().position(|known| known == name).map(|index| &self.columns[index][..])

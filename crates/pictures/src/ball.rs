@@ -1,12 +1,7 @@
-//! Balls with light on them, and the scale of their colours.
+//! Balls with light on them, and the scale of their colours as a bar.
 
 use crate::canvas::Canvas;
-
-/// A colour: red, green, blue.
-pub type Rgb = [u8; 3];
-
-/// Dark to light, so that order is seen without colours too.
-const SCALE: [Rgb; 5] = [[52, 38, 120], [42, 96, 158], [38, 150, 145], [122, 198, 92], [247, 226, 78]];
+use crate::color::{Rgb, color_scale, hex, shaded};
 
 /// A disc or a sphere as it is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,17 +18,6 @@ pub struct Ball {
     pub opacity: f64,
 }
 
-/// The colour of a fraction from 0, dark, to 1, light; equal steps are equal steps of lightness, nearly.
-pub fn color_scale(fraction: f64) -> Rgb {
-    let place = fraction.clamp(0.0, 1.0) * (SCALE.len() - 1) as f64;
-    let first = (place as usize).min(SCALE.len() - 2);
-    let share = place - first as f64;
-    std::array::from_fn(|k| {
-        let [from, to] = [SCALE[first][k], SCALE[first + 1][k]].map(f64::from);
-        (from + share * (to - from)).round() as u8
-    })
-}
-
 impl Canvas {
     /// A ball over all that was drawn before.
     pub fn ball(&mut self, ball: &Ball) {
@@ -47,7 +31,7 @@ impl Canvas {
 
     /// The scale of colours as a bar from left to right.
     pub fn color_bar(&mut self, corner: (f64, f64), size: (f64, f64)) {
-        let steps = 32;
+        let steps = 64;
         let width = size.0 / f64::from(steps);
         for step in 0..steps {
             let color = hex(color_scale((f64::from(step) + 0.5) / f64::from(steps)));
@@ -73,44 +57,21 @@ impl Canvas {
     }
 }
 
-/// Darker below 1, towards white from 1 to 2.
-fn shaded(color: Rgb, light: f64) -> Rgb {
-    color.map(|part| {
-        let part = f64::from(part);
-        let shade = if light > 1.0 { part + (255.0 - part) * (light - 1.0) } else { part * light };
-        shade.round() as u8
-    })
-}
-
-fn hex([red, green, blue]: Rgb) -> String {
-    format!("#{red:02x}{green:02x}{blue:02x}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_scale_of_colours_gets_lighter() {
-        let lightness = |n: u32| {
-            let [red, green, blue] = color_scale(f64::from(n) / 20.0).map(f64::from);
-            0.3 * red + 0.59 * green + 0.11 * blue
-        };
-        assert!((0..20).all(|n| lightness(n + 1) > lightness(n)));
-        assert_eq!((color_scale(-1.0), color_scale(2.0)), (SCALE[0], SCALE[4]));
-    }
-
-    #[test]
     fn the_light_on_spheres_of_a_colour_is_defined_once() {
         let mut canvas = Canvas::new(100.0, 100.0);
         let ball =
-            Ball { center: (50.0, 50.0), radius: 20.0, color: SCALE[2], is_sphere: true, opacity: 1.0 };
+            Ball { center: (50.0, 50.0), radius: 20.0, color: [65, 68, 135], is_sphere: true, opacity: 1.0 };
         canvas.ball(&ball);
         canvas.ball(&Ball { radius: 5.0, ..ball });
         canvas.ball(&Ball { is_sphere: false, ..ball });
         let svg = canvas.inline_svg();
-        assert_eq!(svg.matches("<radialGradient id=\"ball-269691\"").count(), 1);
-        assert_eq!(svg.matches("fill=\"url(#ball-269691)\"").count(), 2);
+        assert_eq!(svg.matches("<radialGradient id=\"ball-414487\"").count(), 1);
+        assert_eq!(svg.matches("fill=\"url(#ball-414487)\"").count(), 2);
         assert!(canvas.png().is_ok());
     }
 }

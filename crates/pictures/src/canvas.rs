@@ -6,10 +6,12 @@ use std::fmt::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg;
 
 use crate::chart::Stroke;
+use crate::color::{Rgb, hex};
+use crate::raster::{Placed, Raster};
 use crate::text;
 
 /// The bundled font first, then fonts of similar width.
@@ -26,6 +28,9 @@ pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
+    /// Pixels under the body, and the elements that hold them in a document.
+    rasters: Vec<Placed>,
+    images: String,
     /// Names of what the body defines once and uses often.
     defined: BTreeSet<String>,
 }
@@ -47,7 +52,8 @@ pub enum PngError {
 impl Canvas {
     /// An empty white canvas.
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new(), defined: BTreeSet::new() }
+        let (body, images) = (String::new(), String::new());
+        Self { width, height, body, rasters: Vec::new(), images, defined: BTreeSet::new() }
     }
 
     /// Width in SVG pixels.
@@ -83,6 +89,64 @@ impl Canvas {
         ));
     }
 
+    /// A closed polygon without filling.
+    pub fn polygon(&mut self, corners: &[(f64, f64)], stroke: Stroke) {
+        let points = points(corners);
+        self.element(format_args!(
+            r#"<polygon points="{points}" fill="none" stroke="{}" stroke-width="{}" stroke-linejoin="round"/>"#,
+            stroke.color, stroke.width
+        ));
+    }
+
+    /// What `draw` draws, as far as it lies in a polygon.
+    pub fn clipped(&mut self, corners: &[(f64, f64)], draw: impl FnOnce(&mut Self)) {
+        let name = format!("clip-{}", self.body.len());
+        let points = points(corners);
+        self.element(format_args!(r#"<clipPath id="{name}"><polygon points="{points}"/></clipPath>"#));
+        self.element(format_args!(r#"<g clip-path="url(#{name})">"#));
+        draw(self);
+        self.element(format_args!("</g>"));
+    }
+
+    /// Slender arrows of one colour, light on dark and dark on light by a border of another one; heads are a
+    /// third of an arrow, at most `head` long.
+    pub fn arrows(&mut self, arrows: &[[(f64, f64); 2]], (color, border): (Rgb, Rgb), head: f64) {
+        let mut path = String::new();
+        for [(x, y), (end_x, end_y)] in arrows {
+            let (dx, dy) = (end_x - x, end_y - y);
+            let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+            let (back, half) = ((length / 3.0).min(head), 0.4 * (length / 3.0).min(head));
+            let (ex, ey) = (dx / length, dy / length);
+            let barb =
+                |side: f64| (end_x - back * ex - side * half * ey, end_y - back * ey + side * half * ex);
+            let ((ax, ay), (bx, by)) = (barb(1.0), barb(-1.0));
+            // Writing to a string cannot fail.
+            let _ = write!(
+                path,
+                "M{x:.1} {y:.1}L{end_x:.1} {end_y:.1}M{ax:.1} {ay:.1}L{end_x:.1} {end_y:.1}L{bx:.1} {by:.1}"
+            );
+        }
+        for (color, width) in [(border, 2.6), (color, 1.1)] {
+            self.element(format_args!(
+                r#"<path d="{path}" fill="none" stroke="{}" stroke-width="{width}" stroke-linecap="round"/>"#,
+                hex(color)
+            ));
+        }
+    }
+
+    /// A raster that fills a rectangle, under everything else on this canvas.
+    ///
+    /// # Errors
+    /// If it has no pixels.
+    pub fn raster(&mut self, corner: (f64, f64), size: (f64, f64), raster: &Raster) -> Result<(), PngError> {
+        let (width, height) = raster.size();
+        let placed = Placed::new(corner, size, raster).ok_or(PngError::Size(width, height))?;
+        self.images.push_str(&placed.element().map_err(PngError::Encoding)?);
+        self.images.push('\n');
+        self.rasters.push(placed);
+        Ok(())
+    }
+
     /// A circle, filled or only outlined.
     pub fn circle(&mut self, center: (f64, f64), radius: f64, fill: &str, stroke: Stroke) {
         self.element(format_args!(
@@ -116,12 +180,12 @@ impl Canvas {
 
     /// The drawing as an SVG document without its fonts (for a page that brings them).
     pub fn inline_svg(&self) -> String {
-        self.document("")
+        self.document("", &self.background())
     }
 
     /// The drawing as an SVG document that carries its fonts.
     pub fn svg(&self) -> String {
-        self.document(&format!("<style>{}</style>", font_faces()))
+        self.document(&format!("<style>{}</style>", font_faces()), &self.background())
     }
 
     /// The same document with its size in millimetres, for print.
@@ -144,19 +208,26 @@ impl Canvas {
         let mut options = usvg::Options { font_family: "Libertinus Serif".to_owned(), ..Default::default() };
         options.fontdb_mut().load_font_data(REGULAR.to_vec());
         options.fontdb_mut().load_font_data(ITALIC.to_vec());
-        let tree = usvg::Tree::from_str(&self.inline_svg(), &options)?;
+        let tree = usvg::Tree::from_str(&self.document("", ""), &options)?;
         let size = tree.size().to_int_size().scale_by(zoom).ok_or(PngError::Size(0, 0))?;
         let mut pixels =
             Pixmap::new(size.width(), size.height()).ok_or(PngError::Size(size.width(), size.height()))?;
+        pixels.fill(Color::WHITE);
+        self.rasters.iter().for_each(|raster| raster.draw(&mut pixels, zoom));
         resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixels.as_mut());
         Ok(pixels)
     }
 
-    fn document(&self, style: &str) -> String {
+    /// White, and pixels on it.
+    fn background(&self) -> String {
+        format!("<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{}", self.images)
+    }
+
+    fn document(&self, style: &str, background: &str) -> String {
         let (w, h) = (self.width, self.height);
         text::typeset(&format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w:.0}\" height=\"{h:.0}\" viewBox=\"0 0 {w:.0} {h:.0}\" \
-             font-family=\"{FONT_FAMILY}\">{style}\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{}</svg>\n",
+             font-family=\"{FONT_FAMILY}\">{style}\n{background}{}</svg>\n",
             self.body
         ))
     }
@@ -172,6 +243,11 @@ impl Canvas {
     pub(crate) fn element(&mut self, element: std::fmt::Arguments<'_>) {
         writeln!(self.body, "{element}").expect("writing to a String cannot fail");
     }
+}
+
+/// Points as SVG lists them.
+fn points(corners: &[(f64, f64)]) -> String {
+    corners.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect::<Vec<_>>().join(" ")
 }
 
 /// CSS that brings the two bundled fonts.

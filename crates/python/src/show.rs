@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use gluey::analyse::AnalyseOptions;
-use gluey::plot::{AnimationOptions, FrameChoice, PlotOptions};
+use gluey::plot::{
+    AnimationOptions, Coloring, FlowOptions, FrameChoice, Look, PlotOptions, Quantity, SliceChoice, Viewpoint,
+};
 use gluey::view::ViewOptions;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -20,6 +22,11 @@ pub struct Plot {
     folder: PathBuf,
     only: Vec<String>,
     frame: Option<String>,
+    flow: Option<String>,
+    slice: Option<String>,
+    view: (f64, f64),
+    colour: String,
+    contacts: Option<f64>,
     animation: bool,
     pixels: u32,
     rate: f64,
@@ -30,8 +37,18 @@ pub struct Plot {
 /// Draws the results in a folder and gives the paths of the pictures.
 #[pyfunction]
 pub fn plot(py: Python<'_>, plot: Plot) -> PyResult<Vec<PathBuf>> {
+    let slice = plot.slice.map(|slice| named::<SliceChoice>("slice", &slice)).transpose()?;
+    let quantity = plot.flow.map(|flow| named::<Quantity>("flow", &flow)).transpose()?;
+    let (azimuth, elevation) = plot.view;
+    let look = Look {
+        viewpoint: Viewpoint { azimuth, elevation },
+        coloring: named::<Coloring>("colour", &plot.colour)?,
+        network: plot.contacts,
+    };
     let options = PlotOptions {
         folder: plot.folder,
+        flow: quantity.map(|quantity| FlowOptions { quantity, slice }),
+        look,
         frame: plot.frame.map(|frame| named::<FrameChoice>("frame", &frame)).transpose()?,
         animation: plot.animation.then_some(AnimationOptions { pixels: plot.pixels, rate: plot.rate }),
         only: plot.only.iter().map(|name| named("only", name)).collect::<PyResult<_>>()?,

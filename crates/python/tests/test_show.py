@@ -31,6 +31,19 @@ def test_pictures_are_drawn(out: Path) -> None:
         gluey.plot(out, width_mm=10)
 
 
+def test_particles_and_flows_are_drawn_as_asked(out: Path, tmp_path: Path) -> None:
+    (seen,) = gluey.plot(out, frame="last", view=(0, 90), colour="gap", contacts=1.0, formats=["svg"])
+    assert "gap" in seen.read_text()
+    with pytest.raises(gluey.GlueyError, match="no fields of the flow"):
+        gluey.plot(tmp_path, flow="speed")
+    with pytest.raises(ValueError, match="flow: found \"force\", expected one of speed"):
+        gluey.plot(out, flow="force")
+    with pytest.raises(ValueError, match="view = "):
+        gluey.plot(out, frame="last", view=(0, 91))
+    with pytest.raises(ValueError, match="slice = 'z=0.5': needs flow"):
+        gluey.plot(out, slice="z=0.5")
+
+
 def test_a_page_is_written(out: Path, tmp_path: Path) -> None:
     page = gluey.view(out, tmp_path / "page.html", every=2)
     assert page == tmp_path / "page.html" and "<html" in page.read_text(encoding="utf-8")[:300]

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::plot::{AnimationOptions, Figure, Format, FrameChoice, PlotOptions};
+use gluey::plot::{
+    AnimationOptions, Coloring, Figure, FlowOptions, Format, FrameChoice, Look, PlotOptions, Quantity,
+    SliceChoice, Viewpoint,
+};
 
 use super::Failure;
 use crate::terminal;
@@ -11,17 +14,35 @@ use crate::terminal;
 /// Arguments of `gluey plot`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example:\n  gluey run suspension.toml --out out --xyz 5\n  gluey plot out --width 85\n  gluey plot out --animation"
+    after_help = "Example:\n  gluey run suspension.toml --out out --xyz 5\n  gluey plot out --width 85\n  gluey plot out --animation\n  gluey run suspension.toml --out out --vtk 5 --xyz 5\n  gluey plot out --flow speed\n  gluey analyse out && gluey plot out"
 )]
 pub struct PlotArguments {
     /// Folder of a run.
     folder: PathBuf,
-    /// What to draw: gaps, trajectories, rheology, solver; whatever there are results for when absent.
+    /// What to draw: gaps, trajectories, rheology, solver, and of the tables of `gluey analyse` contacts,
+    /// correlations, profiles, diffusion; whatever there are results for when absent.
     #[arg(long, value_name = "FIGURE", value_delimiter = ',')]
     only: Vec<Figure>,
-    /// Draw the particles of a frame that was written with --xyz: last, or the number of a step.
+    /// Draw the particles of a frame that was written with --xyz (its flow with --flow): last, or the number
+    /// of a step.
     #[arg(long, value_name = "STEP")]
     frame: Option<FrameChoice>,
+    /// Draw the flow of a frame that was written with --vtk, the last unless --frame names one: speed,
+    /// pressure, strain-rate, vorticity.
+    #[arg(long, value_name = "QUANTITY")]
+    flow: Option<Quantity>,
+    /// In 3D, the plane in which the flow is drawn, such as x=0.5; across z through the middle when absent.
+    #[arg(long, value_name = "AXIS=PLACE", requires = "flow")]
+    slice: Option<SliceChoice>,
+    /// From where spheres are seen, in degrees: around the vertical from the front to the right, and above.
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", default_value = "31.5,20", allow_hyphen_values = true)]
+    view: Viewpoint,
+    /// Colours of particles in frames and animations: speed, spin, or the smallest gap.
+    #[arg(long, value_name = "WHAT", default_value = "speed")]
+    colour: Coloring,
+    /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.
+    #[arg(long, value_name = "GAP", value_parser = reach)]
+    contacts: Option<f64>,
     /// Animate the particles of all frames that were written with --xyz, as a GIF.
     #[arg(long)]
     animation: bool,
@@ -50,9 +71,12 @@ impl PlotArguments {
     }
 
     fn options(&self) -> PlotOptions {
-        let Self { folder, only, frame, animation, pixels, rate, format, width } = self.clone();
+        let Self { folder, only, frame, format, .. } = self.clone();
+        let Self { flow, slice, view, colour, contacts, animation, pixels, rate, width, .. } = *self;
         let animation = animation.then_some(AnimationOptions { pixels, rate });
-        PlotOptions { folder, only, frame, animation, formats: format, width_mm: width }
+        let flow = flow.map(|quantity| FlowOptions { quantity, slice });
+        let look = Look { viewpoint: view, coloring: colour, network: contacts };
+        PlotOptions { folder, frame, flow, look, animation, only, formats: format, width_mm: width }
     }
 }
 
@@ -67,5 +91,12 @@ fn rate(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(rate) if (0.1..=50.0).contains(&rate) => Ok(rate),
         _ => Err("must be a number from 0.1 to 50 (frames a second)".into()),
+    }
+}
+
+fn reach(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(reach) if (0.0..=10.0).contains(&reach) => Ok(reach),
+        _ => Err("must be a number from 0 to 10 (mean radii)".into()),
     }
 }

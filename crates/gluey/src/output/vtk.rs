@@ -8,6 +8,7 @@
 //! nothing touches).
 
 mod background;
+mod read;
 mod xml;
 
 use std::path::{Path, PathBuf};
@@ -19,6 +20,7 @@ use gluey_motion::Fields;
 use super::{OutputError, prepare_folder_of, pvd, write_atomically};
 
 pub(crate) use background::FrameWriter;
+pub use read::{VtkReadError, read_fields, read_particles};
 use vtkio::model::CellType;
 use xml::{Array, Piece};
 pub use xml::{Precision, UnknownPrecision, VtkEncoding};

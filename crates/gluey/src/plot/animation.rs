@@ -7,6 +7,7 @@ use gluey_pictures::{Animation, Canvas, Still};
 use rayon::prelude::*;
 
 use super::error::PlotError;
+use super::look::Look;
 use super::snapshot::{Scene, View, beside_pictures};
 use crate::analyse::frames::{dimension, frame_files, read_frames};
 use crate::output::xyz::XyzFrame;
@@ -26,12 +27,16 @@ pub struct AnimationOptions {
 }
 
 /// The animation of all frames of a run as a GIF, and its path: the same scale and the same colours in all.
-pub(super) fn animation(folder: &Path, options: AnimationOptions) -> Result<(Vec<u8>, PathBuf), PlotError> {
+pub(super) fn animation(
+    folder: &Path,
+    options: AnimationOptions,
+    look: &Look,
+) -> Result<(Vec<u8>, PathBuf), PlotError> {
     let files = frame_files(folder)?;
     let path = beside_pictures(&files[0]).with_file_name("particles.gif");
     let bytes = match dimension(&files)? {
-        2 => animated(&read_frames::<2>(&files)?, options, &path)?,
-        _ => animated(&read_frames::<3>(&files)?, options, &path)?,
+        2 => animated(&read_frames::<2>(&files)?, options, look, &path)?,
+        _ => animated(&read_frames::<3>(&files)?, options, look, &path)?,
     };
     Ok((bytes, path))
 }
@@ -39,12 +44,13 @@ pub(super) fn animation(folder: &Path, options: AnimationOptions) -> Result<(Vec
 fn animated<const D: usize>(
     frames: &[XyzFrame<D>],
     options: AnimationOptions,
+    look: &Look,
     path: &Path,
 ) -> Result<Vec<u8>, PlotError>
 where
     Dim<D>: Space<D>,
 {
-    let views = frames.par_iter().map(|frame| Scene::of(frame).view());
+    let views = frames.par_iter().map(|frame| Scene::of(frame, look).view());
     let Some(view) = views.reduce_with(View::around) else { return Ok(Vec::new()) };
     let still = |canvas: &Canvas| {
         let still = Still::new(canvas, options.pixels);
@@ -53,7 +59,7 @@ where
     let failed = |source| PlotError::Animation { path: path.to_owned(), source };
     let mut animation: Option<Animation> = None;
     for batch in frames.chunks(BATCH) {
-        let draw = |frame: &XyzFrame<D>| still(&Scene::of(frame).draw(&view, WIDTH));
+        let draw = |frame: &XyzFrame<D>| still(&Scene::of(frame, look).draw(&view, WIDTH));
         let stills = batch.par_iter().map(draw).collect::<Result<Vec<Still>, _>>()?;
         for still in stills {
             match &mut animation {

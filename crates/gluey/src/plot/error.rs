@@ -8,7 +8,9 @@ use thiserror::Error;
 
 use super::figure::Figure;
 use crate::analyse::FramesError;
+use crate::case::CaseError;
 use crate::output::OutputError;
+use crate::output::vtk::VtkReadError;
 use crate::table::TableError;
 
 /// Why results could not be drawn.
@@ -75,6 +77,62 @@ pub enum PlotError {
         folder: PathBuf,
         /// Steps that have frames.
         steps: Vec<usize>,
+    },
+    /// No fields of the flow.
+    #[error(
+        "{}: no fields of the flow: run with --vtk N, or with an [[output]] of kind \"vtk\" in the case, \
+         and a flow on a mesh",
+        folder.display()
+    )]
+    NoFields {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Fields of several runs or streams.
+    #[error("{}: fields in {} and in {}: name one of them", folder.display(), first.display(), second.display())]
+    SeveralFields {
+        /// The folder.
+        folder: PathBuf,
+        /// A folder of frames.
+        first: PathBuf,
+        /// Another one.
+        second: PathBuf,
+    },
+    /// No case of a folder of frames.
+    #[error("{}: no <name>-case.toml of its run beside it, which says where the box is periodic", folder.display())]
+    NoCase {
+        /// The folder of frames.
+        folder: PathBuf,
+    },
+    /// The case of a run could not be read.
+    #[error("{}: cannot be read as a case", file.display())]
+    Case {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: Box<CaseError>,
+    },
+    /// A file for ParaView could not be read back.
+    #[error(transparent)]
+    Fields(#[from] VtkReadError),
+    /// Fields without cells.
+    #[error("{}: no cells", path.display())]
+    NoCells {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A slice of a plane.
+    #[error("--slice: the case is plane; slices are of cases in 3D")]
+    SliceOfPlane,
+    /// A slice that misses the box.
+    #[error("--slice {axis}={at}: the box reaches from {axis} = {} to {}", ends[0], ends[1])]
+    SliceOutside {
+        /// The axis across the slice.
+        axis: char,
+        /// Where the slice would be.
+        at: f64,
+        /// Where the box ends.
+        ends: [f64; 2],
     },
     /// A picture could not be drawn.
     #[error("{}: cannot be drawn", path.display())]

@@ -13,11 +13,28 @@ pub enum Figure {
     Rheology,
     /// What the steps cost against time.
     Solver,
+    /// Contacts, clusters and fabric against strain.
+    Contacts,
+    /// g(r), g(theta) and S(k).
+    Correlations,
+    /// Fraction and velocity across the shear.
+    Profiles,
+    /// Mean squares of the displacements beside the shear.
+    Diffusion,
 }
 
 impl Figure {
     /// All, in the order in which they are drawn.
-    pub const ALL: [Self; 4] = [Self::Gaps, Self::Trajectories, Self::Rheology, Self::Solver];
+    pub const ALL: [Self; 8] = [
+        Self::Gaps,
+        Self::Trajectories,
+        Self::Rheology,
+        Self::Solver,
+        Self::Contacts,
+        Self::Correlations,
+        Self::Profiles,
+        Self::Diffusion,
+    ];
 
     /// Name in files and options.
     pub fn as_str(self) -> &'static str {
@@ -26,7 +43,16 @@ impl Figure {
             Self::Trajectories => "trajectories",
             Self::Rheology => "rheology",
             Self::Solver => "solver",
+            Self::Contacts => "contacts",
+            Self::Correlations => "correlations",
+            Self::Profiles => "profiles",
+            Self::Diffusion => "diffusion",
         }
+    }
+
+    /// Whether it is drawn of the tables of `gluey analyse`, which has one set of them in a folder.
+    pub(super) fn is_of_structure(self) -> bool {
+        matches!(self, Self::Contacts | Self::Correlations | Self::Profiles | Self::Diffusion)
     }
 }
 

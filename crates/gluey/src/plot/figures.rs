@@ -11,7 +11,7 @@ use crate::output::solver_log::PHASES;
 use crate::table::TableError;
 
 /// Many curves that are not told apart.
-const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: None };
+pub(super) const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: None };
 /// Paths of more particles than there are strokes.
 const THIN: Stroke = Stroke { color: "#0b4f9e", width: 1.0, dashes: None };
 /// Height of a frame over the width of the picture.
@@ -192,14 +192,14 @@ fn of_steps<'a>(
 }
 
 /// A curve through points, interrupted where there is no number.
-fn curve(label: Option<String>, stroke: Stroke, x: &[f64], y: &[f64]) -> Curve {
+pub(super) fn curve(label: Option<String>, stroke: Stroke, x: &[f64], y: &[f64]) -> Curve {
     let all: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
     let runs = all.split(|(x, y)| !x.is_finite() || !y.is_finite());
     let pieces = runs.filter(|run| !run.is_empty()).map(<[_]>::to_vec).collect();
     Curve { label, stroke, pieces }
 }
 
-fn points(curves: &[Curve]) -> impl Iterator<Item = (f64, f64)> {
+pub(super) fn points(curves: &[Curve]) -> impl Iterator<Item = (f64, f64)> {
     curves.iter().flat_map(|curve| curve.pieces.iter().flatten().copied())
 }
 
@@ -207,11 +207,11 @@ fn ends(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
-fn chart(x: Axis, y: Axis, curves: Vec<Curve>) -> Chart {
+pub(super) fn chart(x: Axis, y: Axis, curves: Vec<Curve>) -> Chart {
     Chart { x, y, curves, notes: Vec::new(), marks: Vec::new() }
 }
 
-fn stacked(charts: &[Chart], width_mm: f64) -> Canvas {
+pub(super) fn stacked(charts: &[Chart], width_mm: f64) -> Canvas {
     let width = width_mm * PIXELS_PER_MM;
     stack_to_width(charts, width, |_| HEIGHT * width)
 }

@@ -28,7 +28,7 @@ impl Source {
 
     /// The table, if a line can be drawn through its rows.
     fn with_rows(self, figure: Figure) -> Result<Self, PlotError> {
-        let rows = self.column("t")?.len();
+        let rows = self.table.row_count();
         if rows < 2 {
             return Err(PlotError::TooShort { path: self.path, figure, rows });
         }
@@ -92,6 +92,42 @@ impl Results {
 
     fn beside(&self, suffix: &str) -> PathBuf {
         self.paths.folder().join(format!("{}{suffix}", self.paths.stem()))
+    }
+}
+
+/// The tables of `gluey analyse` in a folder.
+pub struct Tables<'a> {
+    folder: &'a Path,
+}
+
+impl<'a> Tables<'a> {
+    /// Those in this folder.
+    pub fn new(folder: &'a Path) -> Self {
+        Self { folder }
+    }
+
+    /// Folder of their pictures.
+    pub fn plots(&self) -> PathBuf {
+        self.folder.join("structure-plots")
+    }
+
+    /// Whether there are any.
+    pub fn are_there(&self) -> bool {
+        self.folder.join("series.csv").exists()
+    }
+
+    /// A table with two rows at least; an error where it is needed and not so.
+    pub fn table(&self, name: &str, figure: Figure, is_needed: bool) -> Result<Option<Source>, PlotError> {
+        let path = self.folder.join(name);
+        match (path.exists(), is_needed) {
+            (true, true) => Ok(Some(read(path)?.with_rows(figure)?)),
+            (true, false) => Ok(Some(read(path)?).filter(|source| source.table.row_count() > 1)),
+            (false, false) => Ok(None),
+            (false, true) => {
+                let hint = "`gluey analyse` writes it, of frames that `gluey run --xyz N` left";
+                Err(PlotError::Missing { path, figure, hint })
+            }
+        }
     }
 }
 

@@ -4,23 +4,32 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use gluey_geom::{Dim, Space, Vector};
-use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Stroke, color_scale};
+use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Rgb, Stroke, color_scale};
 use gluey_suspension::Container;
 
 use super::error::PlotError;
+use super::look::{Look, Viewpoint, near_pairs};
 use crate::analyse::frames::{dimension, frame_files, read_frames};
 use crate::output::xyz::XyzFrame;
 
-const EDGE: Stroke = Stroke { color: "#777777", width: 1.2, dashes: None };
-const PERIODIC: Stroke = Stroke { color: "#777777", width: 1.2, dashes: Some("6 4") };
+pub(super) const EDGE: Stroke = Stroke { color: "#777777", width: 1.2, dashes: None };
+pub(super) const PERIODIC: Stroke = Stroke { color: "#777777", width: 1.2, dashes: Some("6 4") };
 /// Opacity of images across periodic borders.
 const IMAGE: f64 = 0.3;
-/// Angles of the view of three dimensions, about the vertical and then about the horizontal.
-const YAW: f64 = -0.55;
-const PITCH: f64 = 0.35;
+/// Lines between near particles.
+const LINK: Stroke = Stroke { color: "#c8471b", width: 2.0, dashes: None };
+/// Parts of an edge in front that are seen or not.
+const EDGE_PARTS: usize = 400;
+/// Share of white in the colours of the particles that are farthest away, in 3D.
+const HAZE: f64 = 0.5;
+/// Steps of this share, so that few colours are used.
+const HAZE_STEPS: f64 = 8.0;
 /// Room around the drawing, and below it for the legend, in SVG pixels.
 const MARGIN: f64 = 8.0;
 const LEGEND: f64 = 56.0;
+/// Width below which the caption has a row of its own, of this height.
+const NARROW: f64 = 460.0;
+const ROW: f64 = 20.0;
 
 /// Which frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +53,12 @@ impl FromStr for FrameChoice {
 }
 
 /// The picture of a frame, and its path without an extension.
-pub fn snapshot(folder: &Path, choice: FrameChoice, width_mm: f64) -> Result<(Canvas, PathBuf), PlotError> {
+pub fn snapshot(
+    folder: &Path,
+    choice: FrameChoice,
+    look: &Look,
+    width_mm: f64,
+) -> Result<(Canvas, PathBuf), PlotError> {
     let files = frame_files(folder)?;
     let file = match choice {
         FrameChoice::Last => files.last(),
@@ -57,8 +71,8 @@ pub fn snapshot(folder: &Path, choice: FrameChoice, width_mm: f64) -> Result<(Ca
     let one = [file.clone()];
     let width = width_mm * PIXELS_PER_MM;
     let canvas = match dimension(&one)? {
-        2 => Scene::of(&read_frames::<2>(&one)?[0]).draw_alone(width),
-        _ => Scene::of(&read_frames::<3>(&one)?[0]).draw_alone(width),
+        2 => Scene::of(&read_frames::<2>(&one)?[0], look).draw_alone(width),
+        _ => Scene::of(&read_frames::<3>(&one)?[0], look).draw_alone(width),
     };
     Ok((canvas, beside_pictures(file)))
 }
@@ -88,18 +102,20 @@ pub(super) fn beside_pictures(file: &Path) -> PathBuf {
 struct Seen {
     at: [f64; 3],
     radius: f64,
-    speed: f64,
+    /// What its colour tells.
+    measure: f64,
     is_image: bool,
 }
 
-/// What has room in a drawing: the sides of a rectangle, and the largest speed.
+/// What has room in a drawing: the sides of a rectangle, and the largest number behind a
+/// colour.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     left: f64,
     right: f64,
     low: f64,
     high: f64,
-    fast: f64,
+    most: f64,
 }
 
 impl View {
@@ -110,7 +126,7 @@ impl View {
             right: self.right.max(other.right),
             low: self.low.min(other.low),
             high: self.high.max(other.high),
-            fast: self.fast.max(other.fast),
+            most: self.most.max(other.most),
         }
     }
 }
@@ -118,7 +134,10 @@ impl View {
 /// What is seen of a frame.
 pub(super) struct Scene {
     is_flat: bool,
+    look: Look,
     balls: Vec<Seen>,
+    /// Lines between near particles.
+    links: Vec<[[f64; 3]; 2]>,
     /// Edges of the box, and whether they are periodic borders of the plane.
     edges: Vec<([[f64; 3]; 2], bool)>,
     caption: String,
@@ -126,23 +145,27 @@ pub(super) struct Scene {
 
 impl Scene {
     /// What is seen of this frame.
-    pub fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
+    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look) -> Self
     where
         Dim<D>: Space<D>,
     {
         // The same box, as upright as its images allow.
         let container = frame.container.tilted(frame.container.lattice().reduced().tilt());
+        let measures = look.measures(frame);
+        let view = look.viewpoint;
         let mut balls = Vec::new();
         for (i, position) in frame.positions.iter().enumerate() {
-            let (radius, speed) = (frame.radii[i], frame.velocities[i].norm());
+            let (radius, measure) = (frame.radii[i], measures[i]);
             let own = container.wrapped(position);
-            balls.push(Seen { at: turned(&own), radius, speed, is_image: false });
+            balls.push(Seen { at: view.turned(&own), radius, measure, is_image: false });
             let images = images(&container, &own, radius);
-            balls.extend(images.iter().map(|x| Seen { at: turned(x), radius, speed, is_image: true }));
+            let seen = |x| Seen { at: view.turned(x), radius, measure, is_image: true };
+            balls.extend(images.iter().map(seen));
         }
         balls.sort_by(|one, other| one.at[2].total_cmp(&other.at[2]));
+        let links = look.network.map_or(Vec::new(), |reach| links(frame, &container, view, reach));
         let caption = format!("*t* = {:.4}, strain *γ* = {:.4}", frame.time, frame.strain);
-        Self { is_flat: D == 2, balls, edges: edges(&container), caption }
+        Self { is_flat: D == 2, look: *look, balls, links, edges: edges(&container, view), caption }
     }
 
     /// What has room for all of it.
@@ -152,8 +175,9 @@ impl Scene {
             let ends = self.edges.iter().flat_map(|(ends, _)| ends.map(|end| sign * end[axis]));
             sign * balls.chain(ends).fold(f64::NEG_INFINITY, f64::max)
         };
-        let fast = self.balls.iter().map(|ball| ball.speed).fold(0.0, f64::max);
-        View { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), fast }
+        let measures = self.balls.iter().map(|ball| ball.measure);
+        let most = self.look.end().unwrap_or_else(|| measures.fold(0.0, f64::max));
+        View { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), most }
     }
 
     fn draw_alone(&self, width: f64) -> Canvas {
@@ -162,26 +186,42 @@ impl Scene {
 
     /// A drawing that has room for this view.
     pub fn draw(&self, view: &View, width: f64) -> Canvas {
-        let View { left, right, low, high, fast } = *view;
+        let View { left, right, low, high, most } = *view;
         // Not higher than wide.
         let scale = (width - 2.0 * MARGIN) / (right - left).max(high - low);
         let shift = MARGIN.max(0.5 * (width - scale * (right - left)));
         let on_paper = |at: [f64; 3]| (shift + scale * (at[0] - left), MARGIN + scale * (high - at[1]));
-        let height = scale * (high - low) + MARGIN + LEGEND;
+        let legend = if width < NARROW { LEGEND + ROW } else { LEGEND };
+        let height = scale * (high - low) + MARGIN + legend;
         let mut canvas = Canvas::new(width, height);
         self.draw_edges(&mut canvas, on_paper, false);
         for ball in &self.balls {
+            let color = color_scale(if most > 0.0 { ball.measure / most } else { 0.0 });
             canvas.ball(&Ball {
                 center: on_paper(ball.at),
                 radius: scale * ball.radius,
-                color: color_scale(if fast > 0.0 { ball.speed / fast } else { 0.0 }),
+                color: faded(color, self.haze(ball.at[2])),
                 is_sphere: !self.is_flat,
                 opacity: if ball.is_image { IMAGE } else { 1.0 },
             });
         }
         self.draw_edges(&mut canvas, on_paper, true);
-        self.draw_legend(&mut canvas, fast, (width, height - LEGEND));
+        for [from, to] in &self.links {
+            canvas.line(on_paper(*from), on_paper(*to), LINK);
+        }
+        self.draw_legend(&mut canvas, most, (width, height - legend));
         canvas
+    }
+
+    /// Share of white at a depth: none in front, most at the back.
+    fn haze(&self, depth: f64) -> f64 {
+        let ends = (self.balls.first().map(|ball| ball.at[2]), self.balls.last().map(|ball| ball.at[2]));
+        match ends {
+            (Some(back), Some(front)) if front > back => {
+                HAZE * ((front - depth) / (front - back) * HAZE_STEPS).round() / HAZE_STEPS
+            }
+            _ => 0.0,
+        }
     }
 
     /// The edges at the corner nearest to the reader, or all others.
@@ -191,34 +231,78 @@ impl Scene {
         let is_in_front = |ends: &[[f64; 3]; 2]| !self.is_flat && ends.iter().any(|end| end[2] >= nearest);
         for (ends, is_periodic) in self.edges.iter().filter(|(ends, _)| is_in_front(ends) == in_front) {
             let stroke = if *is_periodic { PERIODIC } else { EDGE };
-            canvas.line(on_paper(ends[0]), on_paper(ends[1]), stroke);
+            for [from, to] in self.unhidden(*ends) {
+                canvas.line(on_paper(from), on_paper(to), stroke);
+            }
         }
     }
 
-    fn draw_legend(&self, canvas: &mut Canvas, fast: f64, (width, top): (f64, f64)) {
+    /// The parts of an edge that no ball of the box hides. Balls over an edge at the back are drawn later
+    /// anyway.
+    fn unhidden(&self, [from, to]: [[f64; 3]; 2]) -> Vec<[[f64; 3]; 2]> {
+        let at = |n: usize| -> [f64; 3] {
+            let part = n as f64 / EDGE_PARTS as f64;
+            std::array::from_fn(|d| from[d] + part * (to[d] - from[d]))
+        };
+        let nearest = self.edges.iter().flat_map(|(ends, _)| ends.map(|end| end[2])).fold(f64::MIN, f64::max);
+        if self.is_flat || from[2].max(to[2]) < nearest {
+            return vec![[from, to]];
+        }
+        let is_seen = |x: [f64; 3]| {
+            self.balls.iter().filter(|ball| !ball.is_image).all(|ball| {
+                let beside = (x[0] - ball.at[0]).powi(2) + (x[1] - ball.at[1]).powi(2);
+                let over = ball.radius.powi(2) - beside;
+                over <= 0.0 || ball.at[2] + over.sqrt() <= x[2]
+            })
+        };
+        let seen: Vec<usize> = (0..EDGE_PARTS).filter(|n| is_seen(at(*n)) && is_seen(at(n + 1))).collect();
+        let runs = seen.chunk_by(|one, other| other - one == 1);
+        runs.map(|run| [at(run[0]), at(run[run.len() - 1] + 1)]).collect()
+    }
+
+    fn draw_legend(&self, canvas: &mut Canvas, most: f64, (width, top): (f64, f64)) {
+        let [name, low, high] = self.look.legend(most);
         let (y, length) = (top + 22.0, 0.3 * width);
-        canvas.text(MARGIN, y + 9.0, 15.0, "start", "speed");
-        let left = MARGIN + 46.0;
+        canvas.text(MARGIN, y + 9.0, 15.0, "start", &name);
+        let left = MARGIN + 52.0;
         canvas.color_bar((left, y), (length, 10.0));
-        canvas.text(left, y + 25.0, 13.0, "start", "0");
-        canvas.text(left + length, y + 25.0, 13.0, "end", &format!("{fast:.3}"));
-        canvas.text(width - MARGIN, y + 9.0, 15.0, "end", &self.caption);
+        canvas.text(left, y + 25.0, 13.0, "start", &low);
+        canvas.text(left + length, y + 25.0, 13.0, "end", &high);
+        let below = if width < NARROW { 25.0 + ROW } else { 9.0 };
+        canvas.text(width - MARGIN, y + below, 15.0, "end", &self.caption);
     }
 }
 
-/// Across, up and towards the reader; a plane is seen from the front.
-fn turned<const D: usize>(x: &Vector<D>) -> [f64; 3] {
-    if D == 2 {
-        return [x[0], x[1], 0.0];
+/// A colour with a share of white.
+fn faded(color: Rgb, share: f64) -> Rgb {
+    color.map(|part| (f64::from(part) + share * (255.0 - f64::from(part))).round() as u8)
+}
+
+/// Lines between the centres of near particles; across a border, from either one half of the way.
+fn links<const D: usize>(
+    frame: &XyzFrame<D>,
+    container: &Container<D>,
+    view: Viewpoint,
+    reach: f64,
+) -> Vec<[[f64; 3]; 2]>
+where
+    Dim<D>: Space<D>,
+{
+    let mut links = Vec::new();
+    for ([first, second], arm, _) in near_pairs(frame, reach) {
+        let [from, to] = [first, second].map(|i| container.wrapped(&frame.positions[i]));
+        if (from + arm - to).norm() < 1e-9 * arm.norm() {
+            links.push([view.turned(&from), view.turned(&to)]);
+        } else {
+            links.push([view.turned(&from), view.turned(&(from + 0.5 * arm))]);
+            links.push([view.turned(&to), view.turned(&(to - 0.5 * arm))]);
+        }
     }
-    let ((sin_yaw, cos_yaw), (sin_pitch, cos_pitch)) = (YAW.sin_cos(), PITCH.sin_cos());
-    let across = cos_yaw * x[0] + sin_yaw * x[2];
-    let back = cos_yaw * x[2] - sin_yaw * x[0];
-    [across, cos_pitch * x[1] - sin_pitch * back, sin_pitch * x[1] + cos_pitch * back]
+    links
 }
 
 /// Images of a ball that reach into the box, without the ball.
-fn images<const D: usize>(container: &Container<D>, x: &Vector<D>, radius: f64) -> Vec<Vector<D>> {
+pub(super) fn images<const D: usize>(container: &Container<D>, x: &Vector<D>, radius: f64) -> Vec<Vector<D>> {
     let (lattice, bounds) = (container.lattice(), container.bounds());
     let all = (0..3_i32.pow(D as u32)).map(|n| std::array::from_fn(|d| n / 3_i32.pow(d as u32) % 3 - 1));
     let periodic = all.filter(|image: &[i32; D]| {
@@ -236,12 +320,12 @@ fn images<const D: usize>(container: &Container<D>, x: &Vector<D>, radius: f64) 
     periodic.map(|image| *x + lattice.shift(&image)).filter(reaches).collect()
 }
 
-fn edges<const D: usize>(container: &Container<D>) -> Vec<([[f64; 3]; 2], bool)> {
+fn edges<const D: usize>(container: &Container<D>, view: Viewpoint) -> Vec<([[f64; 3]; 2], bool)> {
     let (lattice, bounds) = (container.lattice(), container.bounds());
     let corner = |n: usize| {
         let place =
             Vector::<D>::from_fn(|d, _| if n >> d & 1 == 0 { bounds.lower[d] } else { bounds.upper[d] });
-        turned(&lattice.from_box(&place, bounds.lower[1]))
+        view.turned(&lattice.from_box(&place, bounds.lower[1]))
     };
     let pairs = (0..1 << D).flat_map(|n: usize| (0..D).map(move |d| (n, d)));
     let edges = pairs.filter(|(n, d)| n >> d & 1 == 0);
@@ -252,6 +336,27 @@ fn edges<const D: usize>(container: &Container<D>) -> Vec<([[f64; 3]; 2], bool)>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A ball of radius 0.5 on the edge from (0, 0) to (2, 0) in front hides the middle half of it.
+    #[test]
+    fn balls_hide_edges_behind_them() {
+        let ball = |depth| Seen { at: [1.0, 0.0, depth], radius: 0.5, measure: 0.0, is_image: false };
+        let edge = [[0.0; 3], [2.0, 0.0, 0.0]];
+        let scene = |balls| Scene {
+            is_flat: false,
+            look: Look::default(),
+            balls,
+            links: Vec::new(),
+            edges: vec![(edge, false)],
+            caption: String::new(),
+        };
+        let seen = scene(vec![ball(0.0)]).unhidden(edge);
+        assert_eq!(
+            seen.iter().map(|ends| ends.map(|end| end[0])).collect::<Vec<_>>(),
+            [[0.0, 0.5], [1.5, 2.0]]
+        );
+        assert_eq!(scene(vec![ball(-0.6)]).unhidden(edge), [edge]);
+    }
 
     #[test]
     fn balls_across_periodic_borders_have_images() {

@@ -13,7 +13,8 @@ const SMALLEST_GAP = 1e-4; // in mean radii: the rounding of positions
 const FRAMES_PER_SECOND = 20;
 
 // Dark to light, so that order is seen without colours too.
-const SCALE = [[52, 38, 120], [42, 96, 158], [38, 150, 145], [122, 198, 92], [247, 226, 78]];
+const SCALE = [[68, 1, 84], [72, 37, 118], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140], [34, 168, 132],
+  [68, 191, 112], [122, 209, 81], [189, 223, 38], [253, 231, 37]]; // viridis
 const PARTICLES = [[43, 110, 190], [214, 90, 40], [38, 145, 95], [155, 85, 180], [209, 164, 22], [120, 120, 120]];
 
 const initial = () => ({ yaw: flat ? 0 : -0.55, pitch: flat ? 0 : 0.35, zoom: 1, shift: [0, 0] });
@@ -276,7 +277,7 @@ function drawLegend(eye) {
   pen.fillRect(left - 8, top - 24, width + 24, 60);
   pen.globalAlpha = 1;
   const fill = pen.createLinearGradient(left, 0, left + width, 0);
-  for (let n = 0; n <= 8; n++) fill.addColorStop(n / 8, css(scaled(n / 8)));
+  for (let n = 0; n <= 20; n++) fill.addColorStop(n / 20, css(scaled(n / 20)));
   pen.fillStyle = fill;
   pen.fillRect(left, top, width, height);
   pen.fillStyle = themed("--ink");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Iterable
@@ -14,6 +15,11 @@ def plot(
     *,
     only: Iterable[str] = (),
     frame: int | str | None = None,
+    flow: str | None = None,
+    slice: str | None = None,
+    view: tuple[float, float] = (31.5, 20.0),
+    colour: str = "speed",
+    contacts: float | None = None,
     animation: bool = False,
     pixels: int = 720,
     rate: float = 12.0,
@@ -27,9 +33,21 @@ def plot(
     folder
         What runs wrote to.
     only
-        What to draw: ``gaps``, ``trajectories``, ``rheology``, ``solver``; whatever there are results for when absent.
+        What to draw: ``gaps``, ``trajectories``, ``rheology``, ``solver``, and of the tables of :func:`analyse` ``contacts``,
+        ``correlations``, ``profiles``, ``diffusion``; whatever there are results for when absent.
     frame
-        The particles of a frame instead: ``"last"`` or the number of a step.
+        The particles of a frame instead (its flow with ``flow``): ``"last"`` or the number of a step.
+    flow
+        The flow of a frame written with ``vtk``, the last unless ``frame`` names one: ``speed``, ``pressure``,
+        ``strain-rate``, ``vorticity``.
+    slice
+        In 3D, the plane in which the flow is drawn, such as ``"x=0.5"``; across z through the middle when absent.
+    view
+        From where spheres are seen, in degrees: around the vertical from the front to the right, and above.
+    colour
+        Colours of particles in frames and animations: ``speed``, ``spin``, or the smallest ``gap``.
+    contacts
+        Join the centres of particles with gaps up to this, in mean radii, from 0 to 10.
     animation
         The particles of all frames instead, as ``particles.gif``.
     pixels
@@ -59,10 +77,22 @@ def plot(
         raise ValueError(f"pixels = {pixels}: must be a whole number from 100 to 4000")
     if not 0.1 <= rate <= 50.0:
         raise ValueError(f"rate = {rate}: must be a number from 0.1 to 50")
+    azimuth, elevation = (float(angle) for angle in view)
+    if not (math.isfinite(azimuth) and abs(elevation) <= 90.0):
+        raise ValueError(f"view = {view}: must be two angles in degrees, the second from -90 to 90")
+    if contacts is not None and not 0.0 <= contacts <= 10.0:
+        raise ValueError(f"contacts = {contacts}: must be a number from 0 to 10")
+    if slice is not None and flow is None:
+        raise ValueError(f"slice = {slice!r}: needs flow")
     options = {
         "folder": os.fspath(folder),
         "only": list(only),
         "frame": None if frame is None else str(frame),
+        "flow": flow,
+        "slice": slice,
+        "view": (azimuth, elevation),
+        "colour": colour,
+        "contacts": None if contacts is None else float(contacts),
         "animation": bool(animation),
         "pixels": int(pixels),
         "rate": float(rate),

@@ -1,0 +1,100 @@
+//! What to draw of the flow.
+
+use std::str::FromStr;
+
+/// Names of the axes.
+pub(super) const AXES: [char; 3] = ['x', 'y', 'z'];
+
+/// What is drawn in colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Length of the velocity.
+    Speed,
+    /// Pressure, but for the same number everywhere.
+    Pressure,
+    /// `sqrt(2 E : E)` of the symmetric part `E` of the velocity gradient.
+    StrainRate,
+    /// Component of the curl of the velocity along the axis across the picture.
+    Vorticity,
+}
+
+impl Quantity {
+    const ALL: [Self; 4] = [Self::Speed, Self::Pressure, Self::StrainRate, Self::Vorticity];
+
+    /// Name in options and files.
+    pub(super) fn as_str(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Pressure => "pressure",
+            Self::StrainRate => "strain-rate",
+            Self::Vorticity => "vorticity",
+        }
+    }
+
+    /// Name and unit.
+    pub(super) fn label(self) -> &'static str {
+        match self {
+            Self::Speed => "speed (length / time)",
+            Self::Pressure => "pressure (viscosity / time)",
+            Self::StrainRate => "strain rate (1 / time)",
+            Self::Vorticity => "vorticity (1 / time)",
+        }
+    }
+}
+
+impl FromStr for Quantity {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = || Self::ALL.map(Self::as_str).join(", ");
+        let found = Self::ALL.into_iter().find(|quantity| quantity.as_str() == text);
+        found.ok_or_else(|| format!("expected one of {}", names()))
+    }
+}
+
+/// A plane across an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceChoice {
+    /// The axis: 0 for x, 1 for y, 2 for z.
+    pub axis: usize,
+    /// Where, in lengths of the case.
+    pub at: f64,
+}
+
+impl FromStr for SliceChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('=');
+        let axis = parts.and_then(|(name, _)| ["x", "y", "z"].iter().position(|axis| *axis == name));
+        let at = parts.and_then(|(_, at)| at.parse().ok()).filter(|at: &f64| at.is_finite());
+        match (axis, at) {
+            (Some(axis), Some(at)) => Ok(Self { axis, at }),
+            _ => Err("expected an axis and a place on it, such as z=0.5".into()),
+        }
+    }
+}
+
+/// What to draw of the flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowOptions {
+    /// In colours.
+    pub quantity: Quantity,
+    /// The plane, in 3D; across z through the middle of the box when absent.
+    pub slice: Option<SliceChoice>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_quantities_and_slices_are_read() {
+        assert_eq!("strain-rate".parse(), Ok(Quantity::StrainRate));
+        assert!("strain".parse::<Quantity>().is_err_and(|error| error.contains("speed, pressure")));
+        assert_eq!("y=-0.25".parse(), Ok(SliceChoice { axis: 1, at: -0.25 }));
+        for wrong in ["0.5", "w=1", "x=", "x=nan"] {
+            assert!(wrong.parse::<SliceChoice>().is_err(), "{wrong}");
+        }
+    }
+}
