@@ -310,8 +310,8 @@ where
     let (twists, contacts, domain) = ([Twist::default()], &[], &Domain::default());
     let fields = known::<D>(flow);
     let fields = Some(&fields);
-    let frame =
-        Frame { step: 20, time: 0.5, particles: &particles, twists: &twists, contacts, domain, fields };
+    let (particles, twists, in_box) = (&particles, &twists, None);
+    let frame = Frame { step: 20, time: 0.5, particles, twists, contacts, domain, in_box, fields };
     writer.write(&frame).expect("files");
     let center = vec!["0.5"; D].join(", ");
     let case = format!(

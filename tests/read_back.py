@@ -15,7 +15,7 @@ import meshio
 import numpy
 
 FIELDS = {"velocity": 3, "pressure": 1, "viscosity": 1, "level_set": 1, "lambda": 3}
-PARTICLES = {"radius": 1, "velocity": 3, "spin": 3}
+PARTICLES = {"radius": 1, "velocity": 3, "spin": 3, "particle": 1, "image": 1, "unwrapped": 3}
 CONTACTS = {"gamma": 1, "lambda": 1, "gap": 1}
 
 

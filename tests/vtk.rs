@@ -3,11 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use gluey::output::vtk::{Frame, Precision, VtkEncoding, VtkWriter, read_fields, read_particles};
+use gluey::output::vtk::{
+    Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles,
+};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
+use gluey_suspension::Container;
 use tempfile::TempDir;
 use vtkio::Vtk;
 use vtkio::model::{Attribute, CellType, DataSet, UnstructuredGridPiece};
@@ -82,6 +85,7 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
         twists: &[],
         contacts: &[],
         domain: &Domain::default(),
+        in_box: None,
         fields: Some(&fields),
     };
     writer.write(&frame).expect("files");
@@ -133,9 +137,17 @@ fn every_encoding_reads_back() {
     {
         let encoding = VtkEncoding { compression, precision };
         let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder").encoded(encoding);
-        let (contacts, domain, fields) = (&[], &Domain::default(), None);
-        let frame =
-            Frame { step: 0, time: 0.0, particles: &particles, twists: &twists, contacts, domain, fields };
+        let (contacts, domain, in_box, fields) = (&[], &Domain::default(), None, None);
+        let frame = Frame {
+            step: 0,
+            time: 0.0,
+            particles: &particles,
+            twists: &twists,
+            contacts,
+            domain,
+            in_box,
+            fields,
+        };
         writer.write(&frame).expect("files");
         let path = folder.path().join("particles-000000.vtu");
         let read_back = numbers(&read(&path).data.point, "radius");
@@ -178,6 +190,7 @@ fn particles_and_contacts() {
         twists: &twists,
         contacts: &contacts,
         domain: &Domain::default(),
+        in_box: None,
         fields: None,
     };
     writer.write(&frame).expect("files");
@@ -221,6 +234,7 @@ fn contacts_with_walls_and_images() {
         twists: &twists,
         contacts: &contacts,
         domain: &domain,
+        in_box: None,
         fields: None,
     };
     writer.write(&frame).expect("files");
@@ -233,6 +247,52 @@ fn contacts_with_walls_and_images() {
     // After the centres: the image of particle 1, and its foot point on the ceiling.
     assert_eq!(points[6..], [-0.5, 1.5, 0.0, 3.5, 2.0, 0.0]);
     assert_eq!(piece.cells.cell_verts.into_xml().0, [0, 1, 0, 1, 0, 2, 1, 3]);
+}
+
+/// Two discs that touch across the upper border of a sheared box, both far from it by now: shown in the box, a
+/// line from one to the image of the other, and that image beside them.
+#[test]
+fn a_sheared_box_is_shown_whole() {
+    let folder = TempDir::new().expect("a folder");
+    let particles = [[3.3, 0.92], [-1.8, -0.92]].map(|x| Particle::new(Vector::<2>::from(x), 0.1));
+    let mut domain = Domain::periodic(&Vector::<2>::repeat(1.0));
+    domain.set_sliding(5.1, 0.0);
+    let in_box =
+        Some(ShownBox { container: Container::periodic(&Vector::<2>::repeat(1.0)).tilted(5.1), slide: 0.4 });
+    let twists = [Twist { velocity: Vector::<2>::new(1.0, 2.0), ..Twist::default() }; 2];
+    let contacts = [Contact { pair: PairKey::across(0, 1, [-5, 2, 0]), lambda: 1.0, gamma: 0.0, gap: 0.0 }];
+    let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
+    let (particles, twists, contacts, domain) = (&particles, &twists, &contacts, &domain);
+    let frame = Frame { step: 0, time: 0.0, particles, twists, contacts, domain, in_box, fields: None };
+    writer.write(&frame).expect("files");
+
+    let near = |found: &[f64], exact: &[f64]| {
+        assert_eq!(found.len(), exact.len(), "{found:?}");
+        assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {exact:?}");
+    };
+    let piece = read(&folder.path().join("particles-000000.vtu"));
+    let points: Vec<f64> = piece.points.cast_into().expect("numbers");
+    let data = &piece.data.point;
+    // The first is three periods away, the second one row of images up, where x is 5.1 further.
+    near(&points[..6], &[0.3, 0.92, 0.0, 0.3, 0.08, 0.0]);
+    let (numbers_of, is_image) = (numbers(data, "particle"), numbers(data, "image"));
+    assert_eq!((&numbers_of[..2], &is_image[..2]), ([1.0, 2.0].as_slice(), [0.0, 0.0].as_slice()));
+    assert!(is_image[2..].iter().all(|image| *image == 1.0));
+    let place = |x: [f64; 2]| points.chunks(3).position(|p| (p[0] - x[0]).hypot(p[1] - x[1]) < 1e-12);
+    let above = place([0.4, 1.08]).expect("the image above of the second");
+    assert_eq!(numbers_of[above], 2.0);
+    let below = place([0.2, -0.08]).expect("the image below of the first");
+    assert_eq!(numbers_of[below], 1.0);
+    let velocities = numbers(data, "velocity");
+    let velocity = |ball: usize| velocities[3 * ball..3 * ball + 2].to_vec();
+    near(&[velocity(0), velocity(1)].concat(), &[1.0, 2.0, 1.4, 2.0]);
+    near(&[velocity(above), velocity(below)].concat(), &[1.8, 2.0, 0.6, 2.0]);
+    near(&numbers(data, "unwrapped")[..6], &[3.3, 0.92, 0.0, -1.8, -0.92, 0.0]);
+
+    let piece = read(&folder.path().join("contacts-000000.vtu"));
+    let points: Vec<f64> = piece.points.cast_into().expect("numbers");
+    assert_eq!(piece.cells.cell_verts.into_xml().0, [0, 1, 0, 2]);
+    near(&points, &[0.3, 0.92, 0.0, 0.3, 0.08, 0.0, 0.4, 1.08, 0.0]);
 }
 
 #[test]

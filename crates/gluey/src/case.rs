@@ -37,6 +37,7 @@ mod overrides;
 mod particle;
 mod particle_problem;
 mod particles_file;
+mod repulsion;
 mod schema;
 mod shown;
 mod suggest;
@@ -58,6 +59,7 @@ pub use output::{Interval, OutputSpec};
 pub use overrides::{BadOverride, Override};
 pub use particle::ParticleSpec;
 pub use particle_problem::ParticleProblem;
+pub use repulsion::RepulsionSpec;
 pub use suspension::{RadiiSpec, SuspensionSpec};
 
 use gluey_contact::{Domain, Wall};
@@ -122,6 +124,9 @@ pub struct Case {
     /// Contact.
     #[serde(default)]
     pub contact: ContactSpec,
+    /// Repulsion of particles and walls.
+    #[serde(default)]
+    pub repulsion: RepulsionSpec,
     /// Flow.
     #[serde(default)]
     pub flow: FlowSpec,

@@ -13,7 +13,7 @@ use std::time::Instant;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, ResumeError};
+use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, NoForces, ResumeError};
 use gluey_stokes::{
     Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
     SolverKind, StokesError, WarmStartError,
@@ -108,8 +108,10 @@ where
     /// Whether lubrication keeps particles apart.
     keeps_films_open: bool,
     radii: Vec<f64>,
-    /// Forces and torques on the particles; empty if there are none.
+    /// Forces and torques that the case has on the particles, and these with those set since; empty if there
+    /// are none.
     wrenches: Vec<Wrench<D>>,
+    acting: Vec<Wrench<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
@@ -150,6 +152,7 @@ where
         keeps_films_open: case.lubrication() == Lubrication::Deficit,
         radii,
         wrenches: case.wrenches(),
+        acting: case.wrenches(),
         last: None,
         last_balls: Vec::new(),
         last_positions: Vec::new(),
@@ -189,12 +192,13 @@ where
     /// The flow in a box with walls or Couette flow around.
     fn solve(&mut self, mesh: TreeMesh<D>, balls: &[Ball<D>]) -> Result<Flow<D>, FlowError> {
         let shear = self.undisturbed();
-        let conditions = Conditions::boundary(&shear).with_wrenches(&self.wrenches);
+        let conditions = Conditions::boundary(&shear).with_wrenches(&self.acting);
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
-    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces on the particles
-    /// are balanced by a uniform one on all of the box, which is a mean gradient of the pressure.
+    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces of the case on the
+    /// particles are balanced by a uniform one on all of the box, which is a mean gradient of the pressure;
+    /// those set since are between particles, and their sum is zero.
     fn solve_sheared(
         &mut self,
         mesh: TreeMesh<D>,
@@ -206,7 +210,7 @@ where
         let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
         let back = -total / self.domain.extent().product();
         let uniform = move |_: &Vector<D>| back;
-        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&self.wrenches);
+        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&self.acting);
         let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
         let conditions = if with_stress { conditions.with_stress() } else { conditions };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
@@ -276,6 +280,16 @@ where
         }
     }
 
+    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
+        self.acting.clone_from(&self.wrenches);
+        if self.acting.is_empty() {
+            self.acting.extend_from_slice(wrenches);
+        } else {
+            self.acting.iter_mut().zip(wrenches).for_each(|(sum, wrench)| *sum = *sum + *wrench);
+        }
+        Ok(())
+    }
+
     fn stress(&self) -> Option<MeanStress<D>> {
         let stress = self.last.as_ref()?.stress.as_ref()?;
         let volume = self.domain.extent().product();
@@ -285,6 +299,7 @@ where
             of_bodies: stress.of_bodies(volume),
             of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
             of_contacts: None,
+            of_repulsion: Matrix::zeros(),
             dissipation: stress.dissipation / volume,
         })
     }

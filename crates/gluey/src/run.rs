@@ -426,7 +426,13 @@ where
 {
     let contact = PairContact::new(case.contact.params()).within(case.surroundings());
     let (scheme, dt) = (case.time.scheme, case.time.step);
-    let simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    if case.has_forces() {
+        simulation = simulation.under_forces();
+    }
+    if let Some(law) = case.repulsion() {
+        simulation = simulation.repelling(law, case.surroundings());
+    }
     if !case.is_sheared() {
         return simulation;
     }

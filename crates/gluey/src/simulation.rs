@@ -1,12 +1,13 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
 use gluey_contact::{
-    BodyStep, Contact, ContactError, ContactModel, ContactReport, ContactState, MemoryError,
+    BodyStep, Contact, ContactError, ContactModel, ContactReport, ContactState, Domain, MemoryError,
 };
-use gluey_geom::{Dim, Particle, Pose, Space, Twist};
+use gluey_geom::{Dim, Matrix, Particle, Pose, Space, Twist, Wrench};
 use gluey_motion::{
-    Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, ResumeError, Scheme,
+    Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, NoForces, ResumeError, Scheme,
 };
+use gluey_suspension::{Repelled, Repulsion};
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
@@ -41,6 +42,9 @@ where
     step: usize,
     reversed: bool,
     sliding: Option<Sliding>,
+    repelling: Option<Repelling<D>>,
+    /// Whether forces act that stay when the shear is reversed.
+    has_forces: bool,
     strain: f64,
     particles: Vec<Particle<D>>,
     radii: Vec<f64>,
@@ -52,6 +56,33 @@ where
     twists: Vec<Twist<D>>,
     contact_report: ContactReport,
     phases: PhaseTable,
+}
+
+/// Particles that repel each other, and the walls.
+#[derive(Debug)]
+struct Repelling<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    law: Repulsion,
+    surroundings: Domain<D>,
+    /// Minus the mean product of forces and lines between centres at the last prediction.
+    stress: Matrix<D>,
+    wrenches: Vec<Wrench<D>>,
+}
+
+impl<const D: usize> Repelling<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Takes the forces between particles where they are now.
+    fn update(&mut self, particles: &[Particle<D>]) {
+        let Repelled { forces, moment } = self.law.between(particles, &self.surroundings);
+        let volume: f64 = self.surroundings.lattice.periods().iter().flatten().product();
+        self.stress = -moment / volume;
+        self.wrenches.clear();
+        self.wrenches.extend(forces.into_iter().map(|force| Wrench { force, ..Wrench::default() }));
+    }
 }
 
 /// How images slide along each other in simple shear for ever.
@@ -77,6 +108,16 @@ pub enum StepError<E: std::error::Error + 'static> {
         time: f64,
         /// Why.
         source: E,
+    },
+    /// Particles repel each other, and the model of their motion does not answer to forces.
+    #[error("forces failed in step {step} (t = {time})")]
+    Forces {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: NoForces,
     },
     /// Contact could not be resolved.
     #[error("contact failed in step {step} (t = {time})")]
@@ -115,6 +156,7 @@ impl<E: std::error::Error + 'static> StepError<E> {
     pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> StepError<W> {
         match self {
             Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
+            Self::Forces { step, time, source } => StepError::Forces { step, time, source },
             Self::Contact { step, time, source } => StepError::Contact { step, time, source },
             Self::Film { step, time, source } => StepError::Film { step, time, source },
             Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
@@ -189,6 +231,8 @@ where
             step: 0,
             reversed: false,
             sliding: None,
+            repelling: None,
+            has_forces: false,
             strain: 0.0,
             radii: particles.iter().map(|particle| particle.radius).collect(),
             poses: particles.iter().map(|particle| particle.pose).collect(),
@@ -209,6 +253,19 @@ where
         Self { sliding: Some(sliding), ..self }
     }
 
+    /// The same with particles that repel each other, their images and the walls of `surroundings`.
+    #[must_use]
+    pub fn repelling(self, law: Repulsion, surroundings: Domain<D>) -> Self {
+        let repelling = Repelling { law, surroundings, stress: Matrix::zeros(), wrenches: Vec::new() };
+        Self { repelling: Some(repelling), has_forces: true, ..self }
+    }
+
+    /// The same where forces act on the particles that do not change sign with the shear.
+    #[must_use]
+    pub fn under_forces(self) -> Self {
+        Self { has_forces: true, ..self }
+    }
+
     /// Shear strain of the periodic images, where they slide; zero elsewhere.
     pub fn strain(&self) -> f64 {
         self.strain
@@ -218,6 +275,11 @@ where
     fn sliding_rate(&self) -> f64 {
         let rate = self.sliding.map_or(0.0, |sliding| sliding.rate);
         if self.reversed { -rate } else { rate }
+    }
+
+    /// Velocity along `x` of the image one period up in `y`, beyond that of its particle.
+    pub fn slide(&self) -> f64 {
+        self.sliding_rate() * self.sliding.map_or(0.0, |sliding| sliding.height)
     }
 
     /// Does one step.
@@ -236,6 +298,7 @@ where
             self.hydrodynamics.set_strain(self.strain, step.is_multiple_of(stress_every));
             self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * self.dt);
         }
+        self.repel()?;
         let start = std::time::Instant::now();
         let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
         self.book_flow(start.elapsed().as_secs_f64());
@@ -244,6 +307,22 @@ where
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),
         }
+    }
+
+    /// Sets the forces by which particles repel each other where they are.
+    fn repel(&mut self) -> Result<(), StepError<H::Error>> {
+        let (step, time) = (self.step, self.time());
+        let Some(repelling) = &mut self.repelling else { return Ok(()) };
+        if let Some(Sliding { height, .. }) = self.sliding {
+            repelling.surroundings.set_sliding(self.strain * height, 0.0);
+        }
+        let (hydrodynamics, particles) = (&mut self.hydrodynamics, &self.particles);
+        self.phases
+            .time("repulsion", || {
+                repelling.update(particles);
+                hydrodynamics.set_wrenches(&repelling.wrenches)
+            })
+            .map_err(|source| StepError::Forces { step, time, source })
     }
 
     /// Corrects the predicted velocities so that films that lubrication keeps open stay open.
@@ -291,11 +370,15 @@ where
     /// Reverses the shear from the next step on.
     ///
     /// In Stokes flow all velocities change sign at once, and so does the history of the integrator; what
-    /// contacts remember of the impulse between particles stays.
+    /// contacts remember of the impulse between particles stays. Where forces act that stay as they are,
+    /// velocities are others, and the integrator begins anew.
     pub fn reverse_shear(&mut self) {
         self.reversed = !self.reversed;
         self.hydrodynamics.set_shear_factor(if self.reversed { -1.0 } else { 1.0 });
-        self.integrator.reverse();
+        match self.has_forces {
+            true => self.integrator.restart(),
+            false => self.integrator.reverse(),
+        }
         self.contact.reverse();
     }
 
@@ -346,7 +429,9 @@ where
 
     /// The mean stress of the last prediction, where the flow has one.
     pub fn stress(&self) -> Option<MeanStress<D>> {
-        self.hydrodynamics.stress()
+        let stress = self.hydrodynamics.stress()?;
+        let of_repulsion = self.repelling.as_ref().map_or(stress.of_repulsion, |repelling| repelling.stress);
+        Some(MeanStress { of_repulsion, ..stress })
     }
 
     /// Size and effort of the last prediction.

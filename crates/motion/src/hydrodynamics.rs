@@ -1,6 +1,6 @@
 //! The trait that stands between the flow and the particles.
 
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 
 use crate::Film;
 
@@ -28,6 +28,15 @@ where
     /// other: the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound. And
     /// whether that prediction is to have a stress.
     fn set_strain(&mut self, _strain: f64, _with_stress: bool) {}
+
+    /// Sets forces and torques on the particles at the next predictions, beside those that the model has from
+    /// elsewhere; empty for none.
+    ///
+    /// # Errors
+    /// If the model does not answer to forces.
+    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
+        if wrenches.is_empty() { Ok(()) } else { Err(NoForces) }
+    }
 
     /// The mean stress of the last prediction; `None` where the model has none.
     fn stress(&self) -> Option<MeanStress<D>> {
@@ -63,6 +72,11 @@ where
         }
     }
 }
+
+/// A model does not answer to forces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("forces act on the particles, but the model of their motion does not answer to forces")]
+pub struct NoForces;
 
 /// A model cannot go on from what was kept.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,14 +134,16 @@ pub struct MeanStress<const D: usize> {
     /// Minus the mean product of the forces of contacts with the lines between the centres that they push
     /// apart. In 3D only: forces of contacts between discs have no unit of force.
     pub of_contacts: Option<Matrix<D>>,
+    /// The same of forces by which particles repel each other.
+    pub of_repulsion: Matrix<D>,
     /// Power dissipated by fluid and films.
     pub dissipation: f64,
 }
 
 impl<const D: usize> MeanStress<D> {
-    /// Stress of the particles: of the tractions on them, and of their contacts.
+    /// Stress of the particles: of the tractions on them, of their contacts and of their repulsion.
     pub fn of_particles(&self) -> Matrix<D> {
-        self.of_bodies + self.of_contacts.unwrap_or_else(Matrix::zeros)
+        self.of_bodies + self.of_contacts.unwrap_or_else(Matrix::zeros) + self.of_repulsion
     }
 
     /// Viscosity of the suspension over that of the fluid.
@@ -138,6 +154,11 @@ impl<const D: usize> MeanStress<D> {
     /// The share of contacts in the relative viscosity.
     pub fn viscosity_of_contacts(&self) -> Option<f64> {
         self.of_contacts.map(|stress| self.over_rate(stress[(0, 1)]))
+    }
+
+    /// The share of repulsion in the relative viscosity.
+    pub fn viscosity_of_repulsion(&self) -> f64 {
+        self.over_rate(self.of_repulsion[(0, 1)])
     }
 
     /// The share of films in the relative viscosity.

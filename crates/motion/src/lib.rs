@@ -26,6 +26,7 @@
 //!
 //! Not for inertia: velocities follow positions at once (Stokes flow), there is no mass and no acceleration.
 
+mod approach;
 mod films;
 mod hydrodynamics;
 mod integrator;
@@ -33,8 +34,9 @@ mod linear_flow;
 mod mobility_table;
 mod pair_mobility;
 
+pub use approach::approach_mobility;
 pub use films::{Film, FilmClosed};
-pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, MeanStress, ResumeError};
+pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, MeanStress, NoForces, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};

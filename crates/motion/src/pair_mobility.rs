@@ -1,12 +1,14 @@
-//! Two equal, force- and torque-free spheres in an unbounded linear flow, exactly (Batchelor and Green 1972,
-//! DOI 10.1017/S0022112072002927).
+//! Two equal, torque-free spheres in an unbounded linear flow, exactly (Batchelor and Green 1972,
+//! DOI 10.1017/S0022112072002927), free or pushed along their line of centres ([`approach_mobility`]).
 //!
 //! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they
 //! should and overlap, as they do in a fluid solver that does not resolve the lubrication film.
 
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use std::f64::consts::PI;
 
-use crate::{Film, Hydrodynamics, LinearFlow, MobilityTable};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
+
+use crate::{Film, Hydrodynamics, LinearFlow, MobilityTable, NoForces, approach_mobility};
 
 /// Why a pair has no velocities.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,7 +33,19 @@ pub enum PairMobilityError {
         /// Zero or not a number.
         distance: f64,
     },
+    /// The model knows opposite forces on the line of centres.
+    #[error(
+        "the pair mobility knows equal and opposite forces along the line of centres and no torques: {rest:e} of \
+         the forces is none such"
+    )]
+    Wrenches {
+        /// Size of what is left of forces and torques, relative to the largest.
+        rest: f64,
+    },
 }
+
+/// What may be left of forces beside those that the model knows: rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Exact pair hydrodynamics as a cheap [`Hydrodynamics`].
 ///
@@ -45,18 +59,35 @@ pub struct PairMobility {
     table: MobilityTable,
     /// The film between the two at the last prediction.
     film: Option<Film<3>>,
+    /// Forces and torques on the two, or none at all.
+    wrenches: Vec<Wrench<3>>,
 }
 
 impl PairMobility {
     /// Two spheres in `flow`, exactly.
     pub fn new(flow: LinearFlow<3>) -> Self {
-        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new(), film: None }
+        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new(), film: None, wrenches: Vec::new() }
     }
 
     /// The same with the mobility evaluated at `gap + offset` (`offset` in radii), to imitate a soft solver.
     pub fn with_gap_offset(mut self, offset: f64) -> Self {
         self.offset = offset;
         self
+    }
+
+    /// The force on the second sphere along `n`, the opposite of which acts on the first.
+    fn push(&self, n: &Vector<3>) -> Result<f64, PairMobilityError> {
+        let [first, second] = self.wrenches.as_slice() else { return Ok(0.0) };
+        let push = second.force.dot(n);
+        let rest = (second.force - n * push).norm()
+            + (first.force + second.force).norm()
+            + first.torque.norm()
+            + second.torque.norm();
+        let size = first.force.norm().max(second.force.norm());
+        if rest > ROUNDING * size {
+            return Err(PairMobilityError::Wrenches { rest: rest / size });
+        }
+        Ok(push)
     }
 }
 
@@ -81,7 +112,10 @@ impl Hydrodynamics<3> for PairMobility {
         let (slide, curvature_radius) = (Vector::zeros(), first.radius);
         let film = Film { first: 0, second: Some(1), branch: r, slide, gap, curvature_radius };
         self.film = (gap > 0.0 && self.offset == 0.0).then_some(film);
-        let mobility = self.table.at(distance / first.radius - 2.0 + self.offset);
+        let xi = distance / first.radius - 2.0 + self.offset;
+        let mobility = self.table.at(xi);
+        // Each sphere moves as alone under its force, but for the other that is pushed the other way.
+        let push = self.push(&n)? * approach_mobility(xi) / (6.0 * PI * first.radius);
 
         let strain = flow.strain_rate() * r;
         let normal = n * n.dot(&strain);
@@ -92,13 +126,20 @@ impl Hydrodynamics<3> for PairMobility {
         let middle = flow.velocity(&((first.pose.position + second.pose.position) * 0.5));
         let spin = flow.spin() + Dim::<3>::moment(&n, &(strain / distance)) * mobility.spin;
         for (twist, side) in twists.iter_mut().zip([-0.5, 0.5]) {
-            *twist = Twist { velocity: middle + relative * side, spin };
+            *twist = Twist { velocity: middle + (relative + n * (2.0 * push)) * side, spin };
         }
         Ok(())
     }
 
     fn set_shear_factor(&mut self, factor: f64) {
         self.factor = factor;
+    }
+
+    /// Forces of a fluid of viscosity 1.
+    fn set_wrenches(&mut self, wrenches: &[Wrench<3>]) -> Result<(), NoForces> {
+        self.wrenches.clear();
+        self.wrenches.extend_from_slice(wrenches);
+        Ok(())
     }
 
     fn films(&self, reach: f64) -> Vec<Film<3>> {

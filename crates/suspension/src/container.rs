@@ -25,6 +25,13 @@ impl<const D: usize> Container<D> {
         Self { bounds, lattice: Lattice::new(std::array::from_fn(|d| is_periodic[d].then_some(edges[d]))) }
     }
 
+    /// The space of a lattice, with a corner at the origin, for pairs of particles: where it has no period
+    /// there is no end.
+    pub(crate) fn of_lattice(lattice: Lattice<D>) -> Self {
+        let upper = Vector::from_fn(|d, _| lattice.periods()[d].unwrap_or(1.0));
+        Self { bounds: Aabb { lower: Vector::zeros(), upper }, lattice }
+    }
+
     /// A box with a corner at the origin that is periodic along all axes.
     pub fn periodic(edges: &Vector<D>) -> Self {
         Self::new(Aabb { lower: Vector::zeros(), upper: *edges }, [true; D])

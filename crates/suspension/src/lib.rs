@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! packing      random, equilibrium or lattice arrangements at a volume fraction, of one or many sizes
+//! repulsion    forces that decay with the gap, images and walls included
 //! structure    g(r), g(theta), S(k), contacts and clusters, gaps, fabric, diffusion, profiles
 //! statistics   block averages with confidence intervals, transients
 //! ```
@@ -37,11 +38,13 @@
 mod container;
 pub mod packing;
 mod pairs;
+mod repulsion;
 pub mod statistics;
 pub mod structure;
 
 pub use container::{Container, ball_volume};
 pub use pairs::{NearPair, for_each_pair};
+pub use repulsion::{Repelled, Repulsion};
 
 /// The examples of the README.
 #[cfg(doctest)]

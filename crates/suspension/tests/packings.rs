@@ -5,6 +5,7 @@ use gluey_suspension::Container;
 use gluey_suspension::packing::{
     Amount, Arrangement, LargeShare, Packing, PackingError, PackingParams, Sizes,
 };
+use gluey_suspension::structure::StructureFactor;
 
 const BRIEF: Arrangement = Arrangement::Equilibrium { sweep_count: 20 };
 
@@ -47,8 +48,26 @@ where
     }
     let container = Container::new(bounds, [true; D]);
     let amount = Amount::Count { fraction: dense, count: 400 };
-    let params = PackingParams { arrangement: BRIEF, min_gap: 0.01, ..PackingParams::new(amount) };
-    is_right(&container, &params, dense);
+    for arrangement in [BRIEF, Arrangement::Random] {
+        let params = PackingParams { arrangement, min_gap: 0.01, ..PackingParams::new(amount) };
+        is_right(&container, &params, dense);
+    }
+}
+
+/// Random arrangements are as even over long distances as their neighbours allow, and no lattice.
+#[test]
+fn random_arrangements_have_no_order() {
+    let container = Container::<2>::periodic(&Vector::repeat(1.0));
+    let amount = Amount::Count { fraction: 0.5, count: 400 };
+    let params = PackingParams { arrangement: Arrangement::Random, ..PackingParams::new(amount) };
+    let discs = is_right(&container, &params, 0.5);
+    let step = std::f64::consts::TAU;
+    let mut factor = StructureFactor::new(30.0 * step, step);
+    factor.add(&container, &discs.positions);
+    let highest = factor.bins().iter().map(|bin| bin.s).fold(0.0, f64::max);
+    println!("S at the smallest k {:.3}, highest {highest:.2}", factor.bins()[0].s);
+    // A lattice of 400 has peaks of 400.
+    assert!(factor.bins()[0].s < 0.15 && highest < 6.0, "{highest}");
 }
 
 #[test]

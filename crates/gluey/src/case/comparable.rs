@@ -40,7 +40,7 @@ fn other_flow(case: &Case, reference: &Reference) -> Option<Mismatch> {
     })
     .or_else(|| {
         let needs = "particles without forces and torques";
-        unless(!case.has_forces(), needs, || "some".to_owned())
+        unless(!case.has_forces() && case.repulsion().is_none(), needs, || "some".to_owned())
     })
     .or_else(|| unless(case.shear_rate == 1.0, "shear_rate = 1", || format!("{}", case.shear_rate)))
     .or_else(|| {

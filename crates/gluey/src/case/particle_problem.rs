@@ -91,7 +91,9 @@ fn packing_hint(error: &PackingError) -> &'static str {
             "2D has \"square\" and \"hexagonal\", 3D \"simple-cubic\", \"bcc\" and \"fcc\""
         }
         PackingError::ParticleTooLarge { .. } => "take more particles, a lower fraction or a larger box",
-        PackingError::NotSettled { .. } => "take a lower `volume_fraction`, a larger box or another seed",
+        PackingError::NotSettled { .. } | PackingError::Crowded { .. } => {
+            "take a lower `volume_fraction`, a larger box or another seed"
+        }
         PackingError::OutOfRange { .. } | PackingError::Tilted { .. } => "see the message",
     }
 }

@@ -1,11 +1,11 @@
 //! The rheology of a sheared suspension as comma-separated values, a row whenever its stress was computed.
 //!
 //! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate.
-//! `viscosity` is by the stresslets of the particles and by the forces of their contacts,
-//! `viscosity_by_dissipation` by the power that fluid and films dissipate: without contacts their difference
-//! is an error of discretisation. `viscosity_of_films` and, in 3D, `viscosity_of_contacts` are the shares of
-//! films too thin for the mesh and of contacts in the first. `particle_pressure` is
-//! `-tr S / (D V)`, relative to the mean pressure of the fluid.
+//! `viscosity` is by the stresslets of the particles and by the forces between them,
+//! `viscosity_by_dissipation` by the power that fluid and films dissipate: without such forces their difference
+//! is an error of discretisation. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and
+//! `viscosity_of_repulsion` are the shares of films too thin for the mesh, of contacts and of repulsion in the
+//! first. `particle_pressure` is `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
 use std::path::{Path, PathBuf};
 
@@ -15,13 +15,14 @@ use super::draft::{Draft, Mark, RowsError};
 use super::{OutputError, drafts};
 
 /// The first line in 3D; in 2D there is no `N2`, and forces of contacts have no unit of force.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "t",
     "strain",
     "viscosity",
     "viscosity_by_dissipation",
     "viscosity_of_films",
     "viscosity_of_contacts",
+    "viscosity_of_repulsion",
     "N1",
     "N2",
     "particle_pressure",
@@ -110,8 +111,9 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
         stress.viscosity_of_films(),
     ];
     let contacts = stress.viscosity_of_contacts();
-    let normal = contacts.into_iter().chain(n1).chain(n2).chain([stress.particle_pressure()]);
-    let numbers = first.into_iter().chain(normal).map(|number| format!("{number:.16e}"));
+    let shares = contacts.into_iter().chain([stress.viscosity_of_repulsion()]);
+    let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]);
+    let numbers = first.into_iter().chain(shares).chain(normal).map(|number| format!("{number:.16e}"));
     let gap = row.smallest_gap_over_a.map_or(String::new(), |gap| format!("{gap:.16e}"));
     let cells: Vec<String> = numbers.chain([gap]).collect();
     format!("{}\n", cells.join(","))
@@ -134,13 +136,14 @@ mod tests {
             of_bodies,
             of_films: of_bodies * 0.1,
             of_contacts: Some(of_bodies * 0.5),
+            of_repulsion: of_bodies * 0.5,
             dissipation: 1.25,
         };
         let row = Rheology { time: 1.0, strain: -0.5, stress: &stress, smallest_gap_over_a: Some(0.25) };
         let line = line(&row);
         let numbers: Vec<f64> =
             line.trim_end().split(',').map(|cell| cell.parse().expect("a number")).collect();
-        let expected = [1.0, -0.5, 3.25, 2.5, 0.15, 0.75, -1.5, 3.0, 4.5, 0.25];
+        let expected = [1.0, -0.5, 4.0, 2.5, 0.15, 0.75, 0.75, -2.0, 4.0, 6.0, 0.25];
         assert!(numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{numbers:?}");
         assert_eq!(numbers.len(), header::<3>().split(',').count());
         assert_eq!(header::<2>().split(',').count(), numbers.len() - 2);

@@ -2,13 +2,18 @@
 //! collections.
 //!
 //! Three series a run: `fields` (velocity, pressure, viscosity, level set and rigidity multiplier at the
-//! nodes of quadratic cells), `particles` (a vertex each: radius, velocity, spin) and `contacts` (a line for
-//! each contact, from centre to centre, to the centre of an image across a periodic border, or to the foot
+//! nodes of quadratic cells), `particles` (a vertex each: radius, velocity, spin, number, where it is when
+//! nothing brings it back into a periodic box, whether it is an image) and `contacts` (a line for each
+//! contact, from centre to centre, to the centre of an image across a periodic border, or to the foot
 //! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
 //! nothing touches).
+//!
+//! In periodic boxes particles are where the fields are, in the box, and images that reach into it follow
+//! them, so that pictures are whole.
 
 mod background;
 mod read;
+mod shown;
 mod xml;
 
 use std::path::{Path, PathBuf};
@@ -21,6 +26,8 @@ use super::{OutputError, prepare_folder_of, pvd, write_atomically};
 
 pub(crate) use background::FrameWriter;
 pub use read::{VtkReadError, read_fields, read_particles};
+pub use shown::ShownBox;
+use shown::{Shown, shown};
 use vtkio::model::CellType;
 use xml::{Array, Piece};
 pub use xml::{Precision, UnknownPrecision, VtkEncoding};
@@ -31,6 +38,9 @@ const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
 /// The same for a triquadratic hexahedron (type 29): corners, edges, faces -x +x -y +y -z +z, centre.
 const HEXAHEDRON_ORDER: [usize; 27] =
     [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
+
+/// What rounding may do to a place, relative to the distance of centres.
+const ROUNDING: f64 = 1e-6;
 
 /// Particles, contacts and fields at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +60,8 @@ where
     pub contacts: &'a [Contact],
     /// Their walls and periods.
     pub domain: &'a Domain<D>,
+    /// The box that particles are shown in; where they are, if there is none.
+    pub in_box: Option<ShownBox<D>>,
     /// Flow fields, where the model has any.
     pub fields: Option<&'a Fields<D>>,
 }
@@ -92,10 +104,11 @@ impl VtkWriter {
     where
         Dim<D>: Space<D>,
     {
+        let balls = shown(frame.particles, frame.in_box.as_ref());
         let pieces = [
             frame.fields.map(fields_piece),
-            Some(particles_piece(frame.particles, frame.twists)),
-            Some(contacts_piece(frame.particles, frame.contacts, frame.domain)),
+            Some(particles_piece(frame, &balls)),
+            Some(contacts_piece(frame, &balls)),
         ];
         for (series, piece) in self.series.iter_mut().zip(pieces) {
             if let Some(piece) = piece {
@@ -152,22 +165,34 @@ fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
     }
 }
 
-fn particles_piece<const D: usize>(particles: &[Particle<D>], twists: &[Twist<D>]) -> Piece
+fn particles_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
 where
     Dim<D>: Space<D>,
 {
-    let count = particles.len();
-    let velocities: Vec<Vector<D>> = twists.iter().map(|twist| twist.velocity).collect();
-    let spins: Vec<f64> = twists.iter().flat_map(|twist| spin_in_space::<D>(&twist.spin)).collect();
+    let (particles, twists) = (frame.particles, frame.twists);
+    let count = balls.len();
+    let velocity = |ball: &Shown<D>| {
+        let mut velocity = twists[ball.particle].velocity;
+        velocity[0] += ball.slide;
+        velocity
+    };
+    let of_balls = |number: &dyn Fn(&Shown<D>) -> f64| balls.iter().map(number).collect();
+    let velocities: Vec<Vector<D>> = balls.iter().map(velocity).collect();
+    let unwrapped: Vec<_> = balls.iter().map(|ball| particles[ball.particle].pose.position).collect();
+    let spins: Vec<f64> =
+        balls.iter().flat_map(|ball| spin_in_space::<D>(&twists[ball.particle].spin)).collect();
     Piece {
-        points: in_space(&centers(particles)),
+        points: in_space(&centers(balls)),
         connectivity: (0..count as u64).collect(),
         offsets: (1..=count as u64).collect(),
         types: vec![CellType::Vertex; count],
         of_points: vec![
-            scalars("radius", particles.iter().map(|particle| particle.radius).collect()),
+            scalars("radius", of_balls(&|ball| particles[ball.particle].radius)),
             vectors("velocity", &velocities),
             Array { name: "spin", components: 3, values: spins },
+            scalars("particle", of_balls(&|ball| ball.particle as f64 + 1.0)),
+            scalars("image", of_balls(&|ball| f64::from(u8::from(ball.is_image)))),
+            vectors("unwrapped", &unwrapped),
         ],
         of_cells: Vec::new(),
     }
@@ -175,22 +200,24 @@ where
 
 /// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images
 /// follow the centres, without a vertex.
-fn contacts_piece<const D: usize>(
-    particles: &[Particle<D>],
-    contacts: &[Contact],
-    domain: &Domain<D>,
-) -> Piece
+fn contacts_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
 where
     Dim<D>: Space<D>,
 {
-    let count = particles.len();
-    let mut points = centers(particles);
+    let (contacts, count) = (frame.contacts, frame.particles.len());
+    let positions: Vec<Vector<D>> = frame.particles.iter().map(|particle| particle.pose.position).collect();
+    let mut points = centers(&balls[..count]);
     let mut connectivity: Vec<u64> = (0..count as u64).collect();
     for Contact { pair, .. } in contacts {
-        let second = match (pair.second, pair.branch(&points[..count], domain)) {
-            (Partner::Particle { index, image: [0, 0, 0] }, _) => u64::from(index),
-            (_, branch) => {
-                points.push(points[pair.first as usize] + branch.unwrap_or_else(Vector::zeros));
+        let branch = pair.branch(&positions, frame.domain).unwrap_or_else(Vector::zeros);
+        let end = points[pair.first as usize] + branch;
+        let second = match pair.second {
+            // Where both are shown side by side the line ends at the vertex.
+            Partner::Particle { index, .. } if is_at(&end, &points[index as usize], branch.norm()) => {
+                u64::from(index)
+            }
+            _ => {
+                points.push(end);
                 points.len() as u64 - 1
             }
         };
@@ -236,9 +263,11 @@ where
     }
 }
 
-fn centers<const D: usize>(particles: &[Particle<D>]) -> Vec<Vector<D>>
-where
-    Dim<D>: Space<D>,
-{
-    particles.iter().map(|particle| particle.pose.position).collect()
+fn centers<const D: usize>(balls: &[Shown<D>]) -> Vec<Vector<D>> {
+    balls.iter().map(|ball| ball.center).collect()
+}
+
+/// Whether two places are the same but for rounding, relative to a length.
+fn is_at<const D: usize>(x: &Vector<D>, y: &Vector<D>, length: f64) -> bool {
+    (x - y).norm() <= ROUNDING * length
 }

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use gluey_contact::{ContactModel, PairContact};
 use gluey_geom::{Dim, Space};
+use gluey_suspension::Container;
 
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
 use crate::output::OutputError;
-use crate::output::vtk::{Frame, FrameWriter, VtkEncoding, VtkWriter};
+use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::simulation::Simulation;
 
@@ -112,13 +113,15 @@ where
             match stream {
                 Stream::Vtk { writer, with_fields } => {
                     let (contacts, domain) = (simulation.contacts(), simulation.contact().domain());
-                    let frame = Frame { step, time, particles, twists, contacts, domain, fields: None };
+                    let container = container(case, simulation);
+                    let in_box =
+                        domain.is_periodic().then_some(ShownBox { container, slide: simulation.slide() });
+                    let frame =
+                        Frame { step, time, particles, twists, contacts, domain, in_box, fields: None };
                     writer.write(&frame, with_fields.then(|| simulation.fields()).flatten())?;
                 }
                 Stream::Xyz(writer) => {
-                    let container = case.container();
-                    let height = container.bounds().extent()[1];
-                    let container = container.tilted(simulation.strain() * height);
+                    let container = container(case, simulation);
                     let strain = case.strain_after(step);
                     writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
                 }
@@ -142,6 +145,17 @@ where
             Stream::Xyz(_) => Ok(()),
         })
     }
+}
+
+/// The box as it is sheared now.
+fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, PairContact<D>>) -> Container<D>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+{
+    let container = case.container();
+    container.tilted(simulation.strain() * container.bounds().extent()[1])
 }
 
 fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, OutputError> {

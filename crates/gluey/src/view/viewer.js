@@ -8,9 +8,11 @@ const canvas = element("canvas");
 const pen = canvas.getContext("2d");
 const count = run.radii.length;
 const meanRadius = run.radii.reduce((sum, radius) => sum + radius, 0) / count;
+const largestRadius = run.radii.reduce((most, radius) => Math.max(most, radius), 0);
 const flat = run.dimension === 2;
 const SMALLEST_GAP = 1e-4; // in mean radii: the rounding of positions
 const FRAMES_PER_SECOND = 20;
+const MOST_CELLS = 10000; // along an axis
 
 // Dark to light, so that order is seen without colours too.
 const SCALE = [[68, 1, 84], [72, 37, 118], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140], [34, 168, 132],
@@ -65,16 +67,51 @@ function corners(now) {
 
 // What a frame tells
 
+// Particles by cells of the box without its tilt, as wide as `range` at least: what is nearer than that is in
+// the same cell or the next. Cells at a border without a period hold what lies beyond it, too.
+function cells(now, range) {
+  const slope = run.periodic[1] ? tilt(now) / run.edges[1] : 0;
+  const counts = run.edges.map((edge, d) =>
+    Math.min(Math.max(Math.floor(edge / (range * (d === 0 ? Math.hypot(1, slope) : 1))), 1), MOST_CELLS));
+  const members = new Map();
+  const places = run.radii.map((_, i) => {
+    const x = reduced(minus(at(now.positions, i), run.origin), now, Math.floor);
+    x[0] -= slope * x[1];
+    const place = x.map((along, d) =>
+      Math.min(Math.max(Math.floor(along / run.edges[d] * counts[d]) || 0, 0), counts[d] - 1));
+    const cell = (place[0] * counts[1] + place[1]) * counts[2] + place[2];
+    if (!members.has(cell)) members.set(cell, []);
+    members.get(cell).push(i);
+    return place;
+  });
+  // The cell before, this one and the next along an axis; none twice.
+  const along = (d, cell) => {
+    const beside = [cell - 1, cell, cell + 1];
+    if (!run.periodic[d]) return beside.filter((other) => other >= 0 && other < counts[d]);
+    return [...new Set(beside.map((other) => (other + counts[d]) % counts[d]))];
+  };
+  // Particles after particle `i` that are near it, in order.
+  return (i) => {
+    const [xs, ys, zs] = places[i].map((cell, d) => along(d, cell));
+    const near = [];
+    for (const x of xs) for (const y of ys) for (const z of zs) {
+      for (const j of members.get((x * counts[1] + y) * counts[2] + z) || []) if (j > i) near.push(j);
+    }
+    return near.sort((a, b) => a - b);
+  };
+}
+
 // Pairs with a gap up to one mean radius, of nearest images; gaps in mean radii. Kept once they are known.
 function pairs(now) {
   if (now.pairs) return now.pairs;
   now.pairs = [];
+  const near = cells(now, 2 * largestRadius + meanRadius);
   for (let i = 0; i < count; i++) {
-    for (let j = i + 1; j < count; j++) {
+    near(i).forEach((j) => {
       const apart = nearest(minus(at(now.positions, j), at(now.positions, i)), now);
       const gap = (norm(apart) - run.radii[i] - run.radii[j]) / meanRadius;
       if (gap <= 1) now.pairs.push({ i, j, apart, gap });
-    }
+    });
   }
   return now.pairs;
 }
@@ -144,7 +181,7 @@ function camera() {
   const middle = plus(run.origin, [lx / 2, ly / 2, lz / 2]);
   // A sheared box sticks out by at most a quarter of its edge on either side of its middle.
   const breadth = run.periodic[1] ? 1.5 * lx : lx;
-  const border = run.periodic.some(Boolean) ? 2 * Math.max(...run.radii) : 0; // for images
+  const border = run.periodic.some(Boolean) ? 2 * largestRadius : 0; // for images
   const room = flat ? [breadth + border, ly + border] : [Math.hypot(lx, ly, lz), Math.hypot(lx, ly, lz)];
   const scale = 0.88 * view.zoom * Math.min(width / room[0], height / room[1]);
   const [sy, cy, sp, cp] = [Math.sin(view.yaw), Math.cos(view.yaw), Math.sin(view.pitch), Math.cos(view.pitch)];

@@ -81,6 +81,17 @@ pub enum PackingError {
         /// The tilt.
         tilt: f64,
     },
+    /// Overlaps of random particles could not be removed.
+    #[error(
+        "overlaps could not be removed at {reached} of the radii, {overlap:e} radii are left: the fraction is \
+         too high for this box"
+    )]
+    Crowded {
+        /// Radii that were reached, relative to those wanted.
+        reached: f64,
+        /// The largest overlap that is left, relative to the smallest radius.
+        overlap: f64,
+    },
     /// Overlaps could not be removed.
     #[error("overlaps could not be removed at {reached} of the radii: the fraction is too high for this box")]
     NotSettled {

@@ -7,11 +7,14 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::separate::{self, Crowded};
 use super::{PackingError, monte_carlo};
 use crate::{Container, ball_volume};
 
 /// Fraction at which points become particles: most do not meet.
 const FIRST_FRACTION: f64 = 0.05;
+/// Width of the scatter of even points, in mean distances of neighbours.
+const SCATTER: f64 = 1.0;
 /// Growth of the radii in a stage, at most.
 const STAGE: f64 = 1.05;
 /// Overlap that stages leave, relative to the radii.
@@ -47,6 +50,49 @@ where
         }
     }
     Ok(positions)
+}
+
+/// Centres of balls of these radii that do not overlap, without Monte Carlo moves. Points are spread evenly
+/// before they grow: what is crowded over long distances would have to be pushed all the way, which takes more
+/// time for each ball the more there are.
+pub(super) fn grow_evenly<const D: usize>(
+    container: &Container<D>,
+    radii: &[f64],
+    random: &mut ChaCha8Rng,
+) -> Result<Vec<Vector<D>>, PackingError> {
+    let mut positions = even_points(container, radii, random);
+    let stages = stages::<D>(container, radii);
+    for (stage, &scale) in stages.iter().enumerate() {
+        let radii: Vec<f64> = radii.iter().map(|radius| radius * (1.0 + FINE) * scale).collect();
+        let tolerance = if stage + 1 == stages.len() { FINE } else { ROUGH };
+        separate::separate(container, &mut positions, &radii, tolerance)
+            .map_err(|Crowded { overlap }| PackingError::Crowded { reached: scale, overlap })?;
+    }
+    Ok(positions)
+}
+
+/// Points of the sequence R_D (Roberts 2018), which is even for any number of them, scattered by about the
+/// distance of neighbours; balls keep clear of the walls there.
+fn even_points<const D: usize>(
+    container: &Container<D>,
+    radii: &[f64],
+    random: &mut ChaCha8Rng,
+) -> Vec<Vector<D>> {
+    // The root of x^(D+1) = x + 1: its powers fill the axes.
+    let root = (0..64).fold(2.0, |x: f64, _| (1.0 + x).powf(1.0 / (D as f64 + 1.0)));
+    let bounds = container.bounds();
+    let spacing = (container.volume() / radii.len() as f64).powf(1.0 / D as f64);
+    let start = Vector::<D>::from_fn(|_, _| random.random_range(0.0..1.0));
+    let point = |(number, radius): (usize, &f64)| {
+        Vector::from_fn(|d, _| {
+            let margin = if container.is_walled(d) { *radius } else { 0.0 };
+            let room = bounds.upper[d] - bounds.lower[d] - 2.0 * margin;
+            let even = start[d] + (number as f64 + 1.0) * root.powi(-1 - d as i32);
+            let scattered = even + SCATTER * spacing / room * random.random_range(-0.5..0.5);
+            bounds.lower[d] + margin + room * scattered.rem_euclid(1.0)
+        })
+    };
+    radii.iter().enumerate().map(point).collect()
 }
 
 /// Points where balls keep clear of the walls.

@@ -6,6 +6,7 @@ mod error;
 mod growth;
 mod monte_carlo;
 mod params;
+mod separate;
 mod sizes;
 
 use gluey_geom::{Dim, Space, Vector};
@@ -164,12 +165,15 @@ where
     }
     check_room(container, &enlarged)?;
     let inner = inset(container, 0.5 * gap);
-    let sweep_count = match params.arrangement {
-        Arrangement::Equilibrium { sweep_count } => sweep_count,
-        _ => 0,
+    let positions = match params.arrangement {
+        Arrangement::Equilibrium { sweep_count } => {
+            let in_stage = sweep_count / SWEEPS_PER_STAGE_SWEEP;
+            let mut positions = growth::grow(&inner, &enlarged, in_stage, random)?;
+            monte_carlo::equilibrate(&inner, &mut positions, &enlarged, sweep_count, random);
+            positions
+        }
+        _ => growth::grow_evenly(&inner, &enlarged, random)?,
     };
-    let mut positions = growth::grow(&inner, &enlarged, sweep_count / SWEEPS_PER_STAGE_SWEEP, random)?;
-    monte_carlo::equilibrate(&inner, &mut positions, &enlarged, sweep_count, random);
     let positions = positions.iter().map(|x| container.wrapped(x)).collect();
     Ok(Packing { positions, radii })
 }

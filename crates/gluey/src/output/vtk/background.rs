@@ -11,7 +11,7 @@ use gluey_contact::{Contact, Domain};
 use gluey_geom::{Dim, Particle, Space, Twist};
 use gluey_motion::Fields;
 
-use super::{Frame, VtkWriter};
+use super::{Frame, ShownBox, VtkWriter};
 use crate::output::OutputError;
 
 /// Frames that may wait.
@@ -28,6 +28,7 @@ where
     twists: Vec<Twist<D>>,
     contacts: Vec<Contact>,
     domain: Domain<D>,
+    in_box: Option<ShownBox<D>>,
     fields: Option<Fields<D>>,
 }
 
@@ -74,6 +75,7 @@ where
             twists: frame.twists.to_vec(),
             contacts: frame.contacts.to_vec(),
             domain: frame.domain.clone(),
+            in_box: frame.in_box,
             fields,
         })))
     }
@@ -139,6 +141,7 @@ where
                 twists: &frame.twists,
                 contacts: &frame.contacts,
                 domain: &frame.domain,
+                in_box: frame.in_box,
                 fields: frame.fields.as_ref(),
             })?,
             // Whoever asked has gone if this fails.
@@ -154,7 +157,7 @@ mod tests {
 
     fn frame<'a>(step: usize, particles: &'a [Particle<2>], domain: &'a Domain<2>) -> Frame<'a, 2> {
         let (twists, contacts) = (&[][..], &[][..]);
-        Frame { step, time: step as f64, particles, twists, contacts, domain, fields: None }
+        Frame { step, time: step as f64, particles, twists, contacts, domain, in_box: None, fields: None }
     }
 
     #[test]

@@ -67,7 +67,7 @@ pub fn read_fields<const D: usize>(path: &Path) -> Result<Fields<D>, VtkReadErro
     }
 }
 
-/// The particles of a file `particles-<step>.vtu`.
+/// The particles of a file `particles-<step>.vtu`, without their images.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -77,11 +77,13 @@ where
 {
     let grid = Grid::read(path)?;
     let centers = grid.vectors::<D>(grid.piece.points.cast_into(), "points")?;
-    let radii = grid.scalars("radius")?;
-    if radii.len() != centers.len() {
+    let (radii, image) = (grid.scalars("radius")?, grid.scalars("image")?);
+    if radii.len() != centers.len() || image.len() != centers.len() {
         return Err(grid.foreign(format!("{} radii of {} particles", radii.len(), centers.len())));
     }
-    Ok(centers.into_iter().zip(radii).map(|(center, radius)| Particle::new(center, radius)).collect())
+    let balls = centers.into_iter().zip(radii).zip(image);
+    let own = balls.filter(|(_, image)| *image == 0.0);
+    Ok(own.map(|((center, radius), _)| Particle::new(center, radius)).collect())
 }
 
 /// A file and the grid in it.

@@ -1,0 +1,185 @@
+//! Particles that repel each other, in every model of their motion.
+
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use gluey::{Case, Progress, ProgressState, RunError, RunOptions, Silent, run};
+use gluey_geom::Vector;
+use gluey_motion::approach_mobility;
+use gluey_suspension::{Container, Repulsion, for_each_pair};
+use tempfile::TempDir;
+
+fn case(text: &str) -> Case {
+    Case::parse(text, "r.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Six discs at 0.2 in a box that is sheared, which repel each other.
+fn discs(cells_per_radius: f64, rest: &str) -> Case {
+    case(&format!(
+        "name = \"s\"\ndimension = 2\ndomain = {{ boundary = \"sheared\" }}\n\
+         suspension = {{ volume_fraction = 0.2, count = 6, seed = 3, min_gap = 0.05 }}\n\
+         contact = {{ strategy = \"none\" }}\n{rest}\n\
+         [flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = {cells_per_radius:?}\n\
+         coarsest_level = 2\n"
+    ))
+}
+
+/// Columns of a file by name.
+fn column(path: &Path, name: &str) -> Vec<f64> {
+    let text = fs::read_to_string(path).expect("a table");
+    let place = text.lines().next().expect("a header").split(',').position(|n| n == name).expect(name);
+    let number =
+        |line: &str| line.split(',').nth(place).and_then(|cell| cell.parse().ok()).expect("a number");
+    text.lines().skip(1).map(number).collect()
+}
+
+/// Centres in every row.
+fn centers<const D: usize>(csv: &Path, count: usize) -> Vec<Vec<Vector<D>>> {
+    let columns: Vec<Vec<Vec<f64>>> = (1..=count)
+        .map(|k| ["x", "y", "z"][..D].iter().map(|axis| column(csv, &format!("{axis}{k}"))).collect())
+        .collect();
+    let row = |row: usize| columns.iter().map(|x| Vector::from_fn(|d, _| x[d][row])).collect();
+    (0..columns[0][0].len()).map(row).collect()
+}
+
+fn run_in(case: &Case, folder: &Path) -> std::path::PathBuf {
+    let csv = folder.join("t.csv");
+    run(case, &RunOptions::csv(&csv), &Silent).unwrap_or_else(|error| panic!("{error}"));
+    csv
+}
+
+/// Two spheres in a fluid at rest part as their mobility says: `dg/dt = 2 m(g) F(g) / (6 pi a)`.
+#[test]
+fn a_pair_at_rest_parts_as_its_mobility_says() {
+    let folder = TempDir::new().expect("a folder");
+    let case = case(
+        "name = \"pair\"\ndimension = 3\nshear_rate = 0.0\nrepulsion = { force = 0.2, range = 0.2 }\n\
+         particles = [{ position = [0.448, 0.5, 0.5], radius = 0.05 },\n\
+                      { position = [0.552, 0.5, 0.5], radius = 0.05 }]\n\
+         time = { step = 0.002, end = 0.4 }\ncontact = { strategy = \"none\" }\n\
+         flow = { hydrodynamics = \"pair-mobility\" }",
+    );
+    let csv = run_in(&case, folder.path());
+    let gaps = column(&csv, "gap12_over_a");
+    let speed =
+        |gap: f64| 2.0 * 0.2 * (-gap / 0.2f64).exp() * approach_mobility(gap) / (6.0 * PI * 0.05 * 0.05);
+    let (mut gap, substep, mut worst) = (0.08, 0.0001, 0.0f64);
+    for (step, found) in gaps.iter().enumerate() {
+        if step > 0 {
+            for _ in 0..20 {
+                gap += substep * speed(gap + 0.5 * substep * speed(gap));
+            }
+        }
+        worst = worst.max((found - gap).abs());
+    }
+    println!("gap from {} to {gap}, worst {worst:e}", gaps[0]);
+    assert!(gap > 0.3 && worst < 1.5e-5, "{worst:e}");
+    let middle = centers::<3>(&csv, 2).iter().map(|x| (x[0] + x[1]) * 0.5).last().expect("a row");
+    assert!((middle - Vector::repeat(0.5)).norm() < 1e-14, "{middle}");
+}
+
+/// Repulsion moves particles as forces do that are given one by one: two discs, and one of them off a wall.
+#[test]
+fn the_flow_answers_as_to_given_forces() {
+    let text = |forces: [&str; 2], repulsion: &str| {
+        format!(
+            "name = \"two\"\ndimension = 2\nshear_rate = 0.0\n{repulsion}\ndomain.boundary = \"periodic\"\n\
+             particles = [{{ position = [0.05, 0.125], radius = 0.1{} }},\n\
+                          {{ position = [0.85, 0.125], radius = 0.08{} }}]\n\
+             time = {{ step = 0.001, end = 0.001 }}\ncontact = {{ strategy = \"none\" }}\n\
+             flow = {{ formulation = \"unfitted\", mesh = {{ cells_per_radius = 3.0 }} }}",
+            forces[0], forces[1]
+        )
+    };
+    let law = Repulsion { force: 2.0, range: 0.2 * 0.09, radius: 0.09 };
+    // Across the border, 0.2 apart; and the wall below.
+    let pair = law.at::<2>(0.02, [0.1, 0.08]);
+    let [first, second] = [(0.025, 0.1), (0.045, 0.08)].map(|(gap, a)| law.at::<2>(gap, [a, f64::INFINITY]));
+    let given = [(pair, first), (-pair, second)].map(|(x, y)| format!(", force = [{x:e}, {y:e}]"));
+    let move_of = |text: &str| {
+        let folder = TempDir::new().expect("a folder");
+        let rows = centers::<2>(&run_in(&case(text), folder.path()), 2);
+        [0, 1].map(|k| rows[1][k] - rows[0][k])
+    };
+    let found = move_of(&text(["", ""], "repulsion = { force = 2.0, range = 0.2 }"));
+    let exact = move_of(&text([&given[0], &given[1]], ""));
+    println!("{found:?} {exact:?}");
+    assert!(found[0].x > 0.0 && found[1].x < 0.0 && found[0].y > 0.0);
+    for k in 0..2 {
+        assert!((found[k] - exact[k]).norm() < 1e-6 * exact[k].norm(), "{found:?} {exact:?}");
+    }
+}
+
+/// Energy of repulsion where discs of the radius `a` are.
+fn energy(law: &Repulsion, centers: &[Vector<2>], strain: f64) -> f64 {
+    let container = Container::periodic(&Vector::<2>::repeat(1.0)).tilted(strain);
+    let mut sum = 0.0;
+    for_each_pair(&container, centers, 2.0 * law.radius + law.reach(), |pair| {
+        sum += law.range * law.at::<2>(pair.arm.norm() - 2.0 * law.radius, [law.radius; 2]);
+    });
+    sum
+}
+
+/// What shear and repulsion do to the fluid is dissipated: the stress, with the share of repulsion, times the
+/// rate, less what goes into the energy of repulsion.
+#[test]
+fn power_is_dissipated_or_stored() {
+    let folder = TempDir::new().expect("a folder");
+    let case = discs(4.0, "time = { step = 0.005, end = 0.1 }\nrepulsion = { force = 10.0, range = 0.3 }");
+    let csv = run_in(&case, folder.path());
+    let rheology = folder.path().join("t-rheology.csv");
+    let [viscosity, by_dissipation, share, strain] =
+        ["viscosity", "viscosity_by_dissipation", "viscosity_of_repulsion", "strain"]
+            .map(|name| column(&rheology, name));
+    let law = case.repulsion().expect("a law");
+    let energies: Vec<f64> =
+        centers::<2>(&csv, 6).iter().zip(&strain).map(|(x, strain)| energy(&law, x, *strain)).collect();
+    let (mut worst, mut largest) = (0.0f64, [0.0f64; 2]);
+    for k in 1..energies.len() - 1 {
+        let stored = (energies[k + 1] - energies[k - 1]) / 0.01;
+        worst = worst.max((viscosity[k] - stored - by_dissipation[k]).abs() / by_dissipation[k]);
+        largest = [largest[0].max(stored.abs()), largest[1].max(share[k].abs())];
+    }
+    println!("miss {worst:.1e}; stored up to {:.2}, share of repulsion up to {:.2}", largest[0], largest[1]);
+    assert!(worst < 6e-3 && largest.iter().all(|part| *part > 0.1), "{worst} {largest:?}");
+}
+
+/// Interrupts a run when it has reached a step.
+struct StopAt(usize, Arc<AtomicBool>);
+
+impl Progress for StopAt {
+    fn report(&self, state: &ProgressState<'_>) {
+        if state.step >= self.0 {
+            self.1.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+#[test]
+fn runs_resume_bit_by_bit() {
+    let folder = TempDir::new().expect("a folder");
+    let case = discs(
+        2.0,
+        "shear_rate = 2.0\ntime = { step = 0.05, end = 0.4, reverse_at = 0.25 }\n\
+         repulsion = { force = 0.5 }",
+    );
+    let whole = run_in(&case, folder.path());
+    let csv = folder.path().join("parts.csv");
+    let checkpoint = folder.path().join("c.checkpoint");
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let options = RunOptions { checkpoint: Some(checkpoint.clone()), ..RunOptions::csv(&csv) };
+    let stopped = RunOptions { interrupt: Some(interrupt.clone()), ..options.clone() };
+    match run(&case, &stopped, &StopAt(3, interrupt)) {
+        Err(RunError::Interrupted { .. }) => {}
+        other => panic!("{other:?}"),
+    }
+    let resumed = RunOptions { resume: Some(checkpoint), ..options };
+    run(&case, &resumed, &Silent).unwrap_or_else(|error| panic!("{error}"));
+    let read = |path: &Path| fs::read_to_string(path).expect("a file");
+    assert_eq!(read(&whole), read(&csv));
+    let [whole, parts] = ["t", "parts"].map(|name| folder.path().join(format!("{name}-rheology.csv")));
+    assert_eq!(read(&whole), read(&parts));
+}
