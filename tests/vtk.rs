@@ -3,9 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use gluey::output::vtk::{
-    Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles,
-};
+use gluey::output::vtk::{Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
