@@ -4,12 +4,14 @@
 //! `cargo xtask fuzz --cases 1000000` tries more of them than usual, `--seed` others: the same seed gives the
 //! same texts on every machine. What came of long runs is in `docs/robustness.md`.
 
+#[path = "fuzz/follow.rs"]
+mod follow;
+
 use std::panic::catch_unwind;
 use std::time::Instant;
 
+use follow::{case_text, generates_many};
 use gluey::Case;
-use gluey::flow::{MeshEstimate, stokes_flow};
-use gluey_geom::{Dim, Particle, Space, Vector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -168,16 +170,9 @@ const VALUES: &[&str] = &[
     "\"pair3d_trajectory_box\"",
 ];
 
-/// Particles and moves that are few enough to generate.
-const FEW_PARTICLES: i64 = 200;
-const FEW_SWEEPS: i64 = 20;
-
 /// Most seconds that a text may take, and most memory of the whole program in bytes.
 const MOST_SECONDS: f64 = 30.0;
 const MOST_MEMORY: u64 = 1_000_000_000;
-
-/// Cells that are few enough to build the mesh.
-const FEW_CELLS: f64 = 4000.0;
 
 fn pick<T: Copy>(random: &mut ChaCha8Rng, from: &[T]) -> T {
     from[random.random_range(0..from.len())]
@@ -241,58 +236,6 @@ fn mutate(text: &str, random: &mut ChaCha8Rng) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Sets up the first mesh, if it is small; whether it was.
-fn set_up<const D: usize>(case: &Case, estimate: &MeshEstimate) -> bool
-where
-    Dim<D>: Space<D>,
-{
-    let particles: Vec<Particle<D>> = case
-        .particles
-        .iter()
-        .map(|spec| Particle::new(Vector::from_fn(|d, _| spec.position[d]), spec.radius))
-        .collect();
-    if estimate.cell_count > FEW_CELLS {
-        return false;
-    }
-    // Refused with a typed error, or built: both are answers.
-    if let Ok(cells) = stokes_flow::<D>(case).and_then(|flow| flow.cell_count(&particles)) {
-        let ratio = cells as f64 / estimate.cell_count;
-        assert!((0.3..3.0).contains(&ratio), "{cells} cells, {estimate:?}");
-    }
-    true
-}
-
-/// Whether a text asks for particles whose generation would take long, as a user may wish.
-fn generates_many(text: &str) -> bool {
-    let Ok(table) = toml::from_str::<toml::Table>(text) else { return false };
-    let Some(suspension) = table.get("suspension").and_then(toml::Value::as_table) else { return false };
-    let number = |key: &str| suspension.get(key).and_then(toml::Value::as_integer);
-    number("count").is_none_or(|count| count > FEW_PARTICLES)
-        || number("sweeps").is_none_or(|sweeps| sweeps > FEW_SWEEPS)
-}
-
-/// How far a text comes: 0 refused, 1 read, 2 a mesh was built.
-fn follow(text: &str) -> usize {
-    let case = match Case::parse(text, "fuzz.toml") {
-        Ok(case) => case,
-        Err(error) => {
-            let message = error.to_string();
-            assert!(message.starts_with("fuzz.toml:"), "{message}");
-            return 0;
-        }
-    };
-    case.check().expect("a case that was read can be checked again");
-    assert!(case.step_count() <= 1_000_000_001 && case.mean_radius() > 0.0);
-    assert!(!case.file_stem().is_empty());
-    let Some(estimate) = MeshEstimate::of(&case) else { return 1 };
-    assert!(estimate.cell_count >= 1.0 && estimate.bytes >= 0.0, "{estimate:?}");
-    let is_built = match case.dimension {
-        2 => set_up::<2>(&case, &estimate),
-        _ => set_up::<3>(&case, &estimate),
-    };
-    1 + usize::from(is_built)
-}
-
 /// A number that an environment variable sets.
 fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
@@ -313,7 +256,7 @@ fn no_text_panics_hangs_or_fills_the_memory() {
             continue;
         }
         let start = Instant::now();
-        match catch_unwind(|| follow(&text)) {
+        match catch_unwind(|| case_text(&text)) {
             Ok(stage) => reached[stage] += 1,
             Err(_) => panic!("text {number}:\n{text}"),
         }
