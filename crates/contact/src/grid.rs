@@ -4,6 +4,9 @@ use std::ops::Range;
 
 use gluey_geom::Vector;
 
+/// Cells along an axis.
+const MOST_ALONG_AXIS: f64 = 1e9;
+
 /// A grid of cells over a cloud of points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grid<const D: usize> {
@@ -25,10 +28,12 @@ impl<const D: usize> Grid<D> {
         Self::within(lower, extent, extent.amax() / points.len().max(1) as f64, points.len())
     }
 
-    fn within(lower: Vector<D>, extent: Vector<D>, mut width: f64, most: usize) -> Self {
+    fn within(lower: Vector<D>, extent: Vector<D>, width: f64, most: usize) -> Self {
+        // More cells than this along an axis are too many; and a width of zero would never grow.
+        let mut width = width.max(extent.amax() / MOST_ALONG_AXIS).max(f64::MIN_POSITIVE);
         loop {
             let counts: [usize; D] =
-                std::array::from_fn(|d| (extent[d] / width).clamp(0.0, 1e9) as usize + 1);
+                std::array::from_fn(|d| (extent[d] / width).clamp(0.0, MOST_ALONG_AXIS) as usize + 1);
             let total = counts.iter().fold(1.0, |total, count| total * *count as f64);
             if total <= most.max(1) as f64 {
                 return Self { lower, inverse_width: 1.0 / width, counts };

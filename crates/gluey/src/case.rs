@@ -124,7 +124,10 @@ pub struct Case {
     /// Contact.
     #[serde(default)]
     pub contact: ContactSpec,
-    /// Repulsion of particles and walls.
+    /// Repulsion of particles, images and walls that decays with the gap `g`: `force exp(-g/range)` between
+    /// two particles of the mean radius. Others repel each other in proportion to the harmonic mean of
+    /// their radii, in 2D to its root; a wall counts as a particle of infinite radius. Forces below a
+    /// millionth of that at contact are left out.
     #[serde(default)]
     pub repulsion: RepulsionSpec,
     /// Flow.

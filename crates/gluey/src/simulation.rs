@@ -318,7 +318,7 @@ where
         }
         let (hydrodynamics, particles) = (&mut self.hydrodynamics, &self.particles);
         self.phases
-            .time("repulsion", || {
+            .time("flow", || {
                 repelling.update(particles);
                 hydrodynamics.set_wrenches(&repelling.wrenches)
             })

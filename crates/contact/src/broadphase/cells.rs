@@ -9,6 +9,9 @@ use crate::grid::{Grid, sort_by_key};
 /// Cells for every ball at most, so that a sparse cloud needs no more memory than a dense one.
 const CELLS_PER_BALL: usize = 2;
 
+/// Balls in the cell of a ball, on average, that make the cells crowded: similar sizes have fewer.
+const CROWD: f64 = 256.0;
+
 /// Bins of balls, numbered row by row along the first axis.
 ///
 /// The cells of a row are neighbours in memory: three cells of it are one range of balls.
@@ -40,6 +43,14 @@ impl CellList {
         }));
     }
 
+    /// Bins the balls; whether so many share cells that a search from ball to ball would be slow, as where
+    /// one is far from all others.
+    pub(super) fn is_crowded<const D: usize>(&mut self, centers: &[Vector<D>], radii: &[f64]) -> bool {
+        self.bin(&grid(centers, radii), centers, radii);
+        let crowd = |cell: &[u32]| f64::from(cell[1] - cell[0]).powi(2);
+        self.starts.windows(2).map(crowd).sum::<f64>() > CROWD * centers.len() as f64
+    }
+
     /// Finds the pairs, in the order of the members. Each member looks for those behind it.
     fn find<const D: usize>(&mut self, grid: &Grid<D>, asker_count: usize) {
         let Self { starts, members, balls, found, .. } = self;
@@ -61,6 +72,12 @@ impl CellList {
     }
 }
 
+/// Cells in which balls that meet are neighbours.
+fn grid<const D: usize>(centers: &[Vector<D>], radii: &[f64]) -> Grid<D> {
+    let largest = radii.iter().copied().fold(0.0, f64::max);
+    Grid::over(centers, 2.0 * largest, CELLS_PER_BALL * centers.len())
+}
+
 impl<const D: usize> Broadphase<D> for CellList {
     fn meeting(
         &mut self,
@@ -73,8 +90,7 @@ impl<const D: usize> Broadphase<D> for CellList {
         if centers.len() < 2 {
             return;
         }
-        let largest = radii.iter().copied().fold(0.0, f64::max);
-        let grid = Grid::over(centers, 2.0 * largest, CELLS_PER_BALL * centers.len());
+        let grid = grid(centers, radii);
         self.bin(&grid, centers, radii);
         self.find(&grid, asker_count);
         let Self { found, starts, members: order, .. } = self;

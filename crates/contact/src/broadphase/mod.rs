@@ -27,7 +27,10 @@ pub trait Broadphase<const D: usize>: Send {
 /// Ratio of the largest to the mean radius beyond which the hierarchy is faster than the cell list.
 const SIZE_RATIO: f64 = 4.0;
 
-/// The cell list for balls of similar sizes, the hierarchy otherwise.
+/// So few balls are looked at in no time, wherever they are.
+const FEW: usize = 1000;
+
+/// The cell list for balls of similar sizes that fill their space, the hierarchy otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct BestOf {
     cells: CellList,
@@ -44,7 +47,8 @@ impl<const D: usize> Broadphase<D> for BestOf {
     ) {
         let largest = radii.iter().copied().fold(0.0, f64::max);
         let sum: f64 = radii.iter().sum();
-        if largest * radii.len() as f64 <= SIZE_RATIO * sum {
+        let are_similar = largest * radii.len() as f64 <= SIZE_RATIO * sum;
+        if are_similar && (radii.len() < FEW || !self.cells.is_crowded(centers, radii)) {
             self.cells.meeting(centers, radii, asker_count, pairs);
         } else {
             self.hierarchy.meeting(centers, radii, asker_count, pairs);

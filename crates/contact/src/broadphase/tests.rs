@@ -47,3 +47,38 @@ fn pairs_equal_brute_force() {
     check::<2>();
     check::<3>();
 }
+
+/// Balls as far from each other as numbers go, alone and beside many that are near each other; and as near.
+#[test]
+fn searches_end_wherever_balls_are() {
+    let near = |i: usize| Vector::<3>::from_fn(|d, _| (i as f64 * [0.7548, 0.5698, 0.4301][d]).fract());
+    for far in [1e15, 1e200, 1e300, 1.7e308, 5e-324] {
+        for (count, sizes) in [(2, 1.0), (3, 100.0), (30_000, 1.0), (3000, 100.0)] {
+            let mut centers: Vec<Vector<3>> = (0..count).map(near).collect();
+            let mut radii = vec![0.01; count];
+            radii[0] *= sizes;
+            centers[count - 1] = Vector::repeat(-far);
+            centers[1] = Vector::repeat(far);
+            let [mut best, mut others] = [Vec::new(), Vec::new()];
+            BestOf::default().meeting(&centers, &radii, count, &mut best);
+            Hierarchy.meeting(&centers, &radii, count, &mut others);
+            assert!(best == others && (count < 30_000 || best.len() > 1000), "{far} {count}");
+        }
+    }
+    let (centers, mut pairs) = ([0.0, 5e-324, 1e-323].map(Vector::<2>::repeat), Vec::new());
+    for radius in [0.0, 5e-324] {
+        CellList::default().meeting(&centers, &[radius; 3], 3, &mut pairs);
+    }
+}
+
+/// Where one ball is far from all others, all others are in one cell: the hierarchy looks for them.
+#[test]
+fn a_cell_that_holds_all_is_crowded() {
+    let mut centers: Vec<Vector<3>> =
+        (0..8000).map(|i| Vector::from_fn(|d, _| (i as f64 * [0.7548, 0.5698, 0.4301][d]).fract())).collect();
+    let radii = vec![0.025; 8000];
+    let mut cells = CellList::default();
+    assert!(!cells.is_crowded(&centers, &radii));
+    centers[0] = Vector::repeat(1e300);
+    assert!(cells.is_crowded(&centers, &radii));
+}

@@ -6,10 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Case;
 
-/// Repulsion of particles, images and walls that decays with the gap `g`: `force exp(-g/range)` between two
-/// particles of the mean radius. Others repel each other in proportion to the harmonic mean of their radii (in
-/// 2D to its root), walls twice as much (in 2D 1.41 times). Forces below a millionth of that at contact are
-/// left out.
+/// Repulsion of particles and walls, see [`Repulsion`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RepulsionSpec {
