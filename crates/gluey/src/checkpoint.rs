@@ -25,7 +25,7 @@ use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.

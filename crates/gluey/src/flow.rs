@@ -76,17 +76,19 @@ struct WarmStart<const D: usize> {
 struct SavedFields {
     velocity: Vec<f64>,
     pressure: Vec<f64>,
+    bodies: Vec<f64>,
+    films: Vec<f64>,
 }
 
 impl From<NodalFields> for SavedFields {
-    fn from(NodalFields { velocity, pressure }: NodalFields) -> Self {
-        Self { velocity, pressure }
+    fn from(NodalFields { velocity, pressure, bodies, films }: NodalFields) -> Self {
+        Self { velocity, pressure, bodies, films }
     }
 }
 
 impl From<SavedFields> for NodalFields {
-    fn from(SavedFields { velocity, pressure }: SavedFields) -> Self {
-        Self { velocity, pressure }
+    fn from(SavedFields { velocity, pressure, bodies, films }: SavedFields) -> Self {
+        Self { velocity, pressure, bodies, films }
     }
 }
 

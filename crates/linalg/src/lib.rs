@@ -48,8 +48,8 @@ pub use krylov::{
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;
 pub use smoother::{
-    Chebyshev, ChebyshevParams, Guess, ModesWorkspace, SchwarzPatches, SpectralInterval, WeakModes,
-    weak_modes,
+    Chebyshev, ChebyshevParams, Guess, ModesWorkspace, PatchError, SchwarzPatches, SpectralInterval,
+    WeakModes, weak_modes,
 };
 pub use sparse::{
     BlockGroups, BlockPattern, LocalTerm, Pattern, Prolongation, SellMatrix, SparseError, SparseMatrix,

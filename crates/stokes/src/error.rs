@@ -137,9 +137,16 @@ pub enum StokesError {
     /// The mesh around a surface has an unknown without stiffness.
     #[error("the mesh around the surfaces cannot be smoothed: {0}")]
     AtSurface(#[source] DiagonalError),
-    /// The operator on the nodes of a cell at a surface is not positive definite.
-    #[error("the mesh around the surfaces cannot be smoothed cell by cell: {0}")]
-    SurfaceBlock(#[source] BlockError),
+    /// The operator on the nodes of a cell at a surface is not positive definite, whatever the penalty.
+    #[error("the mesh cannot be smoothed in the cell around {center:?} at body {}: {source}; refine the mesh", body + 1)]
+    SurfaceBlock {
+        /// Centre of the cell, in the box.
+        center: Vec<f64>,
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// Cause.
+        source: BlockError,
+    },
     /// The penalised operator on the nodes of a cell is not positive definite.
     #[error("the solid cannot be smoothed cell by cell: {0}")]
     SolidPatch(#[source] BlockError),
@@ -248,6 +255,10 @@ mod tests {
         }
         let source =
             DiagonalError::Body { body, source: BlockError::NotPositiveDefinite { pivot: 4, value: -1e-3 } };
+        let block = BlockError::NotPositiveDefinite { pivot: 7, value: -0.8 };
+        let text = StokesError::SurfaceBlock { center: vec![0.25, 0.5], body, source: block }.to_string();
+        let parts = ["[0.25, 0.5]", "body 3", "pivot 7", "-8e-1", "refine"];
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
         let text = StokesError::Smoother { level: 5, source }.to_string();
         assert!(["level 5", "body 3", "pivot 4", "-1e-3"].iter().all(|part| text.contains(part)), "{text}");
     }

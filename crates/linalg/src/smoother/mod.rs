@@ -6,4 +6,4 @@ mod schwarz;
 
 pub use chebyshev::{Chebyshev, ChebyshevParams, Guess, SpectralInterval};
 pub use modes::{ModesWorkspace, WeakModes, weak_modes};
-pub use schwarz::SchwarzPatches;
+pub use schwarz::{PatchError, SchwarzPatches};

@@ -14,6 +14,16 @@ use crate::scalar::Scalar;
 use crate::sparse::SymmetricBlockMatrix;
 use crate::vector;
 
+/// A block that is not positive definite, and its patch.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("patch {patch}: {source}")]
+pub struct PatchError {
+    /// Place among the patches.
+    pub patch: usize,
+    /// Cause.
+    pub source: BlockError,
+}
+
 /// The inverses of the blocks on patches of nodes with `B` components, for vectors of `T`.
 #[derive(Clone, Debug)]
 pub struct SchwarzPatches<T, const B: usize> {
@@ -50,7 +60,7 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         patches: impl Iterator<Item = Vec<u32>>,
         diagonal: Vec<T>,
     ) -> Result<Self, BlockError> {
-        Self::weighted(matrix, patches, diagonal, Weights::Symmetric)
+        Self::weighted(matrix, patches, diagonal, Weights::Symmetric).map_err(|error| error.source)
     }
 
     /// Restricted additive Schwarz (Cai and Sarkis 1999): `z = W sum R_c^T A_c^-1 R_c r`, which is not
@@ -62,7 +72,7 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         matrix: &SymmetricBlockMatrix<B>,
         patches: impl Iterator<Item = Vec<u32>>,
         diagonal: Vec<T>,
-    ) -> Result<Self, BlockError> {
+    ) -> Result<Self, PatchError> {
         Self::weighted(matrix, patches, diagonal, Weights::Restricted)
     }
 
@@ -71,7 +81,7 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         patches: impl Iterator<Item = Vec<u32>>,
         mut diagonal: Vec<T>,
         weights_of: Weights,
-    ) -> Result<Self, BlockError> {
+    ) -> Result<Self, PatchError> {
         let ascending = patches.map(|mut nodes| {
             nodes.sort_unstable();
             nodes
@@ -91,9 +101,9 @@ impl<T: Scalar, const B: usize> SchwarzPatches<T, B> {
         inverses.reserve_exact(patches.iter().map(|nodes| triangle_size(nodes.len() * B)).sum());
         let mut place = vec![u32::MAX; matrix.node_count()];
         let (mut dense, mut weights) = (DenseSymmetric::default(), Vec::new());
-        for nodes in patches.iter() {
+        for (patch, nodes) in patches.iter().enumerate() {
             block_on(matrix, nodes, &mut place, &mut dense);
-            dense.sweep()?;
+            dense.sweep().map_err(|source| PatchError { patch, source })?;
             weights.clear();
             weights.extend(nodes.iter().map(weight).flat_map(|weight| [weight; B]));
             for (i, own) in weights.iter().enumerate() {

@@ -18,8 +18,11 @@ use gluey_linalg::{Jagged, Scalar};
 use nalgebra::Matrix2;
 
 use super::deficit::Deficits;
-use super::near::{Film, Heights};
+use super::near::{Film, Heights, Partner};
 use crate::space::VelocitySpace;
+
+/// Least cosine between the normals of one film in two steps.
+const SAME_FILM: f64 = 0.7;
 
 /// Rows of the films' forces `g` in the Stokes system, `s B V - g`.
 #[derive(Clone, Debug)]
@@ -67,6 +70,8 @@ where
 {
     /// Modes of a film: the normal one, sliding and rolling in each direction across it.
     pub const MODES: usize = 1 + 2 * (D - 1);
+    /// Numbers that are kept of a film.
+    pub const KEPT: usize = 2 + 3 * D;
 
     /// The forces of `films` that are widened to these heights, on the velocities of `space` in a fluid of
     /// this viscosity.
@@ -107,6 +112,60 @@ where
             }
         };
         self.films.iter().enumerate().map(of_film).collect()
+    }
+
+    /// What is kept of the scaled forces `g` for the films of another step, [`FilmCoupling::KEPT`] numbers for
+    /// each: body, partner, normal, and the sums of `f slip t` and of `f turning t` over the modes. Unlike
+    /// velocities, forces change little where a film closes.
+    pub fn kept(&self, g: &[f64]) -> Vec<f64> {
+        let mut kept = Vec::with_capacity(self.films.len() * Self::KEPT);
+        for (index, film) in self.films.iter().enumerate() {
+            let first = index * Self::MODES;
+            let [mut force, mut couple] = [Vector::<D>::zeros(); 2];
+            for (k, mode) in self.modes[index].iter().enumerate() {
+                let f = self.scales[first + k] * g[first + k];
+                force += mode.direction * (f * mode.slip);
+                couple += mode.direction * (f * mode.turning);
+            }
+            kept.extend(key(film));
+            kept.extend([&film.normal, &force, &couple].into_iter().flatten());
+        }
+        kept
+    }
+
+    /// Writes the scaled forces of the films that were there before, with nearly the same normal, for what
+    /// [`FilmCoupling::kept`] gave for them then.
+    pub fn restore(&self, kept: &[f64], g: &mut [f64]) {
+        let mut before: Vec<&[f64]> = kept.chunks_exact(Self::KEPT).collect();
+        let order = |a: &[f64], b: &[f64]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+        before.sort_by(|a, b| order(a, b));
+        let vector = |old: &[f64], k: usize| Vector::<D>::from_column_slice(&old[2 + k * D..][..D]);
+        for (film, (modes, at)) in self.films.iter().zip(self.modes.iter().zip((0..).step_by(Self::MODES))) {
+            let key = key(film);
+            let first = before.partition_point(|old| order(old, &key).is_lt());
+            let mut alike = before[first..].iter().take_while(|old| order(old, &key).is_eq());
+            let Some(old) = alike.find(|old| vector(old, 0).dot(&film.normal) > SAME_FILM) else { continue };
+            let (force, couple) = (vector(old, 1), vector(old, 2));
+            let mut set = |k: usize, f: f64| {
+                let scale = self.scales[at + k];
+                g[at + k] = if scale > 0.0 { f / scale } else { 0.0 };
+            };
+            set(0, force.dot(&film.normal));
+            for k in (1..Self::MODES).step_by(2) {
+                let [a, b] = [&modes[k], &modes[k + 1]];
+                let (slip, turning) = (force.dot(&a.direction), couple.dot(&a.direction));
+                let determinant = a.slip * b.turning - b.slip * a.turning;
+                set(k, (slip * b.turning - b.slip * turning) / determinant);
+                set(k + 1, (a.slip * turning - slip * a.turning) / determinant);
+            }
+        }
+    }
+
+    /// The forces `g` that belong to the motions of the bodies in reduced velocities, for the films' part of
+    /// a right-hand side.
+    pub fn of_motions(&self, x: &[f64], b: &[f64]) -> Vec<f64> {
+        let motion = |row: &[(u32, f64)]| row.iter().map(|&(k, weight)| weight * x[k as usize]).sum::<f64>();
+        self.rows.iter().zip(b).map(|(row, b)| motion(row) - b).collect()
     }
 
     /// Number of rows.
@@ -153,6 +212,15 @@ where
             }
         }
     }
+}
+
+/// The two sides of a film as numbers: bodies, negative for walls.
+fn key<const D: usize>(film: &Film<D>) -> [f64; 2] {
+    let partner = match film.partner {
+        Partner::Body(body) => f64::from(body),
+        Partner::Wall { axis, is_upper } => -1.0 - f64::from(2 * axis + u32::from(is_upper)),
+    };
+    [f64::from(film.body), partner]
 }
 
 /// A mode of the relative motion of the two sides of a film: `slip v.t + turning ((w_1 - w_2) x n).t` in a

@@ -214,7 +214,7 @@ where
         let mut method = self.method.clone();
         self.prepare(&mut problem, &mut method)?;
         let prepared = Instant::now();
-        let (guess, before) = self.initial_guess(&problem);
+        let (guess, before) = self.initial_guess(&problem, conditions)?;
         let Trusted { mut flow, x, .. } = self.trusted(&mut problem, &mut method, conditions, &guess)?;
         self.keep_for_next(&problem, &x, &flow.pressure, before);
         flow.times = PhaseTimes {
@@ -316,13 +316,22 @@ where
     }
 
     /// The initial guess, and the last flow on its mesh; zero and nothing at the first step.
-    fn initial_guess(&self, problem: &Problem<D>) -> (Vec<f64>, Option<NodalFields>) {
+    fn initial_guess(
+        &self,
+        problem: &Problem<D>,
+        conditions: &Conditions<'_, D>,
+    ) -> Result<(Vec<f64>, Option<NodalFields>), StokesError> {
         match &self.warm_start {
             Some(warm) if self.params.solver == SolverKind::Multigrid => {
-                let (guess, last) = warm.moved(problem.discretisation()).into_guess(&problem.system);
-                (guess, Some(last))
+                // Only films need it.
+                let b = match &problem.system.films {
+                    Some(_) => conditions.data(problem)?.1,
+                    None => Vec::new(),
+                };
+                let (guess, last) = warm.moved(problem.discretisation()).into_guess(&problem.system, &b);
+                Ok((guess, Some(last)))
             }
-            _ => (vec![0.0; problem.system.dim()], None),
+            _ => Ok((vec![0.0; problem.system.dim()], None)),
         }
     }
 
@@ -338,8 +347,10 @@ where
             let space = &problem.system.space;
             let mut velocity = x[..space.dim()].to_vec();
             space.expand(&mut velocity);
-            velocity.truncate(space.full_dim());
-            let last = NodalFields { velocity, pressure: pressure.to_vec() };
+            let bodies = velocity.split_off(space.full_dim());
+            let films = problem.system.films.as_ref();
+            let films = films.map_or_else(Vec::new, |films| films.kept(problem.system.parts(x)[2]));
+            let last = NodalFields { velocity, pressure: pressure.to_vec(), bodies, films };
             let before = before.filter(|_| problem.rigidity.is_smooth_in_time());
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }

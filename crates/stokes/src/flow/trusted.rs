@@ -42,7 +42,7 @@ where
         let mut is_stiffened = false;
         loop {
             let error = match self.solver(problem).prepare(problem) {
-                Err(error @ (StokesError::SurfaceBlock(_) | StokesError::AtSurface(_))) => error,
+                Err(error @ (StokesError::SurfaceBlock { .. } | StokesError::AtSurface(_))) => error,
                 other => return other.map(|_| is_stiffened),
             };
             *method = method.stiffened().ok_or(error)?;

@@ -18,6 +18,8 @@ use crate::space::{Discretisation, VelocitySpace};
 const MOST_CORNERS: usize = 8;
 /// Unknowns of a twist, at most.
 const MOST_RIGID: usize = 6;
+/// One and the coordinates, at most.
+const MOST_COORDINATES: usize = 4;
 
 /// `[A, -B^T; -B, 0]` of the cut cells.
 #[derive(Clone, Debug)]
@@ -27,6 +29,8 @@ pub struct SurfaceCoupling<const D: usize> {
     discretisation: Discretisation<D>,
     viscosity: f64,
     roots: Vec<u32>,
+    /// A body that cuts each root or a bad cell that it carries.
+    bodies_at_roots: Vec<u32>,
     /// `beta h / eta` of each cut cell.
     penalties: Vec<f64>,
     /// Cut cell and body of each piece.
@@ -99,9 +103,11 @@ where
         );
         drop(data);
         let discretisation = discretisation.clone();
-        let mut roots = aggregates.roots.clone();
+        let body = |cell: &CutCell<D>| cell.bodies[0];
+        let mut roots: Vec<_> = aggregates.roots.iter().copied().zip(cut.cells.iter().map(body)).collect();
         roots.sort_unstable();
-        roots.dedup();
+        roots.dedup_by_key(|root| root.0);
+        let (roots, bodies_at_roots) = roots.into_iter().unzip();
         let corners = node_count::<D>(1);
         let corner = |q: usize, x: &[f64; D]| if q < corners { value::<D>(1, q, x) } else { 0.0 };
         let rule = gauss_cube::<D>(POINTS);
@@ -112,6 +118,7 @@ where
             points: rule.into_iter().map(|point| point.0).collect(),
             corner_values,
             roots,
+            bodies_at_roots,
             penalties,
             wide,
             narrow,
@@ -141,6 +148,11 @@ where
     /// mesh.
     pub fn roots(&self) -> &[u32] {
         &self.roots
+    }
+
+    /// A body that cuts a root or a bad cell that it carries, by the place of the root among these.
+    pub fn body_at_root(&self, place: usize) -> usize {
+        self.bodies_at_roots[place] as usize
     }
 
     /// `beta h / eta` of a cut cell, by its place among these.
@@ -186,14 +198,34 @@ where
         let cell = &self.cut.cells[place as usize];
         let ball = &cell.balls[number as usize];
         let factor = self.stress(cell) * self.penalties[place as usize];
+        // Integrals of products of 1 and the components of the arm, on which motions depend linearly.
+        let mut products = [[0.0; MOST_COORDINATES]; MOST_COORDINATES];
         for (at, area) in self.points.iter().zip(&cell.moments.surfaces[number as usize].area) {
             let from_center: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
             let arm = in_space(shear, &from_center) / ball.radius;
-            let mut motions = [Vector::<D>::zeros(); MOST_RIGID];
-            (0..rigid).for_each(|k| motions[k] = unit_motion(k, &arm));
-            for (row, first) in block.chunks_exact_mut(rigid).zip(&motions) {
-                let weighted = first * (factor * area);
-                row.iter_mut().zip(&motions).for_each(|(sum, second)| *sum += weighted.dot(second));
+            let line: [f64; MOST_COORDINATES] =
+                std::array::from_fn(|i| if i == 0 { 1.0 } else { arm.get(i - 1).copied().unwrap_or(0.0) });
+            for (row, first) in products.iter_mut().zip(&line) {
+                let weighted = factor * area * first;
+                row.iter_mut().zip(&line).for_each(|(sum, second)| *sum += weighted * second);
+            }
+        }
+        let coefficient = |k: usize, i: usize| {
+            let at_center = unit_motion(k, &Vector::<D>::zeros());
+            let axis = Vector::<D>::from_fn(|d, _| f64::from(u8::from(d + 1 == i)));
+            if i == 0 { at_center } else { unit_motion(k, &axis) - at_center }
+        };
+        let mut motions = [[Vector::<D>::zeros(); MOST_COORDINATES]; MOST_RIGID];
+        for (k, motion) in motions[..rigid].iter_mut().enumerate() {
+            (0..=D).for_each(|i| motion[i] = coefficient(k, i));
+        }
+        for (row, first) in block.chunks_exact_mut(rigid).zip(&motions) {
+            for (i, first) in first.iter().enumerate() {
+                for (sum, second) in row.iter_mut().zip(&motions) {
+                    let terms =
+                        products[i].iter().zip(second).map(|(weight, second)| weight * first.dot(second));
+                    *sum += terms.sum::<f64>();
+                }
             }
         }
     }

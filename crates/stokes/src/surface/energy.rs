@@ -65,12 +65,14 @@ where
     ) -> f64 {
         let h = self.discretisation.cell_size(cell);
         let nodes = self.discretisation.velocity.cell(cell);
+        let nodal = |&node: &u32| Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
+        let velocities: Vec<Vector<D>> = nodes.iter().map(nodal).collect();
         let of_point = |(q, (of_rule, slopes)): (usize, &(f64, Vec<Vector<D>>))| {
-            let mut twice = strain * (2.0 * h);
-            for (&node, slope) in nodes.iter().zip(slopes) {
-                let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
-                twice += u * slope.transpose() + slope * u.transpose();
+            let mut gradient = strain * h;
+            for (u, slope) in velocities.iter().zip(slopes) {
+                gradient += u * slope.transpose();
             }
+            let twice = gradient + gradient.transpose();
             weight(q, *of_rule) * twice.norm_squared()
         };
         h.powi(D as i32 - 2) * rule.iter().enumerate().map(of_point).sum::<f64>()

@@ -51,6 +51,8 @@ where
         let cell = cut.cell as usize;
         let h = discretisation.cell_size(cell);
         let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
+        let nodes = discretisation.velocity.cell(cell);
+        let mut forces = vec![Vector::<D>::zeros(); nodes.len()];
         for ((&body, ball), surface) in cut.bodies.iter().zip(&cut.balls).zip(&cut.moments.surfaces) {
             for (q, at) in shapes.points.iter().enumerate() {
                 let from_center: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
@@ -60,10 +62,8 @@ where
                 // The fluid has to follow -E r.
                 let penalty = motion * (surfaces.penalty(place) * surface.area[q] * stress);
                 let flux = (motion * normal.transpose() + normal * motion.transpose()) * stress;
-                let nodes = discretisation.velocity.cell(cell);
-                for (&node, (shape, slope)) in nodes.iter().zip(&shapes.velocity[q]) {
-                    let force = flux * slope - penalty * *shape;
-                    (0..D).for_each(|c| load.velocity[node as usize * D + c] += force[c]);
+                for (force, (shape, slope)) in forces.iter_mut().zip(&shapes.velocity[q]) {
+                    *force += flux * slope - penalty * *shape;
                 }
                 let through = area * motion.dot(&normal);
                 let nodes = discretisation.pressure.cell(cell);
@@ -74,6 +74,9 @@ where
                 wrench.force += penalty;
                 wrench.torque += Dim::<D>::moment(&arm, &penalty);
             }
+        }
+        for (&node, force) in nodes.iter().zip(&forces) {
+            (0..D).for_each(|c| load.velocity[node as usize * D + c] += force[c]);
         }
     }
     load

@@ -30,9 +30,9 @@ impl<const D: usize> Shapes<D> {
         for (&node, (shape, slope)) in nodes.iter().zip(&self.velocity[point]) {
             let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
             sample.velocity += u * *shape;
-            let gradient = u * slope.transpose();
-            sample.strain += gradient + gradient.transpose();
+            sample.strain += u * slope.transpose();
         }
+        sample.strain = sample.strain + sample.strain.transpose();
         let nodes = discretisation.pressure.cell(cell).iter().zip(&self.pressure[point]);
         sample.pressure = nodes.map(|(&node, shape)| shape * pressure[node as usize]).sum();
         sample

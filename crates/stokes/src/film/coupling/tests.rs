@@ -177,3 +177,33 @@ fn forces_are_those_of_the_rows_and_opposite() {
     forces_dissipate::<2>();
     forces_dissipate::<3>();
 }
+
+/// Forces that were kept are those of the same films, and of no other ones.
+fn kept_forces_come_back<const D: usize>()
+where
+    Dim<D>: Space<D>,
+{
+    let (_, coupling) = coupling(&pair::<D>([0.07, 0.11], 0.004), 0.02);
+    let g: Vec<f64> = (0..coupling.dim()).map(|k| 0.4 + (k as f64).sin()).collect();
+    assert_eq!(g.len(), FilmCoupling::<D>::MODES);
+    let kept = coupling.kept(&g);
+    assert_eq!(kept.len(), FilmCoupling::<D>::KEPT);
+    let mut found = vec![0.0; g.len()];
+    coupling.restore(&kept, &mut found);
+    assert!(g.iter().zip(&found).all(|(g, found)| (g - found).abs() < 1e-12), "{g:?} {found:?}");
+    // Of another body, and of an image on the other side.
+    for (number, value) in [(0, 1.0), (1, 0.0), (2, -kept[2])] {
+        let mut other = kept.clone();
+        other[number] = value;
+        other[3] = if number == 2 { -kept[3] } else { kept[3] };
+        let mut untouched = vec![7.0; g.len()];
+        coupling.restore(&other, &mut untouched);
+        assert!(untouched.iter().all(|g| *g == 7.0), "{number}");
+    }
+}
+
+#[test]
+fn forces_of_films_are_kept_from_mesh_to_mesh() {
+    kept_forces_come_back::<2>();
+    kept_forces_come_back::<3>();
+}

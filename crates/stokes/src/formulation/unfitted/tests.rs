@@ -293,3 +293,29 @@ fn slabs_between_bodies_are_resolved() {
     slabs_are_resolved::<2>(6, 0.15, 16);
     slabs_are_resolved::<3>(4, 0.2, 4);
 }
+
+/// Where penalties are far too small, the error names the first root whose block is not positive, and a body
+/// at its surface.
+fn blocks_that_are_not_positive_are_named<const D: usize>(level: u8)
+where
+    Dim<D>: Space<D>,
+{
+    let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
+    let discretisation = Discretisation::new(mesh);
+    let bodies = [0.27, 0.71].map(|x| Ball::new(Vector::<D>::repeat(x), 0.19));
+    let penalty = PenaltyFactor::new(0.01);
+    let system = around(&discretisation, &bodies, &Flats::none(2), 1.0, &penalty).unwrap();
+    let elements = Elements::new(&system, gluey_fem::ReferenceMatrices::<D>::VELOCITY);
+    let surfaces = system.surfaces.as_deref().unwrap();
+    let error = SurfaceCorrection::new(&elements, surfaces, &system.space).err().unwrap();
+    let StokesError::SurfaceBlock { center, body, .. } = error else { panic!("{error}") };
+    let from_center = Vector::<D>::from_column_slice(&center) - bodies[body].center();
+    let cells = (from_center.norm() - 0.19).abs() / discretisation.finest_cell_size();
+    assert!(cells < 2.0 * (D as f64).sqrt(), "{cells} cells from the surface of body {body}");
+}
+
+#[test]
+fn errors_of_the_smoother_name_cell_and_body() {
+    blocks_that_are_not_positive_are_named::<2>(4);
+    blocks_that_are_not_positive_are_named::<3>(4);
+}

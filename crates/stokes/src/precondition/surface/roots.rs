@@ -3,7 +3,8 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    BlockGroups, Jagged, LocalTerm, ModesWorkspace, Pattern, SymmetricBlockMatrix, WeakModes, weak_modes,
+    BlockGroups, Jagged, LocalTerm, ModesWorkspace, PatchError, Pattern, SymmetricBlockMatrix, WeakModes,
+    weak_modes,
 };
 use rayon::prelude::*;
 
@@ -36,22 +37,32 @@ where
     of_node: Jagged<u32>,
 }
 
+/// Why there are none: the first block that is not positive definite, or no matrix.
+pub enum ModesError {
+    /// A block.
+    Patch(PatchError),
+    /// No matrix.
+    Matrix(StokesError),
+}
+
 /// The weak modes on `patches`, ascending numbers of nodes, and the diagonal at all numbered nodes.
 pub fn modes_and_diagonal<const D: usize>(
     nodes: &NumberedNodes<'_, D>,
     elements: &Elements<'_, D>,
     patches: Jagged<u32>,
-) -> Result<(WeakModes<D>, Vec<f64>), StokesError>
+) -> Result<(WeakModes<D>, Vec<f64>), ModesError>
 where
     Dim<D>: Space<D>,
 {
     let contributions = Contributions::new(nodes, elements);
     let batches = batches(&patches, nodes.nodes.len());
     let workspace = || (vec![u32::MAX; nodes.nodes.len()], ModesWorkspace::default());
-    let found: Vec<(Vec<Vec<f32>>, Vec<f64>)> = batches
+    let found: Vec<Result<_, ModesError>> = batches
         .par_iter()
         .map_init(workspace, |work, batch| contributions.of_batch(batch, &patches, work))
-        .collect::<Result<_, StokesError>>()?;
+        .collect();
+    // The first error, whichever thread was the first to find one.
+    let found: Vec<(Vec<Vec<f32>>, Vec<f64>)> = found.into_iter().collect::<Result<_, _>>()?;
     let mut diagonal = vec![0.0; nodes.nodes.len() * D];
     for (batch, (_, own)) in batches.iter().zip(&found) {
         for (&node, own) in batch.nodes.iter().zip(own.chunks_exact(D)) {
@@ -103,7 +114,7 @@ where
         batch: &Batch,
         patches: &Jagged<u32>,
         (place, work): &mut (Vec<u32>, ModesWorkspace),
-    ) -> Result<(Vec<Vec<f32>>, Vec<f64>), StokesError> {
+    ) -> Result<(Vec<Vec<f32>>, Vec<f64>), ModesError> {
         batch.nodes.iter().zip(0..).for_each(|(&node, k)| place[node as usize] = k);
         let matrix = self.matrix(batch, place);
         let local: Vec<Vec<u32>> = batch
@@ -112,10 +123,13 @@ where
             .map(|root| patches[root].iter().map(|&node| place[node as usize]).collect())
             .collect();
         batch.nodes.iter().for_each(|&node| place[node as usize] = u32::MAX);
-        let matrix = matrix?;
+        let matrix = matrix.map_err(ModesError::Matrix)?;
         let diagonal = matrix.diagonal();
-        let modes = local.iter().map(|nodes| weak_modes(&matrix, &diagonal, nodes, work));
-        let modes = modes.collect::<Result<_, _>>().map_err(StokesError::SurfaceBlock)?;
+        let modes = local.iter().zip(batch.roots.clone()).map(|(nodes, patch)| {
+            let modes = weak_modes(&matrix, &diagonal, nodes, work);
+            modes.map_err(|source| ModesError::Patch(PatchError { patch, source }))
+        });
+        let modes = modes.collect::<Result<_, _>>()?;
         Ok((modes, diagonal))
     }
 

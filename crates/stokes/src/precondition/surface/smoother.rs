@@ -8,7 +8,7 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
-    Chebyshev, Guess, LinOp, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
+    Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
     estimate_lambda_max, invert_spd, vector,
 };
 
@@ -20,12 +20,12 @@ use crate::precondition::velocity::cell_lambda_max;
 use crate::space::around_finest_cells;
 use crate::surface::SurfaceCoupling;
 
-use super::roots::modes_and_diagonal;
+use super::roots::{ModesError, modes_and_diagonal};
 
-/// Steps of the sweep with the diagonal.
-const DEGREE: usize = 3;
-/// The sweep damps eigenvalues down to the largest in the fluid over this.
-const RATIO: f64 = 5.0;
+/// Steps of the sweep with the diagonal in 2D and in 3D, and what it damps eigenvalues down to: the largest in
+/// the fluid over this.
+const DEGREES: [usize; 2] = [3, 4];
+const RATIOS: [f64; 2] = [5.0, 8.0];
 /// Lanczos steps for the largest eigenvalue, which depends on the cuts, and the factor on what they find.
 const LANCZOS_STEPS: usize = 8;
 const SAFETY: f64 = 1.1;
@@ -71,8 +71,8 @@ where
         let mut operator = ViscousOperator::new(system);
         let largest = SAFETY * estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
         let in_fluid = cell_lambda_max::<D>(&system.discretisation().reference());
-        let interval = SpectralInterval { lower: in_fluid / RATIO, upper: largest.max(in_fluid) };
-        let chebyshev = Chebyshev::new(operator.dim(), DEGREE, interval);
+        let interval = SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: largest.max(in_fluid) };
+        let chebyshev = Chebyshev::new(operator.dim(), DEGREES[D - 2], interval);
         operator.take_applications();
         Ok(Self { operator, diagonal, chebyshev, blocks })
     }
@@ -137,13 +137,29 @@ where
         let (inverses, diagonal) = if D == 2 {
             let matrix = assemble_on_nodes(nodes, elements)?;
             let patches = SchwarzPatches::restricted(&matrix, blocks, zeros.clone());
-            (Inverses::Whole(patches.map_err(StokesError::SurfaceBlock)?), matrix.diagonal())
+            (Inverses::Whole(patches.map_err(|error| at_root(surfaces, error))?), matrix.diagonal())
         } else {
-            let (modes, diagonal) = modes_and_diagonal(nodes, elements, blocks.collect())?;
+            let found = modes_and_diagonal(nodes, elements, blocks.collect());
+            let (modes, diagonal) = found.map_err(|error| match error {
+                ModesError::Patch(error) => at_root(surfaces, error),
+                ModesError::Matrix(error) => error,
+            })?;
             (Inverses::WeakModes(modes), diagonal)
         };
         Ok((Self { inverses, positions: nodes.positions(), r: zeros.clone(), z: zeros }, diagonal))
     }
+}
+
+/// The error of the block of a root.
+fn at_root<const D: usize>(surfaces: &SurfaceCoupling<D>, error: PatchError) -> StokesError
+where
+    Dim<D>: Space<D>,
+{
+    let PatchError { patch, source } = error;
+    let (discretisation, root) = (surfaces.discretisation(), surfaces.roots()[patch] as usize);
+    let (mesh, half) = (&discretisation.mesh, 0.5 * discretisation.cell_size(root));
+    let center = mesh.lower_corner(&mesh.cells()[root]).iter().map(|x| x + half).collect();
+    StokesError::SurfaceBlock { center, body: surfaces.body_at_root(patch), source }
 }
 
 /// The inverse diagonal, with blocks for the twists.
