@@ -33,7 +33,8 @@ where
     let space = space_of(bodies);
     let heights = Lubrication::Deficit.heights::<D>(cell_size);
     let films = thin_films(bodies, &Aabb::unit(), &heights);
-    let coupling = FilmCoupling::new(&space, films, &heights, 1.0);
+    let flows = vec![None; films.len()];
+    let coupling = FilmCoupling::new(&space, films, flows, &heights, 1.0);
     (space, coupling)
 }
 
