@@ -7,6 +7,10 @@
 //! forces are `-B^T R B V`: symmetric, opposite to each other, and dissipating. For two spheres of any radii
 //! they have the singular terms of Jeffrey and Onishi (1984, 10.1017/S0022112084000355).
 //!
+//! What flows through a film between bodies, `Q` per width relative to the mean of their surfaces, is a mode
+//! too ([`FilmFlow`]): the mesh lets fluid through the widened film as if it were as thick as that. This
+//! resistance acts on the fluid in the film, and on the bodies with the opposite force, half of it each.
+//!
 //! The forces `f = R B V` are unknowns beside velocities and pressures, so that nothing grows where a film
 //! closes: `s B V - g = 0` with `f = s g`, `s^2 = R`. The square of `g` is the power that the film
 //! dissipates, and residuals of these rows weigh velocities by what they do there: in a film that nearly
@@ -19,6 +23,7 @@ use nalgebra::Matrix2;
 
 use super::deficit::Deficits;
 use super::near::{Film, Heights, Partner};
+use super::through::FilmFlow;
 use crate::space::VelocitySpace;
 
 /// Least cosine between the normals of one film in two steps.
@@ -29,6 +34,8 @@ const SAME_FILM: f64 = 0.7;
 pub struct FilmCoupling<const D: usize> {
     /// Films with a resistance, each with the number of its first row.
     films: Vec<Film<D>>,
+    /// What flows through each, where the mesh has it.
+    flows: Vec<Option<FilmFlow<D>>>,
     /// Their modes.
     modes: Vec<Vec<Mode<D>>>,
     /// `s B`: entries of reduced velocities.
@@ -68,28 +75,36 @@ impl<const D: usize> FilmCoupling<D>
 where
     Dim<D>: Space<D>,
 {
-    /// Modes of a film: the normal one, sliding and rolling in each direction across it.
-    pub const MODES: usize = 1 + 2 * (D - 1);
+    /// Modes of a film: the normal one; sliding, rolling and the flow through it in each direction across it.
+    pub const MODES: usize = 1 + 3 * (D - 1);
     /// Numbers that are kept of a film.
-    pub const KEPT: usize = 2 + 3 * D;
+    pub const KEPT: usize = 2 + 4 * D;
 
-    /// The forces of `films` that are widened to these heights, on the velocities of `space` in a fluid of
-    /// this viscosity.
-    pub fn new(space: &VelocitySpace<D>, films: Vec<Film<D>>, heights: &Heights, viscosity: f64) -> Self {
+    /// The forces of `films` that are widened to these heights, each with what flows through it where that
+    /// counts, on the velocities of `space` in a fluid of this viscosity.
+    pub fn new(
+        space: &VelocitySpace<D>,
+        films: Vec<Film<D>>,
+        flows: Vec<Option<FilmFlow<D>>>,
+        heights: &Heights,
+        viscosity: f64,
+    ) -> Self {
         let (mut rows, mut inverses, mut scales) = (Jagged::default(), Vec::new(), Vec::new());
         let mut kinds = Vec::with_capacity(films.len());
-        for film in &films {
+        for (film, flow) in films.iter().zip(&flows) {
             let shape = film.shape(film.height(heights));
-            let modes = modes::<D>(film, &shape.resolved::<D>(), &shape.deficits::<D>());
+            let lacks = if flow.is_some() { shape.deficits_with_flow::<D>() } else { shape.deficits::<D>() };
+            let modes = modes::<D>(film, flow.as_ref(), &shape.resolved::<D>(), &lacks);
             for mode in &modes {
                 let scale = (viscosity * mode.lacks).sqrt();
-                rows.push(mode.row(space, film).into_iter().map(|(k, weight)| (k, scale * weight)));
+                let row = mode.row(space, film, flow.as_ref());
+                rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
                 inverses.push(mode.has / (mode.has + mode.lacks));
                 scales.push(scale);
             }
             kinds.push(modes);
         }
-        Self { films, modes: kinds, rows, inverses, scales }
+        Self { films, flows, modes: kinds, rows, inverses, scales }
     }
 
     /// What the films exert on the bodies, for the scaled forces `g`.
@@ -115,20 +130,25 @@ where
     }
 
     /// What is kept of the scaled forces `g` for the films of another step, [`FilmCoupling::KEPT`] numbers for
-    /// each: body, partner, normal, and the sums of `f slip t` and of `f turning t` over the modes. Unlike
-    /// velocities, forces change little where a film closes.
+    /// each: body, partner, normal, the sums of `f slip t` and of `f turning t` over the modes of motion, and
+    /// that of `f t` over those of the flow through it. Unlike velocities, forces change little where a film
+    /// closes.
     pub fn kept(&self, g: &[f64]) -> Vec<f64> {
         let mut kept = Vec::with_capacity(self.films.len() * Self::KEPT);
         for (index, film) in self.films.iter().enumerate() {
             let first = index * Self::MODES;
-            let [mut force, mut couple] = [Vector::<D>::zeros(); 2];
+            let [mut force, mut couple, mut through] = [Vector::<D>::zeros(); 3];
             for (k, mode) in self.modes[index].iter().enumerate() {
                 let f = self.scales[first + k] * g[first + k];
-                force += mode.direction * (f * mode.slip);
-                couple += mode.direction * (f * mode.turning);
+                if mode.is_flow {
+                    through += mode.direction * f;
+                } else {
+                    force += mode.direction * (f * mode.slip);
+                    couple += mode.direction * (f * mode.turning);
+                }
             }
             kept.extend(key(film));
-            kept.extend([&film.normal, &force, &couple].into_iter().flatten());
+            kept.extend([&film.normal, &force, &couple, &through].into_iter().flatten());
         }
         kept
     }
@@ -145,18 +165,19 @@ where
             let first = before.partition_point(|old| order(old, &key).is_lt());
             let mut alike = before[first..].iter().take_while(|old| order(old, &key).is_eq());
             let Some(old) = alike.find(|old| vector(old, 0).dot(&film.normal) > SAME_FILM) else { continue };
-            let (force, couple) = (vector(old, 1), vector(old, 2));
+            let [force, couple, through] = [1, 2, 3].map(|k| vector(old, k));
             let mut set = |k: usize, f: f64| {
                 let scale = self.scales[at + k];
                 g[at + k] = if scale > 0.0 { f / scale } else { 0.0 };
             };
             set(0, force.dot(&film.normal));
-            for k in (1..Self::MODES).step_by(2) {
+            for k in (1..Self::MODES).step_by(3) {
                 let [a, b] = [&modes[k], &modes[k + 1]];
                 let (slip, turning) = (force.dot(&a.direction), couple.dot(&a.direction));
                 let determinant = a.slip * b.turning - b.slip * a.turning;
                 set(k, (slip * b.turning - b.slip * turning) / determinant);
                 set(k + 1, (a.slip * turning - slip * a.turning) / determinant);
+                set(k + 2, through.dot(&a.direction));
             }
         }
     }
@@ -201,6 +222,33 @@ where
         }
     }
 
+    /// `z += s B V` for the strain of a linear flow that velocities are relative to, at bodies and in the
+    /// films between them.
+    pub fn add_strain(&self, strain: &Matrix<D>, z: &mut [f64]) {
+        self.subtract_partners(|film| (!film.partner.is_wall()).then(|| strain * film.branch()), z);
+        self.for_each_flow(|row, direction, film, flow| {
+            let arm = flow.middle + film.normal * (0.5 * (film.arm(0) - film.arm(1)));
+            z[row] += self.scales[row] * flow.height * (strain * arm).dot(direction);
+        });
+    }
+
+    /// `z += s B V` for the velocities of boundary nodes in a nodal field, which are not unknowns.
+    pub fn add_boundary(&self, u: &[f64], z: &mut [f64]) {
+        self.for_each_flow(|row, direction, _, flow| {
+            let at = |node: u32| Vector::<D>::from_column_slice(&u[node as usize * D..][..D]);
+            let sum: f64 = flow.boundary.iter().map(|&(node, weight)| weight * at(node).dot(direction)).sum();
+            z[row] += self.scales[row] * flow.height * sum;
+        });
+    }
+
+    fn for_each_flow(&self, mut visit: impl FnMut(usize, &Vector<D>, &Film<D>, &FilmFlow<D>)) {
+        for (index, (film, flow)) in self.films.iter().zip(&self.flows).enumerate() {
+            let Some(flow) = flow else { continue };
+            let modes = self.modes[index].iter().enumerate().filter(|(_, mode)| mode.is_flow);
+            modes.for_each(|(k, mode)| visit(index * Self::MODES + k, &mode.direction, film, flow));
+        }
+    }
+
     /// `z -= s B V` for what the velocities of the partners are beside those of bodies: those of walls, or of
     /// the image of a body in a flow that is not periodic. `at` gives them by the film.
     pub fn subtract_partners(&self, at: impl Fn(&Film<D>) -> Option<Vector<D>>, z: &mut [f64]) {
@@ -224,22 +272,34 @@ fn key<const D: usize>(film: &Film<D>) -> [f64; 2] {
 }
 
 /// A mode of the relative motion of the two sides of a film: `slip v.t + turning ((w_1 - w_2) x n).t` in a
-/// direction `t`.
+/// direction `t`, and the flow through the film if it is one of that.
 #[derive(Clone, Copy, Debug)]
 struct Mode<const D: usize> {
     direction: Vector<D>,
     slip: f64,
     turning: f64,
+    is_flow: bool,
     /// About the resistance that the mesh has, and that which it lacks.
     has: f64,
     lacks: f64,
 }
 
 /// The modes of a film: in each direction across it the two of slip and rolling in which the resistance is
-/// diagonal.
-fn modes<const D: usize>(film: &Film<D>, has: &Deficits, lacks: &Deficits) -> Vec<Mode<D>> {
-    let normal =
-        Mode { direction: film.normal, slip: 1.0, turning: 0.0, has: has.normal, lacks: lacks.normal };
+/// diagonal, and the flow through it.
+fn modes<const D: usize>(
+    film: &Film<D>,
+    flow: Option<&FilmFlow<D>>,
+    has: &Deficits,
+    lacks: &Deficits,
+) -> Vec<Mode<D>> {
+    let plain = Mode {
+        direction: film.normal,
+        slip: 1.0,
+        turning: 0.0,
+        is_flow: false,
+        has: has.normal,
+        lacks: lacks.normal,
+    };
     let roll = film.roll_of_slip();
     // In slip and in rolling times a length, which have a common unit: w = m - roll v.
     let length = film.curvature_radius();
@@ -251,29 +311,39 @@ fn modes<const D: usize>(film: &Film<D>, has: &Deficits, lacks: &Deficits) -> Ve
         (spin + 2.0 * cross + rolling) / (length * length),
     );
     let eigen = form.symmetric_eigen();
-    let has = [has.sliding, has.rolling[2] / (length * length)];
+    let of_motion = [has.sliding, has.rolling[2] / (length * length)];
     let across = |direction: Vector<D>, k: usize| {
         let [slip, turning] = [0, 1].map(|i| eigen.eigenvectors[(i, k)]);
         Mode {
             direction,
             slip: slip + turning * length * roll,
             turning: turning * length,
-            has: has[0] * slip * slip + has[1] * turning * turning,
+            has: of_motion[0] * slip * slip + of_motion[1] * turning * turning,
             lacks: eigen.eigenvalues[k].max(0.0),
+            ..plain
         }
     };
+    let through = |direction: Vector<D>| Mode {
+        direction,
+        slip: lacks.carried * roll,
+        turning: lacks.carried + flow.map_or(0.0, FilmFlow::turning),
+        is_flow: true,
+        has: has.through,
+        lacks: lacks.through,
+    };
     let tangents = film.tangents();
-    let tangential = tangents.iter().flat_map(|&t| [0, 1].map(|k| across(t, k)));
-    std::iter::once(normal).chain(tangential).collect()
+    let tangential = tangents.iter().flat_map(|&t| [across(t, 0), across(t, 1), through(t)]);
+    std::iter::once(plain).chain(tangential).collect()
 }
 
 impl<const D: usize> Mode<D> {
-    /// Its row in reduced velocities.
-    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>) -> Vec<(u32, f64)>
+    /// Its row in reduced velocities: those of the sides, then those of the nodes in the film.
+    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>, flow: Option<&FilmFlow<D>>) -> Vec<(u32, f64)>
     where
         Dim<D>: Space<D>,
     {
         let (t, n) = (&self.direction, &film.normal);
+        let flow = flow.filter(|_| self.is_flow);
         let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             let Some(body) = film.side(side) else { continue };
@@ -281,9 +351,20 @@ impl<const D: usize> Mode<D> {
             // From the centre to the middle of the film.
             let arm = n * (sign * film.arm(side));
             let turn = Dim::<D>::moment(&arm, t) * self.slip + Dim::<D>::moment(n, t) * self.turning;
+            let (mut force, mut turn) = (t * (sign * self.slip), turn * sign);
+            if let Some(flow) = flow {
+                let half = -0.5 * flow.height;
+                force += t * half;
+                turn = turn + Dim::<D>::moment(&(arm + flow.middle), t) * half;
+            }
             let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
-            let entries = t.iter().map(|t| self.slip * t).chain(spins).enumerate();
-            row.extend(entries.map(|(k, weight)| ((first + k) as u32, sign * weight)));
+            let entries = force.iter().copied().chain(spins).enumerate();
+            row.extend(entries.map(|(k, weight)| ((first + k) as u32, weight)));
+        }
+        if let Some(flow) = flow {
+            flow.nodes.iter().for_each(|&(node, weight)| {
+                space.push_load(node as usize, &(t * (weight * flow.height)), &mut row);
+            });
         }
         row
     }

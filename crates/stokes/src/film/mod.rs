@@ -11,9 +11,11 @@
 mod coupling;
 mod deficit;
 mod near;
+mod through;
 
 pub use coupling::{FilmCoupling, FilmForce};
 pub use near::{Film, Heights, Partner, films, thin_films};
+pub use through::{FilmFlow, weight};
 
 /// Treatment of films between bodies that are too thin for the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -275,7 +275,7 @@ where
         u[..nodal].copy_from_slice(&load.velocity);
         p.copy_from_slice(&load.pressure);
         if let Some(films) = &self.system.films {
-            films.subtract_partners(|film| (!film.partner.is_wall()).then(|| strain * film.branch()), f);
+            films.add_strain(strain, f);
             vector::scale(-1.0, f);
         }
         self.system.reduce(&mut sum);

@@ -62,7 +62,7 @@ where
         let flats = flats(&films, bodies.len(), &heights);
         let system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
         let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
-        let system = if lubricates { system.with_films(films, &heights) } else { system };
+        let system = if lubricates { system.with_films(bodies, films, &heights) } else { system };
         Ok((system, Arc::new(self.clone())))
     }
 

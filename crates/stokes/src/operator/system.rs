@@ -18,7 +18,7 @@ use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
 };
-use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace};
+use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace, flows_through_films};
 
 /// Operator of the Stokes problem on a mesh, matrix-free.
 #[derive(Clone, Debug)]
@@ -75,9 +75,14 @@ where
         }
     }
 
-    /// The same with the forces of `films` that are widened to these heights.
-    pub(crate) fn with_films(self, films: Vec<Film<D>>, heights: &Heights) -> Self {
-        let films = FilmCoupling::new(&self.space, films, heights, self.viscosity);
+    /// The same with the forces of `films` between these bodies that are widened to these heights.
+    pub(crate) fn with_films(self, bodies: &[Ball<D>], films: Vec<Film<D>>, heights: &Heights) -> Self {
+        let cut = self.surfaces.as_ref().map(|surfaces| &surfaces.cut);
+        let flows = cut.map_or_else(
+            || vec![None; films.len()],
+            |cut| flows_through_films(&self.space, cut, bodies, &films, heights),
+        );
+        let films = FilmCoupling::new(&self.space, films, flows, heights, self.viscosity);
         Self { films: Some(Arc::new(films)), ..self }
     }
 
@@ -156,6 +161,7 @@ where
             films.add([u, f], [&mut *yu, &mut *yf]);
             let at_wall = |film: &Film<D>| film.partner.is_wall().then(|| self.wall_velocity(film, u));
             films.subtract_partners(at_wall, yf);
+            films.add_boundary(u, yf);
         }
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);

@@ -220,6 +220,20 @@ where
         }
     }
 
+    /// Appends the load of a force on a node that neither hangs nor is a ghost, as entries of a reduced
+    /// vector; none on the boundary.
+    pub fn push_load(&self, node: usize, force: &Vector<D>, entries: &mut Vec<(u32, f64)>) {
+        if self.is_free(node) {
+            return entries.extend((0..D).map(|c| ((node * D + c) as u32, force[c])));
+        }
+        let Ok(place) = self.rigid.binary_search_by_key(&(node as u32), |r| r.node) else { return };
+        let RigidNode { body, arm, .. } = &self.rigid[place];
+        let mut load = [0.0; MOST_RIGID];
+        add_moment(arm, force.as_slice(), &mut load[..Dim::<D>::RIGID]);
+        let first = self.full_dim() + *body as usize * Dim::<D>::RIGID;
+        entries.extend((0..Dim::<D>::RIGID).map(|k| ((first + k) as u32, load[k])));
+    }
+
     /// Replaces the nodal velocities of the rigid nodes by the twists closest to them in the least-squares
     /// sense, and clears hanging and boundary nodes and ghosts: from any nodal field to a reduced vector.
     pub fn project<T: Scalar>(&self, x: &mut [T]) {

@@ -10,6 +10,7 @@ mod load;
 mod penalty;
 mod shapes;
 mod strain;
+mod through;
 mod traction;
 mod weak;
 
@@ -21,5 +22,6 @@ pub use flats::{Flat, Flats};
 pub use load::{add_load_of_cut_cells, forces_on_bodies};
 pub use penalty::PenaltyFactor;
 pub use strain::load_of_strain;
+pub use through::flows_through_films;
 pub use traction::first_moments;
 pub use weak::{WeakCell, weak_cells};

@@ -30,10 +30,22 @@ fn coupling<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> (VelocitySpac
 where
     Dim<D>: Space<D>,
 {
+    coupling_with(bodies, cell_size, None)
+}
+
+fn coupling_with<const D: usize>(
+    bodies: &[Ball<D>],
+    cell_size: f64,
+    flow: Option<FilmFlow<D>>,
+) -> (VelocitySpace<D>, FilmCoupling<D>)
+where
+    Dim<D>: Space<D>,
+{
     let space = space_of(bodies);
     let heights = Lubrication::Deficit.heights::<D>(cell_size);
     let films = thin_films(bodies, &Aabb::unit(), &heights);
-    let coupling = FilmCoupling::new(&space, films, &heights, 1.0);
+    let flows = vec![flow; films.len()];
+    let coupling = FilmCoupling::new(&space, films, flows, &heights, 1.0);
     (space, coupling)
 }
 
@@ -183,9 +195,20 @@ fn kept_forces_come_back<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    let (_, coupling) = coupling(&pair::<D>([0.07, 0.11], 0.004), 0.02);
-    let g: Vec<f64> = (0..coupling.dim()).map(|k| 0.4 + (k as f64).sin()).collect();
-    assert_eq!(g.len(), FilmCoupling::<D>::MODES);
+    let flow = FilmFlow {
+        nodes: Vec::new(),
+        boundary: Vec::new(),
+        middle: Vector::zeros(),
+        height: 0.02,
+        reach: 0.03,
+        edge: 0.01,
+    };
+    let (_, coupling) = coupling_with(&pair::<D>([0.07, 0.11], 0.004), 0.02, Some(flow));
+    assert_eq!(coupling.dim(), FilmCoupling::<D>::MODES);
+    assert!(coupling.modes[0].iter().filter(|mode| mode.is_flow && mode.lacks > 0.0).count() == D - 1);
+    // Forces of what the mesh does not lack are zero.
+    let force = |(k, scale): (usize, &f64)| if *scale > 0.0 { 0.4 + (k as f64).sin() } else { 0.0 };
+    let g: Vec<f64> = coupling.scales.iter().enumerate().map(force).collect();
     let kept = coupling.kept(&g);
     assert_eq!(kept.len(), FilmCoupling::<D>::KEPT);
     let mut found = vec![0.0; g.len()];

@@ -135,3 +135,84 @@ fn nothing_is_lacking_from_the_height_on() {
         );
     }
 }
+
+#[test]
+fn discs_lack_what_the_flow_through_their_film_needs() {
+    for (gap, height) in [(1e-3, 0.1), (0.02, 0.1), (0.08, 0.1), (0.0999, 0.1), (1e-4, 0.3)] {
+        let shape = shape(gap, height);
+        let found = shape.deficits_with_flow::<2>();
+        let [film, _] = profiles(shape);
+        let edge = shape.edge();
+        // x = scale sinh(u), which crowds points in the middle.
+        let scale = (shape.radius * gap).sqrt();
+        let end = (edge / scale).asinh();
+        let inside = |f: &dyn Fn(f64) -> f64| -> f64 {
+            let term = |(s, weight): (f64, f64)| {
+                let u = (2.0 * s - 1.0) * end;
+                2.0 * end * weight * scale * u.cosh() * f(scale * u.sinh())
+            };
+            gauss(200).into_iter().map(term).sum()
+        };
+        let square = |x: f64| (x / shape.radius).powi(2);
+        let bend = |x: f64| 0.75 * square(x) * square(x) * shape.radius;
+        let beyond = 12.0 * inside(&|x| 1.2 * square(x) / film(x).powi(3) - bend(x) / film(x).powi(4));
+        for (q, m) in [(1.0, 0.0), (0.0, 1.0), (1.0, -3.0)] {
+            let flow = |x: f64| q + 0.5 * m * (edge * edge - x * x);
+            let whole = 12.0 * inside(&|x| flow(x).powi(2) * (film(x).powi(-3) - height.powi(-3)));
+            let free = q + found.carried * m;
+            let exact = whole + beyond * free * free;
+            let lacks = found.through * free * free + found.rolling.iter().sum::<f64>() * m * m;
+            let scale = found.through * q * q + found.rolling[2] * m * m;
+            assert!((lacks - exact).abs() < 1e-6 * scale, "{gap} {height} {q} {m}: {lacks} {exact}");
+        }
+    }
+}
+
+/// The power of Reynolds' equation within the edge for `f = m` and the flow `q` through the edge, by finite
+/// volumes as in [`power`].
+fn power_within(h: impl Fn(f64) -> f64, edge: f64, [q, m]: [f64; 2]) -> f64 {
+    let count = 6000;
+    let radius = |k: f64| edge * (1e-3f64).powf(1.0 - k / count as f64);
+    let (mut ratio, mut sum) = (vec![0.0; count], vec![0.0; count]);
+    for k in 0..count {
+        let [inner, r, outer] = [0.0, 0.5, 1.0].map(|part| radius(k as f64 + part));
+        let flux = |at: f64, from: f64, to: f64| at * h(at).powi(3) / (to - from);
+        let left = flux(inner, radius(k as f64 - 0.5), r);
+        let is_last = k + 1 == count;
+        let right = if is_last { 0.0 } else { flux(outer, r, radius(k as f64 + 1.5)) };
+        let width = outer - inner;
+        let own = left + right + h(r).powi(3) / r * width;
+        let load = -12.0 * (m * r * r * width + if is_last { q * edge } else { 0.0 });
+        let (before, known) = if k == 0 { (radius(-0.5) / r, 0.0) } else { (ratio[k - 1], sum[k - 1]) };
+        let pivot = own - left * before;
+        ratio[k] = right / pivot;
+        sum[k] = (load + left * known) / pivot;
+    }
+    let (mut u, mut power) = (0.0, 0.0);
+    for k in (0..count).rev() {
+        u = ratio[k] * u + sum[k];
+        let r = radius(k as f64 + 0.5);
+        if k + 1 == count {
+            power -= PI * edge * q * (u - 12.0 * q / h(edge).powi(3) * (edge - r));
+        }
+        power -= PI * m * u * r * r * (radius(k as f64 + 1.0) - radius(k as f64));
+    }
+    power
+}
+
+#[test]
+fn spheres_lack_what_the_flow_through_their_film_needs() {
+    for (gap, height) in [(1e-3, 0.1), (0.02, 0.1), (0.09, 0.1), (1e-6, 0.1)] {
+        let shape = shape(gap, height);
+        let found = shape.deficits_with_flow::<3>();
+        let edge = shape.edge();
+        let [film, _] = profiles(shape);
+        for (q, m) in [(1.0, 0.0), (0.0, 1.0), (1.0, -3.0)] {
+            let exact = power_within(&film, edge, [q, m]) - power_within(|_| height, edge, [q, m]);
+            let free = q + found.carried * m;
+            let lacks = found.through * free * free + found.rolling.iter().sum::<f64>() * m * m;
+            let scale = found.through * q * q + found.rolling[2] * m * m;
+            assert!((lacks - exact).abs() < 5e-3 * scale, "{gap} {height} {q} {m}: {lacks} {exact}");
+        }
+    }
+}
