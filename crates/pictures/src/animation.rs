@@ -62,7 +62,7 @@ impl Animation {
     /// # Errors
     /// Those of the format.
     pub fn into_bytes(self) -> Result<Vec<u8>, EncodingError> {
-        Ok(self.encoder.into_inner()?)
+        self.encoder.into_inner()
     }
 }
 

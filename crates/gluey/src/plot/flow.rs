@@ -26,7 +26,7 @@ use sample::{Samples, Sampling};
 const MOST_PIXELS: f64 = 640.0;
 /// Arrows along the longer side, as long as they have this distance in SVG pixels, or fewer.
 const ARROW_COUNT: f64 = 24.0;
-const ARROW_DISTANCE: f64 = 22.0;
+const ARROW_DISTANCE: f64 = 18.0;
 /// Length of the longest arrow over the distance of arrows.
 const ARROW_LENGTH: f64 = 0.8;
 /// Arrows that are shorter, in SVG pixels, are left out.
@@ -209,8 +209,8 @@ impl<const D: usize> Picture<D> {
         let below = lower_left.1 + 18.0;
         let middle = |a: f64, b: f64| 0.5 * (a + b);
         let name = |axis: usize| format!("*{}*", AXES[axis]);
-        canvas.text(lower_left.0, below, 13.0, "middle", &rounded(ends[0][0]));
-        canvas.text(lower_right.0, below, 13.0, "middle", &rounded(ends[0][1]));
+        canvas.text(lower_left.0, below, 13.0, "start", &rounded(ends[0][0]));
+        canvas.text(lower_right.0, below, 13.0, "end", &rounded(ends[0][1]));
         canvas.text(middle(lower_left.0, lower_right.0), below, 15.0, "middle", &name(*across));
         let beside = |x: f64| x - 8.0;
         canvas.text(beside(lower_left.0), lower_left.1, 13.0, "end", &rounded(ends[1][0]));

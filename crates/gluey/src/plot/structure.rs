@@ -104,7 +104,7 @@ fn profiles(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
     ];
     Ok(vec![
         of_columns(&source, height, "volume fraction", &[("fraction", "", PALETTE[0])], &[0.0])?,
-        of_columns(&source, height, "velocity of particles", &velocities, &[])?,
+        of_columns(&source, height, "velocity (length / time)", &velocities, &[])?,
     ])
 }
 

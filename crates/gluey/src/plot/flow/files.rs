@@ -34,7 +34,7 @@ impl FlowFrame {
         let particles = fields.with_file_name(format!("particles-{step:06}.vtu"));
         // As the folder was named, so that paths stay as short as they were.
         let beside = fields.parent().and_then(Path::parent).filter(|_| !is_series(folder));
-        let beside = beside.map_or_else(|| series.parent().unwrap_or(Path::new("")), |path| path);
+        let beside = beside.unwrap_or_else(|| series.parent().unwrap_or(Path::new("")));
         let plots = beside.join(format!("{stem}-plots"));
         Ok(Self { step, fields, particles, case, plots })
     }
