@@ -247,8 +247,8 @@ fn contacts_with_walls_and_images() {
     assert_eq!(piece.cells.cell_verts.into_xml().0, [0, 1, 0, 1, 0, 2, 1, 3]);
 }
 
-/// Two discs that touch across the upper border of a sheared box, both far from it by now: shown in the box, a
-/// line from one to the image of the other, and that image beside them.
+/// Two discs that touch across the upper border of a sheared box, both far from it by now: shown in the box,
+/// a line from one to the image of the other, and that image beside them.
 #[test]
 fn a_sheared_box_is_shown_whole() {
     let folder = TempDir::new().expect("a folder");

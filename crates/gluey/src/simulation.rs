@@ -1,16 +1,19 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
+mod repelling;
+
 use gluey_contact::{
     BodyStep, Contact, ContactError, ContactModel, ContactReport, ContactState, Domain, MemoryError,
 };
-use gluey_geom::{Dim, Matrix, Particle, Pose, Space, Twist, Wrench};
+use gluey_geom::{Dim, Particle, Pose, Space, Twist};
 use gluey_motion::{
     Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, NoForces, ResumeError, Scheme,
 };
-use gluey_suspension::{Repelled, Repulsion};
+use gluey_suspension::Repulsion;
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
+use repelling::Repelling;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
 ///
@@ -56,33 +59,6 @@ where
     twists: Vec<Twist<D>>,
     contact_report: ContactReport,
     phases: PhaseTable,
-}
-
-/// Particles that repel each other, and the walls.
-#[derive(Debug)]
-struct Repelling<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    law: Repulsion,
-    surroundings: Domain<D>,
-    /// Minus the mean product of forces and lines between centres at the last prediction.
-    stress: Matrix<D>,
-    wrenches: Vec<Wrench<D>>,
-}
-
-impl<const D: usize> Repelling<D>
-where
-    Dim<D>: Space<D>,
-{
-    /// Takes the forces between particles where they are now.
-    fn update(&mut self, particles: &[Particle<D>]) {
-        let Repelled { forces, moment } = self.law.between(particles, &self.surroundings);
-        let volume: f64 = self.surroundings.lattice.periods().iter().flatten().product();
-        self.stress = -moment / volume;
-        self.wrenches.clear();
-        self.wrenches.extend(forces.into_iter().map(|force| Wrench { force, ..Wrench::default() }));
-    }
 }
 
 /// How images slide along each other in simple shear for ever.
@@ -256,8 +232,7 @@ where
     /// The same with particles that repel each other, their images and the walls of `surroundings`.
     #[must_use]
     pub fn repelling(self, law: Repulsion, surroundings: Domain<D>) -> Self {
-        let repelling = Repelling { law, surroundings, stress: Matrix::zeros(), wrenches: Vec::new() };
-        Self { repelling: Some(repelling), has_forces: true, ..self }
+        Self { repelling: Some(Repelling::new(law, surroundings)), has_forces: true, ..self }
     }
 
     /// The same where forces act on the particles that do not change sign with the shear.
@@ -313,13 +288,11 @@ where
     fn repel(&mut self) -> Result<(), StepError<H::Error>> {
         let (step, time) = (self.step, self.time());
         let Some(repelling) = &mut self.repelling else { return Ok(()) };
-        if let Some(Sliding { height, .. }) = self.sliding {
-            repelling.surroundings.set_sliding(self.strain * height, 0.0);
-        }
+        let tilt = self.strain * self.sliding.map_or(0.0, |sliding| sliding.height);
         let (hydrodynamics, particles) = (&mut self.hydrodynamics, &self.particles);
         self.phases
             .time("flow", || {
-                repelling.update(particles);
+                repelling.update(particles, tilt);
                 hydrodynamics.set_wrenches(&repelling.wrenches)
             })
             .map_err(|source| StepError::Forces { step, time, source })

@@ -1,5 +1,5 @@
-//! Times arrangements of more and more spheres, random ones or, with a number of sweeps, such in equilibrium: the
-//! time for each sphere should not grow.
+//! Times arrangements of more and more spheres, random ones or, with a number of sweeps, such in
+//! equilibrium: the time for each sphere should not grow.
 //!
 //! `cargo run --release -p gluey-suspension --example packing_times [largest count [sweeps]]`
 

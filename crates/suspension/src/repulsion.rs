@@ -1,10 +1,10 @@
 //! Repulsion of round particles that decays with the gap of their surfaces, as that of electric double layers
 //! does: `F(g) = F0 s exp(-g / d)` along the line of centres.
 //!
-//! Curved surfaces at radii `a`, `b` repel each other in proportion to `s = (2 a b / ((a + b) a_0))^((D-1)/2)`
-//! (Derjaguin 1934, DOI 10.1007/BF01433225: spheres, and the same sum over strips of parallel cylinders); for
-//! spheres this is the law of Mari, Seto, Morris and Denn (2014, DOI 10.1122/1.4890747). A wall is a surface
-//! of infinite radius.
+//! Surfaces of radii `a`, `b` repel each other in proportion to `s = (2 a b / ((a + b) a_0))^((D-1)/2)`
+//! (Derjaguin 1934, DOI 10.1007/BF01433225: spheres, and the same sum over strips of parallel cylinders);
+//! for spheres this is the law of Mari, Seto, Morris and Denn (2014, DOI 10.1122/1.4890747). A wall is a
+//! surface of infinite radius.
 
 use gluey_contact::Domain;
 use gluey_geom::{Dim, Matrix, Particle, Space, Vector};

@@ -1,15 +1,21 @@
 //! Forces and torques on the particles of a case.
 
 use gluey_geom::{Dim, Space, Vector, Wrench};
-use gluey_suspension::ball_volume;
+use gluey_suspension::{Repulsion, ball_volume};
 
-use super::{Case, ParticleSpec};
+use super::{Case, ParticleSpec, RepulsionSpec};
 
 impl Case {
     /// Whether anything beside fluid and contact acts on a particle.
     pub fn has_forces(&self) -> bool {
         let of_particle = |particle: &ParticleSpec| is_given(&particle.force) || is_given(&particle.torque);
         is_given(&self.gravity) || self.particles.iter().any(of_particle)
+    }
+
+    /// The law by which particles repel each other, if they do.
+    pub fn repulsion(&self) -> Option<Repulsion> {
+        let (RepulsionSpec { force, range }, radius) = (&self.repulsion, self.mean_radius());
+        (*force > 0.0).then_some(Repulsion { force: *force, range: range * radius, radius })
     }
 
     /// Force and torque on each particle of a checked case; no entries where there are none on any.

@@ -1,12 +1,9 @@
 //! What a case says of repulsion.
 
-use gluey_suspension::Repulsion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Case;
-
-/// Repulsion of particles and walls, see [`Repulsion`].
+/// Repulsion of particles and walls, see [`gluey_suspension::Repulsion`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RepulsionSpec {
@@ -22,13 +19,5 @@ pub struct RepulsionSpec {
 impl Default for RepulsionSpec {
     fn default() -> Self {
         Self { force: 0.0, range: 0.05 }
-    }
-}
-
-impl Case {
-    /// The law by which particles repel each other, if they do.
-    pub fn repulsion(&self) -> Option<Repulsion> {
-        let (RepulsionSpec { force, range }, radius) = (&self.repulsion, self.mean_radius());
-        (*force > 0.0).then_some(Repulsion { force: *force, range: range * radius, radius })
     }
 }

@@ -53,8 +53,8 @@ where
 }
 
 /// Centres of balls of these radii that do not overlap, without Monte Carlo moves. Points are spread evenly
-/// before they grow: what is crowded over long distances would have to be pushed all the way, which takes more
-/// time for each ball the more there are.
+/// before they grow: what is crowded over long distances would have to be pushed all the way, which takes
+/// more time for each ball the more there are.
 pub(super) fn grow_evenly<const D: usize>(
     container: &Container<D>,
     radii: &[f64],

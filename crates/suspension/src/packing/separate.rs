@@ -1,5 +1,5 @@
-//! Balls that overlap are pushed apart along their lines of centres, pair by pair, until no overlap is left but
-//! a tolerance. Pairs are looked for with a skin, and a ball is looked at again only after it or a neighbour
+//! Balls that overlap are pushed apart along their lines of centres, pair by pair, until no overlap is left
+//! but a tolerance. Pairs are looked for with a skin, and a ball is looked at again only after it or a neighbour
 //! has moved, so that the cost is that of what is crowded.
 
 use gluey_geom::Vector;
@@ -18,8 +18,8 @@ pub(super) struct Crowded {
     pub overlap: f64,
 }
 
-/// Pushes balls apart until they overlap by no more than `tolerance` smallest radii, and keeps them within the
-/// walls.
+/// Pushes balls apart until they overlap by no more than `tolerance` smallest radii, and keeps them within
+/// the walls.
 pub(super) fn separate<const D: usize>(
     container: &Container<D>,
     positions: &mut [Vector<D>],
