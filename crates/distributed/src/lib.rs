@@ -1,0 +1,1 @@
+//! Stokes flow whose cells are shared by ranks.
