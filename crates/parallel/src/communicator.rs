@@ -129,14 +129,19 @@ fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = Step
     let steps = (0..usize::BITS).map(|bit| 1usize << bit).take_while(|&step| step < size.max(1));
     let steps: Vec<usize> = steps.collect();
     let told = steps.iter().position(|&step| rank & step != 0).map_or(steps.len(), |k| k + 1);
-    steps.into_iter().take(told).filter_map(move |step| {
-        let above = rank + step;
-        if rank & step != 0 {
-            Some(Step::To(rank - step))
-        } else {
-            (above < size).then_some(Step::From(above))
-        }
-    }).collect::<Vec<_>>().into_iter()
+    steps
+        .into_iter()
+        .take(told)
+        .filter_map(move |step| {
+            let above = rank + step;
+            if rank & step != 0 {
+                Some(Step::To(rank - step))
+            } else {
+                (above < size).then_some(Step::From(above))
+            }
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
 }
 
 /// The bytes of rank zero for all: down the tree.

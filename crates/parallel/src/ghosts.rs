@@ -82,11 +82,7 @@ impl GhostPlan {
     ///
     /// # Panics
     /// If a rank is asked for what it does not own.
-    pub fn new(
-        ranks: &dyn Communicator,
-        mut wanted: Vec<Wanted>,
-        find: impl Fn(u64) -> Option<u32>,
-    ) -> Self {
+    pub fn new(ranks: &dyn Communicator, mut wanted: Vec<Wanted>, find: impl Fn(u64) -> Option<u32>) -> Self {
         wanted.sort_unstable();
         wanted.dedup();
         let mut plan = Self::default();
