@@ -1,6 +1,6 @@
 //! Project tasks: `cargo xtask reproduce-figures`, `cargo xtask verify`, `cargo xtask study`,
 //! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask keys`, `cargo xtask fuzz`,
-//! `cargo xtask python`, `cargo xtask mdbook`, `cargo xtask tidy`, `cargo xtask ci`.
+//! `cargo xtask python`, `cargo xtask test-mpi`, `cargo xtask mdbook`, `cargo xtask tidy`, `cargo xtask ci`.
 
 mod bench;
 mod bench_suspension;
@@ -13,6 +13,7 @@ mod mdbook;
 mod python;
 mod reproduce;
 mod study;
+mod test_mpi;
 mod tidy;
 mod verify;
 
@@ -67,6 +68,8 @@ enum Task {
         /// What mdBook asks.
         words: Vec<OsString>,
     },
+    /// Build with MPI and compare flows on 1 to 8 processes with those of threads, bit for bit.
+    TestMpi,
     /// Check the code against ARCHITECTURE.md and the house rules.
     Tidy,
     /// Formatting, lints, all tests, those of the Python package and a quick reproduction of the figures.
@@ -128,6 +131,7 @@ fn main() -> ExitCode {
         Task::Fuzz(options) => outcome(fuzz::run(&workspace_root(), &options)),
         Task::Python { python } => outcome(python::run(&workspace_root(), python.as_deref())),
         Task::Mdbook { words } => outcome(mdbook::run(&words)),
+        Task::TestMpi => outcome(test_mpi::run(&workspace_root())),
         Task::Tidy => tidy(),
         Task::Ci => outcome(ci::run(&workspace_root())),
     }

@@ -39,7 +39,7 @@ mod space;
 
 pub use cells::{CHUNK_CELLS, Chunks};
 pub use element::{ReferenceMatrices, add_viscous};
-pub use mesh::{Cell, MeshError, TreeMesh, half_diagonal};
+pub use mesh::{Cell, Cuts, ImplicitTree, MeshError, Part, TreeMesh, half_diagonal};
 pub use space::{Constraint, Evaluator, Interpolation, NodeMap};
 
 #[cfg(doctest)]

@@ -141,14 +141,14 @@ pub fn residual_from_product<S: Scalar, T: Scalar>(b: &[S], r: &mut [T]) {
     });
 }
 
-/// [`residual_from_product`] and the norm of the residual.
-pub fn residual_norm_from_product<T: Scalar>(b: &[T], r: &mut [T]) -> f64 {
+/// [`residual_from_product`] and the square of the norm of the residual.
+pub fn residual_square_from_product<T: Scalar>(b: &[T], r: &mut [T]) -> f64 {
     debug_assert_eq!(b.len(), r.len());
     let [square] = parallel::update_and_sum(r, |first, piece| {
         let blocks = piece.chunks_mut(BLOCK).zip(b[first..].chunks(BLOCK));
         [blocks.map(|(r, b)| residual_block(b, r)).sum()]
     });
-    square.sqrt()
+    square
 }
 
 /// The residual of one block and the square of its norm.
@@ -212,7 +212,7 @@ mod tests {
         let mut r = y;
         residual_from_product(&x, &mut y);
         assert_eq!(y, [3.0, 5.0, 7.0]);
-        assert_eq!((residual_norm_from_product(&x, &mut r).powi(2).round(), r), (83.0, y));
+        assert_eq!((residual_square_from_product(&x, &mut r).round(), r), (83.0, y));
         scaled_copy(0.5, &x, &mut y);
         scale(2.0, &mut y);
         assert_eq!(y, x);

@@ -16,11 +16,11 @@ pub struct Cell<const D: usize> {
 }
 
 impl<const D: usize> Cell<D> {
-    fn parent(&self) -> Self {
+    pub(super) fn parent(&self) -> Self {
         Self { level: self.level - 1, coords: self.coords.map(|c| c >> 1) }
     }
 
-    fn children(self) -> impl Iterator<Item = Self> {
+    pub(super) fn children(self) -> impl Iterator<Item = Self> {
         (0..1u32 << D).map(move |k| Self {
             level: self.level + 1,
             coords: std::array::from_fn(|d| 2 * self.coords[d] + ((k >> d) & 1)),
@@ -28,7 +28,7 @@ impl<const D: usize> Cell<D> {
     }
 
     /// Interleaved bits of the lower corner on the lattice of `max_level`.
-    fn morton(&self, max_level: u8) -> u64 {
+    pub(super) fn morton(&self, max_level: u8) -> u64 {
         let shift = max_level - self.level;
         let mut key = 0;
         for bit in 0..COORD_BITS {
@@ -103,17 +103,7 @@ impl<const D: usize> TreeMesh<D> {
         max_level: u8,
         wants: impl Fn(&Vector<D>, f64, u8) -> bool,
     ) -> Result<Self, MeshError> {
-        check_box(&domain, &roots, max_level)?;
-        let mut mesh = Self {
-            domain,
-            shear: 0.0,
-            roots,
-            periodic,
-            max_level,
-            refined: Vec::new(),
-            leaves: Vec::new(),
-            index: FxHashMap::default(),
-        };
+        let mut mesh = Self::without_cells(domain, roots, periodic, max_level)?;
         let mut candidates = mesh.root_cells();
         for level in 0..max_level {
             candidates.retain(|c| wants(&mesh.lower_corner(c), mesh.size(level), level));
@@ -123,6 +113,25 @@ impl<const D: usize> TreeMesh<D> {
         mesh.balance();
         mesh.collect_leaves();
         Ok(mesh)
+    }
+
+    /// A box and its lattice.
+    pub(super) fn without_cells(
+        domain: Aabb<D>,
+        roots: [u32; D],
+        periodic: [bool; D],
+        max_level: u8,
+    ) -> Result<Self, MeshError> {
+        check_box(&domain, &roots, max_level)?;
+        let (refined, leaves, index) = Default::default();
+        Ok(Self { domain, shear: 0.0, roots, periodic, max_level, refined, leaves, index })
+    }
+
+    /// These leaves, whatever else the box holds, with a lattice of this level.
+    pub(super) fn with_leaves(self, max_level: u8, mut leaves: Vec<Cell<D>>) -> Self {
+        leaves.sort_by_cached_key(|c| c.morton(max_level));
+        let index = leaves.iter().enumerate().map(|(i, c)| (*c, i as u32)).collect();
+        Self { max_level, leaves, index, ..self }
     }
 
     /// The same tree in a box with this shear.
@@ -239,7 +248,7 @@ impl<const D: usize> TreeMesh<D> {
         Some(Cell { level: cell.level, coords })
     }
 
-    fn root_cells(&self) -> Vec<Cell<D>> {
+    pub(super) fn root_cells(&self) -> Vec<Cell<D>> {
         let count = self.roots.iter().product::<u32>();
         (0..count)
             .map(|mut k| {

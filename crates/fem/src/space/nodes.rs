@@ -93,6 +93,17 @@ impl<const D: usize> NodeMap<D> {
         Vector::from_fn(|d, _| self.lower[d] + self.spacing * f64::from(x[d]))
     }
 
+    /// Position of a node on the lattice of `degree` points a cell of the finest level.
+    pub fn lattice_point(&self, node: usize) -> &[u32; D] {
+        &self.lattice[node]
+    }
+
+    /// A number that stands for the position of a node, the same in every mesh of the box with this finest
+    /// level.
+    pub fn key(&self, node: usize) -> u64 {
+        pack(&self.lattice[node])
+    }
+
     /// Whether a node lies on a face of the box that is not periodic.
     pub fn is_on_boundary(&self, node: usize) -> bool {
         let x = &self.lattice[node];

@@ -4,6 +4,9 @@
 //! Both are written where they stay: directions by the preconditioner, basis vectors by the operator. Basis
 //! vectors are not scaled to norm one; their norms go into the coefficients.
 //!
+//! Sums over the entries held here are completed to sums over all entries by the caller
+//! ([`crate::LinOp::complete`]).
+//!
 //! Orthogonalisation goes by groups of [`GROUP`] vectors, classical Gram-Schmidt inside a group and modified
 //! between groups; the pass over `w` that subtracts one group takes the scalar products with the next.
 
@@ -100,29 +103,36 @@ impl<T: Scalar> Basis<T> {
 
     /// Makes [`Basis::next`] orthogonal to the basis, passes its products with the normalised vectors to
     /// `coefficient` and returns the norm of what is left and its product with `r`.
-    pub fn orthogonalise(&mut self, r: &[T], coefficient: impl FnMut(f64)) -> Remainder {
+    pub fn orthogonalise(
+        &mut self,
+        r: &[T],
+        complete: impl Fn(&mut [f64]),
+        coefficient: impl FnMut(f64),
+    ) -> Remainder {
         let (used, w) = self.vectors.used_and_next();
-        let last = take_out_all(used, &self.norms, w, coefficient);
+        let last = take_out_all((used, &self.norms), w, &complete, coefficient);
         let terms =
             |at: usize, block: &[T]| [dot_block(block, block), dot_block(&r[at..][..block.len()], block)];
-        let [square, product] = pass(w, last, terms);
+        let mut sums = pass(w, last, terms);
+        complete(&mut sums);
+        let [square, product] = sums;
         let norm = square.sqrt();
         Remainder { norm, product: product / norm }
     }
 
     /// Makes `r` orthogonal to the basis, passes its products with the normalised vectors to `coefficient`
     /// and returns the norm of what is left.
-    pub fn take_out(&self, r: &mut [T], coefficient: impl FnMut(f64)) -> f64 {
-        let last = take_out_all(self.vectors.used(), &self.norms, r, coefficient);
-        norm_after(r, last)
+    pub fn take_out(&self, r: &mut [T], complete: impl Fn(&mut [f64]), coefficient: impl FnMut(f64)) -> f64 {
+        let last = take_out_all((self.vectors.used(), &self.norms), r, &complete, coefficient);
+        norm_after(r, last, complete)
     }
 
     /// Subtracts this multiple of the last vector, normalised, from `r` and returns the norm of what is left.
-    pub fn take_out_last(&self, multiple: f64, r: &mut [T]) -> f64 {
+    pub fn take_out_last(&self, multiple: f64, r: &mut [T], complete: impl Fn(&mut [f64])) -> f64 {
         let last = self.vectors.count.saturating_sub(1);
         let mut h = [0.0; GROUP];
         h[0] = multiple / self.norms.last().copied().unwrap_or(1.0);
-        norm_after(r, (&self.vectors.used()[last..], h))
+        norm_after(r, (&self.vectors.used()[last..], h), complete)
     }
 }
 
@@ -131,14 +141,15 @@ type Pending<'a, T> = (&'a [Vec<T>], [f64; GROUP]);
 
 /// Takes all groups but the last out of `w`; what is to be subtracted of that one is returned.
 fn take_out_all<'a, T: Scalar>(
-    vectors: &'a [Vec<T>],
-    norms: &[f64],
+    (vectors, norms): (&'a [Vec<T>], &[f64]),
     w: &mut [T],
+    complete: &impl Fn(&mut [f64]),
     mut coefficient: impl FnMut(f64),
 ) -> Pending<'a, T> {
     let mut before: Pending<'a, T> = (&[], [0.0; GROUP]);
     for (group, norms) in vectors.chunks(GROUP).zip(norms.chunks(GROUP)) {
         let mut h = pass(w, before, |at, block| products(group, at, block));
+        complete(&mut h[..group.len()]);
         for (h, norm) in h.iter_mut().zip(norms) {
             *h /= norm;
             coefficient(*h);
@@ -150,9 +161,10 @@ fn take_out_all<'a, T: Scalar>(
 }
 
 /// Subtracts what is pending from `w` and returns its norm.
-fn norm_after<T: Scalar>(w: &mut [T], pending: Pending<'_, T>) -> f64 {
-    let [square] = pass(w, pending, |_, block| [dot_block(block, block)]);
-    square.sqrt()
+fn norm_after<T: Scalar>(w: &mut [T], pending: Pending<'_, T>, complete: impl Fn(&mut [f64])) -> f64 {
+    let mut square = pass(w, pending, |_, block| [dot_block(block, block)]);
+    complete(&mut square);
+    square[0].sqrt()
 }
 
 /// Subtracts the multiples `h` of `group` from `w` and sums `terms(first index, block)` over the blocks of
@@ -245,7 +257,7 @@ mod tests {
             basis.next().copy_from_slice(&w);
             let mut h = Vec::new();
             let r = wave(n, 0.2);
-            let Remainder { norm, product } = basis.orthogonalise(&r, |c| h.push(c));
+            let Remainder { norm, product } = basis.orthogonalise(&r, |_| {}, |c| h.push(c));
             assert_eq!(h.len(), j);
             assert!((product * norm - vector::dot(&r, basis.next())).abs() < 1e-12 * vector::norm(&r) * norm);
             assert!((norm - vector::norm(basis.next())).abs() < 1e-12 * norm);
@@ -257,13 +269,13 @@ mod tests {
             stored.push(last.to_vec());
         }
         let mut r = wave(n, 0.2);
-        basis.take_out(&mut r, |_| {});
+        basis.take_out(&mut r, |_| {}, |_| {});
         assert!(
             stored.iter().all(|v| vector::dot(v, &r).abs() < 1e-12 * vector::norm(v) * (n as f64).sqrt())
         );
         let mut last = stored[18].clone();
         let norm = vector::norm(&last);
-        assert!(basis.take_out_last(0.75 * norm, &mut last) / norm - 0.25 < 1e-14);
+        assert!(basis.take_out_last(0.75 * norm, &mut last, |_| {}) / norm - 0.25 < 1e-14);
     }
 
     #[test]

@@ -19,7 +19,7 @@
 //! what the preconditioner gave, rounded, and `C` are the images of rounded directions.
 
 use super::basis::{Basis, Directions};
-use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, true_residual};
+use super::{KrylovError, KrylovReport, Reference, Target, check_dimensions, finite, norm, true_residual};
 use crate::operator::{LinOp, Preconditioner};
 use crate::scalar::Scalar;
 use crate::vector;
@@ -142,7 +142,7 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         self.r.resize(b.len(), S::ZERO);
         self.direction.resize(b.len(), S::ZERO);
         self.forget();
-        let right_hand_side_norm = finite(vector::norm(b), 0)?;
+        let right_hand_side_norm = finite(norm::<T>(a, b), 0)?;
         let norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
         let GcrParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
@@ -186,7 +186,8 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         }
         vector::convert(1.0 / norm, &self.residual, &mut self.r);
         self.coefficients.clear();
-        let mut now = self.images.take_out(&mut self.r, |c| self.coefficients.push(c));
+        let complete = |sums: &mut [f64]| a.complete(sums);
+        let mut now = self.images.take_out(&mut self.r, complete, |c| self.coefficients.push(c));
         let enough = (target.norm / norm).max(S::EPSILON.powf(2.0 / 3.0));
         if now <= enough && *last != StageEnd::NoStep {
             return Ok(StageEnd::NoStep);
@@ -227,7 +228,8 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         let kept = directions.push_with(|z| vector::convert(1.0, direction, z));
         vector::convert(1.0, kept, direction);
         a.apply(direction, images.next());
-        let left = images.orthogonalise(r, |h| triangle.push(h));
+        let complete = |sums: &mut [f64]| a.complete(sums);
+        let left = images.orthogonalise(r, complete, |h| triangle.push(h));
         triangle.push(left.norm);
         // Not the other way round: a norm that is not a number goes on to the caller.
         if left.norm <= S::EPSILON * triangle.close() {
@@ -237,7 +239,7 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         }
         images.push(left.norm);
         coefficients.push(left.product);
-        Some(images.take_out_last(left.product, r))
+        Some(images.take_out_last(left.product, r, complete))
     }
 
     /// `x += norm Z R^-1 C^T r`, unless that is not finite, and the true residual for the next stage; returns

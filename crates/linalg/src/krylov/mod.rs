@@ -136,5 +136,14 @@ fn finite(value: f64, iteration: usize) -> Result<f64, KrylovError> {
 /// `r = b - A x` and its norm.
 fn true_residual<T: Scalar>(a: &mut (impl LinOp<T> + ?Sized), b: &[T], x: &[T], r: &mut [T]) -> f64 {
     a.apply(x, r);
-    vector::residual_norm_from_product(b, r)
+    let mut square = [vector::residual_square_from_product(b, r)];
+    a.complete(&mut square);
+    square[0].sqrt()
+}
+
+/// The norm of a vector of the space that the operator acts on.
+fn norm<T: Scalar>(a: &(impl LinOp<T> + ?Sized), x: &[T]) -> f64 {
+    let mut square = [vector::dot(x, x)];
+    a.complete(&mut square);
+    square[0].sqrt()
 }

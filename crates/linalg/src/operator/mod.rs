@@ -10,6 +10,10 @@ pub trait LinOp<T> {
 
     /// `y = A x`. All of `y` is overwritten; nothing is allocated.
     fn apply(&mut self, x: &[T], y: &mut [T]);
+
+    /// Completes sums over the entries held here to sums over all entries, where vectors are shared by ranks.
+    /// [`crate::Gcr`] takes all its scalar products so.
+    fn complete(&self, _sums: &mut [f64]) {}
 }
 
 /// An approximate inverse `M^-1` of an operator.
@@ -46,6 +50,10 @@ impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
 
     fn apply(&mut self, x: &[T], y: &mut [T]) {
         (**self).apply(x, y);
+    }
+
+    fn complete(&self, sums: &mut [f64]) {
+        (**self).complete(sums);
     }
 }
 

@@ -1,0 +1,235 @@
+//! Flow in a box on several ranks, and what they said to each other: a line of JSON for each number of them.
+//!
+//! ```sh
+//! cargo run --release -p gluey-distributed --example box_flow -- --dimension 3 --level 4 --ranks 1,8,64
+//! cargo build --release -p gluey-distributed --example box_flow --features mpi
+//! mpirun -n 8 target/release/examples/box_flow --dimension 3 --level 4
+//! ```
+//!
+//! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
+//! only), `--tolerance T`, `--ranks N,M,...` (threads; without it, the processes of `mpirun`),
+//! `--fail-rank R` (this rank fails before the solve, to see that all end). The time goes to the standard
+//! error, so that equal runs print equal lines.
+
+#![allow(clippy::unwrap_used, reason = "an example that fails says where")]
+
+use std::time::Instant;
+
+use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, equal_cuts};
+use gluey_fem::ImplicitTree;
+use gluey_geom::{Aabb, Vector};
+use gluey_parallel::{Communicator, Threads, Traffic};
+use serde::Serialize;
+
+/// Latency of a message and bytes a second of a rank, of the model.
+const LATENCY: f64 = 1e-6;
+const BANDWIDTH: f64 = 12e9;
+
+#[derive(Clone, Copy, Debug)]
+struct Options {
+    dimension: usize,
+    level: u8,
+    adaptive: bool,
+    tolerance: f64,
+    fail_rank: Option<usize>,
+}
+
+fn main() {
+    let mut options = Options { dimension: 2, level: 5, adaptive: false, tolerance: 1e-8, fail_rank: None };
+    let mut ranks: Option<Vec<usize>> = None;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        if name == "--adaptive" {
+            options.adaptive = true;
+            continue;
+        }
+        let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
+        match name.as_str() {
+            "--dimension" => options.dimension = number(&name, &value),
+            "--level" => options.level = number(&name, &value),
+            "--tolerance" => options.tolerance = number(&name, &value),
+            "--fail-rank" => options.fail_rank = Some(number(&name, &value)),
+            "--ranks" => ranks = Some(value.split(',').map(|n| number(&name, n)).collect()),
+            _ => fail(&format!(
+                "{name} is no option: --dimension, --level, --adaptive, --tolerance, --ranks, --fail-rank"
+            )),
+        }
+    }
+    let Some(ranks) = ranks else { return processes(&options) };
+    for size in ranks {
+        match Threads::run(size, |ranks| run(&options, ranks)) {
+            Ok(lines) => println!("{}", lines[0]),
+            Err(failure) => fail(&failure.to_string()),
+        }
+    }
+}
+
+fn number<T: std::str::FromStr>(name: &str, value: &str) -> T {
+    value.parse().unwrap_or_else(|_| fail(&format!("{name} {value}: a number is needed")))
+}
+
+fn fail(why: &str) -> ! {
+    eprintln!("error: {why}");
+    std::process::exit(1);
+}
+
+#[cfg(feature = "mpi")]
+fn processes(options: &Options) {
+    let ended = gluey_parallel::Processes::run(|ranks| {
+        let line = run(options, ranks);
+        if ranks.rank() == 0 {
+            println!("{line}");
+        }
+    });
+    ended.unwrap_or_else(|error| fail(&error.to_string()));
+}
+
+#[cfg(not(feature = "mpi"))]
+fn processes(_: &Options) {
+    fail("--ranks is needed: this program was built without the feature mpi");
+}
+
+/// The line of a run, the same on all ranks.
+fn run(options: &Options, ranks: &dyn Communicator) -> String {
+    match options.dimension {
+        2 => solve::<2>(options, ranks),
+        3 => solve::<3>(options, ranks),
+        other => fail(&format!("--dimension {other}: 2 or 3")),
+    }
+}
+
+fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String {
+    let wants = |lower: &Vector<D>, h: f64, level: u8| {
+        let distance = (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.45)).norm() - 0.3;
+        !options.adaptive || level < 2 || distance.abs() < h
+    };
+    let walls = |x: &Vector<D>| {
+        let mut u = Vector::<D>::zeros();
+        u[0] = x[1] * (0.3 + x[D - 1]);
+        u[1] = (2.0 * std::f64::consts::TAU * x[0]).sin() * (1.0 - x[1]) * x[1];
+        u
+    };
+    let start = Instant::now();
+    let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], options.level, &wants).unwrap();
+    let cuts = equal_cuts(&tree, ranks);
+    assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
+    let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
+    let mine = flow.solve(&mut tree, &cuts, ranks, &walls).unwrap();
+    if ranks.rank() == 0 {
+        eprintln!("{} ranks, {:.2} s", ranks.size(), start.elapsed().as_secs_f64());
+    }
+    serde_json::to_string(&Record::new(options, ranks, &mine)).unwrap()
+}
+
+/// A number of each rank: the mean and the largest.
+#[derive(Serialize)]
+struct Spread {
+    mean: f64,
+    largest: u64,
+}
+
+#[derive(Serialize)]
+struct LevelRecord {
+    cells: u64,
+    nodes: u64,
+    /// Ghosts over owned, for all ranks together.
+    ghost_cells: f64,
+    ghost_nodes: f64,
+    cells_of_a_rank: Spread,
+    neighbours: Spread,
+}
+
+/// Of a rank, in the solve.
+#[derive(Serialize)]
+struct TrafficRecord {
+    messages: Spread,
+    bytes: Spread,
+    exchanges: u64,
+    reductions: u64,
+}
+
+#[derive(Serialize)]
+struct Record {
+    dimension: usize,
+    level: u8,
+    adaptive: bool,
+    tolerance: f64,
+    ranks: usize,
+    iterations: usize,
+    relative_residual: f64,
+    /// Of the bits of all velocities and pressures.
+    checksum: String,
+    levels: Vec<LevelRecord>,
+    setup: TrafficRecord,
+    solve: TrafficRecord,
+    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if nothing
+    /// overlapped.
+    modelled_communication_seconds: f64,
+}
+
+impl Record {
+    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self {
+        let bits = mine.velocity.iter().flatten().chain(&mine.pressure).map(|x| x.to_bits());
+        let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
+        let &Options { dimension, level, adaptive, tolerance, .. } = options;
+        let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
+        let hops = 2.0 * (ranks.size() as f64).log2().ceil() * solve.reductions as f64;
+        let modelled_communication_seconds =
+            LATENCY * (solve.messages.largest as f64 + hops) + solve.bytes.largest as f64 / BANDWIDTH;
+        Self {
+            dimension,
+            level,
+            adaptive,
+            tolerance,
+            ranks: ranks.size(),
+            iterations: mine.iterations,
+            relative_residual: mine.relative_residual,
+            checksum: format!("{:016x}", hashes.into_iter().fold(FNV_OFFSET, mix)),
+            levels: mine.levels.iter().map(|sizes| LevelRecord::new(ranks, sizes)).collect(),
+            setup: TrafficRecord::new(ranks, &mine.setup_traffic),
+            solve,
+            modelled_communication_seconds,
+        }
+    }
+}
+
+impl TrafficRecord {
+    fn new(ranks: &dyn Communicator, own: &Traffic) -> Self {
+        Self {
+            messages: spread(ranks, own.messages),
+            bytes: spread(ranks, own.bytes),
+            exchanges: own.exchanges,
+            reductions: own.reductions,
+        }
+    }
+}
+
+impl LevelRecord {
+    fn new(ranks: &dyn Communicator, own: &LevelSizes) -> Self {
+        let sum = |own: usize| ranks.all_gather(&[own as u64]).into_iter().sum::<u64>();
+        let (cells, nodes) = (sum(own.cells), sum(own.nodes));
+        Self {
+            cells,
+            nodes,
+            ghost_cells: sum(own.ghost_cells) as f64 / cells as f64,
+            ghost_nodes: sum(own.ghost_nodes) as f64 / nodes as f64,
+            cells_of_a_rank: spread(ranks, own.cells as u64),
+            neighbours: spread(ranks, own.neighbours as u64),
+        }
+    }
+}
+
+fn spread(ranks: &dyn Communicator, own: u64) -> Spread {
+    let all = ranks.all_gather(&[own]);
+    let largest = all.iter().copied().max().unwrap_or(0);
+    Spread { mean: all.iter().sum::<u64>() as f64 / all.len() as f64, largest }
+}
+
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Fowler, Noll and Vo's hash, byte by byte.
+fn mix(hash: u64, bits: u64) -> u64 {
+    bits.to_le_bytes()
+        .iter()
+        .fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}

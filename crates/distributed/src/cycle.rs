@@ -1,0 +1,107 @@
+//! One V-cycle on the velocities, as the serial solver runs it for bodies that are eliminated: loads go down
+//! as they are, and each level smooths once on the way up.
+
+use gluey_fem::{Cuts, ImplicitTree};
+use gluey_parallel::Communicator;
+
+use crate::coarse::CoarseFactor;
+use crate::flow::FlowError;
+use crate::level::Level;
+use crate::space::{LevelSpace, ghost_plan};
+use crate::transfer::Transfer;
+
+/// Cells of the coarsest mesh along the shortest edge of the box, at most, unless it has more roots.
+const COARSEST_CELLS: u32 = 4;
+
+pub struct VCycle<'a, const D: usize> {
+    /// Coarsest first.
+    pub levels: Vec<Level<'a, D>>,
+    /// `transfers[l]` joins level `l` to level `l + 1`.
+    transfers: Vec<Transfer<D>>,
+    /// On rank zero.
+    coarse: Option<CoarseFactor>,
+}
+
+impl<'a, const D: usize> VCycle<'a, D> {
+    pub fn new(
+        tree: &mut ImplicitTree<'_, D>,
+        (cuts, ranks): (&Cuts, &'a dyn Communicator),
+        viscosity: f64,
+    ) -> Result<Self, FlowError> {
+        let own = cuts.of(ranks.rank());
+        let finest = tree.max_level();
+        let coarsest = coarsest_level(tree).min(finest);
+        let mut levels = Vec::new();
+        for depth in coarsest..=finest {
+            // Rank zero holds all of the coarsest level: what it lacks are ghosts.
+            let all = (depth == coarsest && ranks.rank() == 0).then(|| 0..tree.end());
+            let space = LevelSpace::new(tree, depth, &own, all);
+            let nodes = space.velocity.clone();
+            let plan = ghost_plan(tree, (cuts, ranks), &space.part, &nodes, |node| nodes.is_free(node));
+            levels.push(Level::new(ranks, space, plan, viscosity)?);
+        }
+        let pairs = levels.windows(2);
+        let transfers =
+            pairs.map(|pair| Transfer::new(&pair[0].operator.space, &pair[1].operator.space)).collect();
+        let coarse = (ranks.rank() == 0).then(|| CoarseFactor::new(&levels[0].operator.space, viscosity));
+        // All ranks learn of it.
+        let mut failures = [f64::from(u8::from(matches!(coarse, Some(Err(_)))))];
+        ranks.sum(&mut failures);
+        match coarse.transpose() {
+            Ok(_) if failures[0] > 0.0 => Err(FlowError::CoarseElsewhere),
+            coarse => Ok(Self { levels, transfers, coarse: coarse? }),
+        }
+    }
+
+    /// `z = V b` on the finest level.
+    pub fn run(&mut self) {
+        for fine in (1..self.levels.len()).rev() {
+            let (below, above) = self.levels.split_at_mut(fine);
+            let (coarse, fine_level) = (&mut below[fine - 1], &above[0]);
+            let operator = &mut coarse.operator;
+            self.transfers[fine - 1].restrict(&operator.space, &fine_level.b, &mut operator.y);
+            operator.space.velocity.map.condense(D, |w| w as f32, &mut operator.y);
+            operator.clear_boundary();
+            operator.gather(&mut coarse.b);
+        }
+        self.solve_coarsest();
+        for fine in 1..self.levels.len() {
+            let (below, above) = self.levels.split_at_mut(fine);
+            let (coarse, fine_level) = (&mut below[fine - 1], &mut above[0]);
+            let operator = &mut coarse.operator;
+            operator.scatter(&coarse.z);
+            operator.space.velocity.map.distribute(D, |w| w as f32, &mut operator.x);
+            self.transfers[fine - 1].prolong(&operator.space, &operator.x, &mut fine_level.z);
+            fine_level.smooth();
+        }
+    }
+
+    /// All loads to rank zero, and its answers to their owners: its own ones and those of ghosts.
+    fn solve_coarsest(&mut self) {
+        let Level { operator, b, z, .. } = &mut self.levels[0];
+        operator.scatter(b);
+        operator.y.fill(0.0);
+        if let Some(factor) = &mut self.coarse {
+            factor.solve(&operator.x, &mut operator.y);
+        }
+        operator.gather(z);
+    }
+}
+
+impl<const D: usize> crate::level::LevelOperator<'_, D> {
+    /// Loads on nodes at the walls move nothing.
+    fn clear_boundary(&mut self) {
+        let map = &self.space.velocity.map;
+        for (node, load) in self.y.chunks_exact_mut(D).enumerate() {
+            if map.is_on_boundary(node) {
+                load.fill(0.0);
+            }
+        }
+    }
+}
+
+/// Depth of the coarsest mesh.
+fn coarsest_level<const D: usize>(tree: &ImplicitTree<'_, D>) -> u8 {
+    let roots = tree.frame().roots().into_iter().min().unwrap_or(1);
+    (COARSEST_CELLS / roots).max(1).ilog2() as u8
+}

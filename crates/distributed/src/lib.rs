@@ -1,0 +1,46 @@
+//! Stokes flow in a box whose cells are shared by ranks.
+//!
+//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box without bodies, `u = g` on its walls: the same
+//! elements, kernels and Krylov method as in the serial solver, and multigrid on the same levels. A rank
+//! holds the cells of its run in the Morton order of the tree, with those around them, on every level; no
+//! vector is longer than that, and no rank has the whole tree.
+//!
+//! ```
+//! use gluey_distributed::{BoxFlow, equal_cuts};
+//! use gluey_fem::ImplicitTree;
+//! use gluey_geom::{Aabb, Vector};
+//! use gluey_parallel::Threads;
+//!
+//! let wants = |_: &Vector<2>, _: f64, _: u8| true;
+//! let speeds = Threads::run(3, |ranks| {
+//!     let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true, false], 3, &wants).expect("a tree");
+//!     let cuts = equal_cuts(&tree, ranks);
+//!     let shear = |x: &Vector<2>| Vector::<2>::new(x[1], 0.0);
+//!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 50 };
+//!     let mine = flow.solve(&mut tree, &cuts, ranks, &shear).expect("a flow");
+//!     // Between moving walls every node moves with its height.
+//!     mine.points.iter().zip(&mine.velocity).all(|(x, u)| (u - shear(x)).norm() < 1e-8)
+//! })?;
+//! assert_eq!(speeds, [true; 3]);
+//! # Ok::<(), gluey_parallel::RankFailure>(())
+//! ```
+//!
+//! A model problem that is complete: `docs/decisions/0030-ranks.md` says what separates it from `gluey run`
+//! under MPI. Not for bodies, viscosities that vary, or boxes without a wall.
+
+mod coarse;
+mod cuts;
+mod cycle;
+mod flow;
+mod level;
+mod operator;
+mod precondition;
+mod space;
+mod transfer;
+
+pub use cuts::equal_cuts;
+pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,156 @@
+//! Flows on several ranks: those of one rank, and those of the serial solver.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use gluey_distributed::{BoxFlow, MyFlow, equal_cuts};
+use gluey_fem::{Cuts, ImplicitTree};
+use gluey_geom::{Aabb, Vector};
+use gluey_parallel::{Alone, Communicator, Threads};
+
+const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 120 };
+
+#[derive(Clone, Copy)]
+struct Example {
+    level: u8,
+    is_adaptive: bool,
+    /// In the first direction.
+    is_periodic: bool,
+}
+
+const UNIFORM: Example = Example { level: 4, is_adaptive: false, is_periodic: false };
+const ADAPTIVE: Example = Example { level: 5, is_adaptive: true, is_periodic: false };
+const PERIODIC: Example = Example { level: 4, is_adaptive: true, is_periodic: true };
+
+impl Example {
+    fn periodic<const D: usize>(self) -> [bool; D] {
+        std::array::from_fn(|d| self.is_periodic && d == 0)
+    }
+
+    /// Around a sphere, unless uniform.
+    fn wants<const D: usize>(self) -> impl Fn(&Vector<D>, f64, u8) -> bool + Sync {
+        move |lower, h, level| {
+            let distance = (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.45)).norm() - 0.3;
+            !self.is_adaptive || level < 2 || distance.abs() < h
+        }
+    }
+
+    fn solve<const D: usize>(self, ranks: &dyn Communicator) -> MyFlow<D> {
+        let wants = self.wants::<D>();
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), self.level, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        FLOW.solve(&mut tree, &cuts, ranks, &walls).unwrap()
+    }
+}
+
+/// A velocity on the walls that lets as much in as out, has the period of the box and needs a pressure.
+fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
+    let mut u = Vector::zeros();
+    u[0] = x[1] * (0.3 + x[D - 1]) - 0.2;
+    u[1] = (2.0 * std::f64::consts::TAU * x[0]).sin() * (1.0 + 0.5 * x[1]);
+    u
+}
+
+fn largest_difference<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
+    let scale = a.iter().map(Vector::norm).fold(0.0, largest);
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, largest) / scale
+}
+
+/// Velocities and pressures of all ranks, one after the other.
+fn joined<const D: usize>(parts: &[MyFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>) {
+    let velocity = parts.iter().flat_map(|part| part.velocity.iter().copied()).collect();
+    (velocity, parts.iter().flat_map(|part| part.pressure.iter().copied()).collect())
+}
+
+fn ranks_find_the_flow_of_one<const D: usize>(example: Example) {
+    let alone = example.solve::<D>(&Alone::default());
+    assert!(alone.relative_residual < 1e-11);
+    for size in [2, 3, 4, 8] {
+        let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
+        let parts = run();
+        let (velocity, pressure) = joined(&parts);
+        let difference = largest_difference(&alone.velocity, &velocity);
+        assert!(difference < 1e-9, "{size} ranks: {difference:e}");
+        let scale = alone.pressure.iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        let pressures = alone.pressure.iter().zip(&pressure);
+        let difference = pressures.fold(0.0f64, |m, (a, b)| m.max((a - b).abs())) / scale;
+        assert!(difference < 1e-7, "{size} ranks: pressures {difference:e}");
+        let iterations: Vec<usize> = parts.iter().map(|part| part.iterations).collect();
+        assert!(iterations.iter().all(|&n| n == iterations[0] && n.abs_diff(alone.iterations) <= 1));
+        assert_eq!(joined(&run()), (velocity, pressure), "the same bits on every run");
+    }
+}
+
+#[test]
+fn ranks_find_the_flow_of_one_in_2d() {
+    [UNIFORM, ADAPTIVE, PERIODIC].into_iter().for_each(ranks_find_the_flow_of_one::<2>);
+}
+
+#[test]
+fn ranks_find_the_flow_of_one_in_3d() {
+    let [uniform, adaptive, periodic] =
+        [UNIFORM, ADAPTIVE, PERIODIC].map(|e| Example { level: e.level - 1, ..e });
+    [uniform, adaptive, periodic].into_iter().for_each(ranks_find_the_flow_of_one::<3>);
+}
+
+#[test]
+fn cuts_are_those_of_one_rank_that_counts_everything() {
+    for example in [UNIFORM, ADAPTIVE, PERIODIC] {
+        for size in [1, 2, 3, 5, 8, 64] {
+            let wants = example.wants::<2>();
+            let tree = || {
+                ImplicitTree::new(Aabb::unit(), [1; 2], example.periodic(), example.level, &wants).unwrap()
+            };
+            let want = Cuts::equal(&mut tree(), size);
+            let found = Threads::run(size, |ranks| equal_cuts(&tree(), ranks)).unwrap();
+            assert!(found.iter().all(|cuts| *cuts == want));
+        }
+    }
+}
+
+/// More ranks than cells of the coarse levels, and ranks with few cells of the finest.
+#[test]
+fn ranks_without_cells_take_part() {
+    let example = Example { level: 3, ..UNIFORM };
+    let alone = example.solve::<2>(&Alone::default());
+    let parts = Threads::run(40, |ranks| example.solve::<2>(ranks)).unwrap();
+    assert!(parts.iter().any(|part| part.levels[0].cells == 0));
+    let difference = largest_difference(&alone.velocity, &joined(&parts).0);
+    assert!(difference < 1e-9, "{difference:e}");
+}
+
+/// What a rank holds of a mesh shrinks with the number of ranks, on all levels but the coarsest.
+#[test]
+fn no_rank_holds_arrays_of_the_size_of_the_mesh() {
+    let example = Example { level: 7, ..UNIFORM };
+    let parts = Threads::run(16, |ranks| {
+        let wants = example.wants::<2>();
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], example.level, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        let levels =
+            BoxFlow { tolerance: 1e-2, ..FLOW }.solve(&mut tree, &cuts, ranks, &walls).unwrap().levels;
+        (levels, tree.known_count())
+    })
+    .unwrap();
+    let cells = 1 << 14;
+    for (levels, known) in &parts {
+        let finest = levels[levels.len() - 1];
+        assert_eq!(finest.cells, cells / 16);
+        assert!(finest.cells + finest.ghost_cells < 1200, "{finest:?}");
+        assert!(finest.ghost_nodes < 300, "{finest:?}");
+        assert!(*known < cells / 4, "{known}");
+    }
+}
+
+#[test]
+fn a_box_without_walls_is_an_error_on_all_ranks() {
+    let errors = Threads::run(3, |ranks| {
+        let wants = |_: &Vector<2>, _: f64, _: u8| true;
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true; 2], 3, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        FLOW.solve(&mut tree, &cuts, ranks, &walls).unwrap_err().to_string()
+    })
+    .unwrap();
+    assert!(errors.iter().all(|error| error.starts_with("coarsest level: ")), "{errors:?}");
+}

@@ -1,0 +1,201 @@
+//! What ranks say to each other.
+
+use std::cell::Cell;
+
+use crate::number::{read_all, write_all};
+
+/// Bytes for a rank, or from it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Message {
+    /// The other rank.
+    pub rank: usize,
+    /// What is sent; of what is received the length has to be right beforehand.
+    pub bytes: Vec<u8>,
+}
+
+/// What one rank has sent, and how often all waited for each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Messages sent, those of sums included.
+    pub messages: u64,
+    /// Bytes sent.
+    pub bytes: u64,
+    /// Exchanges with neighbours.
+    pub exchanges: u64,
+    /// Sums over all ranks.
+    pub reductions: u64,
+}
+
+impl Traffic {
+    /// What came after an earlier count.
+    #[must_use]
+    pub fn since(self, before: Self) -> Self {
+        Self {
+            messages: self.messages - before.messages,
+            bytes: self.bytes - before.bytes,
+            exchanges: self.exchanges - before.exchanges,
+            reductions: self.reductions - before.reductions,
+        }
+    }
+}
+
+/// One rank among those that share a computation.
+///
+/// All ranks call the same methods in the same order. An implementation provides the first four; whatever
+/// adds numbers is built on them, in an order that depends on the number of ranks alone.
+pub trait Communicator {
+    /// The number of this rank, from zero.
+    fn rank(&self) -> usize;
+
+    /// Number of ranks.
+    fn size(&self) -> usize;
+
+    /// Sends all of `send` and waits for all of `receive`. Messages from one rank to another arrive in the
+    /// order in which they were sent. A rank that is lost ends the computation.
+    fn transfer(&self, send: &[Message], receive: &mut [Message]);
+
+    /// Where this rank counts what it sends.
+    fn counter(&self) -> &Cell<Traffic>;
+
+    /// What this rank has sent so far.
+    fn traffic(&self) -> Traffic {
+        self.counter().get()
+    }
+
+    /// [`Communicator::transfer`] between neighbours, counted.
+    fn exchange(&self, send: &[Message], receive: &mut [Message]) {
+        count(self.counter(), |traffic| {
+            traffic.exchanges += 1;
+            add_messages(traffic, send);
+        });
+        self.transfer(send, receive);
+    }
+
+    /// Adds up `values`, entry by entry, over all ranks, for all of them: a binary tree over the ranks, each
+    /// adding what comes from higher ones to its own.
+    fn sum(&self, values: &mut [f64]) {
+        count(self.counter(), |traffic| traffic.reductions += 1);
+        let length = values.len() * size_of::<f64>();
+        for step in up_the_tree(self.rank(), self.size()) {
+            match step {
+                Step::From(rank) => {
+                    let bytes = receive(self, rank, length);
+                    values.iter_mut().zip(read_all::<f64>(&bytes)).for_each(|(sum, value)| *sum += value);
+                }
+                Step::To(rank) => {
+                    let mut bytes = Vec::new();
+                    write_all(values, &mut bytes);
+                    send(self, rank, bytes);
+                }
+            }
+        }
+        let mut bytes = Vec::new();
+        write_all(values, &mut bytes);
+        broadcast(self, &mut bytes);
+        values.iter_mut().zip(read_all(&bytes)).for_each(|(value, sum)| *value = sum);
+    }
+
+    /// The items of all ranks, of each as many, in the order of the ranks, for all of them.
+    fn all_gather(&self, items: &[u64]) -> Vec<u64> {
+        let (rank, size) = (self.rank(), self.size());
+        let mut gathered = Vec::new();
+        write_all(items, &mut gathered);
+        let one = gathered.len();
+        for step in up_the_tree(rank, size) {
+            match step {
+                Step::From(from) => {
+                    let ranks = (from - rank).min(size - from);
+                    gathered.extend(receive(self, from, ranks * one));
+                }
+                Step::To(to) => send(self, to, gathered.clone()),
+            }
+        }
+        gathered.resize(size * one, 0);
+        broadcast(self, &mut gathered);
+        read_all(&gathered).collect()
+    }
+}
+
+/// A message of this rank in a tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    From(usize),
+    To(usize),
+}
+
+/// What a rank does while numbers move to rank zero: it hears from the ranks at distances 1, 2, 4 above it,
+/// then tells the one below.
+fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = Step> {
+    let steps = (0..usize::BITS).map(|bit| 1usize << bit).take_while(|&step| step < size.max(1));
+    let steps: Vec<usize> = steps.collect();
+    let told = steps.iter().position(|&step| rank & step != 0).map_or(steps.len(), |k| k + 1);
+    steps
+        .into_iter()
+        .take(told)
+        .filter_map(move |step| {
+            let above = rank + step;
+            if rank & step != 0 {
+                Some(Step::To(rank - step))
+            } else {
+                (above < size).then_some(Step::From(above))
+            }
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+/// The bytes of rank zero for all: down the tree.
+fn broadcast(ranks: &(impl Communicator + ?Sized), bytes: &mut Vec<u8>) {
+    for step in up_the_tree(ranks.rank(), ranks.size()).rev() {
+        match step {
+            Step::From(rank) => send(ranks, rank, bytes.clone()),
+            Step::To(rank) => *bytes = receive(ranks, rank, bytes.len()),
+        }
+    }
+}
+
+fn send(ranks: &(impl Communicator + ?Sized), rank: usize, bytes: Vec<u8>) {
+    let message = [Message { rank, bytes }];
+    count(ranks.counter(), |traffic| add_messages(traffic, &message));
+    ranks.transfer(&message, &mut []);
+}
+
+fn receive(ranks: &(impl Communicator + ?Sized), rank: usize, length: usize) -> Vec<u8> {
+    let mut message = [Message { rank, bytes: vec![0; length] }];
+    ranks.transfer(&[], &mut message);
+    let [message] = message;
+    message.bytes
+}
+
+fn count(counter: &Cell<Traffic>, change: impl FnOnce(&mut Traffic)) {
+    let mut traffic = counter.get();
+    change(&mut traffic);
+    counter.set(traffic);
+}
+
+fn add_messages(traffic: &mut Traffic, messages: &[Message]) {
+    traffic.messages += messages.len() as u64;
+    traffic.bytes += messages.iter().map(|message| message.bytes.len() as u64).sum::<u64>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_rank_but_the_first_tells_one_lower_rank_that_listens() {
+        for size in 1..=20 {
+            for rank in 0..size {
+                let told: Vec<_> =
+                    up_the_tree(rank, size).filter(|step| matches!(step, Step::To(_))).collect();
+                assert_eq!(told.len(), usize::from(rank > 0));
+                for step in told {
+                    let Step::To(below) = step else { continue };
+                    assert!(up_the_tree(below, size).any(|step| step == Step::From(rank)));
+                }
+                let heard = up_the_tree(rank, size).filter(|step| matches!(step, Step::From(_)));
+                assert!(heard.count() <= size.ilog2() as usize + 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Copies of what other ranks own.
+//!
+//! Each number belongs to one rank, its owner; ranks that read it, or add to it, keep a copy: a ghost. An
+//! update brings the owners' values to the ghosts, an accumulation the ghosts' values to the owners, which
+//! add them in the order of the ranks. One is the transpose of the other.
+
+use std::ops::AddAssign;
+
+use crate::communicator::{Communicator, Message};
+use crate::number::{Number, read_all, write_all};
+
+/// A ghost that a rank wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Wanted {
+    /// The rank that owns it.
+    pub owner: usize,
+    /// What both call it.
+    pub key: u64,
+    /// Where the copy stands.
+    pub place: u32,
+}
+
+/// Who sends what to whom, as often as it is needed.
+#[derive(Clone, Debug, Default)]
+pub struct GhostPlan {
+    /// Ghosts elsewhere of what stands here.
+    owned: Side,
+    /// Ghosts here.
+    ghosts: Side,
+}
+
+/// Places, rank by rank, and the messages they are read from or written to.
+#[derive(Clone, Debug, Default)]
+struct Side {
+    places: Vec<Vec<u32>>,
+    messages: Vec<Message>,
+}
+
+impl Side {
+    fn push(&mut self, rank: usize, places: Vec<u32>) {
+        if !places.is_empty() {
+            self.places.push(places);
+            self.messages.push(Message { rank, bytes: Vec::new() });
+        }
+    }
+
+    /// Makes room for as many bytes as items of this size need.
+    fn fit(&mut self, item: usize) {
+        for (places, message) in self.places.iter().zip(&mut self.messages) {
+            message.bytes.resize(places.len() * item, 0);
+        }
+    }
+
+    /// Copies from `x` to the messages.
+    fn pack<T: Number, const C: usize>(&mut self, x: &[T]) {
+        self.fit(C * T::SIZE);
+        for (places, message) in self.places.iter().zip(&mut self.messages) {
+            for (&place, item) in places.iter().zip(message.bytes.chunks_exact_mut(C * T::SIZE)) {
+                let values = &x[place as usize * C..][..C];
+                values.iter().zip(item.chunks_exact_mut(T::SIZE)).for_each(|(x, bytes)| x.write(bytes));
+            }
+        }
+    }
+
+    /// Hands `take` each value that came and where it belongs.
+    fn unpack<T: Number, const C: usize>(&self, x: &mut [T], take: impl Fn(&mut T, T)) {
+        for (places, message) in self.places.iter().zip(&self.messages) {
+            for (&place, item) in places.iter().zip(message.bytes.chunks_exact(C * T::SIZE)) {
+                let values = &mut x[place as usize * C..][..C];
+                values.iter_mut().zip(read_all(item)).for_each(|(x, value)| take(x, value));
+            }
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.places.iter().map(Vec::len).sum()
+    }
+}
+
+impl GhostPlan {
+    /// Asks the owners of `wanted` for updates; `find` says where something that this rank owns stands.
+    ///
+    /// # Panics
+    /// If a rank is asked for what it does not own.
+    pub fn new(ranks: &dyn Communicator, mut wanted: Vec<Wanted>, find: impl Fn(u64) -> Option<u32>) -> Self {
+        wanted.sort_unstable();
+        wanted.dedup();
+        let mut plan = Self::default();
+        let mut asked = Vec::new();
+        for of_owner in wanted.chunk_by(|a, b| a.owner == b.owner) {
+            let keys: Vec<u64> = of_owner.iter().map(|wanted| wanted.key).collect();
+            let mut bytes = Vec::new();
+            write_all(&keys, &mut bytes);
+            asked.push(Message { rank: of_owner[0].owner, bytes });
+            plan.ghosts.push(of_owner[0].owner, of_owner.iter().map(|wanted| wanted.place).collect());
+        }
+        for Message { rank, bytes } in deliver(ranks, &asked) {
+            let place = |key| find(key).expect("ranks agree on who owns what");
+            plan.owned.push(rank, read_all(&bytes).map(place).collect());
+        }
+        plan
+    }
+
+    /// Number of ghosts here.
+    pub fn ghost_count(&self) -> usize {
+        self.ghosts.count()
+    }
+
+    /// Number of ranks that this one sends updates to.
+    pub fn neighbour_count(&self) -> usize {
+        self.owned.places.len()
+    }
+
+    /// Places of the ghosts here, rank by rank.
+    pub fn ghosts(&self) -> impl Iterator<Item = u32> {
+        self.ghosts.places.iter().flatten().copied()
+    }
+
+    /// Sets the ghosts of a field with `C` interleaved components to the values of their owners.
+    pub fn update<T: Number, const C: usize>(&mut self, ranks: &dyn Communicator, x: &mut [T]) {
+        self.owned.pack::<T, C>(x);
+        self.ghosts.fit(C * T::SIZE);
+        ranks.exchange(&self.owned.messages, &mut self.ghosts.messages);
+        self.ghosts.unpack::<T, C>(x, |x, value| *x = value);
+    }
+
+    /// Adds the ghosts of a field with `C` interleaved components to the values of their owners, in the
+    /// order of the ranks. The ghosts are zero then.
+    pub fn accumulate<T: Number + AddAssign, const C: usize>(
+        &mut self,
+        ranks: &dyn Communicator,
+        x: &mut [T],
+    ) {
+        self.ghosts.pack::<T, C>(x);
+        self.owned.fit(C * T::SIZE);
+        ranks.exchange(&self.ghosts.messages, &mut self.owned.messages);
+        self.owned.unpack::<T, C>(x, |x, value| *x += value);
+        for place in self.ghosts.places.iter().flatten() {
+            x[*place as usize * C..][..C].fill(T::default());
+        }
+    }
+}
+
+/// Messages of any length to ranks that do not expect them: lengths go before. Returns what came, in the
+/// order of the ranks.
+fn deliver(ranks: &dyn Communicator, messages: &[Message]) -> Vec<Message> {
+    let others = || (0..ranks.size()).filter(|&rank| rank != ranks.rank());
+    let mut lengths: Vec<Message> =
+        others().map(|rank| Message { rank, bytes: 0u64.to_le_bytes().to_vec() }).collect();
+    let mut coming = lengths.clone();
+    for message in messages {
+        assert_ne!(message.rank, ranks.rank(), "a rank asks others only");
+        let own = usize::from(message.rank > ranks.rank());
+        lengths[message.rank - own].bytes = (message.bytes.len() as u64).to_le_bytes().to_vec();
+    }
+    ranks.exchange(&lengths, &mut coming);
+    let length = |message: &Message| u64::read(&message.bytes) as usize;
+    let mut received: Vec<Message> = coming
+        .iter()
+        .map(|message| Message { rank: message.rank, bytes: vec![0; length(message)] })
+        .filter(|message| !message.bytes.is_empty())
+        .collect();
+    ranks.exchange(messages, &mut received);
+    received
+}
