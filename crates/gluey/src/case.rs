@@ -53,7 +53,7 @@ pub use keys::CaseKey;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{
     ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, OutputKind, ParticleVelocity,
-    RadiiKind, Solver, UnknownName,
+    Precision, RadiiKind, Solver, UnknownName,
 };
 pub use output::{Interval, OutputSpec};
 pub use overrides::{BadOverride, Override};

@@ -133,6 +133,17 @@ named! {
 }
 
 named! {
+    /// Bits of the numbers in files.
+    Precision, "precision" {
+        /// 64 bits: the numbers as they were computed.
+        #[default]
+        Double = "f64",
+        /// 32 bits: seven digits, half the size.
+        Single = "f32",
+    }
+}
+
+named! {
     /// How the Stokes equations are solved.
     Solver, "solver" {
         /// Direct in 2D, multigrid in 3D.

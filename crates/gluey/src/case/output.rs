@@ -1,13 +1,12 @@
 //! What a case says of frames to write.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Case;
 use super::error::{Key, Problem};
 use super::findings::Findings;
-use super::names::{self, OutputKind};
-use crate::output::vtk::Precision;
+use super::names::{self, OutputKind, Precision};
 
 /// A stream of frames, beside the tables that every run writes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -36,9 +35,8 @@ pub struct OutputSpec {
     #[serde(default = "fast")]
     #[schemars(range(min = 0, max = 9))]
     pub compression: u32,
-    /// Precision of kind `vtk`: as computed (`f64`) or half the size (`f32`). Default: "f64".
-    #[serde(default = "double")]
-    #[schemars(schema_with = "precisions")]
+    /// Precision of kind `vtk`. Default: "f64".
+    #[serde(default)]
     pub precision: Precision,
 }
 
@@ -118,12 +116,4 @@ fn yes() -> bool {
 
 fn fast() -> u32 {
     1
-}
-
-fn double() -> Precision {
-    Precision::Double
-}
-
-fn precisions(_: &mut SchemaGenerator) -> Schema {
-    names::schema_of_names(&[Precision::Double, Precision::Single])
 }

@@ -24,13 +24,14 @@ use gluey_motion::Fields;
 
 use super::{OutputError, prepare_folder_of, pvd, write_atomically};
 
+pub use crate::case::Precision;
 pub(crate) use background::FrameWriter;
 pub use read::{VtkReadError, read_fields, read_particles};
 pub use shown::ShownBox;
 use shown::{Shown, shown};
 use vtkio::model::CellType;
+pub use xml::VtkEncoding;
 use xml::{Array, Piece};
-pub use xml::{Precision, UnknownPrecision, VtkEncoding};
 
 /// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's
 /// order: corners, edges, centre.

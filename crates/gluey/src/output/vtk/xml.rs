@@ -4,9 +4,7 @@
 //! Every array is base64: a header of 64-bit numbers, then the little-endian values, in zlib blocks where
 //! they are compressed.
 
-use std::fmt;
 use std::io::{self, Write};
-use std::str::FromStr;
 
 use base64::engine::{Engine, general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
@@ -17,6 +15,8 @@ use vtkio::model::{
     VertexNumbers, Vtk,
 };
 use vtkio::xml::Compressor;
+
+use crate::case::Precision;
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
@@ -36,43 +36,6 @@ impl Default for VtkEncoding {
     /// Exact numbers, compressed fast: higher levels gain a few percent.
     fn default() -> Self {
         Self { compression: 1, precision: Precision::Double }
-    }
-}
-
-/// Bits of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Precision {
-    /// 32 bits: seven digits, half the size.
-    #[serde(rename = "f32")]
-    Single,
-    /// 64 bits: the numbers as they were computed.
-    #[serde(rename = "f64")]
-    Double,
-}
-
-/// A name that is no precision.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{name}` is not a known precision: expected `f32` or `f64`")]
-pub struct UnknownPrecision {
-    /// The name as it was given.
-    pub name: String,
-}
-
-impl fmt::Display for Precision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Single => "f32",
-            Self::Double => "f64",
-        })
-    }
-}
-
-impl FromStr for Precision {
-    type Err = UnknownPrecision;
-
-    fn from_str(name: &str) -> Result<Self, UnknownPrecision> {
-        let known = [Self::Single, Self::Double].into_iter().find(|precision| precision.to_string() == name);
-        known.ok_or_else(|| UnknownPrecision { name: name.to_owned() })
     }
 }
 
