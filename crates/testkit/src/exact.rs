@@ -6,7 +6,7 @@ mod sphere;
 
 pub use inclusion::{InclusionViscosity, ViscousInclusion};
 pub use polynomial::{PolynomialFlow, WavyPressure};
-pub use sphere::RigidSphere;
+pub use sphere::{RigidSphere, ViscousSphere};
 
 use gluey_geom::{Matrix, Vector};
 

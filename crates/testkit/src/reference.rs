@@ -123,14 +123,16 @@ reference_table!(
     "pair2d_resistance.csv"
 );
 reference_table!(
-    /// Drag of a square lattice of fixed discs: `phi, gap_over_a, drag_F_over_muU`.
-    square_lattice,
-    "lattice_square2d.csv"
+    /// Square (0) and hexagonal (1) lattices of discs:
+    /// `lattice, phi, gap_over_a, drag_F_over_muU, eta_axes_strain, eta_shear, rel_diff_drag`.
+    lattices_of_discs,
+    "lattices2d.csv"
 );
 reference_table!(
-    /// Drag of a simple cubic lattice of fixed spheres: `phi, gap_over_a, K, relchange_K`.
-    simple_cubic_lattice,
-    "lattice_sc3d.csv"
+    /// Simple (0), body-centred (1) and face-centred (2) cubic lattices of spheres:
+    /// `lattice, phi, gap_over_a, K, alpha, beta, relchange_K, ...`.
+    lattices_of_spheres,
+    "lattices3d.csv"
 );
 reference_table!(
     /// A square lattice of free discs in shear, by the strain of the cell: `phi, strain, eta_r, N1, omega`.

@@ -60,4 +60,12 @@ impl Method {
     pub fn params<const D: usize>(&self, tolerance: f64) -> FlowParams {
         FlowParams { formulation: (self.formulation)(D), tolerance, ..FlowParams::for_dimension(D) }
     }
+
+    /// The thickness to which films between bodies are widened on cells of this size.
+    pub fn height_of_films<const D: usize>(&self, cell_size: f64) -> f64 {
+        match (self.formulation)(D) {
+            Formulation::Unfitted { lubrication } => lubrication.heights::<D>(cell_size).between_bodies,
+            _ => 0.0,
+        }
+    }
 }

@@ -2,9 +2,9 @@
 
 use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
-use gluey_stokes::Flow;
-use gluey_stokes::fem::cut::{BallInCell, CutMoments, POINTS};
+use gluey_stokes::fem::cut::{BallInCell, CutRules, FlatInCell, POINTS};
 use gluey_stokes::fem::element::{gauss_cube, gradient, node_count, value};
+use gluey_stokes::{Flat, Flow, films};
 use gluey_testkit::exact::StokesSolution;
 
 /// Errors of a flow in the fluid. Those of the velocity are relative to the exact one.
@@ -98,22 +98,45 @@ where
     nodes.map(|(i, &n)| flow.pressure[n as usize] * value::<D>(1, i, at)).sum()
 }
 
-/// The integral of the velocity over the fluid around one body, which repeats where the box is periodic, over
-/// the volume of the box.
-pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, [ball]: &[Ball<D>; 1]) -> Vector<D>
+/// The integral of the velocity over the fluid around bodies, which repeat where the box is periodic, over
+/// the volume of the box. Films between bodies that are thinner than `height` are as thick as that, as the
+/// mesh sees them.
+pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], height: f64) -> Vector<D>
 where
     Dim<D>: Space<D>,
 {
     let mesh = &flow.discretisation.mesh;
-    let points = gauss_cube::<D>(POINTS);
+    let (points, rules) = (gauss_cube::<D>(POINTS), CutRules::new(0.0));
+    let flats = flats(balls, mesh.domain(), height);
     let of_cell = |(index, cell)| {
         let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
-        let volume = CutMoments::new(&in_cell(ball, &lower, h)).volume;
+        let near = balls.iter().zip(&flats).flat_map(|(ball, flats)| {
+            let images = in_cell(ball, &lower, h).into_iter();
+            images.map(|image| (image, flats.iter().map(|flat| flat.in_cell(&image, h, 0.0)).collect()))
+        });
+        let cuts =
+            |(_, flats): &(BallInCell<D>, Vec<FlatInCell<D>>)| !flats.iter().any(FlatInCell::takes_cell);
+        let mut near: Vec<(BallInCell<D>, Vec<FlatInCell<D>>)> = near.filter(cuts).collect();
+        near.iter_mut().for_each(|(ball, flats)| flats.retain(|f| !f.leaves_cell() && !f.leaves_ball(ball)));
+        let volume = rules.moments(near.iter().map(|(ball, flats)| (ball, &flats[..]))).volume;
         let sum: Vector<D> =
             points.iter().zip(&volume).map(|((at, _), weight)| velocity_at(flow, index, at) * *weight).sum();
         sum * h.powi(D as i32)
     };
     mesh.cells().iter().enumerate().map(of_cell).sum::<Vector<D>>() / mesh.domain().extent().product()
+}
+
+/// The planes that cut each of these bodies flat where films are thinner than `height`.
+fn flats<const D: usize>(balls: &[Ball<D>], domain: &Aabb<D>, height: f64) -> Vec<Vec<Flat<D>>> {
+    let mut flats = vec![Vec::new(); balls.len()];
+    for film in films(balls, domain, height) {
+        for ((side, distance), sign) in film.flats(height).into_iter().enumerate().zip([1.0, -1.0]) {
+            if let Some(body) = film.side(side) {
+                flats[body].push(Flat { normal: film.normal * sign, distance });
+            }
+        }
+    }
+    flats
 }
 
 /// The images of a ball that cut or cover a cell, in its coordinates.
@@ -239,6 +262,8 @@ where
 
 #[cfg(test)]
 mod tests {
+    use gluey_stokes::fem::cut::CutMoments;
+
     use super::*;
 
     fn lattice<const D: usize>() -> Lattice<D> {
@@ -266,6 +291,11 @@ mod tests {
         let fluid: f64 = cells.map(|lower| CutMoments::new(&in_cell(&ball, &lower, h)).fraction()).sum();
         let exact = 1.0 - std::f64::consts::PI * 0.48 * 0.48;
         assert!((fluid * h * h - exact).abs() < 1e-12, "{} {exact}", fluid * h * h);
+        // Film to its images are 0.04 thick, widened to 0.1: two flats along each axis.
+        assert_eq!(flats(&[ball], &Aabb::unit(), 0.03)[0].len(), 0);
+        let flats = flats(&[ball], &Aabb::unit(), 0.1);
+        assert_eq!(flats[0].len(), 4);
+        assert!(flats[0].iter().all(|flat| (flat.distance - 0.45).abs() < 1e-12), "{flats:?}");
     }
 
     #[test]

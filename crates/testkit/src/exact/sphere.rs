@@ -63,6 +63,43 @@ impl StokesSolution<3> for RigidSphere {
     }
 }
 
+/// A sphere of another viscosity that is a sphere at this instant, in the flow of a [`RigidSphere`] far away:
+/// Eshelby's inclusion (1957, 10.1098/rspa.1957.0133) for incompressible fluids without surface tension.
+///
+/// With the ratio `r` of the viscosities the strain inside is uniform, `5 / (2 r + 3) E`; outside, the
+/// disturbance is that of a rigid sphere times `(2 r - 2) / (2 r + 3)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViscousSphere {
+    /// The flow if it were rigid.
+    pub rigid: RigidSphere,
+    /// Viscosity inside over that around it.
+    pub ratio: f64,
+}
+
+impl ViscousSphere {
+    /// The disturbance in units of that of a rigid sphere.
+    pub fn share(&self) -> f64 {
+        (2.0 * self.ratio - 2.0) / (2.0 * self.ratio + 3.0)
+    }
+}
+
+impl StokesSolution<3> for ViscousSphere {
+    fn velocity(&self, x: &Vector<3>) -> Vector<3> {
+        let r = x - self.rigid.center;
+        let undisturbed = self.rigid.strain * r + Dim::<3>::cross_spin(&self.rigid.spin, &r);
+        undisturbed + (self.rigid.velocity(x) - undisturbed) * self.share()
+    }
+
+    fn pressure(&self, x: &Vector<3>) -> f64 {
+        self.rigid.pressure(x) * self.share()
+    }
+
+    fn viscosity(&self, x: &Vector<3>) -> f64 {
+        let is_inside = (x - self.rigid.center).norm() < self.rigid.radius;
+        self.rigid.viscosity * if is_inside { self.ratio } else { 1.0 }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::checks::{points, solves_stokes};
@@ -147,5 +184,28 @@ mod tests {
         let flow = RigidSphere::in_simple_shear(Vector::zeros(), 1e-3, 1.0, 2.0);
         let far = flow.velocity(&Vector::<3>::new(0.3, 0.5, -0.2));
         assert!((far - Vector::<3>::new(1.0, 0.0, 0.0)).norm() < 1e-7);
+    }
+
+    /// Velocity and traction are continuous, and inside the strain is uniform.
+    #[test]
+    fn a_viscous_sphere_matches_the_fluid_around_it() {
+        let flow = ViscousSphere {
+            rigid: RigidSphere {
+                center: Vector::<3>::new(0.1, -0.05, 0.2),
+                radius: 0.4,
+                viscosity: 1.5,
+                strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
+                spin: Spin::<3>::new(0.3, -0.2, -0.5),
+            },
+            ratio: 7.0,
+        };
+        for n in [[1.0, 0.0, 0.0], [0.3, -0.5, 0.8], [-0.2, 0.9, -0.4]] {
+            let n = Vector::<3>::from(n).normalize();
+            let d = 1e-5;
+            let [inside, outside] = [-d, d].map(|d| flow.rigid.center + n * (flow.rigid.radius + d));
+            assert!((flow.velocity(&inside) - flow.velocity(&outside)).norm() < 10.0 * d);
+            let of = |x: &Vector<3>| super::super::stress(&flow, x, 0.25 * d) * n;
+            assert!((of(&inside) - of(&outside)).norm() < 1e-3, "{:?} {:?}", of(&inside), of(&outside));
+        }
     }
 }

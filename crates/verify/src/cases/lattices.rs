@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
-use gluey_testkit::reference::{simple_cubic_lattice, square_lattice};
+use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::{METHODS, Method};
@@ -25,7 +25,7 @@ pub const CASE: Case = Case {
     text: "A body that is held in a box with periodic borders under a uniform force along x: the square lattice of discs and the \
            simple cubic lattice of spheres. Relative error of the drag F/(mu U) or F/(6 pi mu a U), with the force F on the box and the \
            superficial velocity U, the integral of the velocity in the fluid over the volume of the box. Against spectral \
-           boundary integrals (data/reference/lattice_square2d.csv, lattice_sc3d.csv: 1e-9; they agree with Zick and Homsy 1982, \
+           boundary integrals (data/reference/lattices2d.csv, lattices3d.csv: 1e-9; they agree with Zick and Homsy 1982, \
            10.1017/S0022112082000627, and Sangani and Acrivos 1982, 10.1016/0301-9322(82)90029-5). Cells per edge of the box, \
            those away from the surface may be larger; two places of the body in its cell.",
     keys: &["dimension", "cells", "phi", "position"],
@@ -84,11 +84,12 @@ where
     let ball = [Ball::periodic(center, radius, [Some(1.0); D])];
     let refinement = Refinement { coarsest: level.min(3), ..Refinement::to_level(level) };
     let mesh = refinement.mesh(Aabb::unit(), [1; D], [true; D], &ball)?;
+    let mesh_size = mesh.size(level);
     let (still, force) = ([Twist::default()], |_: &Vector<D>| along_x());
     let conditions = Conditions::at_rest().with_force(Some(&force)).with_twists(&still);
     let tolerance = if D == 2 { 1e-9 } else { 1e-7 };
     let flow = FlowSolver::new(method.params::<D>(tolerance))?.solve_under(mesh, &ball, &conditions)?;
-    let drag = 1.0 / superficial_velocity(&flow, &ball)[0];
+    let drag = 1.0 / superficial_velocity(&flow, &ball, method.height_of_films::<D>(mesh_size))[0];
     let scale = if D == 2 { 1.0 } else { 6.0 * PI * radius };
     Ok(vec![drag / scale / exact(D, phi)? - 1.0, -flow.wrenches[0].force[0] - 1.0])
 }
@@ -103,9 +104,13 @@ fn radius(dimension: usize, phi: f64) -> f64 {
 }
 
 fn exact(dimension: usize, phi: f64) -> Result<f64, VerifyError> {
-    let (table, name) =
-        if dimension == 2 { (square_lattice()?, "drag_F_over_muU") } else { (simple_cubic_lattice()?, "K") };
-    let row = table.column("phi")?.iter().position(|&x| x == phi);
+    let (table, name) = match dimension {
+        2 => (lattices_of_discs()?, "drag_F_over_muU"),
+        _ => (lattices_of_spheres()?, "K"),
+    };
+    // The first lattice of each table.
+    let lattices = table.column("lattice")?.iter();
+    let row = lattices.zip(table.column("phi")?).position(|(&lattice, &x)| lattice == 0.0 && x == phi);
     let row = row.ok_or_else(|| VerifyError::NoReference(format!("a solid fraction of {phi}")))?;
     Ok(table.column(name)?[row])
 }

@@ -1,15 +1,20 @@
 //! The chapters of the book.
 
+mod cells;
 mod cost;
+mod crystals;
 mod disc;
+mod disc_wall;
 mod discs;
 mod doublet;
 mod equilibrium;
 mod exact_flows;
+mod inclusion;
 mod integrator;
 mod lattices;
 mod linear_flow;
 mod manufactured;
+mod random_pairs;
 mod sheared;
 mod spheres;
 mod symmetry;
@@ -25,10 +30,15 @@ pub const CASES: &[Case] = &[
     discs::CASE,
     linear_flow::DISC,
     linear_flow::SPHERE,
+    inclusion::CASE,
     spheres::CASE,
+    disc_wall::CASE,
     wall::CASE,
     lattices::CASE,
+    crystals::CASE,
     sheared::CASE,
+    cells::CASE,
+    random_pairs::CASE,
     equilibrium::CASE,
     integrator::CASE,
     doublet::CASE,

@@ -1,0 +1,164 @@
+//! A disc or sphere of another viscosity in a linear flow, with the exact velocity on a box around it.
+
+use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
+use gluey_levelset::Ball;
+use gluey_stokes::fem::TreeMesh;
+use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams};
+use gluey_testkit::convergence_order;
+use gluey_testkit::exact::{
+    InclusionViscosity, RigidSphere, StokesSolution, ViscousInclusion, ViscousSphere,
+};
+
+use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::norms::{Lattice, errors};
+use crate::number::{Kind, Number};
+use crate::plot::Plot;
+use crate::set_up::shift;
+use crate::statistics::{mean, rms};
+
+/// Half the edge of the box in radii.
+const HALF_WIDTH: f64 = 2.5;
+/// Viscosity inside over that around it.
+const RATIOS: [f64; 3] = [2.0, 10.0, 100.0];
+const METHOD: &str = "paper";
+
+/// The chapter.
+pub const CASE: Case = Case {
+    name: "inclusion",
+    title: "A viscous inclusion",
+    text: "A disc and a sphere of 2, 10 and 100 times the viscosity of the fluid around them in a linear flow, whose exact velocity is \
+           given on the sides of a box of half-width 2.5 radii: Schmid and Podladchikov 2003, 10.1046/j.1365-246X.2003.02042.x, for a \
+           disc; Eshelby 1957, 10.1098/rspa.1957.0133, for a sphere, inside which the strain is 5 / (2 r + 3) of that far away. Only \
+           `paper` has a viscosity inside bodies (here without multiplier, one solve); in the other formulations they are rigid. Relative \
+           errors of the velocity in fluid and body (mean square) and of the stresslet (mean over positions).",
+    keys: &["dimension", "a/h", "ratio", "position"],
+    measures: &["velocity", "stresslet"],
+    tasks,
+    numbers,
+    plot,
+};
+
+/// Cells per radius and positions, in 2D and 3D.
+fn meshes(extent: Extent) -> [&'static [(f64, usize)]; 2] {
+    match extent {
+        Extent::Quick => [&[(3.2, 4), (6.4, 4)], &[(1.6, 1)]],
+        Extent::Full => [&[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)], &[(1.6, 4), (3.2, 2)]],
+    }
+}
+
+fn tasks(extent: Extent) -> Vec<Task> {
+    let mut tasks = Vec::new();
+    for (dimension, meshes) in [2, 3].into_iter().zip(meshes(extent)) {
+        for &(cells, count) in meshes {
+            for (ratio, k) in RATIOS.into_iter().flat_map(|ratio| (0..count).map(move |k| (ratio, k))) {
+                let at = [f64::from(dimension), cells, ratio, k as f64];
+                tasks.push(Task::new(METHOD, &at, move || match dimension {
+                    2 => disc(cells, ratio, k),
+                    _ => sphere(cells, ratio, k),
+                }));
+            }
+        }
+    }
+    tasks
+}
+
+fn disc(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
+    let exact = ViscousInclusion {
+        center: shift::<2>(position) / cells,
+        radius: 1.0,
+        matrix_viscosity: 1.0,
+        inclusion_viscosity: InclusionViscosity::Finite(ratio),
+        pure_shear: 0.6,
+        simple_shear: 1.0,
+        spin: -0.5,
+    };
+    let strain = Matrix::<2>::new(0.6, 0.5, 0.5, -0.6);
+    let stresslet = 4.0 * (ratio - 1.0) / (ratio + 1.0);
+    measure(cells, ratio, &exact, Ball::new(exact.center, 1.0), (strain, stresslet))
+}
+
+fn sphere(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
+    let rigid = RigidSphere {
+        center: shift::<3>(position) / cells,
+        radius: 1.0,
+        viscosity: 1.0,
+        strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
+        spin: Spin::<3>::new(0.3, -0.2, -0.5),
+    };
+    let exact = ViscousSphere { rigid, ratio };
+    let stresslet = 20.0 / 3.0 * exact.share();
+    measure(cells, ratio, &exact, Ball::new(rigid.center, 1.0), (rigid.strain, stresslet))
+}
+
+/// Errors of the velocity and of the stresslet, which is this many `pi mu a^D` times the strain.
+fn measure<const D: usize>(
+    cells: f64,
+    ratio: f64,
+    exact: &impl StokesSolution<D>,
+    ball: Ball<D>,
+    (strain, stresslet): (Matrix<D>, f64),
+) -> Result<Vec<f64>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    let corner = Vector::<D>::repeat(HALF_WIDTH);
+    let domain = Aabb { lower: -corner, upper: corner };
+    let lattice = Lattice { domain, cells: (2.0 * HALF_WIDTH * cells).round() as usize };
+    let boundary = lattice.without_net_flux(|x| exact.velocity(x));
+    let level = lattice.cells.trailing_zeros();
+    let roots = (lattice.cells >> level) as u32;
+    let mesh = TreeMesh::uniform(domain, [roots; D], [false; D], level as u8)?;
+    let params = PaperParams { viscosity_ratio: ratio, uzawa_steps: 1, ..PaperParams::default() };
+    let params = FlowParams {
+        formulation: Formulation::Paper(params),
+        tolerance: 1e-9,
+        ..FlowParams::for_dimension(D)
+    };
+    let flow = FlowSolver::new(params)?.solve(mesh, &[ball], &boundary)?;
+    let of_strain = stresslet * std::f64::consts::PI * strain.norm_squared();
+    let found = lattice.stresslet(&flow, &boundary, &strain);
+    Ok(vec![errors(&flow, exact, &[]).velocity, found / of_strain - 1.0])
+}
+
+/// The mean square of the errors of velocities, the mean of those of stresslets.
+fn statistic(table: &Table, measure: &str, at: &[(&str, f64)]) -> f64 {
+    let values = table.values(measure, METHOD, at);
+    if measure == "stresslet" { mean(&values) } else { rms(&values) }
+}
+
+fn numbers(tables: &Tables) -> Vec<Number> {
+    let table = tables.of(CASE.name);
+    let mut numbers = Vec::new();
+    for (dimension, ratio) in [2.0, 3.0].into_iter().flat_map(|d| RATIOS.map(|ratio| (d, ratio))) {
+        let at = [("dimension", dimension), ("ratio", ratio)];
+        let computed = table.steps("a/h", METHOD, &at);
+        for &measure in CASE.measures {
+            let kind = if measure == "stresslet" { Kind::Error } else { Kind::Size };
+            let of = |cells: f64| statistic(&table, measure, &[&at[..], &[("a/h", cells)]].concat());
+            let name = format!("{measure}, {dimension}D, {ratio} times");
+            for &cells in &computed {
+                numbers.push(Number::new(kind, format!("{name}, a/h = {cells}"), METHOD, of(cells)));
+            }
+            if measure == "velocity" && computed.len() > 1 {
+                let sizes: Vec<f64> = computed.iter().map(|cells| 1.0 / cells).collect();
+                let magnitudes: Vec<f64> = computed.iter().map(|&cells| of(cells)).collect();
+                let order = convergence_order(&sizes, &magnitudes);
+                numbers.push(Number::new(Kind::Order, format!("{name}, order"), METHOD, order));
+            }
+        }
+    }
+    numbers
+}
+
+fn plot(tables: &Tables) -> Plot {
+    let table = tables.of(CASE.name);
+    let things = ["2D, 2 times", "2D, 100 times", "3D, 2 times", "3D, 100 times"];
+    Plot::of_methods("cells per radius *a*/*h*", "error of the velocity", &things, |method, thing| {
+        if method != METHOD {
+            return Vec::new();
+        }
+        let at = [("dimension", (2 + thing / 2) as f64), ("ratio", if thing % 2 == 0 { 2.0 } else { 100.0 })];
+        let point = |cells| (cells, statistic(&table, "velocity", &[&at[..], &[("a/h", cells)]].concat()));
+        table.steps("a/h", method, &at).into_iter().map(point).collect()
+    })
+}
