@@ -20,7 +20,6 @@ use crate::film::{FilmForce, Lubrication};
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, symmetric};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
-use trusted::Trusted;
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given};
@@ -215,7 +214,8 @@ where
         self.prepare(&mut problem, &mut method)?;
         let prepared = Instant::now();
         let (guess, before) = self.initial_guess(&problem, conditions)?;
-        let Trusted { mut flow, x, .. } = self.trusted(&mut problem, &mut method, conditions, &guess)?;
+        let trusted = self.trusted(&mut problem, &mut method, conditions, &guess)?;
+        let (mut flow, x) = (trusted.flow, trusted.x);
         self.keep_for_next(&problem, &x, &flow.pressure, before);
         flow.times = PhaseTimes {
             assembly: (assembled - start).as_secs_f64(),
