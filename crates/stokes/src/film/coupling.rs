@@ -129,10 +129,10 @@ where
         self.films.iter().enumerate().map(of_film).collect()
     }
 
-    /// What is kept of the scaled forces `g` for the films of another step, [`FilmCoupling::KEPT`] numbers for
-    /// each: body, partner, normal, the sums of `f slip t` and of `f turning t` over the modes of motion, and
-    /// that of `f t` over those of the flow through it. Unlike velocities, forces change little where a film
-    /// closes.
+    /// What is kept of the scaled forces `g` for the films of another step, [`FilmCoupling::KEPT`] numbers
+    /// for each: body, partner, normal, the sums of `f slip t` and of `f turning t` over the modes of motion,
+    /// and that of `f t` over those of the flow through it. Unlike velocities, forces change little where a
+    /// film closes.
     pub fn kept(&self, g: &[f64]) -> Vec<f64> {
         let mut kept = Vec::with_capacity(self.films.len() * Self::KEPT);
         for (index, film) in self.films.iter().enumerate() {

@@ -103,11 +103,7 @@ where
         );
         drop(data);
         let discretisation = discretisation.clone();
-        let body = |cell: &CutCell<D>| cell.bodies[0];
-        let mut roots: Vec<_> = aggregates.roots.iter().copied().zip(cut.cells.iter().map(body)).collect();
-        roots.sort_unstable();
-        roots.dedup_by_key(|root| root.0);
-        let (roots, bodies_at_roots) = roots.into_iter().unzip();
+        let (roots, bodies_at_roots) = roots_and_bodies(&cut, aggregates);
         let corners = node_count::<D>(1);
         let corner = |q: usize, x: &[f64; D]| if q < corners { value::<D>(1, q, x) } else { 0.0 };
         let rule = gauss_cube::<D>(POINTS);
@@ -320,6 +316,15 @@ where
             q[node as usize] += back(load);
         }
     }
+}
+
+/// The roots, ascending, and a body that cuts each or a bad cell that it carries.
+fn roots_and_bodies<const D: usize>(cut: &CutCells<D>, aggregates: &Aggregates) -> (Vec<u32>, Vec<u32>) {
+    let bodies = cut.cells.iter().map(|cell| cell.bodies[0]);
+    let mut roots: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(bodies).collect();
+    roots.sort_unstable();
+    roots.dedup_by_key(|root| root.0);
+    roots.into_iter().unzip()
 }
 
 /// Some nodes in all nodes, of which ghosts take their values from others.

@@ -22,8 +22,8 @@ use crate::surface::SurfaceCoupling;
 
 use super::roots::{ModesError, modes_and_diagonal};
 
-/// Steps of the sweep with the diagonal in 2D and in 3D, and what it damps eigenvalues down to: the largest in
-/// the fluid over this.
+/// Steps of the sweep with the diagonal in 2D and in 3D, and what it damps eigenvalues down to: the largest
+/// in the fluid over this.
 const DEGREES: [usize; 2] = [3, 4];
 const RATIOS: [f64; 2] = [5.0, 8.0];
 /// Lanczos steps for the largest eigenvalue, which depends on the cuts, and the factor on what they find.
