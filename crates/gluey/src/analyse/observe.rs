@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use gluey_contact::ContactError;
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_suspension::structure::{
     AngularDistribution, Diffusivity, Displacements, GapStatistics, Profile, ProximityNetwork,
     RadialDistribution, StructureFactor,
@@ -121,18 +121,20 @@ where
             interval: interval(frames),
             rate: rate(frames),
         };
-        frames.iter().for_each(|frame| all.add(frame));
+        frames.iter().enumerate().for_each(|(number, frame)| all.add(frame, rate_at(frames, number)));
         all
     }
 
-    fn add(&mut self, frame: &XyzFrame<D>) {
+    /// Adds a frame that is sheared at this rate.
+    fn add(&mut self, frame: &XyzFrame<D>, rate: f64) {
         let XyzFrame { container, positions, radii, velocities, strain, .. } = frame;
         self.radial.add(container, positions, self.a);
         self.angular.add(container, positions, radii);
         if let Some(waves) = &mut self.waves {
             waves.add(container, positions);
         }
-        self.profile.add(container, positions, radii, velocities);
+        let slide = Vector::from_fn(|d, _| if d == 0 { rate * container.bounds().extent()[1] } else { 0.0 });
+        self.profile.add(container, positions, radii, velocities, &slide);
         self.displacements.push(*strain, positions);
     }
 }
@@ -160,7 +162,15 @@ where
     (first > 0.0 && steps.all(|step| (step / first - 1.0).abs() < 1e-6)).then_some(first)
 }
 
-/// Rate of shear.
+/// Rate of shear from a frame to the next one, for the last frame from the one before.
+fn rate_at<const D: usize>(frames: &[XyzFrame<D>], number: usize) -> f64
+where
+    Dim<D>: Space<D>,
+{
+    rate(&frames[number.min(frames.len().saturating_sub(2))..])
+}
+
+/// Rate of shear between the first two frames.
 fn rate<const D: usize>(frames: &[XyzFrame<D>]) -> f64
 where
     Dim<D>: Space<D>,

@@ -43,28 +43,33 @@ impl<const D: usize> Profile<D> {
         }
     }
 
-    /// Adds one configuration; one velocity for each particle.
+    /// Adds one configuration; one velocity for each particle. Where the box is periodic across the slabs
+    /// particles may be anywhere, and an image one period up moves with `slide` more.
     pub fn add(
         &mut self,
         container: &Container<D>,
         positions: &[Vector<D>],
         radii: &[f64],
         velocities: &[Vector<D>],
+        slide: &Vector<D>,
     ) {
         self.volume += container.volume();
-        let is_periodic = !container.is_walled(self.axis);
+        let slide = (!container.is_walled(self.axis)).then_some(slide);
         for ((x, &radius), velocity) in positions.iter().zip(radii).zip(velocities) {
-            self.add_ball((x[self.axis] - self.lower) / self.width, radius, velocity, is_periodic);
+            self.add_ball((x[self.axis] - self.lower) / self.width, radius, velocity, slide);
         }
     }
 
     /// Adds a ball whose centre is `at` slabs above the lower end.
-    fn add_ball(&mut self, at: f64, radius: f64, velocity: &Vector<D>, is_periodic: bool) {
+    fn add_ball(&mut self, at: f64, radius: f64, velocity: &Vector<D>, slide: Option<&Vector<D>>) {
         let (reach, count) = (radius / self.width, self.sums.len() as i64);
         let below = |height: i64| volume_below::<D>((height as f64 - at) * self.width, radius);
         for slab in (at - reach).floor() as i64..=(at + reach).floor() as i64 {
             let volume = below(slab + 1) - below(slab);
-            let place = if is_periodic { slab.rem_euclid(count) } else { slab };
+            let (place, velocity) = match slide {
+                Some(slide) => (slab.rem_euclid(count), velocity - slide * slab.div_euclid(count) as f64),
+                None => (slab, *velocity),
+            };
             if let Some(sum) = usize::try_from(place).ok().and_then(|place| self.sums.get_mut(place)) {
                 sum.0 += volume;
                 sum.1 += velocity * volume;
@@ -108,7 +113,7 @@ mod tests {
             let heights = [0.4, if is_periodic { 0.95 } else { 0.8 }];
             let positions = heights.map(|y| Vector::<D>::from_fn(|d, _| if d == 1 { y } else { 0.5 }));
             let velocities = [1.0, 3.0].map(Vector::repeat);
-            profile.add(&container, &positions, &[0.1, 0.2], &velocities);
+            profile.add(&container, &positions, &[0.1, 0.2], &velocities, &Vector::zeros());
             let slabs = profile.slabs();
             let fraction = slabs.iter().map(|slab| slab.fraction).sum::<f64>() / 7.0;
             let volume = ball_volume::<D>(0.1) + ball_volume::<D>(0.2);
@@ -122,6 +127,24 @@ mod tests {
     fn no_volume_is_lost() {
         check::<2>();
         check::<3>();
+    }
+
+    /// Particles that follow a linear shear, wherever they have got to.
+    #[test]
+    fn images_move_with_the_row_they_are_in() {
+        let container = Container::<2>::periodic(&Vector::repeat(1.0));
+        let mut profile = Profile::new(&container, 1, 4);
+        let positions = [0.1, 3.3, -1.4, 2.98].map(|y| Vector::<2>::new(0.5, y));
+        let velocities = positions.map(|x| Vector::<2>::new(2.0 * x[1], 0.0));
+        profile.add(&container, &positions, &[0.05; 4], &velocities, &Vector::<2>::new(2.0, 0.0));
+        let slabs = profile.slabs();
+        let middle = |slab: usize| slabs[slab].velocity[0];
+        assert!((middle(1) - 0.6).abs() < 1e-12 && (middle(2) - 1.2).abs() < 1e-12, "{slabs:?}");
+        // The last one reaches into the first slab, where its image below is.
+        let upper = volume_below::<2>(0.02, 0.05) / ball_volume::<2>(0.05);
+        let lower = 1.0 - upper;
+        assert!((middle(3) - 1.96).abs() < 1e-12, "{slabs:?}");
+        assert!((middle(0) - (0.2 - 0.04 * lower) / (1.0 + lower)).abs() < 1e-12, "{slabs:?}");
     }
 
     #[test]
