@@ -162,8 +162,8 @@ struct Record {
     levels: Vec<LevelRecord>,
     setup: TrafficRecord,
     solve: TrafficRecord,
-    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if nothing
-    /// overlapped.
+    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if
+    /// nothing overlapped.
     modelled_communication_seconds: f64,
 }
 
