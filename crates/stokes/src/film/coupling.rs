@@ -355,7 +355,7 @@ impl<const D: usize> Mode<D> {
             if let Some(flow) = flow {
                 let half = -0.5 * flow.height;
                 force += t * half;
-                turn = turn + Dim::<D>::moment(&(arm + flow.middle), t) * half;
+                turn += Dim::<D>::moment(&(arm + flow.middle), t) * half;
             }
             let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
             let entries = force.iter().copied().chain(spins).enumerate();

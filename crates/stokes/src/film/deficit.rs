@@ -262,8 +262,8 @@ fn inside(y: f64) -> [f64; 4] {
 ///
 /// The flow is that of the pressure `p(r) x / r`, which is `-12 (u Q r^2 + v m r^4) / (r H^3)` for the flow
 /// `Q` through a circle of any radius `r`. Reynolds' equation makes `u' = 1 - u^2 + k u`,
-/// `v' = u + (k - 3 - u) v` with `k = 3 r H' / H`, and the power grows by `(2 v - v^2) r^6 / H^3`, derivatives
-/// by the logarithm of `r`.
+/// `v' = u + (k - 3 - u) v` with `k = 3 r H' / H`, and the power grows by `(2 v - v^2) r^6 / H^3`,
+/// derivatives by the logarithm of `r`.
 fn through_spheres(t: f64) -> [f64; 3] {
     let ratio = (1.0 - t) / t;
     let start = (NEAREST / ratio.sqrt()).ln().min(-FAR);
