@@ -75,7 +75,7 @@ pub trait Communicator {
     /// adding what comes from higher ones to its own.
     fn sum(&self, values: &mut [f64]) {
         count(self.counter(), |traffic| traffic.reductions += 1);
-        let length = values.len() * size_of::<f64>();
+        let length = size_of_val(values);
         for step in up_the_tree(self.rank(), self.size()) {
             match step {
                 Step::From(rank) => {
