@@ -3,10 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Case;
-use super::error::{Key, Problem};
-use super::findings::Findings;
-use super::names::{self, OutputKind, Precision};
+use super::names::{OutputKind, Precision};
 
 /// A stream of frames, beside the tables that every run writes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,8 +11,8 @@ use super::names::{self, OutputKind, Precision};
 pub struct OutputSpec {
     /// Format of the frames.
     pub kind: OutputKind,
-    /// The frames go to the folder `<run>-<label>` beside the trajectory: letters, digits, `-` and `_`, at most
-    /// 64 of them, other than those of the other streams. Default: the kind.
+    /// The frames go to the folder `<run>-<label>` beside the trajectory: letters, digits, `-` and `_`, at
+    /// most 64 of them, other than those of the other streams. Default: the kind.
     #[serde(default)]
     #[schemars(regex(pattern = "^[A-Za-z0-9_-]{1,64}$"))]
     pub label: Option<String>,
@@ -23,8 +20,8 @@ pub struct OutputSpec {
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub every: Option<usize>,
-    /// A frame whenever the sheared distance has grown by so much strain, forth or back, at the first step that
-    /// gets there. Unit: none. Default: none, `every` says when.
+    /// A frame whenever the sheared distance has grown by so much strain, forth or back, at the first step
+    /// that gets there. Unit: none. Default: none, `every` says when.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every_strain: Option<f64>,
@@ -65,47 +62,15 @@ impl OutputSpec {
 }
 
 impl Interval {
-    /// Whether there is a frame at the beginning of this step of the case.
-    pub fn is_due(self, case: &Case, step: usize) -> bool {
+    /// Whether there is a frame at the beginning of this step, if each shears by `strain`.
+    pub fn is_due(self, step: usize, strain: f64) -> bool {
         match self {
             Self::Steps(every) => step.is_multiple_of(every.max(1)),
             Self::Strain(every) => {
-                let a_step = case.shear_rate.abs() * case.time.step / every;
+                let a_step = strain.abs() / every;
                 let frames = |step: usize| (a_step * step as f64 + 1e-9).floor();
                 step == 0 || frames(step) > frames(step - 1)
             }
-        }
-    }
-}
-
-/// Notes streams without or with two intervals, and those that would write over each other.
-pub(super) fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
-    for (index, output) in case.output.iter().enumerate() {
-        let key = key.index(index);
-        let mut unfit = |name: &str, choice: String, needs: &str, found: String| {
-            findings.add(key.name(name), Problem::Unfit { choice, needs: needs.to_owned(), found });
-        };
-        let choice = format!("output {}", index + 1);
-        match (output.every, output.every_strain) {
-            (None, None) => unfit("kind", choice, "either `every` or `every_strain`", "neither".to_owned()),
-            (Some(_), Some(_)) => {
-                unfit("every", choice, "either `every` or `every_strain`", "both".to_owned())
-            }
-            (None, Some(_)) if case.shear_rate == 0.0 => {
-                let needs = "a shear rate that is not 0";
-                unfit("every_strain", "every_strain".to_owned(), needs, "shear_rate = 0".to_owned());
-            }
-            _ => {}
-        }
-        let label = output.label();
-        let before = case.output[..index].iter().position(|other| other.label() == label);
-        if let Some(before) = before {
-            let name = if output.label.is_some() { "label" } else { "kind" };
-            let found = format!("that of output {}", before + 1);
-            unfit(name, format!("label = \"{label}\""), "a label of its own", found);
-        }
-        if !names::is_file_name(label) {
-            findings.add(key.name("label"), Problem::BadName);
         }
     }
 }

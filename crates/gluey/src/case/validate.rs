@@ -5,7 +5,6 @@ use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
 use super::neighbours::{Neighbours, nearer_than};
-use super::output::check_output;
 use super::particle_problem::ParticleProblem;
 use super::{Case, fill};
 use crate::reference::Reference;
@@ -46,6 +45,38 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
     }
     if findings.is_empty() {
         check_reference(case, root.name("reference"), findings);
+    }
+}
+
+/// Notes streams without or with two intervals, and those that would write over each other.
+fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
+    for (index, output) in case.output.iter().enumerate() {
+        let key = key.index(index);
+        let mut unfit = |name: &str, choice: String, needs: &str, found: String| {
+            findings.add(key.name(name), Problem::Unfit { choice, needs: needs.to_owned(), found });
+        };
+        let choice = format!("output {}", index + 1);
+        match (output.every, output.every_strain) {
+            (None, None) => unfit("kind", choice, "either `every` or `every_strain`", "neither".to_owned()),
+            (Some(_), Some(_)) => {
+                unfit("every", choice, "either `every` or `every_strain`", "both".to_owned())
+            }
+            (None, Some(_)) if case.shear_rate == 0.0 => {
+                let needs = "a shear rate that is not 0";
+                unfit("every_strain", "every_strain".to_owned(), needs, "shear_rate = 0".to_owned());
+            }
+            _ => {}
+        }
+        let label = output.label();
+        let before = case.output[..index].iter().position(|other| other.label() == label);
+        if let Some(before) = before {
+            let name = if output.label.is_some() { "label" } else { "kind" };
+            let found = format!("that of output {}", before + 1);
+            unfit(name, format!("label = \"{label}\""), "a label of its own", found);
+        }
+        if !is_file_name(label) {
+            findings.add(key.name("label"), Problem::BadName);
+        }
     }
 }
 

@@ -1,5 +1,5 @@
-//! Flows whose penalties are large enough: where the smoother or the flow shows that they are not, the problem
-//! is set up again with larger ones.
+//! Flows whose penalties are large enough: where the smoother or the flow shows that they are not, the
+//! problem is set up again with larger ones.
 
 use std::sync::Arc;
 

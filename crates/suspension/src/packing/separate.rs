@@ -1,6 +1,6 @@
 //! Balls that overlap are pushed apart along their lines of centres, pair by pair, until no overlap is left
-//! but a tolerance. Pairs are looked for with a skin, and a ball is looked at again only after it or a neighbour
-//! has moved, so that the cost is that of what is crowded.
+//! but a tolerance. Pairs are looked for with a skin, and a ball is looked at again only after it or a
+//! neighbour has moved, so that the cost is that of what is crowded.
 
 use gluey_geom::Vector;
 
