@@ -375,6 +375,9 @@ fn is_sensible(line: &str) -> bool {
         |name: &str| vec![format!("crates/{}/Cargo.toml", name.strip_prefix("gluey-").unwrap_or(name))];
     match words[..] {
         ["cargo", "xtask", task, ..] => is_task(task, &words[3..]),
+        ["mpirun", "-n", _, program, ..] => program
+            .strip_prefix("target/release/examples/")
+            .is_some_and(|name| within("examples")(name).iter().any(|file| root.join(file).exists())),
         ["cargo", "build" | "test" | "doc" | "bench" | "run" | "install", ..] => {
             has("-p", &package)
                 && has("--path", &|path| vec![format!("{path}/Cargo.toml")])

@@ -135,11 +135,11 @@ named! {
 named! {
     /// Bits of the numbers in files.
     Precision, "precision" {
+        /// 32 bits: seven digits, half the size.
+        Single = "f32",
         /// 64 bits: the numbers as they were computed.
         #[default]
         Double = "f64",
-        /// 32 bits: seven digits, half the size.
-        Single = "f32",
     }
 }
 

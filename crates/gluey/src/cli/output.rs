@@ -1,10 +1,12 @@
 //! What a run writes beside its trajectory.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
+use gluey::case::UnknownName;
 use gluey::output::vtk::{Precision, VtkEncoding};
 use gluey::{RecordOptions, ResultPaths, RunOptions, VtkOptions, XyzOptions};
 
@@ -19,7 +21,7 @@ pub struct OutputArguments {
     #[arg(value_parser = clap::value_parser!(u32).range(0..=9))]
     vtk_compression: u32,
     /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
-    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double)]
+    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double, value_parser = by_name::<Precision>)]
     vtk_precision: Precision,
     /// Write particles in extended XYZ, which OVITO and ASE read, every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
@@ -77,4 +79,12 @@ fn minutes(text: &str) -> Result<f64, String> {
         Ok(minutes) if minutes > 0.0 && f64::is_finite(minutes) => Ok(minutes),
         _ => Err("must be a number greater than 0".into()),
     }
+}
+
+/// A choice by its name; what is none is told with the names there are.
+pub(super) fn by_name<T: FromStr<Err = UnknownName>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|unknown: UnknownName| {
+        let known: Vec<String> = unknown.known.iter().map(|name| format!("`{name}`")).collect();
+        format!("{unknown}: expected {}", known.join(" or "))
+    })
 }

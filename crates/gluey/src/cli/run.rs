@@ -9,7 +9,7 @@ use gluey::{Case, Formulation, ResultPaths, RunOptions, Strategy};
 use super::failure::Failure;
 use super::interrupt::interrupt_flag;
 use super::manner::Manner;
-use super::output::OutputArguments;
+use super::output::{OutputArguments, by_name};
 use crate::terminal::print_report;
 
 /// Arguments of `gluey run`.
@@ -28,7 +28,7 @@ pub struct RunArguments {
     #[arg(long)]
     strategy: Option<Strategy>,
     /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs, unfitted.
-    #[arg(long)]
+    #[arg(long, value_parser = by_name::<Formulation>)]
     formulation: Option<Formulation>,
     /// Folder for all output.
     #[arg(long, default_value = "out", value_name = "DIR")]
