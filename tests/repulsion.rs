@@ -77,7 +77,7 @@ fn a_pair_at_rest_parts_as_its_mobility_says() {
     }
     println!("gap from {} to {gap}, worst {worst:e}", gaps[0]);
     assert!(gap > 0.3 && worst < 1.5e-5, "{worst:e}");
-    let middle = centers::<3>(&csv, 2).iter().map(|x| (x[0] + x[1]) * 0.5).last().expect("a row");
+    let middle = centers::<3>(&csv, 2).iter().map(|x| (x[0] + x[1]) * 0.5).next_back().expect("a row");
     assert!((middle - Vector::repeat(0.5)).norm() < 1e-14, "{middle}");
 }
 
