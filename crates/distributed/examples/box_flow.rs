@@ -11,8 +11,6 @@
 //! `--fail-rank R` (this rank fails before the solve, to see that all end). The time goes to the standard
 //! error, so that equal runs print equal lines.
 
-#![allow(clippy::unwrap_used, reason = "an example that fails says where")]
-
 use std::time::Instant;
 
 use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, equal_cuts};
@@ -110,15 +108,18 @@ fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String 
         u
     };
     let start = Instant::now();
-    let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], options.level, &wants).unwrap();
+    let tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], options.level, &wants);
+    let mut tree = tree.unwrap_or_else(|error| fail(&error.to_string()));
     let cuts = equal_cuts(&tree, ranks);
     assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
     let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
-    let mine = flow.solve(&mut tree, &cuts, ranks, &walls).unwrap();
+    let mine = flow.solve(&mut tree, &cuts, ranks, &walls);
+    let mine = mine.unwrap_or_else(|error| fail(&error.to_string()));
     if ranks.rank() == 0 {
         eprintln!("{} ranks, {:.2} s", ranks.size(), start.elapsed().as_secs_f64());
     }
-    serde_json::to_string(&Record::new(options, ranks, &mine)).unwrap()
+    let line = serde_json::to_string(&Record::new(options, ranks, &mine));
+    line.unwrap_or_else(|error| fail(&error.to_string()))
 }
 
 /// A number of each rank: the mean and the largest.
