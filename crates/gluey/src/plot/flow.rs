@@ -90,7 +90,7 @@ fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
 }
 
 /// Four digits, without those that are 0 at the end.
-fn rounded(value: f64) -> String {
+pub(super) fn rounded(value: f64) -> String {
     let digits = (3.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.digits$}");
     let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

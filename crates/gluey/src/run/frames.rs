@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{ContactModel, PairContact};
-use gluey_geom::{Dim, Space};
+use gluey_contact::{ContactLaw, ContactModel, ContactNetwork, PairContact};
+use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::Container;
 
+use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
 use crate::output::OutputError;
 use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, StepError};
 
 /// A stream of frames that a run is to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,7 +104,7 @@ where
         &mut self,
         case: &Case,
         simulation: &Simulation<D, H, PairContact<D>>,
-    ) -> Result<(), OutputError>
+    ) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
     {
@@ -124,7 +125,12 @@ where
                 Stream::Xyz(writer) => {
                     let container = container(case, simulation);
                     let strain = case.strain_after(step);
-                    writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
+                    let frame = XyzFrame::of(time, strain, container, (particles, twists));
+                    let frame = match contact_forces(simulation)? {
+                        Some(forces) => frame.with_contact_forces(forces),
+                        None => frame,
+                    };
+                    writer.write(step, &frame)?;
                 }
             }
         }
@@ -146,6 +152,28 @@ where
             Stream::Xyz(_) => Ok(()),
         })
     }
+}
+
+/// What contacts exert on each particle; nothing where there is no contact model.
+fn contact_forces<const D: usize, H>(
+    simulation: &Simulation<D, H, PairContact<D>>,
+) -> Result<Option<Vec<Vector<D>>>, RunError>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+{
+    let contact = simulation.contact();
+    if contact.params().law == ContactLaw::None {
+        return Ok(None);
+    }
+    let centers: Vec<Vector<D>> =
+        simulation.particles().iter().map(|particle| particle.pose.position).collect();
+    let radii: Vec<f64> = simulation.particles().iter().map(|particle| particle.radius).collect();
+    let network = ContactNetwork::new(contact.contacts(), &centers, &radii, contact.domain());
+    let (step, time) = (simulation.step_index(), simulation.time());
+    let network = network.map_err(|source| StepError::Contact { step, time, source })?;
+    Ok(Some(network.forces()))
 }
 
 /// The box as it is sheared now.
