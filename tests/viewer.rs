@@ -160,7 +160,7 @@ fn frames_have_the_forces_of_contacts() {
     let picture = ["plot", "out", "--frame", "0", "--colour", "contact-force", "--format", "svg"];
     let stdout = succeeds(folder.path(), &picture);
     let svg = fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
-    assert!(svg.contains(">force / 6"), "{svg}");
+    assert!(svg.contains(">contact force / 6"), "{svg}");
 }
 
 /// Nothing is drawn where there is no contact model.

@@ -72,16 +72,20 @@ def test_frames_are_read_compressed_or_not(tmp_path: Path) -> None:
 
 
 def test_forces_of_contacts_are_those_of_pairs_that_touch(tmp_path: Path) -> None:
-    case = pair(end=0.2)
+    case = pair(end=0.4)
     case["particles"] = gluey.particles([[0.38, 0.54], [0.61, 0.46]], 0.1215)
     case["flow"] = {"formulation": "unfitted", "lubrication": "none", "mesh": {"cells_per_radius": 1.9}}
+    touching = 0
     for _, at_step in gluey.run(case, tmp_path, progress=False).frames():
         forces = at_step.contact_forces
         assert forces is not None and forces.shape == (2, 2)
         assert forces[0] == pytest.approx(-forces[1], rel=1e-12)
         apart = at_step.positions[1] - at_step.positions[0]
-        # Pushed apart, along the line of the centres.
-        assert forces[1] @ apart > 0.99 * np.linalg.norm(forces[1]) * np.linalg.norm(apart) > 0.0
+        if forces.any():
+            touching += 1
+            # Pushed apart, along the line of the centres.
+            assert forces[1] @ apart > 0.99 * np.linalg.norm(forces[1]) * np.linalg.norm(apart)
+    assert 0 < touching
 
 
 def test_ase_reads_frames(tmp_path: Path) -> None:

@@ -154,7 +154,7 @@ impl Look {
 
     /// Room for the name of what colours tell, in SVG pixels.
     pub(super) fn name_width(&self) -> f64 {
-        if self.coloring == Coloring::ContactForce { 96.0 } else { 52.0 }
+        if self.coloring == Coloring::ContactForce { 145.0 } else { 52.0 }
     }
 
     /// Name of what colours tell, and what stands at the ends of their bar.
@@ -162,7 +162,7 @@ impl Look {
         match self.coloring {
             Coloring::Speed => ["speed".to_owned(), "0".to_owned(), rounded(most)],
             Coloring::Spin => ["spin".to_owned(), "0".to_owned(), rounded(most)],
-            Coloring::ContactForce => ["force / 6π*η*".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::ContactForce => ["contact force / 6π*η*".to_owned(), "0".to_owned(), rounded(most)],
             Coloring::Gap => ["gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()],
         }
     }
