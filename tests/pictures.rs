@@ -400,7 +400,14 @@ fn tables_of_the_structure_are_drawn() {
         let line = summary.lines().find(|line| line.contains(&format!("self-diffusivity {axis}")));
         let number: f64 =
             line.and_then(|line| line.split_whitespace().nth(2)?.parse().ok()).expect("a diffusivity");
-        assert!(svg("diffusion").contains(&format!(" = {number:.3e}<")), "{number:.3e} along {axis}");
+        // Four digits, at most nine behind the point.
+        let digits = (3.0 - number.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+        let text = format!("{number:.digits$}");
+        let shown = match text.trim_end_matches('0').trim_end_matches('.') {
+            "-0" => "0".to_owned(),
+            other => other.replace('-', "\u{2212}"),
+        };
+        assert!(svg("diffusion").contains(&format!(" = {shown}<")), "{shown} along {axis}");
     }
     fails(folder.path(), &["plot", "out", "--only", "profiles"], &["profile_y.csv: not there", "analyse"]);
 }
@@ -425,7 +432,10 @@ fn spheres_are_seen_from_where_it_is_asked_for() {
     assert!(front.len() == 2 && front[0] != front[1], "{front:?}");
     assert!(above.len() == 2 && above[0] == above[1], "{above:?}");
     let joined = drawn(&["--contacts", "10", "--colour", "gap"]);
-    assert!(joined.matches("<line").count() == 13 && joined.contains(">gap / "), "12 edges and a pair");
+    assert!(
+        joined.matches("<line").count() == 13 && joined.contains(">smallest gap / "),
+        "12 edges and a pair"
+    );
     let (code, _, stderr) = gluey(folder.path(), &["plot", "out", "--frame", "20", "--view", "30"]);
     assert!(code == Some(2) && stderr.contains("two angles in degrees"), "{stderr}");
 }

@@ -152,18 +152,17 @@ impl Look {
         (self.coloring == Coloring::Gap).then_some(1.0)
     }
 
-    /// Room for the name of what colours tell, in SVG pixels.
-    pub(super) fn name_width(&self) -> f64 {
-        if self.coloring == Coloring::ContactForce { 145.0 } else { 52.0 }
-    }
-
     /// Name of what colours tell, and what stands at the ends of their bar.
     pub(super) fn legend(&self, most: f64) -> [String; 3] {
         match self.coloring {
-            Coloring::Speed => ["speed".to_owned(), "0".to_owned(), rounded(most)],
-            Coloring::Spin => ["spin".to_owned(), "0".to_owned(), rounded(most)],
-            Coloring::ContactForce => ["contact force / 6π*η*".to_owned(), "0".to_owned(), rounded(most)],
-            Coloring::Gap => ["gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()],
+            Coloring::Speed => ["speed (length / time)".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::Spin => ["spin (1 / time)".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::ContactForce => {
+                ["contact force / 6π*η* (length^{2} / time)".to_owned(), "0".to_owned(), rounded(most)]
+            }
+            Coloring::Gap => {
+                ["smallest gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()]
+            }
         }
     }
 }
