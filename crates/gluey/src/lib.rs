@@ -78,6 +78,11 @@ struct ReadmeOfAll;
 #[doc = include_str!("../../../docs/tutorial/contact-law.md")]
 struct ContactLawTutorial;
 
+/// The page of the book on another formulation of rigidity.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/tutorial/formulation.md")]
+struct FormulationTutorial;
+
 /// The page of the book on another flow.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/tutorial/hydrodynamics.md")]

@@ -26,6 +26,7 @@ mod figures;
 mod flow;
 mod look;
 mod read;
+mod rounded;
 mod snapshot;
 mod structure;
 

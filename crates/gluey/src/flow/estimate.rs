@@ -22,8 +22,8 @@ use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
 /// The program and its tables; unit: bytes.
 const PROGRAM: f64 = 16e6;
-/// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the penalties;
-/// unit: bytes.
+/// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
+/// penalties; unit: bytes.
 const CUT_CELL: [f64; 2] = [40e3, 55e3];
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
@@ -146,8 +146,8 @@ impl Tree {
         case.particles.iter().map(|particle| ball * (particle.radius / size).powi(self.dimension)).sum()
     }
 
-    /// Leaves that surfaces cut: a circle of radius `R h` meets about `8 R` squares, a sphere `6 pi R^2 + 2` cubes
-    /// (what a ball meets less what lies inside it).
+    /// Leaves that surfaces cut: a circle of radius `R h` meets about `8 R` squares, a sphere `6 pi R^2 + 2`
+    /// cubes (what a ball meets less what lies inside it).
     fn cells_cut(&self, case: &Case) -> f64 {
         let size = self.size(i32::from(self.refinement.surface));
         let met = |radius: f64| match self.dimension {

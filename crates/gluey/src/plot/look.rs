@@ -8,7 +8,7 @@ use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::for_each_pair;
 
 use super::error::PlotError;
-use super::flow::rounded;
+use super::rounded::rounded;
 use crate::output::xyz::XyzFrame;
 
 /// Smallest gap that has a colour of its own, in mean radii.

@@ -5,8 +5,8 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, PALETTE, Stroke};
 use super::error::PlotError;
 use super::figure::Figure;
 use super::figures::{FAINT, chart, curve, points, stacked, under_frame};
-use super::flow::rounded;
 use super::read::{Source, Tables};
+use super::rounded::rounded;
 
 /// A column, its name in the legend, its stroke.
 type Column = (&'static str, &'static str, Stroke);

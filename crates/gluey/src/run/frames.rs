@@ -110,7 +110,8 @@ where
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         let (particles, twists) = (simulation.particles(), simulation.twists());
-        let due = |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step);
+        let due =
+            |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step, case.time.step);
         for (_, stream) in self.streams.iter_mut().filter(|(interval, _)| due(interval)) {
             match stream {
                 Stream::Vtk { writer, with_fields } => {
@@ -189,7 +190,7 @@ where
 
 fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, OutputError> {
     let strain = case.shear_rate * case.time.step;
-    let done = (0..step).filter(|&step| interval.is_due(step, strain));
+    let done = (0..step).filter(|&step| interval.is_due(step, strain, case.time.step));
     let done: Vec<(usize, f64)> = done.map(|step| (step, step as f64 * case.time.step)).collect();
     VtkWriter::create(folder, &done)
 }
