@@ -2,8 +2,9 @@
 //!
 //! The first line is the number of particles, the second holds `key=value`: `Lattice` (the edges of the box,
 //! the second one tilted), `Origin`, `pbc` (`T` along periodic axes), `Properties`, `Time`, `Strain` (of the
-//! undisturbed flow) and `Dimension`. A line per particle: `species pos radius velo angular_velocity`, with
-//! a contact model also `contact_force`, vectors of three coordinates each. In 2D discs lie in the middle of a box as high as the largest of them.
+//! undisturbed flow) and `Dimension`. A line per particle: `species pos radius velo angular_velocity`, and
+//! `contact_force` where there is a contact model, vectors of three coordinates each. In 2D discs lie in the
+//! middle of a box as high as the largest of them.
 //! Positions are not wrapped. Numbers read back exactly.
 
 mod read;
