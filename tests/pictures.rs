@@ -1,9 +1,8 @@
-//! Pictures of a run: charts of its tables, the page for the browser.
+//! Pictures of a run: charts of its tables, its particles, its flow.
 
 use std::fs;
 use std::io::Read;
 use std::path::Path;
-use std::process;
 
 use assert_cmd::Command;
 use flate2::read::ZlibDecoder;
@@ -12,7 +11,6 @@ use gluey_contact::Domain;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_pictures::{Rgb, color_scale};
-use serde_json::Value;
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";
@@ -105,71 +103,6 @@ fn run_with_frames() -> TempDir {
     let folder = TempDir::new().expect("a folder");
     succeeds(folder.path(), &["run", CASE, "--xyz", "20"]);
     folder
-}
-
-/// The frames that a page holds.
-fn data(page: &str) -> Value {
-    let (_, behind) = page.split_once("<script type=\"application/json\" id=\"run\">").expect("data");
-    let (json, _) = behind.split_once("</script>").expect("an end");
-    serde_json::from_str(json).expect("JSON")
-}
-
-#[test]
-fn a_page_shows_the_frames_of_a_run_without_a_network() {
-    let folder = run_with_frames();
-    let stdout = succeeds(folder.path(), &["view", "out"]);
-    assert!(stdout.contains("view.html: ") && stdout.contains(" frames of 2 particles"), "{stdout}");
-    let page = fs::read_to_string(folder.path().join("out/view.html")).expect("a page");
-    let data = data(&page);
-    let frames = fs::read_dir(folder.path().join(format!("out/{STEM}-xyz"))).expect("frames").count();
-    let shown = data["frames"].as_array().expect("frames");
-    assert_eq!(shown.len(), frames);
-    assert_eq!((data["dimension"].as_u64(), data["title"].as_str()), (Some(3), Some(STEM)));
-    for numbers in ["positions", "velocities", "spins"] {
-        assert!(shown.iter().all(|frame| frame[numbers].as_array().is_some_and(|all| all.len() == 6)));
-    }
-    assert_eq!(shown[0]["positions"][0].as_f64().map(|x| x as f32), Some(0.3));
-    for outside in ["http:", "https:", " src=", "<link", "import ", "{{"] {
-        assert!(!page.contains(outside), "`{outside}` in the page");
-    }
-    succeeds(folder.path(), &["view", "out", "--every", "2", "--out", "pages/two.html"]);
-    let half = fs::read_to_string(folder.path().join("pages/two.html")).expect("a page");
-    assert_eq!(self::data(&half)["frames"].as_array().map(Vec::len), Some(frames.div_ceil(2)));
-}
-
-#[test]
-fn a_browser_draws_all_particles() {
-    let found = ["chromium", "chromium-browser", "google-chrome"]
-        .into_iter()
-        .find(|name| process::Command::new(name).arg("--version").output().is_ok());
-    let Some(browser) = found else {
-        eprintln!("skipped: no Chromium to draw the page with");
-        return;
-    };
-    let folder = run_with_frames();
-    succeeds(folder.path(), &["view", "out"]);
-    let page = folder.path().join("out/view.html");
-    let mut command = Command::new(browser);
-    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]);
-    command.args(["--disable-background-networking", "--disable-component-update", "--disable-sync"]);
-    command.arg(format!("--user-data-dir={}", folder.path().join("profile").display()));
-    command.arg("--dump-dom").arg(format!("file://{}#frame=3&colour=gap", page.display()));
-    let output = command.output().expect("it runs");
-    let drawn = String::from_utf8(output.stdout).expect("text");
-    assert!(drawn.contains("data-balls=\"2\"") && drawn.contains("data-frame=\"3\""), "{drawn}");
-    assert!(drawn.contains("<span id=\"fault\" role=\"alert\"></span>"), "a fault in:\n{drawn}");
-}
-
-#[test]
-fn runs_without_frames_cannot_be_shown() {
-    let folder = TempDir::new().expect("a folder");
-    fails(folder.path(), &["view", "nowhere"], &["nowhere: cannot be listed"]);
-    fs::create_dir(folder.path().join("out")).expect("a folder");
-    fails(folder.path(), &["view", "out"], &["out: no particles in extended XYZ", "--xyz N"]);
-    fs::create_dir(folder.path().join("out/a-xyz")).expect("a folder");
-    fs::write(folder.path().join("out/a-xyz/particles-000000.xyz"), "1\nDimension=2\n").expect("a file");
-    fails(folder.path(), &["view", "out"], &["particles-000000.xyz:2"]);
-    assert!(!folder.path().join("out/view.html").exists(), "a page of nothing");
 }
 
 #[test]
@@ -467,7 +400,14 @@ fn tables_of_the_structure_are_drawn() {
         let line = summary.lines().find(|line| line.contains(&format!("self-diffusivity {axis}")));
         let number: f64 =
             line.and_then(|line| line.split_whitespace().nth(2)?.parse().ok()).expect("a diffusivity");
-        assert!(svg("diffusion").contains(&format!(" = {number:.3e}<")), "{number:.3e} along {axis}");
+        // Four digits, at most nine behind the point.
+        let digits = (3.0 - number.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+        let text = format!("{number:.digits$}");
+        let shown = match text.trim_end_matches('0').trim_end_matches('.') {
+            "-0" => "0".to_owned(),
+            other => other.replace('-', "\u{2212}"),
+        };
+        assert!(svg("diffusion").contains(&format!(" = {shown}<")), "{shown} along {axis}");
     }
     fails(folder.path(), &["plot", "out", "--only", "profiles"], &["profile_y.csv: not there", "analyse"]);
 }
@@ -492,7 +432,10 @@ fn spheres_are_seen_from_where_it_is_asked_for() {
     assert!(front.len() == 2 && front[0] != front[1], "{front:?}");
     assert!(above.len() == 2 && above[0] == above[1], "{above:?}");
     let joined = drawn(&["--contacts", "10", "--colour", "gap"]);
-    assert!(joined.matches("<line").count() == 13 && joined.contains(">gap / "), "12 edges and a pair");
+    assert!(
+        joined.matches("<line").count() == 13 && joined.contains(">smallest gap / "),
+        "12 edges and a pair"
+    );
     let (code, _, stderr) = gluey(folder.path(), &["plot", "out", "--frame", "20", "--view", "30"]);
     assert!(code == Some(2) && stderr.contains("two angles in degrees"), "{stderr}");
 }

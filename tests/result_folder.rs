@@ -226,6 +226,11 @@ fn a_case_has_streams_of_frames_with_intervals_of_their_own() {
         kind = "xyz"
         label = "often"
         every = 10
+        [[output]]
+        kind = "xyz"
+        label = "clock"
+        every_time = 2.5
+        compression = 0
     "#;
     let text = fs::read_to_string(CASE).expect("a case") + streams;
     fs::write(folder.join("case.toml"), text).expect("a case");
@@ -238,6 +243,8 @@ fn a_case_has_streams_of_frames_with_intervals_of_their_own() {
     assert_eq!(of_strain.len(), 49);
     let of_steps: Vec<String> = (0..=12).map(|frame| format!("particles-{:06}.xyz.gz", 10 * frame)).collect();
     assert_eq!(frames(folder, "often"), of_steps);
+    let of_time = [0, 25, 50, 75, 100].map(|step| format!("particles-{step:06}.xyz"));
+    assert_eq!(frames(folder, "clock"), of_time);
     let coarse = frames(folder, "coarse");
     assert_eq!(coarse.iter().filter(|name| name.starts_with("particles-")).count(), 3, "{coarse:?}");
     // An option takes the place of the stream in the same folder; frames of the run before are gone.

@@ -116,6 +116,23 @@ impl<'a, const D: usize> ContactNetwork<'a, D> {
         sum / volume
     }
 
+    /// The sum of the forces of its contacts on each particle, over `6 pi eta`: what a contact model with the
+    /// metric of Stokes drag has added to the velocities, times the radii.
+    ///
+    /// A particle between two that press alike feels none.
+    pub fn forces(&self) -> Vec<Vector<D>> {
+        let mut forces = vec![Vector::zeros(); self.positions.len()];
+        for contact in self.contacts {
+            let push = self.arm(contact).normal * contact.lambda;
+            let (first, second) = contact.pair.particles();
+            forces[first] -= push;
+            if let Some(second) = second {
+                forces[second] += push;
+            }
+        }
+        forces
+    }
+
     /// How many contacts particles have.
     pub fn coordination(&self) -> Coordination {
         let count = self.positions.len();

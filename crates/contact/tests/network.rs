@@ -1,8 +1,8 @@
 //! The contact network against exact answers.
 
 use gluey_contact::{
-    Contact, ContactError, ContactModel, ContactNetwork, ContactParams, Domain, PairContact, PairKey,
-    StepGeometry, Wall,
+    Contact, ContactError, ContactLaw, ContactModel, ContactNetwork, ContactParams, Domain, PairContact,
+    PairKey, StepGeometry, Wall,
 };
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 
@@ -153,6 +153,10 @@ fn two_discs_and_walls() {
     // lambda: wall 2, pair 1; arms 1 and 2.
     let stress = network.stress(8.0);
     assert!((stress - Matrix::<2>::new(0.0, 0.0, 0.0, -0.5)).norm() < 1e-12, "{stress}");
+    // What contact has added to the velocities, times the radii.
+    let forces = network.forces();
+    let exact = [(0, 1.0), (1, 1.0), (2, 0.0)].map(|(k, up)| (forces[k] - Vector::<2>::new(0.0, up)).norm());
+    assert!(exact.iter().all(|error| *error < 1e-11), "{forces:?}");
     let coordination = network.coordination();
     assert!((coordination.mean - 4.0 / 3.0).abs() < 1e-15);
     assert_eq!((coordination.mean_of_backbone, coordination.rattler_count), (0.0, 3));
@@ -180,6 +184,47 @@ fn two_discs_and_walls() {
     assert_eq!([8, 9, 10, 11].map(|column| number(1, column)), [0.0, 1.0, 0.0, 2.0]);
     assert_eq!([8, 9, 10, 11].map(|column| number(2, column)), [0.0, -1.0, 0.0, 0.0]);
     assert_eq!([8, 9, 10, 11].map(|column| number(3, column)), [0.0, 1.0, 0.0, 4.0]);
+}
+
+/// A heap that is pressed together across periodic, tilted borders: forces are changes of velocity times
+/// radii.
+fn moves_as_forces_say<const D: usize>()
+where
+    Dim<D>: Space<D>,
+{
+    let mut domain = Domain::periodic(&Vector::<D>::repeat(4.0));
+    domain.set_sliding(0.7, 0.0);
+    let number = |k: usize| (0.5 + k as f64 * 0.754_877_666).fract();
+    let positions: Vec<_> = (0..2usize.pow(D as u32))
+        .map(|n| Vector::<D>::from_fn(|d, _| 2.0 * f64::from(n as u32 >> d & 1)))
+        .collect();
+    let radii: Vec<f64> = (0..positions.len()).map(|n| 0.9 + 0.1 * number(n)).collect();
+    let mut twists: Vec<_> = (0..positions.len())
+        .map(|n| Twist::<D> {
+            velocity: Vector::from_fn(|d, _| 4.0 * number(D * n + d) - 2.0),
+            ..Twist::default()
+        })
+        .collect();
+    let before = twists.clone();
+    let drift = vec![Vector::zeros(); positions.len()];
+    let step =
+        StepGeometry { positions: &positions, radii: &radii, drift: &drift, velocity_weight: 0.1, dt: 0.1 };
+    let params = ContactParams { law: ContactLaw::Inelastic, ..ContactParams::default() };
+    let mut model = PairContact::new(params).within(domain.clone());
+    model.correct(&step, &mut twists).expect("a good step");
+    let network = ContactNetwork::new(model.contacts(), &positions, &radii, &domain).expect("good");
+    let forces = network.forces();
+    assert!(model.contacts().len() > 1 && forces.iter().any(|force| force.norm() > 0.1), "{forces:?}");
+    for (n, force) in forces.iter().enumerate() {
+        let change = (twists[n].velocity - before[n].velocity) * radii[n];
+        assert!((change - force).norm() < 1e-9, "{n}: {change} {force}");
+    }
+}
+
+#[test]
+fn forces_are_what_contact_adds_to_velocities() {
+    moves_as_forces_say::<2>();
+    moves_as_forces_say::<3>();
 }
 
 #[test]

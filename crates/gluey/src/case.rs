@@ -39,7 +39,6 @@ mod particle_problem;
 mod particles_file;
 mod repulsion;
 mod schema;
-mod shown;
 mod suggest;
 mod suspension;
 mod validate;

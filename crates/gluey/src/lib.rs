@@ -35,6 +35,7 @@ pub mod progress;
 pub mod reference;
 mod report;
 mod run;
+mod shown;
 mod simulation;
 pub mod summary;
 pub mod sweep;
@@ -57,6 +58,7 @@ pub use run::{
     ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
+pub use shown::shown;
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
 pub use summary::CaseSummary;
 pub use trajectory::Row;
@@ -75,6 +77,11 @@ struct ReadmeOfAll;
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/tutorial/contact-law.md")]
 struct ContactLawTutorial;
+
+/// The page of the book on another formulation of rigidity.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/tutorial/formulation.md")]
+struct FormulationTutorial;
 
 /// The page of the book on another flow.
 #[cfg(doctest)]

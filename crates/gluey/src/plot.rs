@@ -11,7 +11,7 @@
 //! profiles       fraction and velocity across the shear
 //! diffusion      mean squares of the displacements beside the shear, and the lines that fit them
 //! particles      those of a frame that is asked for, or of all frames as an animation, with their images,
-//!                coloured by speed, spin or gap
+//!                coloured by speed, spin, gap or the force of their contacts
 //! flow           of a frame with fields that is asked for, with arrows and particles
 //! ```
 //!
@@ -26,6 +26,7 @@ mod figures;
 mod flow;
 mod look;
 mod read;
+mod rounded;
 mod snapshot;
 mod structure;
 

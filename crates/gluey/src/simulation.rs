@@ -13,6 +13,7 @@ use gluey_suspension::Repulsion;
 use thiserror::Error;
 
 use crate::phases::PhaseTable;
+use crate::shown::shown;
 use repelling::Repelling;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
@@ -76,7 +77,7 @@ pub struct Sliding {
 #[derive(Debug, Error)]
 pub enum StepError<E: std::error::Error + 'static> {
     /// The flow could not be computed.
-    #[error("the flow failed in step {step} (t = {time})")]
+    #[error("the flow failed in step {step} (t = {})", shown(*time))]
     Flow {
         /// Steps done before.
         step: usize,
@@ -86,7 +87,7 @@ pub enum StepError<E: std::error::Error + 'static> {
         source: E,
     },
     /// Particles repel each other, and the model of their motion does not answer to forces.
-    #[error("forces failed in step {step} (t = {time})")]
+    #[error("forces failed in step {step} (t = {})", shown(*time))]
     Forces {
         /// Steps done before.
         step: usize,
@@ -96,7 +97,7 @@ pub enum StepError<E: std::error::Error + 'static> {
         source: NoForces,
     },
     /// Contact could not be resolved.
-    #[error("contact failed in step {step} (t = {time})")]
+    #[error("contact failed in step {step} (t = {})", shown(*time))]
     Contact {
         /// Steps done before.
         step: usize,
@@ -106,7 +107,7 @@ pub enum StepError<E: std::error::Error + 'static> {
         source: ContactError,
     },
     /// A film could not be kept open.
-    #[error("motion failed in step {step} (t = {time})")]
+    #[error("motion failed in step {step} (t = {})", shown(*time))]
     Film {
         /// Steps done before.
         step: usize,
@@ -116,7 +117,7 @@ pub enum StepError<E: std::error::Error + 'static> {
         source: FilmClosed,
     },
     /// A velocity is infinite or not a number.
-    #[error("the velocity of particle {particle} is not finite in step {step} (t = {time})")]
+    #[error("the velocity of particle {particle} is not finite in step {step} (t = {})", shown(*time))]
     NotFinite {
         /// Its number, from 1.
         particle: usize,

@@ -4,6 +4,7 @@ use gluey_suspension::ball_volume;
 use serde::Serialize;
 
 use crate::case::Case;
+use crate::shown::shown;
 
 /// What a case is, in a few numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -63,15 +64,10 @@ impl CaseSummary {
             ("model", format!("{}, contact {}", self.formulation, self.strategy)),
         ];
         if let (Some(steps), Some(end)) = (self.steps, self.end) {
-            lines.push(("run", format!("{steps} steps of {} to t = {}", self.time_step, shown(end))));
+            lines.push(("run", format!("{steps} steps of {} to t = {}", shown(self.time_step), shown(end))));
         }
         lines
     }
-}
-
-/// A time without what rounding added to it.
-pub fn shown(time: f64) -> f64 {
-    (time * 1e9).round() / 1e9
 }
 
 fn volume_fraction(case: &Case) -> f64 {

@@ -1,7 +1,7 @@
 //! Progress and results in words: a bar on a terminal, plain lines in a log.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -111,14 +111,17 @@ pub fn say(line: &str) {
     let _ = writeln!(stderr(), "{line}");
 }
 
-/// Prints what came out, and where the time went.
-pub fn print_report(report: &RunReport) {
+/// Prints what came out, where the time went, and where the results are that begin with the table `csv`.
+pub fn print_report(report: &RunReport, csv: &Path) {
     let total: f64 = report.phases.iter().map(|(_, seconds)| seconds).sum();
     let mut text = format!("{report}  phase                seconds   share\n");
     for (name, seconds) in &report.phases {
         let share = 100.0 * seconds / total.max(f64::MIN_POSITIVE);
         text.push_str(&format!("  {name:<18} {seconds:>9.3} {share:>6.1} %\n"));
     }
+    let folder = csv.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (table, folder) = (csv.display(), folder.display());
+    text.push_str(&format!("  results: {table} and beside it; pictures: gluey plot {folder}\n"));
     // All results are on disk: that nobody reads this is no failure.
     let _ = stdout().write_all(text.as_bytes());
 }

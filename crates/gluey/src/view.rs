@@ -100,6 +100,8 @@ struct Frame {
     positions: Vec<f32>,
     velocities: Vec<f32>,
     spins: Vec<f32>,
+    /// Empty without a contact model.
+    forces: Vec<f32>,
 }
 
 impl Run {
@@ -136,7 +138,7 @@ impl Frame {
         Dim<D>: Space<D>,
     {
         let flat = |vectors: &[gluey_geom::Vector<D>]| {
-            vectors.iter().flat_map(|vector| triple(vector.as_slice())).collect()
+            vectors.iter().flat_map(|vector| triple(vector.as_slice())).collect::<Vec<f32>>()
         };
         Self {
             time: frame.time,
@@ -145,6 +147,7 @@ impl Frame {
             positions: flat(&frame.positions),
             velocities: flat(&frame.velocities),
             spins: frame.spins.iter().flat_map(|spin| triple(spin)).collect(),
+            forces: frame.contact_forces.as_deref().map_or_else(Vec::new, flat),
         }
     }
 }

@@ -39,3 +39,15 @@ def spheres(end: float = 2.0) -> dict[str, Any]:
         "time": {"step": 0.05, "end": end},
         "flow": {"hydrodynamics": "pair-mobility"},
     }
+
+
+#: Discs in a box that is sheared for ever.
+SUSPENSION = {
+    "name": "dense",
+    "dimension": 2,
+    "domain": {"boundary": "sheared"},
+    "suspension": {"volume_fraction": 0.3, "count": 12, "seed": 3, "sweeps": 50, "arrangement": "equilibrium"},
+    "time": {"step": 0.05, "end": 0.1},
+    "contact": {"strategy": "none"},
+    "flow": {"formulation": "unfitted", "mesh": {"cells_per_radius": 1.6}},
+}

@@ -11,18 +11,8 @@ from pathlib import Path
 import gluey
 import numpy as np
 import pytest
-from conftest import pair, spheres
+from conftest import SUSPENSION, pair, spheres
 from gluey import results
-
-SUSPENSION = {
-    "name": "dense",
-    "dimension": 2,
-    "domain": {"boundary": "sheared"},
-    "suspension": {"volume_fraction": 0.3, "count": 12, "seed": 3, "sweeps": 50, "arrangement": "equilibrium"},
-    "time": {"step": 0.05, "end": 0.1},
-    "contact": {"strategy": "none"},
-    "flow": {"formulation": "unfitted", "mesh": {"cells_per_radius": 1.6}},
-}
 
 
 def test_the_module_alone_reads_what_a_run_wrote(tmp_path: Path) -> None:
@@ -68,6 +58,10 @@ def test_frames_are_read_compressed_or_not(tmp_path: Path) -> None:
     path = tmp_path / f"{run.name}-xyz" / "particles-000001.xyz"
     plain = results.frame(path)
     assert plain.positions.shape == (2, 3) and plain.spins.shape == (2, 3) and plain.time == pytest.approx(0.05)
+    assert plain.contact_forces is not None and (plain.contact_forces == 0.0).all()
+    none = {**spheres(end=0.05), "name": "none", "contact": {"strategy": "none"}}
+    without = next(iter(gluey.run(none, tmp_path, progress=False).frames()))[1]
+    assert without.contact_forces is None and without.spins.shape == (2, 3)
     packed = path.with_suffix(".xyz.gz")
     packed.write_bytes(gzip.compress(path.read_bytes()))
     again = results.frame(packed)
@@ -75,6 +69,33 @@ def test_frames_are_read_compressed_or_not(tmp_path: Path) -> None:
     path.write_text("2\nTime=0\n")
     with pytest.raises(results.ResultsError, match="particles-000001.xyz: not particles"):
         results.frame(path)
+
+
+def test_forces_of_contacts_are_those_of_pairs_that_touch(tmp_path: Path) -> None:
+    case = pair(end=0.4)
+    case["particles"] = gluey.particles([[0.38, 0.54], [0.61, 0.46]], 0.1215)
+    case["flow"] = {"formulation": "unfitted", "lubrication": "none", "mesh": {"cells_per_radius": 1.9}}
+    touching = 0
+    for _, at_step in gluey.run(case, tmp_path, progress=False).frames():
+        forces = at_step.contact_forces
+        assert forces is not None and forces.shape == (2, 2)
+        assert forces[0] == pytest.approx(-forces[1], rel=1e-12)
+        apart = at_step.positions[1] - at_step.positions[0]
+        if forces.any():
+            touching += 1
+            # Pushed apart, along the line of the centres.
+            assert forces[1] @ apart > 0.99 * np.linalg.norm(forces[1]) * np.linalg.norm(apart)
+    assert 0 < touching
+
+
+def test_ase_reads_frames(tmp_path: Path) -> None:
+    ase = pytest.importorskip("ase.io", reason="ASE is not installed")
+    run = gluey.run(spheres(end=0.1), tmp_path, progress=False)
+    path = tmp_path / f"{run.name}-xyz" / "particles-000002.xyz"
+    atoms, ours = ase.read(path, format="extxyz"), results.frame(path)
+    assert (atoms.get_positions() == ours.positions).all() and (atoms.cell.array == ours.lattice).all()
+    assert (atoms.arrays["contact_force"] == ours.contact_forces).all()
+    assert (atoms.arrays["velo"] == ours.velocities).all() and atoms.info["Time"] == ours.time
 
 
 def test_rows_of_a_run_that_goes_on_are_read(tmp_path: Path) -> None:

@@ -149,9 +149,11 @@ def test_python_goes_on_meanwhile() -> None:
 def test_interrupt_leaves_a_checkpoint_and_resume_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     whole = gluey.run(pair(end=4.0), tmp_path / "whole", progress=False)
     program = f"""
-        import gluey, sys
+        import gluey, signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from conftest import pair
+        # What shells start in the background begins with Ctrl-C ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         begun = lambda state: print("begun", flush=True) if state["step"] > 1 else None
         try:
             gluey.run(pair(end=4.0), {str(tmp_path / "cut")!r}, progress=begun)

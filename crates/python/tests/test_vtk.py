@@ -9,14 +9,14 @@ from typing import Any
 import gluey
 import numpy as np
 import pytest
-from conftest import pair
+from conftest import SUSPENSION, pair
 
 meshio = pytest.importorskip("meshio", reason="meshio is not installed")
 vtk_xml = pytest.importorskip("vtkmodules.vtkIOXML", reason="VTK is not installed")
 numpy_support = pytest.importorskip("vtkmodules.util.numpy_support", reason="VTK is not installed")
 
 FIELDS = {"velocity": 3, "pressure": 1, "viscosity": 1, "level_set": 1, "lambda": 3}
-PARTICLES = {"radius": 1, "velocity": 3, "spin": 3}
+PARTICLES = {"radius": 1, "velocity": 3, "spin": 3, "particle": 1, "image": 1, "unwrapped": 3}
 CONTACTS = {"gamma": 1, "lambda": 1, "gap": 1}
 
 
@@ -87,10 +87,39 @@ def test_particles_are_those_of_the_table(run: gluey.Result) -> None:
             assert (flat(mesh.point_data[name]) == flat(array)).all(), name
         assert (mesh.points[:, :d] == run.positions[row]).all() and (mesh.points[:, d:] == 0.0).all()
         assert (by_vtk["radius"] == run.radii).all()
+        # Walls all around: nothing is brought back, and there are no images.
+        assert by_vtk["particle"].tolist() == [1.0, 2.0] and by_vtk["image"].tolist() == [0.0, 0.0]
+        assert (by_vtk["unwrapped"] == mesh.points).all()
         assert (by_vtk["velocity"][:, :d] == run.velocities[row]).all()
         spins = by_vtk["spin"][:, 2] if d == 2 else by_vtk["spin"]
         assert (spins == run.spins[row]).all()
         assert {block.type for block in mesh.cells} == {"vertex"}
+
+
+def test_images_complete_a_sheared_box(tmp_path: Path) -> None:
+    run = gluey.run(SUSPENSION, tmp_path, progress=False, vtk=1)
+    found = 0
+    for row, (_, path) in enumerate(run.vtk("particles")):
+        mesh, grid = both(path)
+        by_vtk = arrays_of_vtk(grid.GetPointData())
+        assert {name: width(array) for name, array in by_vtk.items()} == PARTICLES
+        image, number = by_vtk["image"], by_vtk["particle"].astype(int) - 1
+        # The particles in their order, then what reaches into the box of them.
+        assert number[: run.count].tolist() == list(range(run.count)) and not image[: run.count].any()
+        assert (image[run.count :] == 1.0).all()
+        found += len(image) - run.count
+        assert (by_vtk["unwrapped"][:, :2] == run.positions[row][number]).all()
+        assert (by_vtk["radius"] == run.radii[number]).all()
+        # All are whole periods away from where nothing brings them back: rows of the lattice.
+        tilt = run.rheology["strain"][row]
+        away = mesh.points[:, :2] - by_vtk["unwrapped"][:, :2]
+        up = np.round(away[:, 1])
+        right = away[:, 0] - up * tilt
+        assert away[:, 1] == pytest.approx(up, abs=1e-12) and right == pytest.approx(np.round(right), abs=1e-12)
+        # Images slide with their rows.
+        faster = by_vtk["velocity"][:, 0] - run.velocities[row][number, 0]
+        assert faster == pytest.approx(up, abs=1e-12)
+    assert found > 0
 
 
 def test_contacts_join_the_particles(run: gluey.Result) -> None:

@@ -11,7 +11,7 @@ use super::VERSION;
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
-use super::shown::shown;
+use crate::shown::shown;
 
 /// A case could not be used.
 #[derive(Debug, Error)]

@@ -9,8 +9,8 @@ use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 use super::error::{Key, Problem};
 use super::findings::{Findings, Violation};
 use super::particle_problem::ParticleProblem;
-use super::shown::shown;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
+use crate::shown::shown;
 
 /// So many particles can be generated: the range of `suspension.count`.
 const MOST_PARTICLES: f64 = 1e6;

@@ -8,8 +8,8 @@ use super::Case;
 use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::names::UnknownName;
-use super::shown::shown;
 use super::suggest::{closest, synonym};
+use crate::shown::shown;
 
 /// Notes everything in `value`, which stands at `key`, that `schema` does not allow.
 pub(super) fn check(value: &Value, schema: &Schema, key: &Key, findings: &mut Findings) {

@@ -16,15 +16,20 @@ pub struct OutputSpec {
     #[serde(default)]
     #[schemars(regex(pattern = "^[A-Za-z0-9_-]{1,64}$"))]
     pub label: Option<String>,
-    /// A frame every so many steps. Unit: steps. Default: none, `every_strain` says when.
+    /// A frame every so many steps. Unit: steps. Default: none, another key says when.
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub every: Option<usize>,
     /// A frame whenever the sheared distance has grown by so much strain, forth or back, at the first step
-    /// that gets there. Unit: none. Default: none, `every` says when.
+    /// that gets there. Unit: none. Default: none, another key says when.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every_strain: Option<f64>,
+    /// A frame whenever so much time has gone by, at the first step that gets there. Unit: time. Default:
+    /// none, another key says when.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub every_time: Option<f64>,
     /// Whether the flow on the mesh is written (kind `vtk`), or particles and contacts alone. Default: true.
     #[serde(default = "yes")]
     pub fields: bool,
@@ -44,6 +49,8 @@ pub enum Interval {
     Steps(usize),
     /// Whenever the strain, forth or back, has grown by this.
     Strain(f64),
+    /// Whenever so much time has gone by.
+    Time(f64),
 }
 
 impl OutputSpec {
@@ -54,24 +61,25 @@ impl OutputSpec {
 
     /// When its frames are written; every step if nothing is said, which no checked case does.
     pub fn interval(&self) -> Interval {
-        match (self.every, self.every_strain) {
-            (None, Some(strain)) => Interval::Strain(strain),
-            (every, _) => Interval::Steps(every.unwrap_or(1)),
+        match (self.every_strain, self.every_time) {
+            (Some(strain), _) => Interval::Strain(strain),
+            (None, Some(time)) => Interval::Time(time),
+            (None, None) => Interval::Steps(self.every.unwrap_or(1)),
         }
     }
 }
 
 impl Interval {
-    /// Whether there is a frame at the beginning of this step, if each shears by `strain`.
-    pub fn is_due(self, step: usize, strain: f64) -> bool {
-        match self {
-            Self::Steps(every) => step.is_multiple_of(every.max(1)),
-            Self::Strain(every) => {
-                let a_step = strain.abs() / every;
-                let frames = |step: usize| (a_step * step as f64 + 1e-9).floor();
-                step == 0 || frames(step) > frames(step - 1)
-            }
-        }
+    /// Whether there is a frame at the beginning of this step, if each shears by `strain` and takes `time`.
+    pub fn is_due(self, step: usize, strain: f64, time: f64) -> bool {
+        // Frames that a step goes past.
+        let a_step = match self {
+            Self::Steps(every) => return step.is_multiple_of(every.max(1)),
+            Self::Strain(every) => strain.abs() / every,
+            Self::Time(every) => time / every,
+        };
+        let frames = |step: usize| (a_step * step as f64 + 1e-9).floor();
+        step == 0 || frames(step) > frames(step - 1)
     }
 }
 

@@ -56,12 +56,18 @@ fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
             findings.add(key.name(name), Problem::Unfit { choice, needs: needs.to_owned(), found });
         };
         let choice = format!("output {}", index + 1);
-        match (output.every, output.every_strain) {
-            (None, None) => unfit("kind", choice, "either `every` or `every_strain`", "neither".to_owned()),
-            (Some(_), Some(_)) => {
-                unfit("every", choice, "either `every` or `every_strain`", "both".to_owned())
-            }
-            (None, Some(_)) if case.shear_rate == 0.0 => {
+        let intervals = [
+            ("every", output.every.is_some()),
+            ("every_strain", output.every_strain.is_some()),
+            ("every_time", output.every_time.is_some()),
+        ];
+        let given: Vec<&str> =
+            intervals.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+        let one = "one of `every`, `every_strain`, `every_time`";
+        match given[..] {
+            [] => unfit("kind", choice, one, "none of them".to_owned()),
+            [first, _, ..] => unfit(first, choice, one, given.join(" and ")),
+            ["every_strain"] if case.shear_rate == 0.0 => {
                 let needs = "a shear rate that is not 0";
                 unfit("every_strain", "every_strain".to_owned(), needs, "shear_rate = 0".to_owned());
             }

@@ -4,10 +4,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use gluey::summary::shown;
 use gluey::{
     Case, CaseSummary, CheckpointSummary, FolderError, RecordError, ResultPaths, RunRecord, RunState,
-    recorded_runs,
+    recorded_runs, shown,
 };
 use serde::Serialize;
 use thiserror::Error;

@@ -37,7 +37,7 @@ pub struct PlotArguments {
     /// From where spheres are seen, in degrees: around the vertical from the front to the right, and above.
     #[arg(long, value_name = "AZIMUTH,ELEVATION", default_value = "31.5,20", allow_hyphen_values = true)]
     view: Viewpoint,
-    /// Colours of particles in frames and animations: speed, spin, or the smallest gap.
+    /// Colours of particles in frames and animations: speed, spin, gap (the smallest), or contact-force.
     #[arg(long, value_name = "WHAT", default_value = "speed")]
     colour: Coloring,
     /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.

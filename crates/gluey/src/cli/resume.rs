@@ -38,7 +38,7 @@ impl ResumeArguments {
         let case = Case::load(&case_file)?;
         let options = RunOptions { interrupt: Some(interrupt_flag()), ..options };
         let report = self.manner.run(&case, &options, &case_file)?;
-        self.manner.tell(&report, print_report);
+        self.manner.tell(&report, |report| print_report(report, &options.csv));
         Ok(())
     }
 

@@ -52,7 +52,7 @@ impl RunArguments {
         let case = self.case()?;
         let options = self.options(&case);
         let report = self.manner.run(&case, &options, &self.case)?;
-        self.manner.tell(&report, print_report);
+        self.manner.tell(&report, |report| print_report(report, &options.csv));
         Ok(())
     }
 

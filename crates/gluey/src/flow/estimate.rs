@@ -22,6 +22,9 @@ use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
 /// The program and its tables; unit: bytes.
 const PROGRAM: f64 = 16e6;
+/// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
+/// penalties; unit: bytes.
+const CUT_CELL: [f64; 2] = [40e3, 55e3];
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
 
@@ -46,7 +49,7 @@ impl MeshEstimate {
         let tree = Tree::of(case)?;
         let cell_count = tree.cell_count(case);
         let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
-        Some(Self { cell_count, unknown_count, bytes: memory(case, &tree, cell_count) })
+        Some(Self { cell_count, unknown_count, bytes: memory(case, &tree, (cell_count, unknown_count)) })
     }
 }
 
@@ -74,7 +77,8 @@ impl MeshSize {
             2 => counts::<2>(case)?,
             _ => counts::<3>(case)?,
         };
-        Ok(Some(Self { cell_count, dof_count, bytes: memory(case, &tree, cell_count as f64) }))
+        let bytes = memory(case, &tree, (cell_count as f64, dof_count as f64));
+        Ok(Some(Self { cell_count, dof_count, bytes }))
     }
 }
 
@@ -142,6 +146,17 @@ impl Tree {
         case.particles.iter().map(|particle| ball * (particle.radius / size).powi(self.dimension)).sum()
     }
 
+    /// Leaves that surfaces cut: a circle of radius `R h` meets about `8 R` squares, a sphere `6 pi R^2 + 2`
+    /// cubes (what a ball meets less what lies inside it).
+    fn cells_cut(&self, case: &Case) -> f64 {
+        let size = self.size(i32::from(self.refinement.surface));
+        let met = |radius: f64| match self.dimension {
+            2 => 8.0 * radius,
+            _ => 6.0 * PI * radius * radius + 2.0,
+        };
+        case.particles.iter().map(|particle| met(particle.radius / size)).sum()
+    }
+
     /// Refined cells of a level above that of the surfaces.
     fn near_surfaces(&self, case: &Case, level: i32) -> f64 {
         let most = self.root_count * 2f64.powi(self.dimension * level);
@@ -198,33 +213,41 @@ fn cells_met(dimension: i32, radius: f64) -> f64 {
     }
 }
 
-/// Memory that a run takes, in bytes (measured: see `docs/benchmarks.md`).
-fn memory(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
-    PROGRAM + memory_of_solver(case, tree, cell_count)
+/// Memory that a run with so many cells and unknowns takes, in bytes (measured: see `docs/robustness.md`).
+fn memory(case: &Case, tree: &Tree, counts: (f64, f64)) -> f64 {
+    let of_cuts = match case.flow.formulation {
+        Formulation::Unfitted => CUT_CELL[case.dimension - 2] * tree.cells_cut(case),
+        Formulation::Paper | Formulation::RigidDofs => 0.0,
+    };
+    PROGRAM + of_cuts + memory_of_solver(case, tree, counts)
 }
 
-fn memory_of_solver(case: &Case, tree: &Tree, cell_count: f64) -> f64 {
+fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64)) -> f64 {
     let direct = match case.flow.solver {
         Solver::Direct => true,
         Solver::Multigrid => false,
         Solver::Auto => case.dimension == 2,
     };
-    let rigid = case.flow.formulation != Formulation::Paper;
-    let per_cell = UNKNOWNS_PER_CELL[case.dimension - 2];
+    let formulation = case.flow.formulation;
     if direct {
         // The nodes inside rigid particles are eliminated.
-        let inside = if rigid { tree.cells_inside(case) } else { 0.0 };
-        let solved = (per_cell * (cell_count - inside)).max(1e3);
+        let inside = if formulation == Formulation::Paper { 0.0 } else { tree.cells_inside(case) };
+        let solved = (unknown_count * (1.0 - inside / cell_count)).max(1e3);
+        let per_unknown = match formulation {
+            Formulation::Unfitted => 290.0,
+            Formulation::Paper => 310.0,
+            Formulation::RigidDofs => 150.0,
+        };
         return match case.dimension {
-            2 => solved * 185.0 * solved.log2(),
+            2 => solved * per_unknown * solved.log2(),
             _ => solved * 450.0 * solved.cbrt(),
         };
     }
-    let per_unknown = match (case.dimension, case.flow.formulation) {
+    let per_unknown = match (case.dimension, formulation) {
         (_, Formulation::RigidDofs) => 500.0,
-        (_, Formulation::Unfitted) => 1400.0,
+        (_, Formulation::Unfitted) => 800.0,
         (2, Formulation::Paper) => 2400.0,
         (_, Formulation::Paper) => 1400.0,
     };
-    per_unknown * per_cell * cell_count
+    per_unknown * unknown_count
 }

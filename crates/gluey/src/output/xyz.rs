@@ -2,8 +2,9 @@
 //!
 //! The first line is the number of particles, the second holds `key=value`: `Lattice` (the edges of the box,
 //! the second one tilted), `Origin`, `pbc` (`T` along periodic axes), `Properties`, `Time`, `Strain` (of the
-//! undisturbed flow) and `Dimension`. A line per particle: `species pos radius velo angular_velocity`,
-//! vectors of three coordinates each. In 2D discs lie in the middle of a box as high as the largest of them.
+//! undisturbed flow) and `Dimension`. A line per particle: `species pos radius velo angular_velocity`, and
+//! `contact_force` where there is a contact model, vectors of three coordinates each. In 2D discs lie in the
+//! middle of a box as high as the largest of them.
 //! Positions are not wrapped. Numbers read back exactly.
 
 mod read;
@@ -21,7 +22,10 @@ use super::{OutputError, prepare_folder_of, write_atomically};
 
 pub use read::{XyzError, dimension, read_text};
 
+/// What all frames have.
 const PROPERTIES: &str = "species:S:1:pos:R:3:radius:R:1:velo:R:3:angular_velocity:R:3";
+/// What those of a run with a contact model have besides.
+const WITH_FORCES: &str = "species:S:1:pos:R:3:radius:R:1:velo:R:3:angular_velocity:R:3:contact_force:R:3";
 
 /// Fast: numbers hardly get smaller at higher levels.
 const COMPRESSION_LEVEL: u32 = 1;
@@ -46,6 +50,9 @@ where
     pub velocities: Vec<Vector<D>>,
     /// Angular velocities; in 2D about the third axis.
     pub spins: Vec<[f64; 3]>,
+    /// Sum of the forces of its contacts on each particle, over `6 pi eta`; none without a contact model.
+    /// Unit: length^2/time.
+    pub contact_forces: Option<Vec<Vector<D>>>,
 }
 
 impl<const D: usize> XyzFrame<D>
@@ -67,7 +74,14 @@ where
             radii: particles.iter().map(|particle| particle.radius).collect(),
             velocities: twists.iter().map(|twist| twist.velocity).collect(),
             spins: twists.iter().map(|twist| spin(Dim::<D>::spin_slice(&twist.spin))).collect(),
+            contact_forces: None,
         }
+    }
+
+    /// The same with the forces of contacts.
+    #[must_use]
+    pub fn with_contact_forces(self, forces: Vec<Vector<D>>) -> Self {
+        Self { contact_forces: Some(forces), ..self }
     }
 
     /// The text of the file.
@@ -79,6 +93,9 @@ where
             write_numbers(&mut text, &[*radius]);
             write_numbers(&mut text, &padded(self.velocities[i].as_slice()));
             write_numbers(&mut text, &self.spins[i]);
+            if let Some(forces) = &self.contact_forces {
+                write_numbers(&mut text, &padded(forces[i].as_slice()));
+            }
             text.push('\n');
         }
         text
@@ -99,10 +116,11 @@ where
         let periodic = (0..3).map(|d| if d < D && !self.container.is_walled(d) { "T" } else { "F" });
         let periodic: Vec<&str> = periodic.collect();
         let (time, strain) = (self.time, self.strain);
+        let properties = if self.contact_forces.is_some() { WITH_FORCES } else { PROPERTIES };
         // Writing to a string cannot fail.
         let _ = write!(
             text,
-            "\" pbc=\"{}\" Properties={PROPERTIES} Time={time:e} Strain={strain:e} Dimension={D}",
+            "\" pbc=\"{}\" Properties={properties} Time={time:e} Strain={strain:e} Dimension={D}",
             periodic.join(" ")
         );
         text.replace("=\" ", "=\"")
@@ -188,7 +206,10 @@ mod tests {
     {
         let folder = tempfile::tempdir().expect("a folder");
         for (gzip, tilt) in [(false, 0.0), (true, 0.25)] {
-            let written = frame::<D>(tilt);
+            let mut written = frame::<D>(tilt);
+            if gzip {
+                written = written.with_contact_forces(vec![Vector::repeat(0.1 / 7.0); 3]);
+            }
             XyzWriter::create(folder.path(), gzip).expect("a folder").write(7, &written).expect("a file");
             let name = if gzip { "particles-000007.xyz.gz" } else { "particles-000007.xyz" };
             let path = folder.path().join(name);
@@ -216,6 +237,10 @@ mod tests {
              Time=1e-1 Strain=-3e-1 Dimension=2"
         );
         assert!(lines[2].starts_with("P 0e0 0e0 0e0 1.25e-1 "));
+        let with = frame::<2>(0.5).with_contact_forces(vec![Vector::<2>::new(0.5, -2.0); 3]).text();
+        let with: Vec<&str> = with.lines().collect();
+        assert_eq!(with[1], lines[1].replace(PROPERTIES, WITH_FORCES));
+        assert_eq!(with[2], format!("{} 5e-1 -2e0 0e0", lines[2]), "what is there stays as it is");
     }
 
     #[test]
@@ -227,5 +252,8 @@ mod tests {
         assert!(fault(&text.replacen('3', "4", 1)).starts_with("f.xyz:6: "));
         assert!(fault(&text.replace("Time", "Tome")).starts_with("f.xyz:2: "));
         assert!(fault(&text.replacen("P 0e0", "P zero", 1)).contains("f.xyz:3: found `zero`"));
+        assert!(fault(&text.replace(PROPERTIES, "pos:R:3")).contains("f.xyz:2: found `pos:R:3`"));
+        let short = fault(&text.replace(PROPERTIES, WITH_FORCES));
+        assert!(short.starts_with("f.xyz:3: ") && short.contains("a name and 13 numbers"), "{short}");
     }
 }

@@ -35,8 +35,8 @@ pub(super) fn animation(
     let files = frame_files(folder)?;
     let path = beside_pictures(&files[0]).with_file_name("particles.gif");
     let bytes = match dimension(&files)? {
-        2 => animated(&read_frames::<2>(&files)?, options, look, &path)?,
-        _ => animated(&read_frames::<3>(&files)?, options, look, &path)?,
+        2 => animated(&read_frames::<2>(&files)?, options, look, [&files[0], &path])?,
+        _ => animated(&read_frames::<3>(&files)?, options, look, [&files[0], &path])?,
     };
     Ok((bytes, path))
 }
@@ -45,11 +45,12 @@ fn animated<const D: usize>(
     frames: &[XyzFrame<D>],
     options: AnimationOptions,
     look: &Look,
-    path: &Path,
+    [first, path]: [&Path; 2],
 ) -> Result<Vec<u8>, PlotError>
 where
     Dim<D>: Space<D>,
 {
+    look.check(frames, first)?;
     let views = frames.par_iter().map(|frame| Scene::of(frame, look).view());
     let Some(view) = views.reduce_with(View::around) else { return Ok(Vec::new()) };
     let still = |canvas: &Canvas| {

@@ -78,6 +78,16 @@ pub enum PlotError {
         /// Steps that have frames.
         steps: Vec<usize>,
     },
+    /// No forces in the frames.
+    #[error(
+        "{}: no column `contact_force`, so there are no colours by contact-force: the run had no contact model \
+         ([contact] strategy = \"none\"), or an older gluey wrote the frames",
+        path.display()
+    )]
+    NoContactForces {
+        /// The frame.
+        path: PathBuf,
+    },
     /// No fields of the flow.
     #[error(
         "{}: no fields of the flow: run with --vtk N, or with an [[output]] of kind \"vtk\" in the case, \

@@ -188,7 +188,14 @@ fn of_steps<'a>(
         }
     }
     let values: Vec<f64> = points(&curves).map(|point| point.1).chain([0.0]).collect();
-    Ok(chart(Axis::around("time *t*", t.iter().copied()), Axis::around(label, values), curves))
+    Ok(chart(Axis::around("time *t*", t.iter().copied()), Axis::around(label, under_frame(values)), curves))
+}
+
+/// Values, and one above them: a plateau does not lie on the frame.
+pub(super) fn under_frame(mut values: Vec<f64>) -> Vec<f64> {
+    let most = values.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max);
+    values.push(1.04 * most);
+    values
 }
 
 /// A curve through points, interrupted where there is no number.

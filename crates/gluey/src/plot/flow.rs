@@ -13,6 +13,7 @@ use gluey_pictures::{Canvas, PIXELS_PER_MM, Raster, Stroke, color_scale};
 use gluey_suspension::Container;
 
 use super::error::PlotError;
+use super::rounded::rounded;
 use super::snapshot::{EDGE, FrameChoice, PERIODIC, images};
 use crate::case::Case;
 use crate::output::vtk::{read_fields, read_particles};
@@ -87,14 +88,6 @@ fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
     };
     let (now, strain) = (time.step * frame.step as f64, frame.case.strain_after(frame.step));
     format!("*t* = {}, strain *γ* = {}{slice}", rounded(now), rounded(strain))
-}
-
-/// Four digits, without those that are 0 at the end.
-fn rounded(value: f64) -> String {
-    let digits = (3.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{value:.digits$}");
-    let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if short == "-0" { "0".to_owned() } else { short.replace('-', "\u{2212}") }
 }
 
 /// Where the plane cuts particles and their images: centres in the plane and radii.
@@ -284,11 +277,5 @@ mod tests {
         assert_eq!((range.low, range.high, range.is_cut), (0.0, 999.0, [false; 2]));
         let constant = Range::of(vec![-1.0, -1.0 + 1e-9], Quantity::Vorticity);
         assert_eq!((constant.fraction(-1.0), constant.is_cut), (0.5, [false; 2]));
-    }
-
-    #[test]
-    fn numbers_have_four_digits_at_most() {
-        let texts = [0.5, 0.0, -0.00001234567, 12345.6, 0.1 + 0.2].map(rounded);
-        assert_eq!(texts, ["0.5", "0", "\u{2212}0.00001235", "12346", "0.3"]);
     }
 }

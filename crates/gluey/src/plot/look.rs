@@ -1,11 +1,14 @@
 //! How particles are shown: from where, in which colours.
 
 use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
 use std::str::FromStr;
 
 use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::for_each_pair;
 
+use super::error::PlotError;
+use super::rounded::rounded;
 use crate::output::xyz::XyzFrame;
 
 /// Smallest gap that has a colour of its own, in mean radii.
@@ -68,16 +71,19 @@ pub enum Coloring {
     Spin,
     /// The smallest gap to another particle, on a logarithmic scale.
     Gap,
+    /// The sum of the forces of its contacts, over `6 pi eta`.
+    ContactForce,
 }
 
 impl Coloring {
-    const ALL: [Self; 3] = [Self::Speed, Self::Spin, Self::Gap];
+    const ALL: [Self; 4] = [Self::Speed, Self::Spin, Self::Gap, Self::ContactForce];
 
     fn as_str(self) -> &'static str {
         match self {
             Self::Speed => "speed",
             Self::Spin => "spin",
             Self::Gap => "gap",
+            Self::ContactForce => "contact-force",
         }
     }
 }
@@ -111,6 +117,9 @@ impl Look {
         Dim<D>: Space<D>,
     {
         match self.coloring {
+            Coloring::ContactForce => {
+                frame.contact_forces.iter().flatten().map(|force| force.norm()).collect()
+            }
             Coloring::Speed => frame.velocities.iter().map(|velocity| velocity.norm()).collect(),
             Coloring::Spin => {
                 frame.spins.iter().map(|spin| spin.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
@@ -126,6 +135,18 @@ impl Look {
         }
     }
 
+    /// Checks that frames, which were read from files such as `path`, tell what colours are to show.
+    pub(super) fn check<const D: usize>(&self, frames: &[XyzFrame<D>], path: &Path) -> Result<(), PlotError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let is_told = |frame: &XyzFrame<D>| frame.contact_forces.is_some();
+        match self.coloring != Coloring::ContactForce || frames.iter().all(is_told) {
+            true => Ok(()),
+            false => Err(PlotError::NoContactForces { path: path.to_owned() }),
+        }
+    }
+
     /// The end of the scale of colours, where it does not follow from the numbers.
     pub(super) fn end(&self) -> Option<f64> {
         (self.coloring == Coloring::Gap).then_some(1.0)
@@ -134,9 +155,14 @@ impl Look {
     /// Name of what colours tell, and what stands at the ends of their bar.
     pub(super) fn legend(&self, most: f64) -> [String; 3] {
         match self.coloring {
-            Coloring::Speed => ["speed".to_owned(), "0".to_owned(), format!("{most:.3}")],
-            Coloring::Spin => ["spin".to_owned(), "0".to_owned(), format!("{most:.3}")],
-            Coloring::Gap => ["gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()],
+            Coloring::Speed => ["speed (length / time)".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::Spin => ["spin (1 / time)".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::ContactForce => {
+                ["contact force / 6π*η* (length^{2} / time)".to_owned(), "0".to_owned(), rounded(most)]
+            }
+            Coloring::Gap => {
+                ["smallest gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()]
+            }
         }
     }
 }

@@ -26,7 +26,7 @@ const HAZE: f64 = 0.5;
 const HAZE_STEPS: f64 = 8.0;
 /// Room around the drawing, and below it for the legend, in SVG pixels.
 const MARGIN: f64 = 8.0;
-const LEGEND: f64 = 56.0;
+const LEGEND: f64 = 74.0;
 /// Width below which the caption has a row of its own, of this height.
 const NARROW: f64 = 460.0;
 const ROW: f64 = 20.0;
@@ -71,10 +71,24 @@ pub fn snapshot(
     let one = [file.clone()];
     let width = width_mm * PIXELS_PER_MM;
     let canvas = match dimension(&one)? {
-        2 => Scene::of(&read_frames::<2>(&one)?[0], look).draw_alone(width),
-        _ => Scene::of(&read_frames::<3>(&one)?[0], look).draw_alone(width),
+        2 => drawn(&read_frames::<2>(&one)?, look, file, width)?,
+        _ => drawn(&read_frames::<3>(&one)?, look, file, width)?,
     };
     Ok((canvas, beside_pictures(file)))
+}
+
+/// The first of the frames, which is of `file`.
+fn drawn<const D: usize>(
+    frames: &[XyzFrame<D>],
+    look: &Look,
+    file: &Path,
+    width: f64,
+) -> Result<Canvas, PlotError>
+where
+    Dim<D>: Space<D>,
+{
+    look.check(frames, file)?;
+    Ok(Scene::of(&frames[0], look).draw_alone(width))
 }
 
 /// The number in `particles-<step>.xyz`.
@@ -262,9 +276,8 @@ impl Scene {
 
     fn draw_legend(&self, canvas: &mut Canvas, most: f64, (width, top): (f64, f64)) {
         let [name, low, high] = self.look.legend(most);
-        let (y, length) = (top + 22.0, 0.3 * width);
-        canvas.text(MARGIN, y + 9.0, 15.0, "start", &name);
-        let left = MARGIN + 52.0;
+        let (left, y, length) = (MARGIN, top + 40.0, 0.4 * width);
+        canvas.text(left, y - 7.0, 15.0, "start", &name);
         canvas.color_bar((left, y), (length, 10.0));
         canvas.text(left, y + 25.0, 13.0, "start", &low);
         canvas.text(left + length, y + 25.0, 13.0, "end", &high);

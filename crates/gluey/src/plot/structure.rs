@@ -4,8 +4,9 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, PALETTE, Stroke};
 
 use super::error::PlotError;
 use super::figure::Figure;
-use super::figures::{FAINT, chart, curve, points, stacked};
+use super::figures::{FAINT, chart, curve, points, stacked, under_frame};
 use super::read::{Source, Tables};
+use super::rounded::rounded;
 
 /// A column, its name in the legend, its stroke.
 type Column = (&'static str, &'static str, Stroke);
@@ -125,7 +126,7 @@ fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErr
     for (name, label, stroke) in columns {
         let Some(squares) = found(&source, name)? else { continue };
         let fit = fitted(lags, squares);
-        let told = fit.map_or(String::new(), |[slope, _]| format!(", *D* = {:.3e}", 0.5 * slope));
+        let told = fit.map_or(String::new(), |[slope, _]| format!(", *D* = {}", rounded(0.5 * slope)));
         curves.push(curve(Some(format!("{label}{told}")), stroke, lags, squares));
         let line = fit.map(|[slope, start]| lags.iter().map(|lag| start + slope * lag).collect::<Vec<_>>());
         curves.extend(line.map(|line| {
@@ -198,7 +199,7 @@ fn over(x: Axis, name: &str, curves: Vec<Curve>, shown: &[f64]) -> Chart {
     if values.iter().all(|value| *value == 0.0) {
         values.push(1.0);
     }
-    chart(x, Axis::around(name, values), curves)
+    chart(x, Axis::around(name, under_frame(values)), curves)
 }
 
 fn last(x: &[f64]) -> f64 {

@@ -10,6 +10,7 @@ use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::TooLarge;
 use crate::output::{ClaimError, OutputError, RowsError};
+use crate::shown::shown;
 use crate::simulation::StepError;
 
 /// Why a run failed.
@@ -47,7 +48,8 @@ pub enum RunError {
     Step(#[from] StepError<HydrodynamicsError>),
     /// A particle touched the boundary of the box, where the flow is prescribed.
     #[error(
-        "particle {particle} reached the boundary of the box in step {step} (t = {time}): it sticks out by {excess:.3e}"
+        "particle {particle} reached the boundary of the box in step {step} (t = {}): it sticks out by {excess:.3e}",
+        shown(*time)
     )]
     LeftBox {
         /// Its number, from 1.
@@ -60,7 +62,7 @@ pub enum RunError {
         excess: f64,
     },
     /// The program is at fault: something that it takes for granted did not hold, in any of its threads.
-    #[error("an internal error in step {step} (t = {time}): {message}")]
+    #[error("an internal error in step {step} (t = {}): {message}", shown(*time))]
     Panicked {
         /// Steps done.
         step: usize,
@@ -70,7 +72,7 @@ pub enum RunError {
         message: String,
     },
     /// The run was asked to stop.
-    #[error("interrupted after step {step} of {steps} (t = {time})")]
+    #[error("interrupted after step {step} of {steps} (t = {})", shown(*time))]
     Interrupted {
         /// Steps done.
         step: usize,

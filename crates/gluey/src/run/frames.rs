@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{ContactModel, PairContact};
-use gluey_geom::{Dim, Space};
+use gluey_contact::{ContactLaw, ContactModel, ContactNetwork, PairContact};
+use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::Container;
 
+use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
 use crate::output::OutputError;
 use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
-use crate::simulation::Simulation;
+use crate::simulation::{Simulation, StepError};
 
 /// A stream of frames that a run is to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,13 +104,14 @@ where
         &mut self,
         case: &Case,
         simulation: &Simulation<D, H, PairContact<D>>,
-    ) -> Result<(), OutputError>
+    ) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         let (particles, twists) = (simulation.particles(), simulation.twists());
-        let due = |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step);
+        let due =
+            |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step, case.time.step);
         for (_, stream) in self.streams.iter_mut().filter(|(interval, _)| due(interval)) {
             match stream {
                 Stream::Vtk { writer, with_fields } => {
@@ -124,7 +126,12 @@ where
                 Stream::Xyz(writer) => {
                     let container = container(case, simulation);
                     let strain = case.strain_after(step);
-                    writer.write(step, &XyzFrame::of(time, strain, container, (particles, twists)))?;
+                    let frame = XyzFrame::of(time, strain, container, (particles, twists));
+                    let frame = match contact_forces(simulation)? {
+                        Some(forces) => frame.with_contact_forces(forces),
+                        None => frame,
+                    };
+                    writer.write(step, &frame)?;
                 }
             }
         }
@@ -148,6 +155,28 @@ where
     }
 }
 
+/// What contacts exert on each particle; nothing where there is no contact model.
+fn contact_forces<const D: usize, H>(
+    simulation: &Simulation<D, H, PairContact<D>>,
+) -> Result<Option<Vec<Vector<D>>>, RunError>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+{
+    let contact = simulation.contact();
+    if contact.params().law == ContactLaw::None {
+        return Ok(None);
+    }
+    let centers: Vec<Vector<D>> =
+        simulation.particles().iter().map(|particle| particle.pose.position).collect();
+    let radii: Vec<f64> = simulation.particles().iter().map(|particle| particle.radius).collect();
+    let network = ContactNetwork::new(contact.contacts(), &centers, &radii, contact.domain());
+    let (step, time) = (simulation.step_index(), simulation.time());
+    let network = network.map_err(|source| StepError::Contact { step, time, source })?;
+    Ok(Some(network.forces()))
+}
+
 /// The box as it is sheared now.
 fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, PairContact<D>>) -> Container<D>
 where
@@ -161,7 +190,7 @@ where
 
 fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, OutputError> {
     let strain = case.shear_rate * case.time.step;
-    let done = (0..step).filter(|&step| interval.is_due(step, strain));
+    let done = (0..step).filter(|&step| interval.is_due(step, strain, case.time.step));
     let done: Vec<(usize, f64)> = done.map(|step| (step, step as f64 * case.time.step)).collect();
     VtkWriter::create(folder, &done)
 }

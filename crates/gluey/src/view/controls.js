@@ -27,8 +27,9 @@ function toggle(id) {
 }
 
 function nextColour() {
-  const colour = element("colour");
-  colour.selectedIndex = (colour.selectedIndex + 1) % colour.options.length;
+  const { options, selectedIndex } = element("colour");
+  const others = [...options.keys()].map((n) => (selectedIndex + 1 + n) % options.length);
+  element("colour").selectedIndex = others.find((n) => !options[n].disabled);
   draw();
 }
 
@@ -87,7 +88,12 @@ function begin() {
   element("frame").max = run.frames.length - 1;
   const wanted = new URLSearchParams(location.hash.slice(1));
   element("images").checked = flat || wanted.has("images");
-  if (measures[wanted.get("colour")] || wanted.get("colour") === "id") element("colour").value = wanted.get("colour");
+  const options = [...element("colour").options];
+  const forces = options.find((option) => option.value === "contact-force");
+  forces.disabled = !hasForces;
+  if (!hasForces) forces.textContent = "contact force (none in the frames)";
+  const chosen = options.find((option) => option.value === wanted.get("colour"));
+  if (chosen && !chosen.disabled) element("colour").value = chosen.value;
   show(Math.trunc(Number(wanted.get("frame"))) || 0);
 }
 

@@ -128,10 +128,14 @@ function turns() {
   return run.turns;
 }
 
+// Frames of a run without a contact model have no forces.
+const hasForces = run.frames.every((now) => now.forces.length === 3 * count);
+
 // Numbers of the particles that decide their colours.
 const measures = {
   speed: (now) => run.radii.map((_, i) => norm(at(now.velocities, i))),
   spin: (now) => run.radii.map((_, i) => norm(at(now.spins, i))),
+  "contact-force": (now) => run.radii.map((_, i) => norm(at(now.forces, i))),
   gap: (now) => {
     const gaps = new Array(count).fill(1);
     pairs(now).forEach(({ i, j, gap }) => { gaps[i] = Math.min(gaps[i], gap); gaps[j] = Math.min(gaps[j], gap); });
@@ -162,7 +166,7 @@ function colours(now) {
   const name = element("colour").value;
   if (name === "id") return run.radii.map((_, i) => PARTICLES[i % PARTICLES.length]);
   const [low, high] = range(name);
-  return measures[name](now).map((value) => scaled(high > low ? (value - low) / (high - low) : 0.5));
+  return measures[name](now).map((value) => scaled(high > low ? (value - low) / (high - low) : 0));
 }
 
 const css = ([r, g, b], light = 1) =>
@@ -320,7 +324,8 @@ function drawLegend(eye) {
   pen.fillStyle = themed("--ink");
   pen.font = "13px system-ui, sans-serif";
   const digits = (value) => Number((name === "gap" ? 10 ** value : value).toPrecision(3)).toString();
-  const title = { speed: "speed", spin: "spin (angular speed)", gap: "smallest gap, mean radii" }[name];
+  const title = { speed: "speed", spin: "spin (angular speed)", gap: "smallest gap, mean radii",
+    "contact-force": "contact force / 6\u03c0\u03b7" }[name];
   pen.textAlign = "left";
   pen.fillText(title, left, top - 6);
   pen.fillText(digits(range(name)[0]), left, top + 24);
@@ -339,6 +344,7 @@ function describe(now, drawn) {
   canvas.setAttribute("aria-label", element("facts").textContent);
   document.body.dataset.frame = frame;
   document.body.dataset.pairs = drawn;
+  document.body.dataset.colour = element("colour").value;
 }
 
 function draw() {

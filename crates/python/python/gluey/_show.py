@@ -45,7 +45,7 @@ def plot(
     view
         From where spheres are seen, in degrees: around the vertical from the front to the right, and above.
     colour
-        Colours of particles in frames and animations: ``speed``, ``spin``, or the smallest ``gap``.
+        Colours of particles in frames and animations: ``speed``, ``spin``, the smallest ``gap``, or ``contact-force``.
     contacts
         Join the centres of particles with gaps up to this, in mean radii, from 0 to 10.
     animation

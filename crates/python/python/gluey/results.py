@@ -102,6 +102,8 @@ class Frame:
     velocities: Array
     #: Angular velocities: (N,) about the third axis in 2D, (N, 3) in 3D.
     spins: Array
+    #: Sum of the forces of its contacts on each particle over ``6 pi eta``, (N, D); None without a contact model.
+    contact_forces: Array | None = None
 
 
 def frame(path: PathLike) -> Frame:
@@ -113,7 +115,9 @@ def frame(path: PathLike) -> Frame:
         lines = text.splitlines()
         count = int(lines[0])
         said = {key: quoted or plain for key, quoted, plain in _SAID.findall(lines[1])}
-        numbers = np.array([line.split()[1:] for line in lines[2 : 2 + count]], dtype=float).reshape(count, 10)
+        has_forces = ":contact_force:R:3" in said["Properties"]
+        width = 13 if has_forces else 10
+        numbers = np.array([line.split()[1:] for line in lines[2 : 2 + count]], dtype=float).reshape(count, width)
         dimension = int(said["Dimension"])
         return Frame(
             time=float(said["Time"]),
@@ -124,7 +128,8 @@ def frame(path: PathLike) -> Frame:
             positions=numbers[:, :dimension],
             radii=numbers[:, 3],
             velocities=numbers[:, 4 : 4 + dimension],
-            spins=numbers[:, 9] if dimension == 2 else numbers[:, 7:],
+            spins=numbers[:, 9] if dimension == 2 else numbers[:, 7:10],
+            contact_forces=numbers[:, 10 : 10 + dimension] if has_forces else None,
         )
     except (OSError, EOFError, UnicodeDecodeError, ValueError, KeyError, IndexError) as error:
         raise ResultsError(f"{path}: not particles in extended XYZ as gluey writes them ({error})") from error

@@ -8,10 +8,11 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_suspension::Container;
 use thiserror::Error;
 
-use super::{PROPERTIES, XyzFrame};
+use super::{PROPERTIES, WITH_FORCES, XyzFrame};
 
-/// Numbers in the line of a particle.
+/// Numbers in the line of a particle, without and with the force of its contacts.
 const NUMBER_COUNT: usize = 10;
+const COUNT_WITH_FORCES: usize = 13;
 
 /// A file could not be read as a frame.
 #[derive(Debug, Error)]
@@ -74,9 +75,11 @@ where
             .parse()
             .map_err(|_| lines.fault(0, lines.line(0), "the number of particles"))?;
         let container = lines.container::<D>()?;
-        if lines.value("Properties")? != PROPERTIES {
-            return Err(lines.fault(1, lines.value("Properties")?, &format!("Properties={PROPERTIES}")));
-        }
+        let number_count = match lines.value("Properties")? {
+            PROPERTIES => NUMBER_COUNT,
+            WITH_FORCES => COUNT_WITH_FORCES,
+            other => return Err(lines.fault(1, other, &format!("Properties={WITH_FORCES}"))),
+        };
         let [time, strain] = [lines.numbers::<1>("Time")?[0], lines.numbers::<1>("Strain")?[0]];
         let mut frame = Self {
             time,
@@ -86,8 +89,9 @@ where
             radii: Vec::new(),
             velocities: Vec::new(),
             spins: Vec::new(),
+            contact_forces: (number_count == COUNT_WITH_FORCES).then(Vec::new),
         };
-        (2..count + 2).try_for_each(|line| frame.push(&lines.particle(line)?, &lines, line))?;
+        (2..count + 2).try_for_each(|line| frame.push(&lines.particle(line, number_count)?, &lines, line))?;
         Ok(frame)
     }
 
@@ -99,6 +103,9 @@ where
         self.radii.push(numbers[3]);
         self.velocities.push(Vector::from_fn(|d, _| numbers[4 + d]));
         self.spins.push(std::array::from_fn(|d| numbers[7 + d]));
+        if let Some(forces) = &mut self.contact_forces {
+            forces.push(Vector::from_fn(|d, _| numbers[NUMBER_COUNT + d]));
+        }
         Ok(())
     }
 }
@@ -157,15 +164,15 @@ impl<'a> Lines<'a> {
         Ok(container.tilted(edges[3]))
     }
 
-    /// The numbers in the line of a particle.
-    fn particle(&self, index: usize) -> Result<Vec<f64>, XyzError> {
+    /// The numbers in the line of a particle, which must be so many.
+    fn particle(&self, index: usize, count: usize) -> Result<Vec<f64>, XyzError> {
         let line = self.line(index);
         let cells = line.split_whitespace().skip(1);
         let read = |cell: &str| number(cell).ok_or_else(|| self.fault(index, cell, "a finite number"));
         let numbers = cells.map(read).collect::<Result<Vec<f64>, _>>()?;
-        match numbers.len() {
-            NUMBER_COUNT => Ok(numbers),
-            _ => Err(self.fault(index, line, "a particle: a name and ten numbers")),
+        match numbers.len() == count {
+            true => Ok(numbers),
+            false => Err(self.fault(index, line, &format!("a particle: a name and {count} numbers"))),
         }
     }
 }
