@@ -26,6 +26,7 @@ mod findings;
 mod flow;
 mod forces;
 mod form;
+mod given;
 mod keys;
 mod load;
 mod locate;
@@ -101,6 +102,13 @@ pub struct Case {
     #[schemars(length(min = 2, max = 3))]
     #[serde(default)]
     pub gravity: Option<Vec<f64>>,
+    /// Force per unit of volume on fluid and particles alike, one coordinate per dimension: minus the mean
+    /// gradient of the pressure that drives fluid along a periodic axis. It needs a period along each axis with
+    /// a component, and walls or particles that are held to stand on. It is not reversed with the shear. In
+    /// `unfitted`. Unit: viscosity/(length time). Default: none.
+    #[schemars(length(min = 2, max = 3))]
+    #[serde(default)]
+    pub body_force: Option<Vec<f64>>,
     /// Name of a reference solution to compare with. Default: none.
     #[schemars(schema_with = "references")]
     #[serde(default)]
@@ -243,9 +251,10 @@ impl Case {
         self.flow.hydrodynamics == Hydrodynamics::Stokes && self.domain.boundary == Boundary::Sheared
     }
 
-    /// Whether there is a stress to compute: where the box is sheared, and not at the rate 0.
+    /// Whether there is a stress to compute: where the box is sheared, not at the rate 0, and all particles
+    /// are free. What acts on others from outside is no stress of the suspension.
     pub fn has_rheology(&self) -> bool {
-        self.is_sheared() && self.shear_rate != 0.0
+        self.is_sheared() && self.shear_rate != 0.0 && !self.gives_motions()
     }
 
     /// Surroundings of the particles: walls below and above (y), which move along themselves, and the

@@ -6,6 +6,7 @@
 
 mod estimate;
 mod fields;
+mod given;
 mod prepared;
 
 use std::time::Instant;
@@ -13,7 +14,7 @@ use std::time::Instant;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, NoForces, ResumeError};
+use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
 use gluey_stokes::{
     Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
     SolverKind, StokesError, WarmStartError,
@@ -114,6 +115,11 @@ where
     /// are none.
     wrenches: Vec<Wrench<D>>,
     acting: Vec<Wrench<D>>,
+    /// Motions of the particles that are held or driven while the shear is not reversed; empty if all are
+    /// free.
+    given: Vec<Option<Twist<D>>>,
+    /// Force per unit of volume on fluid and particles.
+    force_density: Vector<D>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
@@ -155,6 +161,8 @@ where
         radii,
         wrenches: case.wrenches(),
         acting: case.wrenches(),
+        given: case.given_twists(),
+        force_density: case.force_density(),
         last: None,
         last_balls: Vec::new(),
         last_positions: Vec::new(),
@@ -186,33 +194,68 @@ where
         }
     }
 
+    /// The motion with the undisturbed velocity at a point and its spin.
+    fn undisturbed_twist(&self) -> impl Fn(&Vector<D>) -> Twist<D> + use<D> {
+        let (velocity, rate) = (self.undisturbed(), self.rate());
+        move |x: &Vector<D>| {
+            let mut twist = Twist { velocity: velocity(x), ..Twist::default() };
+            // About z, the only axis in 2D and the last one in 3D.
+            twist.spin[Dim::<D>::ROT - 1] = -0.5 * rate;
+            twist
+        }
+    }
+
     /// The shear rate now.
     fn rate(&self) -> f64 {
         self.shear_rate * self.shear_factor
     }
 
     /// The flow in a box with walls or Couette flow around.
-    fn solve(&mut self, mesh: TreeMesh<D>, balls: &[Ball<D>]) -> Result<Flow<D>, FlowError> {
+    fn solve(
+        &mut self,
+        mesh: TreeMesh<D>,
+        balls: &[Ball<D>],
+        at: &[Particle<D>],
+    ) -> Result<Flow<D>, FlowError> {
         let shear = self.undisturbed();
-        let conditions = Conditions::boundary(&shear).with_wrenches(&self.acting);
+        let given = self.given_bodies(at, |_| Twist::default());
+        let density = self.force_density;
+        let uniform = move |_: &Vector<D>| density;
+        let conditions = Conditions::boundary(&shear);
+        let conditions =
+            if density.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let conditions = match given[..] {
+            [] => conditions.with_wrenches(&self.acting),
+            _ => conditions.with_bodies(&given),
+        };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
-    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces of the case on the
-    /// particles are balanced by a uniform one on all of the box, which is a mean gradient of the pressure;
-    /// those set since are between particles, and their sum is zero.
+    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Where all particles are
+    /// free, forces of the case on them are balanced by a uniform one on all of the box, which is a mean
+    /// gradient of the pressure; those set since are between particles, and their sum is zero. Where some are
+    /// held, these carry all of it, and the mean gradient is that of the case.
     fn solve_sheared(
         &mut self,
         mesh: TreeMesh<D>,
         balls: &[Ball<D>],
+        at: &[Particle<D>],
         with_stress: bool,
     ) -> Result<Flow<D>, FlowError> {
         let mut gradient = Matrix::<D>::zeros();
         gradient[(0, 1)] = self.rate();
+        let given = self.given_bodies(at, self.undisturbed_twist());
         let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
-        let back = -total / self.domain.extent().product();
+        let back = match given[..] {
+            [] => -total / self.domain.extent().product(),
+            _ => self.force_density,
+        };
         let uniform = move |_: &Vector<D>| back;
-        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&self.acting);
+        let conditions = Conditions::in_linear_flow(&gradient);
+        let conditions = match given[..] {
+            [] => conditions.with_wrenches(&self.acting),
+            _ => conditions.with_bodies(&given),
+        };
         let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
         let conditions = if with_stress { conditions.with_stress() } else { conditions };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
@@ -251,19 +294,20 @@ where
         let mesh = self.mesh(&balls)?;
         let meshed = start.elapsed().as_secs_f64();
         let mut flow = match self.sheared {
-            None => self.solve(mesh, &balls)?,
-            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, with_stress)?,
+            None => self.solve(mesh, &balls, particles)?,
+            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, particles, with_stress)?,
         };
         flow.times.assembly += meshed;
         twists.copy_from_slice(&flow.twists);
         if self.sheared.is_some() {
-            let undisturbed = self.undisturbed();
-            let spin = -0.5 * self.rate();
+            let undisturbed = self.undisturbed_twist();
             for (twist, particle) in twists.iter_mut().zip(particles) {
-                twist.velocity += undisturbed(&particle.pose.position);
-                // About z, the only axis in 2D and the last one in 3D.
-                twist.spin[Dim::<D>::ROT - 1] += spin;
+                *twist = *twist + undisturbed(&particle.pose.position);
             }
+        }
+        // Without the rounding of what the flow is relative to.
+        for (index, twist) in twists.iter_mut().enumerate() {
+            *twist = self.given_twist(index).unwrap_or(*twist);
         }
         self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
         self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
@@ -306,6 +350,10 @@ where
         })
     }
 
+    fn holding(&self) -> Option<Holding<D>> {
+        self.last_holding()
+    }
+
     fn films(&self, reach: f64) -> Vec<Film<D>> {
         if !self.keeps_films_open {
             return Vec::new();
@@ -316,6 +364,7 @@ where
             second: film.side(1),
             branch: film.branch(),
             slide: self.slide(&film),
+            is_held: [0, 1].map(|side| film.side(side).is_some_and(|body| self.given_twist(body).is_some())),
             gap: film.gap,
             curvature_radius: film.curvature_radius(),
         };

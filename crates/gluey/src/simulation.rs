@@ -7,7 +7,8 @@ use gluey_contact::{
 };
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
 use gluey_motion::{
-    Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, NoForces, ResumeError, Scheme,
+    Fields, FilmClosed, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, NoForces,
+    ResumeError, Scheme,
 };
 use gluey_suspension::Repulsion;
 use thiserror::Error;
@@ -405,6 +406,11 @@ where
         let stress = self.hydrodynamics.stress()?;
         let of_repulsion = self.repelling.as_ref().map_or(stress.of_repulsion, |repelling| repelling.stress);
         Some(MeanStress { of_repulsion, ..stress })
+    }
+
+    /// What held the particles that move as they are told at the last prediction, if there are any.
+    pub fn holding(&self) -> Option<Holding<D>> {
+        self.hydrodynamics.holding()
     }
 
     /// Size and effort of the last prediction.

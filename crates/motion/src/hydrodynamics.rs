@@ -43,6 +43,11 @@ where
         None
     }
 
+    /// What held the particles that move as they are told at the last prediction; `None` where all are free.
+    fn holding(&self) -> Option<Holding<D>> {
+        None
+    }
+
     /// The films of the last prediction that lubrication keeps open, with gaps up to `reach`, sorted by
     /// particles. None where the model lets gaps close.
     fn films(&self, _reach: f64) -> Vec<Film<D>> {
@@ -71,6 +76,19 @@ where
             bytes => Err(ResumeError::Foreign { bytes }),
         }
     }
+}
+
+/// What holds or drives particles that move as they are told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Holding<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Mean velocity of fluid and particles over the box, in a sheared one less that of the shear.
+    pub mean_velocity: Vector<D>,
+    /// Of each of these particles its index, and the force and torque on it by what holds it: beside those of
+    /// fluid, films, weight and repulsion. Contacts are not counted.
+    pub wrenches: Vec<(usize, Wrench<D>)>,
 }
 
 /// A model does not answer to forces.

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{ContactModel, PairContact};
+use gluey_contact::ContactModel;
 use gluey_geom::{Dim, Space};
 use gluey_suspension::Container;
 
+use super::Contacts;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
@@ -79,7 +80,7 @@ where
 impl<const D: usize> Frames<D>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
 {
     /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
     pub fn create(case: &Case, options: &RunOptions, step: usize) -> Result<Self, OutputError> {
@@ -102,7 +103,7 @@ where
     pub fn write<H>(
         &mut self,
         case: &Case,
-        simulation: &Simulation<D, H, PairContact<D>>,
+        simulation: &Simulation<D, H, Contacts<D>>,
     ) -> Result<(), OutputError>
     where
         H: gluey_motion::Hydrodynamics<D>,
@@ -149,10 +150,10 @@ where
 }
 
 /// The box as it is sheared now.
-fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, PairContact<D>>) -> Container<D>
+fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, Contacts<D>>) -> Container<D>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
     let container = case.container();

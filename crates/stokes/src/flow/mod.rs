@@ -22,7 +22,7 @@ use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
 
-pub use conditions::{Conditions, Field, Given};
+pub use conditions::{Conditions, Field, Given, GivenOf};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use stress::Stress;
@@ -76,6 +76,9 @@ where
     pub wrenches: Vec<Wrench<D>>,
     /// Strain of the linear flow that velocities, spins and pressures are relative to; zero for none.
     pub strain: Matrix<D>,
+    /// Mean velocity of fluid and bodies over the box, relative to the linear flow, where bodies are held
+    /// (`unfitted` only; elsewhere conditions at the border give it).
+    pub mean_velocity: Option<Vector<D>>,
     /// Stress of the suspension, where [`Conditions::with_stress`] asked for it.
     pub stress: Option<Stress<D>>,
     /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
@@ -128,7 +131,7 @@ where
     Dim<D>: Space<D>,
 {
     params: FlowParams,
-    /// For free bodies and for held ones.
+    /// For free bodies, and where any is held.
     solvers: [Box<dyn SaddleSolver<D> + Send>; 2],
     method: Arc<dyn Method<D>>,
     /// The last mesh, which the next one is often equal to.
@@ -208,7 +211,7 @@ where
     ) -> Result<Flow<D>, StokesError> {
         let start = Instant::now();
         let mut problem = self.problem(mesh, bodies)?;
-        problem.system.space.hold_twists(conditions.hold_bodies());
+        problem.system.space.hold(&conditions.held(bodies.len()));
         let assembled = Instant::now();
         let mut method = self.method.clone();
         self.prepare(&mut problem, &mut method)?;
@@ -230,9 +233,9 @@ where
         Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
     }
 
-    /// The solver for free bodies or for held ones.
+    /// The solver for free bodies, or for where any is held.
     fn solver(&mut self, problem: &Problem<D>) -> &mut Box<dyn SaddleSolver<D> + Send> {
-        &mut self.solvers[usize::from(problem.system.space.holds_twists())]
+        &mut self.solvers[usize::from(problem.system.space.holds_any())]
     }
 
     /// The flow under some conditions from the guess `x`, which becomes the reduced vector that it belongs
@@ -255,8 +258,14 @@ where
         let multiplier = problem.rigidity.solve(problem, &data, x, &mut solve)?;
         let mut pressure = problem.pressure_and_films(x);
         let mut velocity = problem.velocity(&lift, x);
-        if let (false, Some(surfaces)) = (problem.system.space.is_anchored(), &problem.system.surfaces) {
-            let space = &problem.system.space;
+        let space = &problem.system.space;
+        let mut mean_velocity = None;
+        if let Some(surfaces) = &problem.system.surfaces
+            && space.holds_any()
+        {
+            mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
+        }
+        if let (false, Some(surfaces)) = (space.is_anchored(), &problem.system.surfaces) {
             let mean = mean::mean_velocity(problem, surfaces, &velocity);
             mean::subtract(space, &mut velocity, &mean, |_| true);
             // Guesses made of solutions would let what no equation determines grow from step to step.
@@ -276,6 +285,7 @@ where
             twists,
             wrenches,
             strain: conditions.strain,
+            mean_velocity,
             stress,
             films: problem.film_forces(x),
             solve_count: effort.solve_count,
