@@ -105,7 +105,8 @@ pub struct Case {
     /// Force per unit of volume on fluid and particles alike, one coordinate per dimension: minus the mean
     /// gradient of the pressure that drives fluid along a periodic axis. It needs a period along each axis with
     /// a component, and walls or particles that are held to stand on. It is not reversed with the shear. In
-    /// `unfitted`. Unit: viscosity/(length time). Default: none.
+    /// `unfitted`. Unit: viscosity/(length time). Default: none, but in a box without walls where particles are
+    /// held that without which there would be a mean flow.
     #[schemars(length(min = 2, max = 3))]
     #[serde(default)]
     pub body_force: Option<Vec<f64>>,

@@ -118,8 +118,9 @@ where
     /// Motions of the particles that are held or driven while the shear is not reversed; empty if all are
     /// free.
     given: Vec<Option<Twist<D>>>,
-    /// Force per unit of volume on fluid and particles.
-    force_density: Vector<D>,
+    /// Force per unit of volume on fluid and particles; where particles are held in a box without walls and it
+    /// is not given, it is what stops the mean flow.
+    force_density: Option<Vector<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
@@ -219,7 +220,7 @@ where
     ) -> Result<Flow<D>, FlowError> {
         let shear = self.undisturbed();
         let given = self.given_bodies(at, |_| Twist::default());
-        let density = self.force_density;
+        let density = self.force_density.unwrap_or_else(Vector::zeros);
         let uniform = move |_: &Vector<D>| density;
         let conditions = Conditions::boundary(&shear);
         let conditions =
@@ -234,7 +235,7 @@ where
     /// The flow in a box that is sheared for ever, relative to the undisturbed one. Where all particles are
     /// free, forces of the case on them are balanced by a uniform one on all of the box, which is a mean
     /// gradient of the pressure; those set since are between particles, and their sum is zero. Where some are
-    /// held, these carry all of it, and the mean gradient is that of the case.
+    /// held, these carry all of it; the mean gradient is that of the case, or stops the mean flow.
     fn solve_sheared(
         &mut self,
         mesh: TreeMesh<D>,
@@ -248,16 +249,18 @@ where
         let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
         let back = match given[..] {
             [] => -total / self.domain.extent().product(),
-            _ => self.force_density,
+            _ => self.force_density.unwrap_or_else(Vector::zeros),
         };
         let uniform = move |_: &Vector<D>| back;
         let conditions = Conditions::in_linear_flow(&gradient);
         let conditions = match given[..] {
             [] => conditions.with_wrenches(&self.acting),
+            _ if self.force_density.is_none() => conditions.with_bodies(&given).without_mean_flow(),
             _ => conditions.with_bodies(&given),
         };
         let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
-        let conditions = if with_stress { conditions.with_stress() } else { conditions };
+        let has_stress = with_stress && given.is_empty();
+        let conditions = if has_stress { conditions.with_stress() } else { conditions };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 

@@ -86,6 +86,8 @@ where
 {
     /// Mean velocity of fluid and particles over the box, in a sheared one less that of the shear.
     pub mean_velocity: Vector<D>,
+    /// Uniform force per unit of volume on fluid and particles: minus the mean gradient of the pressure.
+    pub force_density: Vector<D>,
     /// Of each of these particles its index, and the force and torque on it by what holds it: beside those of
     /// fluid, films, weight and repulsion. Contacts are not counted.
     pub wrenches: Vec<(usize, Wrench<D>)>,

@@ -37,9 +37,9 @@ impl Case {
         particles.filter(|(_, particle)| particle.is_given_motion()).map(|(index, _)| index)
     }
 
-    /// The force per unit of volume on fluid and particles of a checked case; zero where there is none.
-    pub(crate) fn force_density<const D: usize>(&self) -> Vector<D> {
-        vector(&self.body_force)
+    /// The force per unit of volume on fluid and particles of a checked case, where it is given.
+    pub(crate) fn force_density<const D: usize>(&self) -> Option<Vector<D>> {
+        self.body_force.is_some().then(|| vector(&self.body_force))
     }
 }
 

@@ -41,6 +41,7 @@ where
         let held = self.given.iter().enumerate().filter(|(_, given)| given.is_some());
         Some(Holding {
             mean_velocity: flow.mean_velocity?,
+            force_density: flow.mean_force + self.force_density.unwrap_or_else(Vector::zeros),
             wrenches: held.map(|(index, _)| (index, flow.wrenches[index] - acting(index))).collect(),
         })
     }

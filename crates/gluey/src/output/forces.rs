@@ -2,7 +2,8 @@
 //!
 //! Force and torque on each such particle by what holds it, about its centre: together with fluid, films,
 //! weight and repulsion they make it move as it is told. Without weight and free particles their sum is minus
-//! that of the force density on the box. Then the mean velocity of fluid and particles over the box.
+//! that of the force density on the box. Before them stand the mean velocity of fluid and particles over the box
+//! and the force density.
 
 use std::path::{Path, PathBuf};
 
@@ -74,6 +75,7 @@ pub fn forces_path(csv: &Path) -> PathBuf {
 pub fn header<const D: usize>(particles: impl IntoIterator<Item = usize>) -> String {
     let mut names = vec!["t".to_owned()];
     names.extend(AXES[..D].iter().map(|axis| format!("mean_velocity_{axis}")));
+    names.extend(AXES[..D].iter().map(|axis| format!("body_force_{axis}")));
     for number in particles.into_iter().map(|index| index + 1) {
         names.extend(AXES[..D].iter().map(|axis| format!("force{number}{axis}")));
         match D {
@@ -92,7 +94,8 @@ where
     let of_particles = holding.wrenches.iter().flat_map(|(_, wrench)| {
         wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)).copied().collect::<Vec<f64>>()
     });
-    let numbers = std::iter::once(time).chain(holding.mean_velocity.iter().copied()).chain(of_particles);
+    let of_box = holding.mean_velocity.iter().chain(&holding.force_density).copied();
+    let numbers = std::iter::once(time).chain(of_box).chain(of_particles);
     let cells: Vec<String> = numbers.map(|number| format!("{number:.16e}")).collect();
     format!("{}\n", cells.join(","))
 }
@@ -106,11 +109,13 @@ mod tests {
     #[test]
     fn a_row_has_a_number_for_each_name() {
         let wrench = Wrench { force: Vector::<2>::new(1.0, -2.0), torque: Spin::<2>::new(0.5) };
-        let holding = Holding { mean_velocity: Vector::<2>::new(0.25, 0.0), wrenches: vec![(2, wrench)] };
-        assert_eq!(header::<2>([2]), "t,mean_velocity_x,mean_velocity_y,force3x,force3y,torque3");
+        let (mean_velocity, force_density) = (Vector::<2>::new(0.25, 0.0), Vector::<2>::new(0.0, 7.0));
+        let holding = Holding { mean_velocity, force_density, wrenches: vec![(2, wrench)] };
+        let names = "t,mean_velocity_x,mean_velocity_y,body_force_x,body_force_y,force3x,force3y,torque3";
+        assert_eq!(header::<2>([2]), names);
         let line = line(3.0, &holding);
         let numbers: Vec<f64> = line.trim_end().split(',').map(|x| x.parse().expect("a number")).collect();
-        assert_eq!(numbers, [3.0, 0.25, 0.0, 1.0, -2.0, 0.5]);
-        assert_eq!(header::<3>([0, 4]).split(',').count(), 4 + 2 * 6);
+        assert_eq!(numbers, [3.0, 0.25, 0.0, 0.0, 7.0, 1.0, -2.0, 0.5]);
+        assert_eq!(header::<3>([0, 4]).split(',').count(), 7 + 2 * 6);
     }
 }

@@ -30,6 +30,8 @@ where
     pub bodies: Given<'a, D>,
     /// Whether [`crate::Flow::stress`] is wanted; `unfitted` only.
     pub stress: bool,
+    /// See [`Conditions::without_mean_flow`].
+    pub without_mean: bool,
 }
 
 /// What is known of the bodies, one entry each in their order; the other follows from the flow.
@@ -85,7 +87,14 @@ where
 {
     /// Free bodies without forces in a flow with this velocity on the boundary.
     pub fn boundary(boundary: Field<'a, D>) -> Self {
-        Self { boundary, force: None, strain: Matrix::zeros(), bodies: Given::Wrenches(&[]), stress: false }
+        Self {
+            boundary,
+            force: None,
+            strain: Matrix::zeros(),
+            bodies: Given::Wrenches(&[]),
+            stress: false,
+            without_mean: false,
+        }
     }
 
     /// Free bodies without forces in the linear flow `G x`, whose trace is zero, in a box that is periodic in
@@ -114,6 +123,14 @@ where
     #[must_use]
     pub fn with_stress(self) -> Self {
         Self { stress: true, ..self }
+    }
+
+    /// The same with a uniform force on fluid and bodies, beside `force`, so that the mean velocity over both
+    /// vanishes: around held bodies in a box that is periodic in all directions, where without it the mean
+    /// gradient of the pressure is zero. It takes a solve more for each axis; `unfitted` only.
+    #[must_use]
+    pub fn without_mean_flow(self) -> Self {
+        Self { without_mean: true, ..self }
     }
 
     /// The same with forces and torques on the bodies, which are free.

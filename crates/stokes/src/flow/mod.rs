@@ -1,5 +1,6 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
+mod balance;
 mod conditions;
 mod mean;
 mod prepared;
@@ -79,6 +80,8 @@ where
     /// Mean velocity of fluid and bodies over the box, relative to the linear flow, where bodies are held
     /// (`unfitted` only; elsewhere conditions at the border give it).
     pub mean_velocity: Option<Vector<D>>,
+    /// The uniform force per unit of volume that [`Conditions::without_mean_flow`] found; zero elsewhere.
+    pub mean_force: Vector<D>,
     /// Stress of the suspension, where [`Conditions::with_stress`] asked for it.
     pub stress: Option<Stress<D>>,
     /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
@@ -220,6 +223,9 @@ where
         let trusted = self.trusted(&mut problem, &mut method, conditions, &guess)?;
         let (mut flow, x) = (trusted.flow, trusted.x);
         self.keep_for_next(&problem, &x, &flow.pressure, before);
+        if conditions.without_mean {
+            (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;
+        }
         flow.times = PhaseTimes {
             assembly: (assembled - start).as_secs_f64(),
             preparation: (prepared - assembled).as_secs_f64(),
@@ -286,6 +292,7 @@ where
             wrenches,
             strain: conditions.strain,
             mean_velocity,
+            mean_force: Vector::zeros(),
             stress,
             films: problem.film_forces(x),
             solve_count: effort.solve_count,

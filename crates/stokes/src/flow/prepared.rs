@@ -15,6 +15,7 @@ use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
 use super::conditions::Conditions;
+use super::trusted::Trusted;
 use super::{Flow, FlowSolver, film_moments};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem, symmetric_and_traceless};
@@ -119,13 +120,19 @@ where
         self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
         let Self { solver, problem, method, ready } = self;
-        let trusted = solver.get().trusted(problem, method, conditions, &guess)?;
-        if trusted.is_raised {
+        let Trusted { mut flow, mut is_raised, .. } =
+            solver.get().trusted(problem, method, conditions, &guess)?;
+        if conditions.without_mean {
+            let raised;
+            (flow, raised) = solver.get().balanced(problem, method, conditions, flow)?;
+            is_raised |= raised;
+        }
+        if is_raised {
             let space = &problem.system.space;
             *ready = [None, None];
             ready[usize::from(space.holds_any())] = Some(space.held().to_vec());
         }
-        Ok(trusted.flow)
+        Ok(flow)
     }
 
     /// Holds or frees the bodies and prepares the solver for that, unless it is.
