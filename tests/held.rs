@@ -101,7 +101,7 @@ fn two_that_are_driven_together_resist_as_they_should() {
         let row = gaps.iter().position(|xi| (xi - gap).abs() < 1e-9).expect("a row");
         table.column("n").expect("resistances")[row]
     };
-    for (row, (gap, measured)) in [(0.3, 2.5e-2), (0.2, 2.5e-2), (0.1, 2.5e-2)].into_iter().enumerate() {
+    for (row, (gap, measured)) in [(0.3, 4.9e-3), (0.2, 3e-3), (0.1, 4.9e-3)].into_iter().enumerate() {
         let exact = of_gap(gap);
         small(&format!("discs at {gap}"), (forces[row] / exact - 1.0).abs(), measured);
     }
@@ -111,27 +111,28 @@ fn two_that_are_driven_together_resist_as_they_should() {
         &text(0.1, ["0.385, 0.5, 0.5", "0.615, 0.5, 0.5"], ["0.5, 0.0, 0.0", "-0.5, 0.0, 0.0"]),
     );
     let forces = ran(&spheres, |csv| vectors::<3>(&beside(csv, "forces"), "force2"));
-    for (row, (gap, measured)) in [(0.3, 2.5e-2), (0.2, 2.5e-2), (0.1, 2.5e-2)].into_iter().enumerate() {
+    for (row, (gap, measured)) in [(0.3, 2.4e-2), (0.2, 1.9e-2), (0.1, 2.8e-3)].into_iter().enumerate() {
         let exact = -6.0 * PI * 0.1 * 0.5 / approach_mobility(gap);
         small(&format!("spheres at {gap}"), (forces[row].x / exact - 1.0).abs(), measured);
     }
 }
 
 /// The force that holds a particle beside a free one under shear also holds it as a force, and the free one
-/// moves alike: between walls, in Couette flow and in a sheared box.
+/// moves alike: between walls, in Couette flow and in a sheared box. In so short a step films do not care which
+/// side yields.
 #[test]
 fn what_holds_a_particle_is_a_force_like_any_other() {
     for (dimension, boundary, measured) in
-        [(2, "periodic", 1e-5), (2, "couette", 1e-5), (2, "sheared", 1e-5), (3, "sheared", 1e-5)]
+        [(2, "periodic", 9e-8), (2, "couette", 8e-8), (2, "sheared", 2.6e-8), (3, "sheared", 8.8e-7)]
     {
         let at = |x: f64, y: f64| if dimension == 2 { format!("{x}, {y}") } else { format!("{x}, {y}, 0.5") };
         let text = |held: &str| {
             format!(
-                "time = {{ step = 1e-3, end = 1e-3 }}\ndomain = {{ boundary = \"{boundary}\" }}\n\
+                "time = {{ step = 1e-6, end = 1e-6 }}\ndomain = {{ boundary = \"{boundary}\" }}\n\
                  particles = [{{ position = [{}], radius = 0.1, {held} }},\n\
                               {{ position = [{}], radius = 0.12 }}]",
                 at(0.4, 0.6),
-                at(0.62, 0.52)
+                at(0.62, 0.72)
             )
         };
         let read = |csv: &Path| {
@@ -147,7 +148,7 @@ fn what_holds_a_particle_is_a_force_like_any_other() {
         };
         let moves = |csv: &Path| {
             let of = |name: &str| column(csv, name);
-            let move_of = |name: String| (of(&name)[1] - of(&name)[0]) / 1e-3;
+            let move_of = |name: String| (of(&name)[1] - of(&name)[0]) / 1e-6;
             let names = [1, 2].into_iter().flat_map(|k| ["x", "y"].map(|d| format!("{d}{k}")));
             let spin = if dimension == 2 { "omega" } else { "omegaz" };
             let spins = [1, 2].map(|k| match dimension {
@@ -208,28 +209,29 @@ fn fluid_is_driven_between_walls() {
          particles = [{ position = [0.5, 0.5], radius = 0.04 }]",
     );
     let speed = ran(&case, |csv| (column(csv, "x1")[1] - column(csv, "x1")[0]) / 1e-3);
-    small("speed", (speed - (1.0 - 2.0 * 0.04 * 0.04)).abs(), 1e-3);
+    small("speed", (speed - (1.0 - 2.0 * 0.04 * 0.04)).abs(), 1.6e-5);
 }
 
-/// A held disc that free ones run into, and a driven one, with contact: what is held moves as it is told, and
-/// nothing overlaps.
+/// A disc that sinks onto a held one and slides off it, beside a driven one, with contact: what is held moves
+/// as it is told, and nothing overlaps.
 #[test]
 fn contact_does_not_move_what_is_held() {
     for lubrication in ["none", "deficit"] {
         let case = case(&format!(
-            "name = \"h\"\ndimension = 2\nshear_rate = 4.0\ndomain = {{ boundary = \"sheared\" }}\n\
+            "name = \"h\"\ndimension = 2\nshear_rate = 0.0\ngravity = [0.0, -200.0]\n\
+             domain = {{ boundary = \"periodic\" }}\n\
              contact = {{ strategy = \"gluey\" }}\ntime = {{ step = 0.02, end = 0.8 }}\n\
-             particles = [{{ position = [0.6, 0.5], radius = 0.1, held = true }},\n\
-             {{ position = [0.3, 0.58], radius = 0.1 }}, {{ position = [0.7, 0.2], radius = 0.1 }},\n\
-             {{ position = [0.1, 0.85], radius = 0.1, velocity = [0.0, 0.05] }}]\n\
+             particles = [{{ position = [0.6, 0.4], radius = 0.1, held = true }},\n\
+             {{ position = [0.62, 0.66], radius = 0.1 }},\n\
+             {{ position = [0.15, 0.4], radius = 0.1, velocity = [0.0, 0.05] }}]\n\
              flow = {{ formulation = \"unfitted\", lubrication = \"{lubrication}\", \
              mesh = {{ cells_per_radius = 2.0 }} }}"
         ));
-        let (rows, gaps) = ran(&case, |csv| (centers::<2>(csv, 4), column(csv, "gap12_over_a")));
-        assert!(rows.iter().all(|row| row[0] == rows[0][0] && row[3].x == rows[0][3].x));
-        assert!((rows[40][3].y - 0.89).abs() < 1e-12, "{}", rows[40][3].y);
+        let (rows, gaps) = ran(&case, |csv| (centers::<2>(csv, 3), column(csv, "gap12_over_a")));
+        assert!(rows.iter().all(|row| row[0] == rows[0][0] && row[2].x == rows[0][2].x));
+        assert!((rows[40][2].y - 0.44).abs() < 1e-12, "{}", rows[40][2].y);
         let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-        println!("{lubrication}: {least:.2e}");
+        println!("{lubrication}: {least:.2e}, {:?}", rows[40][1]);
         assert!((-1e-10..0.1).contains(&least), "{gaps:?}");
     }
 }
@@ -307,9 +309,9 @@ fn forces_on_the_box_are_balanced() {
             let [force1, force3, body_force, mean] = ["force1", "force3", "body_force_", "mean_velocity_"]
                 .map(|name| vectors::<2>(&path, name)[0]);
             let sum = force1 + force3 + body_force;
-            small("sum", sum.norm() / force1.norm(), 1e-9);
+            small("sum", sum.norm() / force1.norm(), 3e-14);
             match force {
-                None => small("mean", mean.norm(), 1e-12),
+                None => small("mean", mean.norm(), 1e-16),
                 Some(force) => {
                     assert_eq!(body_force, Vector::<2>::new(0.0, force));
                     assert!(mean.y > 0.01, "{mean:?}");
