@@ -1,6 +1,9 @@
 //! Suspensions that are sheared for ever.
 
 use gluey::Case;
+use gluey_geom::Vector;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 #[path = "runs/mod.rs"]
 mod runs;
@@ -33,6 +36,76 @@ fn the_viscosity_is_continuous_and_the_same_by_two_routes() {
     let range = viscosity.iter().fold(0.0f64, |range, v| range.max((v - viscosity[0]).abs()));
     println!("routes {miss:.1e}, bend {bend:.1e}, range {range:.1e}");
     assert!(bend < 0.5 * range && viscosity.iter().all(|v| (1.3..2.5).contains(v)), "{viscosity:?}");
+}
+
+/// The particles of a case as a list, moved and copied, in a box of so many copies along x.
+fn moved(case: &Case, by: &[f64], copies: usize) -> Case {
+    let mut moved = case.clone();
+    let (lower, upper) = (case.lower(), case.upper());
+    moved.particles.clear();
+    for copy in 0..copies {
+        for particle in &case.particles {
+            let mut particle = particle.clone();
+            for (d, x) in particle.position.iter_mut().enumerate() {
+                *x = lower[d] + (*x + by[d] - lower[d]).rem_euclid(upper[d] - lower[d]);
+            }
+            particle.position[0] += copy as f64 * (upper[0] - lower[0]);
+            moved.particles.push(particle);
+        }
+    }
+    let mut corner = upper;
+    corner[0] = lower[0] + copies as f64 * (corner[0] - lower[0]);
+    moved.domain.upper = Some(corner);
+    moved.check().unwrap_or_else(|error| panic!("{error}"));
+    moved
+}
+
+/// How far particles went, less what the shear takes along where they began and less the way of the first, in mean
+/// radii, and the viscosity in every row.
+fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) {
+    let count = case.particles.len();
+    ran(case, |csv| {
+        let rows = centers::<D>(csv, count);
+        let way = |k: usize| {
+            let mut way = rows[rows.len() - 1][k] - rows[0][k];
+            way[0] -= case.time.end * rows[0][k][1];
+            way
+        };
+        let ways = (0..count).map(|k| (way(k) - way(0)) / case.mean_radius()).collect();
+        (ways, column(&beside(csv, "rheology"), "viscosity"))
+    })
+}
+
+/// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell side
+/// by side go the same way, and so do all particles moved by any vector, up to the error of the mesh; nor does it
+/// know by which strain the cell is named.
+fn runs_do_not_know_the_seam<const D: usize>(end: f64, [copied, shifted, bent]: [f64; 3]) {
+    let mut case = case(D, &format!("time = {{ step = 0.1, end = {end:?} }}"));
+    case.flow.tolerance = 1e-9;
+    let (ways, viscosity) = way_and_viscosity::<D>(&case);
+    let miss = |other: &(Vec<Vector<D>>, Vec<f64>)| {
+        let of_ways = ways.iter().zip(&other.0).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let of_rows = viscosity.iter().zip(&other.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        [of_ways, of_rows]
+    };
+    let still = [0.0; 3];
+    let copies = miss(&way_and_viscosity::<D>(&moved(&case, &still[..D], 2)));
+    println!("{D}D, 2 x 1 copies: {copies:?}");
+    assert!(copies.iter().all(|miss| *miss < 3.0 * copied), "{copies:?}");
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    for _ in 0..2 {
+        let by: Vec<f64> = (0..D).map(|_| random.random_range(0.0..1.0)).collect();
+        // Up in y the undisturbed velocity is larger by as much for all.
+        let there = miss(&way_and_viscosity::<D>(&moved(&case, &by, 1)));
+        println!("{D}D, moved by {by:?}: {there:?}");
+        assert!(there[0] < 3.0 * shifted && there[1] < 3.0 * bent, "{there:?}");
+    }
+}
+
+#[test]
+fn runs_do_not_know_where_the_seam_is() {
+    runs_do_not_know_the_seam::<2>(0.7, [1e-6, 1e-2, 1e-2]);
+    runs_do_not_know_the_seam::<3>(0.2, [1e-6, 1e-2, 1e-2]);
 }
 
 /// Forward and back: the error is of second order in the time step.

@@ -27,6 +27,7 @@ mod flow;
 mod forces;
 mod form;
 mod given;
+mod given_stress;
 mod keys;
 mod load;
 mod locate;
@@ -96,6 +97,13 @@ pub struct Case {
     /// 1/time. Default: 1.
     #[serde(default = "one")]
     pub shear_rate: f64,
+    /// Shear stress that drives a box that is sheared for ever, instead of a shear rate: that of fluid,
+    /// particles and their repulsion, without contacts. The run counts strain then, in `time.step`, `time.end`
+    /// and the column `t`, and velocities are by strain; time and shear rate are written to
+    /// `<name>-rheology.csv`. Unit: viscosity/time. Default: none, the rate is given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub shear_stress: Option<f64>,
     /// Weight of the particles per unit of volume (in 2D: area), less that of the fluid: `(rho_s - rho_f) g`,
     /// one coordinate per dimension. It is not reversed with the shear. Unit: viscosity/(length time).
     /// Default: none.

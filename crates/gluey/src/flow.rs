@@ -7,6 +7,7 @@
 mod estimate;
 mod fields;
 mod given;
+mod given_stress;
 mod prepared;
 
 use std::time::Instant;
@@ -23,6 +24,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::{Case, Formulation, Lubrication, Solver};
+
+use given_stress::StressControl;
 
 pub use estimate::{MeshEstimate, MeshSize};
 pub use prepared::prepared_flow;
@@ -51,6 +54,17 @@ pub enum FlowError {
         saved: usize,
         /// Particles here.
         present: usize,
+    },
+    /// What drives a suspension is less than what particles that repel each other need at rest.
+    #[error(
+        "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
+         {at_rest:.6}; take a larger stress or less repulsion"
+    )]
+    NotDriven {
+        /// The stress that is given.
+        stress: f64,
+        /// That at rest.
+        at_rest: f64,
     },
     /// A flow to start from that is of another mesh.
     #[error(transparent)]
@@ -121,6 +135,8 @@ where
     /// Force per unit of volume on fluid and particles; where particles are held in a box without walls and it
     /// is not given, it is what stops the mean flow.
     force_density: Option<Vector<D>>,
+    /// Where the stress is given instead of the rate.
+    control: Option<StressControl<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
@@ -164,6 +180,7 @@ where
         acting: case.wrenches(),
         given: case.given_twists(),
         force_density: case.force_density(),
+        control: case.shear_stress.map(StressControl::new),
         last: None,
         last_balls: Vec::new(),
         last_positions: Vec::new(),
@@ -298,6 +315,7 @@ where
         let meshed = start.elapsed().as_secs_f64();
         let mut flow = match self.sheared {
             None => self.solve(mesh, &balls, particles)?,
+            Some(_) if self.control.is_some() => self.solve_at_stress(mesh, &balls)?,
             Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, particles, with_stress)?,
         };
         flow.times.assembly += meshed;
@@ -339,8 +357,19 @@ where
         Ok(())
     }
 
+    fn set_pair_stress(&mut self, stress: &Matrix<D>) {
+        self.control.iter_mut().for_each(|control| control.pair_stress = *stress);
+    }
+
+    fn clock_rate(&self) -> f64 {
+        self.control.as_ref().map_or(1.0, |control| control.rate)
+    }
+
     fn stress(&self) -> Option<MeanStress<D>> {
         let stress = self.last.as_ref()?.stress.as_ref()?;
+        if !self.sheared?.with_stress {
+            return None;
+        }
         let volume = self.domain.extent().product();
         Some(MeanStress {
             rate: self.rate(),

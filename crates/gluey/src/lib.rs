@@ -57,7 +57,7 @@ pub use run::{
     ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
-pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
+pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
 pub use trajectory::Row;
 

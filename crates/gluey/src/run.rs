@@ -432,11 +432,12 @@ where
     if !case.is_sheared() {
         return simulation;
     }
-    simulation.sheared(Sliding {
+    let simulation = simulation.sheared(Sliding {
         rate: case.shear_rate,
         height: case.upper()[1] - case.lower()[1],
         stress_every: case.rheology.every,
-    })
+    });
+    if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
 }
 
 /// The particles of a checked case.

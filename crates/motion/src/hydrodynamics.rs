@@ -38,6 +38,16 @@ where
         if wrenches.is_empty() { Ok(()) } else { Err(NoForces) }
     }
 
+    /// Sets the stress of the forces between particles that are among those set by
+    /// [`Hydrodynamics::set_wrenches`]: minus the mean product of forces and lines between centres.
+    fn set_pair_stress(&mut self, _stress: &Matrix<D>) {}
+
+    /// Shear rate of the last prediction over that by which its velocities count, where the stress is given
+    /// and the rate follows; one elsewhere.
+    fn clock_rate(&self) -> f64 {
+        1.0
+    }
+
     /// The mean stress of the last prediction; `None` where the model has none.
     fn stress(&self) -> Option<MeanStress<D>> {
         None

@@ -4,6 +4,7 @@ use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::given::{check_force_density, check_motion};
+use super::given_stress::{check_shear_stress, check_stress_alone};
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
 use super::neighbours::{Neighbours, nearer_than};
 use super::particle_problem::ParticleProblem;
@@ -30,6 +31,9 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     if findings.are_good(&["domain", "flow"]) {
         check_boundary(case, &root.name("domain"), findings);
     }
+    if findings.are_good(&["domain", "flow", "shear_rate", "shear_stress"]) {
+        check_shear_stress(case, &root, findings);
+    }
     if findings.are_good(&["time"]) {
         check_time(case, &root.name("time"), findings);
     }
@@ -43,6 +47,9 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
     let root = Key::default();
     if findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
         check_particles(case, &root.name("particles"), findings);
+    }
+    if findings.are_good(&fill::NEEDED) {
+        check_stress_alone(case, &root, findings);
     }
     if findings.are_good(&fill::NEEDED) && findings.are_good(&["body_force"]) {
         check_force_density(case, &root.name("body_force"), findings);

@@ -48,7 +48,9 @@ impl Tables {
         let (has_rheology, has_forces) = (case.has_rheology(), case.gives_motions());
         let forces = || ForcesWriter::create::<D>(csv, case.given_particles());
         Ok(Self {
-            rheology: has_rheology.then(|| RheologyWriter::create::<D>(csv)).transpose()?,
+            rheology: has_rheology
+                .then(|| RheologyWriter::create::<D>(csv, case.shear_stress.is_some()))
+                .transpose()?,
             forces: has_forces.then(forces).transpose()?,
         })
     }
@@ -78,7 +80,14 @@ impl Tables {
             let stress = with_contacts(stress, simulation.contact(), simulation.particles())
                 .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
-            rheology.write(&Rheology { time, strain, stress: &stress, smallest_gap_over_a })?;
+            let time_and_rate = simulation.time_and_rate();
+            rheology.write(&Rheology {
+                time,
+                strain,
+                stress: &stress,
+                smallest_gap_over_a,
+                time_and_rate,
+            })?;
         }
         if let (Some(forces), Some(holding)) = (&mut self.forces, simulation.holding()) {
             forces.write(time, &holding)?;

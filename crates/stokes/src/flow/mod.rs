@@ -1,6 +1,7 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
 mod balance;
+mod combined;
 mod conditions;
 mod mean;
 mod prepared;
@@ -262,46 +263,7 @@ where
         };
         let data = Data { lift: &lift, b: &b };
         let multiplier = problem.rigidity.solve(problem, &data, x, &mut solve)?;
-        let mut pressure = problem.pressure_and_films(x);
-        let mut velocity = problem.velocity(&lift, x);
-        let space = &problem.system.space;
-        let mut mean_velocity = None;
-        if let Some(surfaces) = &problem.system.surfaces
-            && space.holds_any()
-        {
-            mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
-        }
-        if let (false, Some(surfaces)) = (space.is_anchored(), &problem.system.surfaces) {
-            let mean = mean::mean_velocity(problem, surfaces, &velocity);
-            mean::subtract(space, &mut velocity, &mean, |_| true);
-            // Guesses made of solutions would let what no equation determines grow from step to step.
-            mean::subtract(space, x, &mean, |node| space.is_free(node));
-        }
-        let twists = problem.twists(&velocity)?;
-        let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
-        let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
-        let stress = stress.transpose()?;
-        velocity.truncate(problem.system.space.full_dim());
-        pressure.truncate(problem.system.pressure.dim());
-        let flow = Flow {
-            discretisation: problem.discretisation().clone(),
-            velocity,
-            pressure,
-            multiplier,
-            twists,
-            wrenches,
-            strain: conditions.strain,
-            mean_velocity,
-            mean_force: Vector::zeros(),
-            stress,
-            films: problem.film_forces(x),
-            solve_count: effort.solve_count,
-            iteration_count: effort.iteration_count,
-            residual: effort.residual,
-            fine_operator_applications: effort.fine_operator_applications,
-            times: PhaseTimes::default(),
-        };
-        Ok(flow)
+        flow_of(problem, conditions, (&lift, x), multiplier, &effort)
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.
@@ -372,6 +334,60 @@ where
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }
     }
+}
+
+/// The flow under some conditions that belongs to a lift and a reduced vector, which loses its mean velocity
+/// where no equation determines it.
+fn flow_of<const D: usize>(
+    problem: &Problem<D>,
+    conditions: &Conditions<'_, D>,
+    (lift, x): (&[f64], &mut [f64]),
+    multiplier: Vec<f64>,
+    effort: &Effort,
+) -> Result<Flow<D>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let mut pressure = problem.pressure_and_films(x);
+    let mut velocity = problem.velocity(lift, x);
+    let space = &problem.system.space;
+    let mut mean_velocity = None;
+    if let Some(surfaces) = &problem.system.surfaces
+        && space.holds_any()
+    {
+        mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
+    }
+    if let (false, Some(surfaces)) = (space.is_anchored(), &problem.system.surfaces) {
+        let mean = mean::mean_velocity(problem, surfaces, &velocity);
+        mean::subtract(space, &mut velocity, &mean, |_| true);
+        // Guesses made of solutions would let what no equation determines grow from step to step.
+        mean::subtract(space, x, &mean, |node| space.is_free(node));
+    }
+    let twists = problem.twists(&velocity)?;
+    let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
+    let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
+    let stress = stress.transpose()?;
+    velocity.truncate(problem.system.space.full_dim());
+    pressure.truncate(problem.system.pressure.dim());
+    let flow = Flow {
+        discretisation: problem.discretisation().clone(),
+        velocity,
+        pressure,
+        multiplier,
+        twists,
+        wrenches,
+        strain: conditions.strain,
+        mean_velocity,
+        mean_force: Vector::zeros(),
+        stress,
+        films: problem.film_forces(x),
+        solve_count: effort.solve_count,
+        iteration_count: effort.iteration_count,
+        residual: effort.residual,
+        fine_operator_applications: effort.fine_operator_applications,
+        times: PhaseTimes::default(),
+    };
+    Ok(flow)
 }
 
 /// The stress of a flow: its velocity, nodal and of bodies, and pressure, and the reduced vector.
