@@ -25,8 +25,8 @@ fn small(what: &str, value: f64, measured: f64) {
     assert!(value <= 3.0 * measured, "{what}: {value:e}, was {measured:e}");
 }
 
-/// Fluid that is driven through a square or simple cubic lattice that is held: the drag is that of the tables,
-/// and all of what drives the fluid is carried.
+/// Fluid that is driven through a square or simple cubic lattice that is held: the drag is that of the
+/// tables, and all of what drives the fluid is carried.
 #[test]
 fn the_permeability_of_a_bed_is_that_of_its_lattice() {
     for (dimension, force, arrangement, count, drag, error) in [
@@ -118,8 +118,8 @@ fn two_that_are_driven_together_resist_as_they_should() {
 }
 
 /// The force that holds a particle beside a free one under shear also holds it as a force, and the free one
-/// moves alike: between walls, in Couette flow and in a sheared box. In so short a step films do not care which
-/// side yields.
+/// moves alike: between walls, in Couette flow and in a sheared box. In so short a step films do not care
+/// which side yields.
 #[test]
 fn what_holds_a_particle_is_a_force_like_any_other() {
     for (dimension, boundary, measured) in

@@ -57,8 +57,8 @@ fn without_forces_time_is_the_integral_of_the_viscosity() {
     assert!(sum > 0.5);
 }
 
-/// With repulsion the rate is that which makes the stress what it is to be: at this rate viscosity and velocities
-/// are the same.
+/// With repulsion the rate is that which makes the stress what it is to be: at this rate viscosity and
+/// velocities are the same.
 fn at_the_rate_that_follows_the_stress_is_that_given<const D: usize>(measured: [f64; 2])
 where
     gluey_geom::Dim<D>: gluey_geom::Space<D>,
@@ -99,7 +99,8 @@ fn with_repulsion_the_rate_makes_the_stress() {
     at_the_rate_that_follows_the_stress_is_that_given::<3>([1e-5, 1e-5]);
 }
 
-/// Sheared forth and back in equal strains: at first the rate is that of free discs, then it depends on the way.
+/// Sheared forth and back in equal strains: at first the rate is that of free discs, then it depends on the
+/// way.
 #[test]
 fn sheared_back_the_rate_changes_its_sign() {
     let case = suspension(2, "shear_stress = 3.0\ntime = { step = 0.05, end = 0.4, reverse_at = 0.2 }");

@@ -60,8 +60,8 @@ fn moved(case: &Case, by: &[f64], copies: usize) -> Case {
     moved
 }
 
-/// How far particles went, less what the shear takes along where they began and less the way of the first, in mean
-/// radii, and the viscosity in every row.
+/// How far particles went, less what the shear takes along where they began and less the way of the first, in
+/// mean radii, and the viscosity in every row.
 fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) {
     let count = case.particles.len();
     ran(case, |csv| {
@@ -76,9 +76,9 @@ fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) 
     })
 }
 
-/// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell side
-/// by side go the same way, and so do all particles moved by any vector, up to the error of the mesh; nor does it
-/// know by which strain the cell is named.
+/// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell
+/// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh;
+/// nor does it know by which strain the cell is named.
 fn runs_do_not_know_the_seam<const D: usize>(end: f64, [copied, shifted, bent]: [f64; 3]) {
     let mut case = case(D, &format!("time = {{ step = 0.1, end = {end:?} }}"));
     case.flow.tolerance = 1e-9;

@@ -98,8 +98,8 @@ pub struct Case {
     #[serde(default = "one")]
     pub shear_rate: f64,
     /// Shear stress that drives a box that is sheared for ever, instead of a shear rate: that of fluid,
-    /// particles and their repulsion, without contacts. The run counts strain then, in `time.step`, `time.end`
-    /// and the column `t`, and velocities are by strain; time and shear rate are written to
+    /// particles and their repulsion, without contacts. The run counts strain then, in `time.step`,
+    /// `time.end` and the column `t`, and velocities are by strain; time and shear rate are written to
     /// `<name>-rheology.csv`. Unit: viscosity/time. Default: none, the rate is given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -111,10 +111,10 @@ pub struct Case {
     #[serde(default)]
     pub gravity: Option<Vec<f64>>,
     /// Force per unit of volume on fluid and particles alike, one coordinate per dimension: minus the mean
-    /// gradient of the pressure that drives fluid along a periodic axis. It needs a period along each axis with
-    /// a component, and walls or particles that are held to stand on. It is not reversed with the shear. In
-    /// `unfitted`. Unit: viscosity/(length time). Default: none, but in a box without walls where particles are
-    /// held that without which there would be a mean flow.
+    /// gradient of the pressure that drives fluid along a periodic axis. It needs a period along each axis
+    /// with a component, and walls or particles that are held to stand on. It is not reversed with the shear.
+    /// In `unfitted`. Unit: viscosity/(length time). Default: none, but in a box without walls where
+    /// particles are held that without which there would be a mean flow.
     #[schemars(length(min = 2, max = 3))]
     #[serde(default)]
     pub body_force: Option<Vec<f64>>,

@@ -4,78 +4,32 @@
 //! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x` and under the
 //! forces and torques of the case, and reads off the twists.
 
+mod error;
 mod estimate;
 mod fields;
 mod given;
 mod given_stress;
+mod params;
 mod prepared;
+mod stress_control;
 
 use std::time::Instant;
 
-use gluey_fem::{MeshError, TreeMesh};
+use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_stokes::{
-    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
-    SolverKind, StokesError, WarmStartError,
-};
+use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::case::{Case, Formulation, Lubrication, Solver};
+use crate::case::{Case, Lubrication};
 
-use given_stress::StressControl;
+use params::{flow_params, refinement, tree};
+use stress_control::StressControl;
 
+pub use error::FlowError;
 pub use estimate::{MeshEstimate, MeshSize};
 pub use prepared::prepared_flow;
-
-/// Why the finite-element flow failed.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FlowError {
-    /// In mesh, assembly or solution.
-    #[error(transparent)]
-    Stokes(#[from] StokesError),
-    /// The box is not made of cubes.
-    #[error(
-        "[domain]: a box of {extent:?} is not a small number of cubes; make the ratios of its edges simple, such as 2:1"
-    )]
-    Box {
-        /// Edge lengths.
-        extent: Vec<f64>,
-    },
-    /// What the next prediction starts from could not be turned into bytes or back.
-    #[error("the flow to start from cannot be stored or read")]
-    Stored(#[from] postcard::Error),
-    /// A flow to start from that is of other particles.
-    #[error("the flow to start from is one around {saved} particles, not {present}")]
-    Particles {
-        /// Particles of the stored flow.
-        saved: usize,
-        /// Particles here.
-        present: usize,
-    },
-    /// What drives a suspension is less than what particles that repel each other need at rest.
-    #[error(
-        "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
-         {at_rest:.6}; take a larger stress or less repulsion"
-    )]
-    NotDriven {
-        /// The stress that is given.
-        stress: f64,
-        /// That at rest.
-        at_rest: f64,
-    },
-    /// A flow to start from that is of another mesh.
-    #[error(transparent)]
-    WarmStart(#[from] WarmStartError),
-}
-
-impl From<MeshError> for FlowError {
-    fn from(error: MeshError) -> Self {
-        Self::Stokes(error.into())
-    }
-}
 
 /// Flows that the next prediction starts from, for checkpoints.
 #[derive(Serialize, Deserialize)]
@@ -132,8 +86,8 @@ where
     /// Motions of the particles that are held or driven while the shear is not reversed; empty if all are
     /// free.
     given: Vec<Option<Twist<D>>>,
-    /// Force per unit of volume on fluid and particles; where particles are held in a box without walls and it
-    /// is not given, it is what stops the mean flow.
+    /// Force per unit of volume on fluid and particles; where particles are held in a box without walls and
+    /// it is not given, it is what stops the mean flow.
     force_density: Option<Vector<D>>,
     /// Where the stress is given instead of the rate.
     control: Option<StressControl<D>>,
@@ -455,50 +409,4 @@ where
         (self.last_balls, self.last_positions, self.last_strain) = (balls, centers, strain);
         Ok(())
     }
-}
-
-/// The root cells along each axis of a box, and the level of the surfaces.
-fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
-    let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
-    let uneven = || FlowError::Box { extent: domain.extent().iter().copied().collect() };
-    roots.zip(case.surface_level()).ok_or_else(uneven)
-}
-
-/// Refinement of the mesh of a checked case, whose surfaces are at `level`.
-fn refinement(case: &Case, level: f64) -> Refinement {
-    let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
-    let surface = level as u8;
-    let rigid = case.flow.formulation == Formulation::RigidDofs;
-    let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
-    Refinement {
-        coarsest: mesh.coarsest_level.min(u32::from(surface)) as u8,
-        surface,
-        band: mesh.band,
-        gap_fraction: if rigid { rigid_dofs.gap_fraction } else { 0.0 },
-        gap_levels: case.gap_levels().min(levels_left) as u8,
-    }
-}
-
-fn flow_params<const D: usize>(case: &Case) -> FlowParams {
-    let flow = &case.flow;
-    let formulation = match flow.formulation {
-        Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
-            offset: case.rigid_offset(),
-            cut_cell_pressures: CutCellPressures::Aggregate,
-        },
-        Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
-        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted {
-            lubrication: match case.lubrication() {
-                Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
-                Lubrication::None => gluey_stokes::Lubrication::None,
-            },
-        },
-    };
-    let solver = match flow.solver {
-        Solver::Direct => SolverKind::Direct,
-        Solver::Multigrid => SolverKind::Multigrid,
-        Solver::Auto if D == 2 => SolverKind::Direct,
-        Solver::Auto => SolverKind::Multigrid,
-    };
-    FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance }
 }

@@ -3,6 +3,7 @@
 //! The dimension of a case is matched here and nowhere else: below, everything is compiled for it.
 
 mod checkpoint_file;
+mod contacts;
 mod error;
 mod frames;
 mod leftovers;
@@ -46,13 +47,11 @@ use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
+use contacts::Contacts;
 use frames::{Frames, StreamOptions};
 use log::Log;
 use recorder::Recorder;
 use tables::{TableMarks, Tables};
-
-/// Contact among particles some of which may move as they are told.
-type Contacts<const D: usize> = PairContact<D, WithFixed>;
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;

@@ -65,7 +65,8 @@ where
         parallel::visit_all(takes_part, &neighbours.candidates, admit)
     }
 
-    /// Refuses motions that are given and make particles overlap, or stick in a wall: nothing can yield there.
+    /// Refuses motions that are given and make particles overlap, or stick in a wall: nothing can yield
+    /// there.
     pub(super) fn check_given_motions(
         &self,
         step: &StepGeometry<'_, D>,

@@ -55,13 +55,14 @@ pub(super) fn check_motion(case: &Case, particle: &ParticleSpec, key: &Key, find
     };
     for (at, is_there) in [("velocity", particle.velocity.is_some()), ("spin", particle.spin.is_some())] {
         if particle.held && is_there {
-            unfit(at, at, "a particle that is not held".to_owned(), "held = true".to_owned());
+            let needs = "a particle that is not held".to_owned();
+            unfit(at, &format!("`{at}`"), needs, "held = true".to_owned());
         }
     }
     for (at, is_there) in [("force", particle.force.is_some()), ("torque", particle.torque.is_some())] {
         if is_there {
             let needs = "a particle that is free".to_owned();
-            unfit(at, at, needs, format!("`{name}`, by which it moves whatever acts on it"));
+            unfit(at, &format!("`{at}`"), needs, format!("`{name}`, by which it moves whatever acts on it"));
         }
     }
     if let Some((needs, found)) = other_model(case) {

@@ -22,8 +22,8 @@ pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut Finding
     }
 }
 
-/// Notes what acts from outside on a suspension that is driven by a stress: then it is not the stress alone that
-/// tells the rate.
+/// Notes what acts from outside on a suspension that is driven by a stress: then it is not the stress alone
+/// that tells the rate.
 pub(super) fn check_stress_alone(case: &Case, root: &Key, findings: &mut Findings) {
     if case.shear_stress.is_none() {
         return;

@@ -27,14 +27,15 @@ pub struct ParticleSpec {
     /// `<name>-forces.csv`. In `unfitted`. Default: false.
     #[serde(default, skip_serializing_if = "is_false")]
     pub held: bool,
-    /// Velocity at which it is driven, one coordinate per dimension: it moves so whatever the fluid does. It is
-    /// reversed with the shear, as that of walls is. In `unfitted`. Unit: length/time. Default: that of the
-    /// fluid, or 0 where `spin` is given.
+    /// Velocity at which it is driven, one coordinate per dimension: it moves so whatever the fluid does. It
+    /// is reversed with the shear, as that of walls is. In `unfitted`. Unit: length/time. Default: that of
+    /// the fluid, or 0 where `spin` is given.
     #[serde(default)]
     #[schemars(length(min = 2, max = 3))]
     pub velocity: Option<Vec<f64>>,
-    /// Spin with which it is driven: one number in 2D (positive counter-clockwise), three in 3D. It is reversed
-    /// with the shear. In `unfitted`. Unit: 1/time. Default: that of the fluid, or 0 where `velocity` is given.
+    /// Spin with which it is driven: one number in 2D (positive counter-clockwise), three in 3D. It is
+    /// reversed with the shear. In `unfitted`. Unit: 1/time. Default: that of the fluid, or 0 where
+    /// `velocity` is given.
     #[serde(default)]
     #[schemars(length(min = 1, max = 3))]
     pub spin: Option<Vec<f64>>,

@@ -1,34 +1,17 @@
 //! Shear at a given stress: the rate follows.
 //!
 //! The mean shear stress is `r A + B`, with `A` of the flow at the rate one and `B` of the flow that forces
-//! between particles make at rest, their own share included. Both are solved for on one mesh, so `r = (sigma - B)
-//! / A` is exact. Velocities count by the strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale with the
-//! flow; their stress is known after the step only and is no part of the stress that is given.
+//! between particles make at rest, their own share included. Both are solved for on one mesh, so `r = (sigma
+//! - B) / A` is exact. Velocities count by the strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale
+//! with the flow; their stress is known after the step only and is no part of the stress that is given.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, Flow, Stress};
 
-use super::{FlowError, StokesFlow};
-
-/// Control of the stress.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StressControl<const D: usize> {
-    /// The stress that is given, positive.
-    stress: f64,
-    /// Minus the mean product of the forces between particles with the lines between centres.
-    pub pair_stress: Matrix<D>,
-    /// The rate of the last flow, positive also while the shear is reversed.
-    pub rate: f64,
-}
-
-impl<const D: usize> StressControl<D> {
-    /// A suspension under this stress, at rest.
-    pub fn new(stress: f64) -> Self {
-        Self { stress, pair_stress: Matrix::zeros(), rate: 1.0 }
-    }
-}
+use super::StokesFlow;
+use super::error::FlowError;
 
 impl<const D: usize> StokesFlow<D>
 where

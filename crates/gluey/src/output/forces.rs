@@ -2,8 +2,8 @@
 //!
 //! Force and torque on each such particle by what holds it, about its centre: together with fluid, films,
 //! weight and repulsion they make it move as it is told. Without weight and free particles their sum is minus
-//! that of the force density on the box. Before them stand the mean velocity of fluid and particles over the box
-//! and the force density.
+//! that of the force density on the box. Before them stand the mean velocity of fluid and particles over the
+//! box and the force density.
 
 use std::path::{Path, PathBuf};
 

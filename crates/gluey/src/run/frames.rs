@@ -6,7 +6,7 @@ use gluey_contact::ContactModel;
 use gluey_geom::{Dim, Space};
 use gluey_suspension::Container;
 
-use super::Contacts;
+use super::contacts::Contacts;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};

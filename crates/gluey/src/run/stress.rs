@@ -6,7 +6,7 @@ use gluey_contact::{ContactError, ContactModel, ContactNetwork};
 use gluey_geom::{Dim, Matrix, Particle, Space, Vector};
 use gluey_motion::MeanStress;
 
-use super::Contacts;
+use super::contacts::Contacts;
 
 /// Minus the mean product of the contact forces with the lines between centres, in spheres that fill the
 /// periods of `contact`; nothing in 2D.

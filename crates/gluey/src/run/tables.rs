@@ -6,7 +6,7 @@ use gluey_contact::ContactModel;
 use gluey_geom::{Dim, Space};
 use gluey_motion::Hydrodynamics;
 
-use super::Contacts;
+use super::contacts::Contacts;
 use super::error::RunError;
 use super::stress::with_contacts;
 use crate::case::Case;

@@ -1,8 +1,8 @@
 //! Time where steps are those of the strain, because the stress is given and not the shear rate.
 //!
-//! Stokes flow has no memory: at a given stress a suspension goes through the same states against the strain as
-//! at the rate one, if forces between particles count as they do at that rate. Time is `int dgamma / r` with the
-//! rates `r` that the stress asks for, by the trapezoidal rule.
+//! Stokes flow has no memory: at a given stress a suspension goes through the same states against the strain
+//! as at the rate one, if forces between particles count as they do at that rate. Time is `int dgamma / r`
+//! with the rates `r` that the stress asks for, by the trapezoidal rule.
 
 use serde::{Deserialize, Serialize};
 

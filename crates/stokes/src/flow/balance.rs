@@ -1,9 +1,10 @@
 //! Flows without mean flow around bodies that are held in a box without walls.
 //!
 //! What is held takes up any force, so that the mean gradient of the pressure has to be given, or the mean
-//! velocity: then a uniform force `g` on fluid and bodies is sought. The flow is linear in it, `u = u_0 + sum_d
-//! g_d u_d`, with the flows `u_d` around bodies at rest that the force `e_d` drives, and `g` makes the mean
-//! vanish. The matrix of the mean velocities of the `u_d` is the permeability, symmetric and positive definite.
+//! velocity: then a uniform force `g` on fluid and bodies is sought. The flow is linear in it, `u = u_0 +
+//! sum_d g_d u_d`, with the flows `u_d` around bodies at rest that the force `e_d` drives, and `g` makes the
+//! mean vanish. The matrix of the mean velocities of the `u_d` is the permeability, symmetric and positive
+//! definite.
 
 use std::sync::Arc;
 

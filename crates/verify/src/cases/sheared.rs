@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Dim, Lattice, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, Flow, FlowSolver, Refinement};
 use gluey_testkit::reference::{Table, sheared_simple_cubic_lattice, sheared_square_lattice};
