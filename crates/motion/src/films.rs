@@ -338,8 +338,8 @@ where
                 break;
             }
         }
-        let given = targets.iter().filter(|target| target.film.is_given());
-        given.map(|target| self.check_given(target.film, twists)).collect::<Result<(), _>>()?;
+        let mut given = targets.iter().filter(|target| target.film.is_given());
+        given.try_for_each(|target| self.check_given(target.film, twists))?;
         for _ in 0..MOST_OPENINGS {
             let mut is_open = true;
             for target in targets.iter().filter(|target| !target.film.is_given()) {

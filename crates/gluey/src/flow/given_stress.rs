@@ -1,9 +1,9 @@
 //! Shear at a given stress: the rate follows.
 //!
 //! The mean shear stress is `r A + B`, with `A` of the flow at the rate one and `B` of the flow that forces
-//! between particles make at rest, their own share included. Both are solved for on one mesh, so `r = (sigma
-//! - B) / A` is exact. Velocities count by the strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale
-//! with the flow; their stress is known after the step only and is no part of the stress that is given.
+//! between particles make at rest, their own share included. Both are solved for on one mesh, so the rate
+//! `r = (sigma - B) / A` is exact. Velocities count by the strain, `u_1 + u_2 / r`, as at the rate one.
+//! Contacts scale with the flow; their stress is known after the step only and is no part of what is given.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space};
