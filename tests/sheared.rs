@@ -77,35 +77,40 @@ fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) 
 }
 
 /// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell
-/// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh;
-/// nor does it know by which strain the cell is named.
-fn runs_do_not_know_the_seam<const D: usize>(end: f64, [copied, shifted, bent]: [f64; 3]) {
+/// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh. The
+/// cell of the copies is another one from the strain on where only the tilt of the one wraps round.
+fn runs_do_not_know_the_seam<const D: usize>(end: f64, same: f64, [copied, shifted]: [[f64; 2]; 2])
+where
+    gluey_geom::Dim<D>: gluey_geom::Space<D>,
+{
     let mut case = case(D, &format!("time = {{ step = 0.1, end = {end:?} }}"));
     case.flow.tolerance = 1e-9;
     let (ways, viscosity) = way_and_viscosity::<D>(&case);
-    let miss = |other: &(Vec<Vector<D>>, Vec<f64>)| {
-        let of_ways = ways.iter().zip(&other.0).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        let of_rows = viscosity.iter().zip(&other.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        [of_ways, of_rows]
+    let largest = |differences: &mut dyn Iterator<Item = f64>| differences.fold(0.0, f64::max);
+    let miss = |ran: &(Vec<Vector<D>>, Vec<f64>), rows: usize| {
+        let of_rows = &mut viscosity.iter().zip(&ran.1).take(rows).map(|(a, b)| (a - b).abs());
+        [largest(&mut ways.iter().zip(&ran.0).map(|(a, b)| (a - b).norm())), largest(of_rows)]
     };
-    let still = [0.0; 3];
-    let copies = miss(&way_and_viscosity::<D>(&moved(&case, &still[..D], 2)));
-    println!("{D}D, 2 x 1 copies: {copies:?}");
-    assert!(copies.iter().all(|miss| *miss < 3.0 * copied), "{copies:?}");
+    let check = |what: &str, found: [f64; 2], measured: [f64; 2]| {
+        println!("{D}D, {what}: {found:?}");
+        assert!(found[0] <= 3.0 * measured[0] && found[1] <= 3.0 * measured[1], "{D}D, {what}: {found:?}");
+    };
+    let two = way_and_viscosity::<D>(&moved(&case, &[0.0; 3][..D], 2));
+    check("2 x 1 copies", miss(&two, usize::MAX), copied);
+    // Up to a strain of 0.4.
+    check("2 x 1 copies at first", [0.0, miss(&two, 5)[1]], [0.0, same]);
     let mut random = ChaCha8Rng::seed_from_u64(11);
     for _ in 0..2 {
         let by: Vec<f64> = (0..D).map(|_| random.random_range(0.0..1.0)).collect();
-        // Up in y the undisturbed velocity is larger by as much for all.
-        let there = miss(&way_and_viscosity::<D>(&moved(&case, &by, 1)));
-        println!("{D}D, moved by {by:?}: {there:?}");
-        assert!(there[0] < 3.0 * shifted && there[1] < 3.0 * bent, "{there:?}");
+        let there = way_and_viscosity::<D>(&moved(&case, &by, 1));
+        check(&format!("moved by {by:.3?}"), miss(&there, usize::MAX), shifted);
     }
 }
 
 #[test]
 fn runs_do_not_know_where_the_seam_is() {
-    runs_do_not_know_the_seam::<2>(0.7, [1e-6, 1e-2, 1e-2]);
-    runs_do_not_know_the_seam::<3>(0.2, [1e-6, 1e-2, 1e-2]);
+    runs_do_not_know_the_seam::<2>(0.7, 1e-6, [[4.7e-4, 1.2e-3], [1e-2, 1e-2]]);
+    runs_do_not_know_the_seam::<3>(0.2, 1e-6, [[1e-6, 1e-6], [1e-2, 1e-2]]);
 }
 
 /// Forward and back: the error is of second order in the time step.
