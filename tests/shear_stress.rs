@@ -87,14 +87,14 @@ where
         assert!(miss < 3.0 * measured[0] && difference < 3.0 * measured[1] * largest, "{miss} {difference}");
         viscosities.push(at_stress.viscosity[0]);
     }
-    // Repulsion counts less at the larger stress.
-    assert!((viscosities[0] - viscosities[1]).abs() > 0.01, "{viscosities:?}");
+    // The relative viscosity depends on the stress: repulsion counts less at the larger one.
+    assert!((viscosities[0] - viscosities[1]).abs() > 2e-3, "{viscosities:?}");
 }
 
 #[test]
 fn with_repulsion_the_rate_makes_the_stress() {
-    at_the_rate_that_follows_the_stress_is_that_given::<2>([4.1e-8, 1e-7]);
-    at_the_rate_that_follows_the_stress_is_that_given::<3>([1e-5, 1e-5]);
+    at_the_rate_that_follows_the_stress_is_that_given::<2>([4.1e-8, 7.2e-8]);
+    at_the_rate_that_follows_the_stress_is_that_given::<3>([6.5e-8, 8.7e-7]);
 }
 
 /// Sheared forth and back in equal strains: at first the rate is that of free discs, then it depends on the

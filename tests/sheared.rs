@@ -109,8 +109,8 @@ where
 
 #[test]
 fn runs_do_not_know_where_the_seam_is() {
-    runs_do_not_know_the_seam::<2>(0.7, 1e-6, [[4.7e-4, 1.2e-3], [1e-2, 1e-2]]);
-    runs_do_not_know_the_seam::<3>(0.2, 1e-6, [[1e-6, 1e-6], [1e-2, 1e-2]]);
+    runs_do_not_know_the_seam::<2>(0.7, 1e-6, [[4.7e-4, 1.2e-3], [9.2e-4, 1.1e-3]]);
+    runs_do_not_know_the_seam::<3>(0.2, 2.1e-10, [[1e-10, 2.1e-10], [5.5e-5, 7.4e-5]]);
 }
 
 /// Forward and back: the error is of second order in the time step.
