@@ -77,8 +77,8 @@ fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) 
 }
 
 /// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell
-/// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh. The
-/// cell of the copies is another one from the strain on where only the tilt of the one wraps round.
+/// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh.
+/// The cell of the copies is another one from the strain on where only the tilt of the one wraps round.
 fn runs_do_not_know_the_seam<const D: usize>(end: f64, same: f64, [copied, shifted]: [[f64; 2]; 2])
 where
     gluey_geom::Dim<D>: gluey_geom::Space<D>,
