@@ -1,20 +1,15 @@
 //! Particles that repel each other, in every model of their motion.
 
 use std::f64::consts::PI;
-use std::fs;
-use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use gluey::{Case, Progress, ProgressState, RunError, RunOptions, Silent, run};
+use gluey::Case;
 use gluey_geom::Vector;
 use gluey_motion::approach_mobility;
 use gluey_suspension::{Container, Repulsion, for_each_pair};
-use tempfile::TempDir;
 
-fn case(text: &str) -> Case {
-    Case::parse(text, "r.toml").unwrap_or_else(|error| panic!("{error}"))
-}
+#[path = "runs/mod.rs"]
+mod runs;
+use runs::{beside, case, centers, column, ran};
 
 /// Six discs at 0.2 in a box that is sheared, which repel each other.
 fn discs(cells_per_radius: f64, rest: &str) -> Case {
@@ -27,34 +22,9 @@ fn discs(cells_per_radius: f64, rest: &str) -> Case {
     ))
 }
 
-/// Columns of a file by name.
-fn column(path: &Path, name: &str) -> Vec<f64> {
-    let text = fs::read_to_string(path).expect("a table");
-    let place = text.lines().next().expect("a header").split(',').position(|n| n == name).expect(name);
-    let number =
-        |line: &str| line.split(',').nth(place).and_then(|cell| cell.parse().ok()).expect("a number");
-    text.lines().skip(1).map(number).collect()
-}
-
-/// Centres in every row.
-fn centers<const D: usize>(csv: &Path, count: usize) -> Vec<Vec<Vector<D>>> {
-    let columns: Vec<Vec<Vec<f64>>> = (1..=count)
-        .map(|k| ["x", "y", "z"][..D].iter().map(|axis| column(csv, &format!("{axis}{k}"))).collect())
-        .collect();
-    let row = |row: usize| columns.iter().map(|x| Vector::from_fn(|d, _| x[d][row])).collect();
-    (0..columns[0][0].len()).map(row).collect()
-}
-
-fn run_in(case: &Case, folder: &Path) -> std::path::PathBuf {
-    let csv = folder.join("t.csv");
-    run(case, &RunOptions::csv(&csv), &Silent).unwrap_or_else(|error| panic!("{error}"));
-    csv
-}
-
 /// Two spheres in a fluid at rest part as their mobility says: `dg/dt = 2 m(g) F(g) / (6 pi a)`.
 #[test]
 fn a_pair_at_rest_parts_as_its_mobility_says() {
-    let folder = TempDir::new().expect("a folder");
     let case = case(
         "name = \"pair\"\ndimension = 3\nshear_rate = 0.0\nrepulsion = { force = 0.2, range = 0.2 }\n\
          particles = [{ position = [0.448, 0.5, 0.5], radius = 0.05 },\n\
@@ -62,8 +32,7 @@ fn a_pair_at_rest_parts_as_its_mobility_says() {
          time = { step = 0.002, end = 0.4 }\ncontact = { strategy = \"none\" }\n\
          flow = { hydrodynamics = \"pair-mobility\" }",
     );
-    let csv = run_in(&case, folder.path());
-    let gaps = column(&csv, "gap12_over_a");
+    let (gaps, rows) = ran(&case, |csv| (column(csv, "gap12_over_a"), centers::<3>(csv, 2)));
     let speed =
         |gap: f64| 2.0 * 0.2 * (-gap / 0.2f64).exp() * approach_mobility(gap) / (6.0 * PI * 0.05 * 0.05);
     let (mut gap, substep, mut worst) = (0.08, 0.0001, 0.0f64);
@@ -77,7 +46,7 @@ fn a_pair_at_rest_parts_as_its_mobility_says() {
     }
     println!("gap from {} to {gap}, worst {worst:e}", gaps[0]);
     assert!(gap > 0.3 && worst < 1.5e-5, "{worst:e}");
-    let middle = centers::<3>(&csv, 2).iter().map(|x| (x[0] + x[1]) * 0.5).next_back().expect("a row");
+    let middle = rows.iter().map(|x| (x[0] + x[1]) * 0.5).next_back().expect("a row");
     assert!((middle - Vector::repeat(0.5)).norm() < 1e-14, "{middle}");
 }
 
@@ -100,8 +69,7 @@ fn the_flow_answers_as_to_given_forces() {
     let [first, second] = [(0.025, 0.1), (0.045, 0.08)].map(|(gap, a)| law.at::<2>(gap, [a, f64::INFINITY]));
     let given = [(pair, first), (-pair, second)].map(|(x, y)| format!(", force = [{x:e}, {y:e}]"));
     let move_of = |text: &str| {
-        let folder = TempDir::new().expect("a folder");
-        let rows = centers::<2>(&run_in(&case(text), folder.path()), 2);
+        let rows = ran(&case(text), |csv| centers::<2>(csv, 2));
         [0, 1].map(|k| rows[1][k] - rows[0][k])
     };
     let found = move_of(&text(["", ""], "repulsion = { force = 2.0, range = 0.2 }"));
@@ -127,16 +95,13 @@ fn energy(law: &Repulsion, centers: &[Vector<2>], strain: f64) -> f64 {
 /// rate, less what goes into the energy of repulsion.
 #[test]
 fn power_is_dissipated_or_stored() {
-    let folder = TempDir::new().expect("a folder");
     let case = discs(4.0, "time = { step = 0.005, end = 0.1 }\nrepulsion = { force = 10.0, range = 0.3 }");
-    let csv = run_in(&case, folder.path());
-    let rheology = folder.path().join("t-rheology.csv");
-    let [viscosity, by_dissipation, share, strain] =
-        ["viscosity", "viscosity_by_dissipation", "viscosity_of_repulsion", "strain"]
-            .map(|name| column(&rheology, name));
+    let names = ["viscosity", "viscosity_by_dissipation", "viscosity_of_repulsion", "strain"];
+    let (columns, rows) =
+        ran(&case, |csv| (names.map(|name| column(&beside(csv, "rheology"), name)), centers::<2>(csv, 6)));
+    let [viscosity, by_dissipation, share, strain] = columns;
     let law = case.repulsion().expect("a law");
-    let energies: Vec<f64> =
-        centers::<2>(&csv, 6).iter().zip(&strain).map(|(x, strain)| energy(&law, x, *strain)).collect();
+    let energies: Vec<f64> = rows.iter().zip(&strain).map(|(x, strain)| energy(&law, x, *strain)).collect();
     let (mut worst, mut largest) = (0.0f64, [0.0f64; 2]);
     for k in 1..energies.len() - 1 {
         let stored = (energies[k + 1] - energies[k - 1]) / 0.01;
@@ -147,39 +112,12 @@ fn power_is_dissipated_or_stored() {
     assert!(worst < 6e-3 && largest.iter().all(|part| *part > 0.1), "{worst} {largest:?}");
 }
 
-/// Interrupts a run when it has reached a step.
-struct StopAt(usize, Arc<AtomicBool>);
-
-impl Progress for StopAt {
-    fn report(&self, state: &ProgressState<'_>) {
-        if state.step >= self.0 {
-            self.1.store(true, Ordering::Relaxed);
-        }
-    }
-}
-
 #[test]
 fn runs_resume_bit_by_bit() {
-    let folder = TempDir::new().expect("a folder");
     let case = discs(
         2.0,
         "shear_rate = 2.0\ntime = { step = 0.05, end = 0.4, reverse_at = 0.25 }\n\
          repulsion = { force = 0.5 }",
     );
-    let whole = run_in(&case, folder.path());
-    let csv = folder.path().join("parts.csv");
-    let checkpoint = folder.path().join("c.checkpoint");
-    let interrupt = Arc::new(AtomicBool::new(false));
-    let options = RunOptions { checkpoint: Some(checkpoint.clone()), ..RunOptions::csv(&csv) };
-    let stopped = RunOptions { interrupt: Some(interrupt.clone()), ..options.clone() };
-    match run(&case, &stopped, &StopAt(3, interrupt)) {
-        Err(RunError::Interrupted { .. }) => {}
-        other => panic!("{other:?}"),
-    }
-    let resumed = RunOptions { resume: Some(checkpoint), ..options };
-    run(&case, &resumed, &Silent).unwrap_or_else(|error| panic!("{error}"));
-    let read = |path: &Path| fs::read_to_string(path).expect("a file");
-    assert_eq!(read(&whole), read(&csv));
-    let [whole, parts] = ["t", "parts"].map(|name| folder.path().join(format!("{name}-rheology.csv")));
-    assert_eq!(read(&whole), read(&parts));
+    runs::resumes_bit_by_bit(&case, 3, &["rheology"]);
 }

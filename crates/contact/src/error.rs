@@ -159,6 +159,14 @@ pub enum ContactError {
         /// The contacts, sorted.
         pairs: Vec<PairKey>,
     },
+    /// Two particles that only move as they are told, and are told to overlap.
+    #[error("the motions that {pair} are given make them overlap: gap {gap:e}")]
+    Given {
+        /// The particles.
+        pair: PairKey,
+        /// Their gap at the end of the step; unit: length.
+        gap: f64,
+    },
     /// The projection did not converge in so many iterations.
     #[error(
         "the contact projection stands at a residual of {residual:e} (tolerance {tolerance:e}) after {iterations} \

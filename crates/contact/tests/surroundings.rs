@@ -69,6 +69,28 @@ fn a_fixed_disc_is_not_pushed() {
     assert!((after[1].x + 1.0).abs() < 1e-12 && (after[2].x - 1.0).abs() < 1e-12, "{after:?}");
 }
 
+/// Two fixed discs are told to meet, or one to go through a wall; no force can keep them from it.
+#[test]
+fn motions_that_are_given_may_not_make_discs_overlap() {
+    let domain = Domain { walls: vec![Wall::new(&at(0.0, -1.0), &at(0.0, 1.0))], ..Domain::default() };
+    let mut contact = PairContact::with_mobility(inelastic(), WithFixed::new([0, 1])).within(domain);
+    let positions = [at(0.0, 0.5), at(2.5, 0.5), at(8.0, 0.5)];
+    let still = at(0.0, 0.0);
+    let mut told = |first: [f64; 2]| {
+        let velocity = at(first[0], first[1]) / RATE;
+        correct(&mut contact, &positions, &[1.0; 3], &[velocity, still, still])
+    };
+    assert!(told([0.4, -0.4]).is_ok());
+    for (first, gap) in [([1.0, 0.0], -0.5), ([0.0, -1.0], -0.5)] {
+        match told(first) {
+            Err(ContactError::Given { pair, gap: found }) => {
+                assert!(pair.particles().0 == 0 && (found - gap).abs() < 1e-12, "{pair} {found}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
 #[test]
 fn discs_meet_across_the_border_and_their_memory_stays() {
     let domain = Domain::default().with_period(0, 6.0);

@@ -26,6 +26,8 @@ mod findings;
 mod flow;
 mod forces;
 mod form;
+mod given;
+mod given_stress;
 mod keys;
 mod load;
 mod locate;
@@ -94,12 +96,27 @@ pub struct Case {
     /// 1/time. Default: 1.
     #[serde(default = "one")]
     pub shear_rate: f64,
+    /// Shear stress that drives a box that is sheared for ever, instead of a shear rate: that of fluid,
+    /// particles and their repulsion, without contacts. The run counts strain then, in `time.step`,
+    /// `time.end` and the column `t`, and velocities are by strain; time and shear rate are written to
+    /// `<name>-rheology.csv`. Unit: viscosity/time. Default: none, the rate is given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub shear_stress: Option<f64>,
     /// Weight of the particles per unit of volume (in 2D: area), less that of the fluid: `(rho_s - rho_f) g`,
     /// one coordinate per dimension. It is not reversed with the shear. Unit: viscosity/(length time).
     /// Default: none.
     #[schemars(length(min = 2, max = 3))]
     #[serde(default)]
     pub gravity: Option<Vec<f64>>,
+    /// Force per unit of volume on fluid and particles alike, one coordinate per dimension: minus the mean
+    /// gradient of the pressure that drives fluid along a periodic axis. It needs a period along each axis
+    /// with a component, and walls or particles that are held to stand on. It is not reversed with the shear.
+    /// In `unfitted`. Unit: viscosity/(length time). Default: none, but in a box without walls where
+    /// particles are held that without which there would be a mean flow.
+    #[schemars(length(min = 2, max = 3))]
+    #[serde(default)]
+    pub body_force: Option<Vec<f64>>,
     /// Name of a reference solution to compare with. Default: none.
     #[schemars(schema_with = "references")]
     #[serde(default)]
@@ -242,9 +259,10 @@ impl Case {
         self.flow.hydrodynamics == Hydrodynamics::Stokes && self.domain.boundary == Boundary::Sheared
     }
 
-    /// Whether there is a stress to compute: where the box is sheared, and not at the rate 0.
+    /// Whether there is a stress to compute: where the box is sheared, not at the rate 0, and all particles
+    /// are free. What acts on others from outside is no stress of the suspension.
     pub fn has_rheology(&self) -> bool {
-        self.is_sheared() && self.shear_rate != 0.0
+        self.is_sheared() && self.shear_rate != 0.0 && !self.gives_motions()
     }
 
     /// Surroundings of the particles: walls below and above (y), which move along themselves, and the

@@ -25,7 +25,7 @@ use crate::simulation::{RestoreError, SimulationState};
 
 const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
 const DIGEST_LENGTH: usize = 32;
 const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
@@ -44,6 +44,8 @@ where
     pub output: CsvMarks,
     /// How far that of the rheology had come, where there is one.
     pub rheology: Option<Mark>,
+    /// How far that of what holds particles had come, where there is one.
+    pub forces: Option<Mark>,
     /// How far that of the solver had come.
     pub solver: Mark,
     /// Wall time so far, phase by phase.

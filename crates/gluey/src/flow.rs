@@ -4,63 +4,32 @@
 //! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x` and under the
 //! forces and torques of the case, and reads off the twists.
 
+mod error;
 mod estimate;
 mod fields;
+mod given;
+mod given_stress;
+mod params;
 mod prepared;
+mod stress_control;
 
 use std::time::Instant;
 
-use gluey_fem::{MeshError, TreeMesh};
+use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_stokes::{
-    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement,
-    SolverKind, StokesError, WarmStartError,
-};
+use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
+use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::case::{Case, Formulation, Lubrication, Solver};
+use crate::case::{Case, Lubrication};
 
+use params::{flow_params, refinement, tree};
+use stress_control::StressControl;
+
+pub use error::FlowError;
 pub use estimate::{MeshEstimate, MeshSize};
 pub use prepared::prepared_flow;
-
-/// Why the finite-element flow failed.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FlowError {
-    /// In mesh, assembly or solution.
-    #[error(transparent)]
-    Stokes(#[from] StokesError),
-    /// The box is not made of cubes.
-    #[error(
-        "[domain]: a box of {extent:?} is not a small number of cubes; make the ratios of its edges simple, such as 2:1"
-    )]
-    Box {
-        /// Edge lengths.
-        extent: Vec<f64>,
-    },
-    /// What the next prediction starts from could not be turned into bytes or back.
-    #[error("the flow to start from cannot be stored or read")]
-    Stored(#[from] postcard::Error),
-    /// A flow to start from that is of other particles.
-    #[error("the flow to start from is one around {saved} particles, not {present}")]
-    Particles {
-        /// Particles of the stored flow.
-        saved: usize,
-        /// Particles here.
-        present: usize,
-    },
-    /// A flow to start from that is of another mesh.
-    #[error(transparent)]
-    WarmStart(#[from] WarmStartError),
-}
-
-impl From<MeshError> for FlowError {
-    fn from(error: MeshError) -> Self {
-        Self::Stokes(error.into())
-    }
-}
 
 /// Flows that the next prediction starts from, for checkpoints.
 #[derive(Serialize, Deserialize)]
@@ -114,6 +83,14 @@ where
     /// are none.
     wrenches: Vec<Wrench<D>>,
     acting: Vec<Wrench<D>>,
+    /// Motions of the particles that are held or driven while the shear is not reversed; empty if all are
+    /// free.
+    given: Vec<Option<Twist<D>>>,
+    /// Force per unit of volume on fluid and particles; where particles are held in a box without walls and
+    /// it is not given, it is what stops the mean flow.
+    force_density: Option<Vector<D>>,
+    /// Where the stress is given instead of the rate.
+    control: Option<StressControl<D>>,
     last: Option<Flow<D>>,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
@@ -155,6 +132,9 @@ where
         radii,
         wrenches: case.wrenches(),
         acting: case.wrenches(),
+        given: case.given_twists(),
+        force_density: case.force_density(),
+        control: case.shear_stress.map(StressControl::new),
         last: None,
         last_balls: Vec::new(),
         last_positions: Vec::new(),
@@ -186,35 +166,72 @@ where
         }
     }
 
+    /// The motion with the undisturbed velocity at a point and its spin.
+    fn undisturbed_twist(&self) -> impl Fn(&Vector<D>) -> Twist<D> + use<D> {
+        let (velocity, rate) = (self.undisturbed(), self.rate());
+        move |x: &Vector<D>| {
+            let mut twist = Twist { velocity: velocity(x), ..Twist::default() };
+            // About z, the only axis in 2D and the last one in 3D.
+            twist.spin[Dim::<D>::ROT - 1] = -0.5 * rate;
+            twist
+        }
+    }
+
     /// The shear rate now.
     fn rate(&self) -> f64 {
         self.shear_rate * self.shear_factor
     }
 
     /// The flow in a box with walls or Couette flow around.
-    fn solve(&mut self, mesh: TreeMesh<D>, balls: &[Ball<D>]) -> Result<Flow<D>, FlowError> {
+    fn solve(
+        &mut self,
+        mesh: TreeMesh<D>,
+        balls: &[Ball<D>],
+        at: &[Particle<D>],
+    ) -> Result<Flow<D>, FlowError> {
         let shear = self.undisturbed();
-        let conditions = Conditions::boundary(&shear).with_wrenches(&self.acting);
+        let given = self.given_bodies(at, |_| Twist::default());
+        let density = self.force_density.unwrap_or_else(Vector::zeros);
+        let uniform = move |_: &Vector<D>| density;
+        let conditions = Conditions::boundary(&shear);
+        let conditions =
+            if density.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let conditions = match given[..] {
+            [] => conditions.with_wrenches(&self.acting),
+            _ => conditions.with_bodies(&given),
+        };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
-    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Forces of the case on the
-    /// particles are balanced by a uniform one on all of the box, which is a mean gradient of the pressure;
-    /// those set since are between particles, and their sum is zero.
+    /// The flow in a box that is sheared for ever, relative to the undisturbed one. Where all particles are
+    /// free, forces of the case on them are balanced by a uniform one on all of the box, which is a mean
+    /// gradient of the pressure; those set since are between particles, and their sum is zero. Where some are
+    /// held, these carry all of it; the mean gradient is that of the case, or stops the mean flow.
     fn solve_sheared(
         &mut self,
         mesh: TreeMesh<D>,
         balls: &[Ball<D>],
+        at: &[Particle<D>],
         with_stress: bool,
     ) -> Result<Flow<D>, FlowError> {
         let mut gradient = Matrix::<D>::zeros();
         gradient[(0, 1)] = self.rate();
+        let given = self.given_bodies(at, self.undisturbed_twist());
         let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
-        let back = -total / self.domain.extent().product();
+        let back = match given[..] {
+            [] => -total / self.domain.extent().product(),
+            _ => self.force_density.unwrap_or_else(Vector::zeros),
+        };
         let uniform = move |_: &Vector<D>| back;
-        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&self.acting);
+        let conditions = Conditions::in_linear_flow(&gradient);
+        let conditions = match given[..] {
+            [] => conditions.with_wrenches(&self.acting),
+            _ if self.force_density.is_none() => conditions.with_bodies(&given).without_mean_flow(),
+            _ => conditions.with_bodies(&given),
+        };
         let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
-        let conditions = if with_stress { conditions.with_stress() } else { conditions };
+        let has_stress = with_stress && given.is_empty();
+        let conditions = if has_stress { conditions.with_stress() } else { conditions };
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
@@ -251,19 +268,21 @@ where
         let mesh = self.mesh(&balls)?;
         let meshed = start.elapsed().as_secs_f64();
         let mut flow = match self.sheared {
-            None => self.solve(mesh, &balls)?,
-            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, with_stress)?,
+            None => self.solve(mesh, &balls, particles)?,
+            Some(_) if self.control.is_some() => self.solve_at_stress(mesh, &balls)?,
+            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, particles, with_stress)?,
         };
         flow.times.assembly += meshed;
         twists.copy_from_slice(&flow.twists);
         if self.sheared.is_some() {
-            let undisturbed = self.undisturbed();
-            let spin = -0.5 * self.rate();
+            let undisturbed = self.undisturbed_twist();
             for (twist, particle) in twists.iter_mut().zip(particles) {
-                twist.velocity += undisturbed(&particle.pose.position);
-                // About z, the only axis in 2D and the last one in 3D.
-                twist.spin[Dim::<D>::ROT - 1] += spin;
+                *twist = *twist + undisturbed(&particle.pose.position);
             }
+        }
+        // Without the rounding of what the flow is relative to.
+        for (index, twist) in twists.iter_mut().enumerate() {
+            *twist = self.given_twist(index).unwrap_or(*twist);
         }
         self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
         self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
@@ -292,8 +311,19 @@ where
         Ok(())
     }
 
+    fn set_pair_stress(&mut self, stress: &Matrix<D>) {
+        self.control.iter_mut().for_each(|control| control.pair_stress = *stress);
+    }
+
+    fn clock_rate(&self) -> f64 {
+        self.control.as_ref().map_or(1.0, |control| control.rate)
+    }
+
     fn stress(&self) -> Option<MeanStress<D>> {
         let stress = self.last.as_ref()?.stress.as_ref()?;
+        if !self.sheared?.with_stress {
+            return None;
+        }
         let volume = self.domain.extent().product();
         Some(MeanStress {
             rate: self.rate(),
@@ -306,6 +336,10 @@ where
         })
     }
 
+    fn holding(&self) -> Option<Holding<D>> {
+        self.last_holding()
+    }
+
     fn films(&self, reach: f64) -> Vec<Film<D>> {
         if !self.keeps_films_open {
             return Vec::new();
@@ -316,6 +350,7 @@ where
             second: film.side(1),
             branch: film.branch(),
             slide: self.slide(&film),
+            is_held: [0, 1].map(|side| film.side(side).is_some_and(|body| self.given_twist(body).is_some())),
             gap: film.gap,
             curvature_radius: film.curvature_radius(),
         };
@@ -374,50 +409,4 @@ where
         (self.last_balls, self.last_positions, self.last_strain) = (balls, centers, strain);
         Ok(())
     }
-}
-
-/// The root cells along each axis of a box, and the level of the surfaces.
-fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
-    let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
-    let uneven = || FlowError::Box { extent: domain.extent().iter().copied().collect() };
-    roots.zip(case.surface_level()).ok_or_else(uneven)
-}
-
-/// Refinement of the mesh of a checked case, whose surfaces are at `level`.
-fn refinement(case: &Case, level: f64) -> Refinement {
-    let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
-    let surface = level as u8;
-    let rigid = case.flow.formulation == Formulation::RigidDofs;
-    let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
-    Refinement {
-        coarsest: mesh.coarsest_level.min(u32::from(surface)) as u8,
-        surface,
-        band: mesh.band,
-        gap_fraction: if rigid { rigid_dofs.gap_fraction } else { 0.0 },
-        gap_levels: case.gap_levels().min(levels_left) as u8,
-    }
-}
-
-fn flow_params<const D: usize>(case: &Case) -> FlowParams {
-    let flow = &case.flow;
-    let formulation = match flow.formulation {
-        Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
-            offset: case.rigid_offset(),
-            cut_cell_pressures: CutCellPressures::Aggregate,
-        },
-        Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
-        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted {
-            lubrication: match case.lubrication() {
-                Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
-                Lubrication::None => gluey_stokes::Lubrication::None,
-            },
-        },
-    };
-    let solver = match flow.solver {
-        Solver::Direct => SolverKind::Direct,
-        Solver::Multigrid => SolverKind::Multigrid,
-        Solver::Auto if D == 2 => SolverKind::Direct,
-        Solver::Auto => SolverKind::Multigrid,
-    };
-    FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance }
 }

@@ -59,7 +59,7 @@ pub use run::{
     recorded_runs, run,
 };
 pub use shown::shown;
-pub use simulation::{RestoreError, Simulation, SimulationState, StepError};
+pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
 pub use trajectory::Row;
 

@@ -4,6 +4,7 @@
 mod claim;
 pub mod csv;
 mod draft;
+pub mod forces;
 mod pvd;
 pub mod rheology;
 pub mod solver_log;

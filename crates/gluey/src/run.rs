@@ -3,6 +3,7 @@
 //! The dimension of a case is matched here and nowhere else: below, everything is compiled for it.
 
 mod checkpoint_file;
+mod contacts;
 mod error;
 mod frames;
 mod leftovers;
@@ -15,6 +16,7 @@ mod recorded;
 mod recorder;
 mod resumption;
 mod stress;
+mod tables;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,7 +24,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use gluey_contact::{ContactModel, PairContact};
+use gluey_contact::{ContactModel, PairContact, WithFixed};
 use gluey_geom::{Dim, Particle, Space, Vector};
 
 pub use error::RunError;
@@ -38,7 +40,6 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
 use crate::output::csv::{CsvWriter, earlier_drafts};
-use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::solver_log::{self, SolverLog, SolverRow};
 use crate::output::{Claim, OutputError};
 use crate::progress::{Notice, Progress, ProgressState};
@@ -46,10 +47,11 @@ use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
+use contacts::Contacts;
 use frames::{Frames, StreamOptions};
 use log::Log;
 use recorder::Recorder;
-use stress::with_contacts;
+use tables::{TableMarks, Tables};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -104,10 +106,10 @@ where
     case: &'a Case,
     options: &'a RunOptions,
     progress: &'a dyn Progress,
-    simulation: Simulation<D, H, PairContact<D>>,
+    simulation: Simulation<D, H, Contacts<D>>,
     measures: Measures<D>,
     csv: CsvWriter<D>,
-    rheology: Option<RheologyWriter>,
+    tables: Tables,
     solver: SolverLog,
     frames: Frames<D>,
     checkpoints: Option<CheckpointFile>,
@@ -123,7 +125,7 @@ where
 impl<'a, const D: usize, H> Run<'a, D, H>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
@@ -138,28 +140,24 @@ where
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
-        if case.has_rheology() {
-            drafts.extend(rheology::earlier_drafts(&options.csv)?);
-        }
+        drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
         let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
-        let mut rheology = None;
-        let (csv, solver) = match &options.resume {
+        let (csv, tables, solver) = match &options.resume {
             None => {
-                if case.has_rheology() {
-                    rheology = Some(RheologyWriter::create::<D>(&options.csv)?);
-                }
                 if !drafts.is_empty() {
                     progress.notice(&Notice::EarlierDrafts { drafts });
                 }
-                (CsvWriter::create(&options.csv, case.particles.len())?, SolverLog::create(&options.csv)?)
+                let csv = CsvWriter::create(&options.csv, case.particles.len())?;
+                (csv, Tables::create::<D>(case, &options.csv)?, SolverLog::create(&options.csv)?)
             }
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?;
                 wall_before_s = checkpoint.wall_s;
-                let mark = checkpoint.rheology.as_ref();
-                rheology = mark.map(|mark| RheologyWriter::resume(&options.csv, mark)).transpose()?;
+                let Checkpoint { rheology, forces, .. } = checkpoint.clone();
+                let tables = Tables::resume(&options.csv, &TableMarks { rheology, forces })?;
                 let solver = SolverLog::resume(&options.csv, &checkpoint.solver, &checkpoint.phases)?;
-                (go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?, solver)
+                let csv = go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?;
+                (csv, tables, solver)
             }
         };
         let first_step = simulation.step_index();
@@ -173,7 +171,7 @@ where
             simulation,
             measures,
             csv,
-            rheology,
+            tables,
             solver,
             frames,
             checkpoints,
@@ -202,7 +200,7 @@ where
         let flow = self.simulation.statistics();
         self.frames.finish()?;
         self.csv.finish()?;
-        self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
+        self.tables.finish()?;
         self.solver.finish()?;
         Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
     }
@@ -259,16 +257,10 @@ where
 
     fn write(&mut self) -> Result<(), RunError> {
         let simulation = &self.simulation;
-        let (step, time) = (simulation.step_index(), simulation.time());
-        let (particles, twists) = (simulation.particles(), simulation.twists());
+        let (time, particles, twists) = (simulation.time(), simulation.particles(), simulation.twists());
         let domain = simulation.contact().domain();
         let smallest_gap_over_a = self.csv.write(&Row { time, particles, twists, domain })?;
-        if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
-            let stress = with_contacts(stress, simulation.contact(), particles)
-                .map_err(|source| StepError::Contact { step, time, source })?;
-            let strain = simulation.strain();
-            rheology.write(&Rheology { time, strain, stress: &stress, smallest_gap_over_a })?;
-        }
+        self.tables.write(simulation, smallest_gap_over_a)?;
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
         self.frames.write(self.case, simulation)?;
@@ -331,10 +323,12 @@ where
     /// start from.
     fn remember(&mut self) -> Result<(), RunError> {
         if self.checkpoints.is_some() {
+            let TableMarks { rheology, forces } = self.tables.marks();
             self.last_good = Some(Checkpoint {
                 state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
                 output: self.csv.marks(),
-                rheology: self.rheology.as_ref().map(RheologyWriter::mark),
+                rheology,
+                forces,
                 solver: self.solver.mark(),
                 phases: self.simulation.phases().clone(),
                 wall_s: self.wall_s(),
@@ -347,7 +341,7 @@ where
     fn save(&mut self) -> Result<(), OutputError> {
         let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
         self.csv.sync()?;
-        self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
+        self.tables.sync()?;
         self.solver.sync()?;
         self.frames.flush()?;
         file.write(checkpoint, self.case, self.progress)?;
@@ -398,14 +392,14 @@ fn panic_message(payload: &(dyn Any + Send)) -> String {
 /// Brings a simulation and its measures to where `checkpoint`, which was read from `path`, is, and gives the
 /// files of rows that belong to it.
 fn go_on<const D: usize, H>(
-    simulation: &mut Simulation<D, H, PairContact<D>>,
+    simulation: &mut Simulation<D, H, Contacts<D>>,
     measures: &mut Measures<D>,
     checkpoint: Checkpoint<D>,
     [path, csv]: [&Path; 2],
 ) -> Result<CsvWriter<D>, RunError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
@@ -418,13 +412,14 @@ where
 }
 
 /// A case at time 0.
-fn simulation<const D: usize, H>(case: &Case, hydrodynamics: H) -> Simulation<D, H, PairContact<D>>
+fn simulation<const D: usize, H>(case: &Case, hydrodynamics: H) -> Simulation<D, H, Contacts<D>>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
-    let contact = PairContact::new(case.contact.params()).within(case.surroundings());
+    let fixed = WithFixed::new(case.given_particles());
+    let contact = PairContact::with_mobility(case.contact.params(), fixed).within(case.surroundings());
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
     if case.has_forces() {
@@ -436,11 +431,12 @@ where
     if !case.is_sheared() {
         return simulation;
     }
-    simulation.sheared(Sliding {
+    let simulation = simulation.sheared(Sliding {
         rate: case.shear_rate,
         height: case.upper()[1] - case.lower()[1],
         stress_every: case.rheology.every,
-    })
+    });
+    if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
 }
 
 /// The particles of a checked case.

@@ -1,20 +1,19 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
+mod error;
 mod repelling;
+mod strain_clock;
 
-use gluey_contact::{
-    BodyStep, Contact, ContactError, ContactModel, ContactReport, ContactState, Domain, MemoryError,
-};
+use gluey_contact::{BodyStep, Contact, ContactModel, ContactReport, ContactState, Domain};
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
-use gluey_motion::{
-    Fields, FilmClosed, FlowStatistics, Hydrodynamics, Integrator, MeanStress, NoForces, ResumeError, Scheme,
-};
+use gluey_motion::{Fields, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, Scheme};
 use gluey_suspension::Repulsion;
-use thiserror::Error;
 
 use crate::phases::PhaseTable;
-use crate::shown::shown;
 use repelling::Repelling;
+
+pub use error::{RestoreError, StepError};
+pub use strain_clock::StrainClock;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
 ///
@@ -47,6 +46,8 @@ where
     reversed: bool,
     sliding: Option<Sliding>,
     repelling: Option<Repelling<D>>,
+    /// Time, where steps are those of the strain.
+    clock: Option<StrainClock>,
     /// Whether forces act that stay when the shear is reversed.
     has_forces: bool,
     strain: f64,
@@ -73,104 +74,6 @@ pub struct Sliding {
     pub stress_every: usize,
 }
 
-/// A step could not be done.
-#[derive(Debug, Error)]
-pub enum StepError<E: std::error::Error + 'static> {
-    /// The flow could not be computed.
-    #[error("the flow failed in step {step} (t = {})", shown(*time))]
-    Flow {
-        /// Steps done before.
-        step: usize,
-        /// Time at the start of the step.
-        time: f64,
-        /// Why.
-        source: E,
-    },
-    /// Particles repel each other, and the model of their motion does not answer to forces.
-    #[error("forces failed in step {step} (t = {})", shown(*time))]
-    Forces {
-        /// Steps done before.
-        step: usize,
-        /// Time at the start of the step.
-        time: f64,
-        /// Why.
-        source: NoForces,
-    },
-    /// Contact could not be resolved.
-    #[error("contact failed in step {step} (t = {})", shown(*time))]
-    Contact {
-        /// Steps done before.
-        step: usize,
-        /// Time at the start of the step.
-        time: f64,
-        /// Why.
-        source: ContactError,
-    },
-    /// A film could not be kept open.
-    #[error("motion failed in step {step} (t = {})", shown(*time))]
-    Film {
-        /// Steps done before.
-        step: usize,
-        /// Time at the start of the step.
-        time: f64,
-        /// Why.
-        source: FilmClosed,
-    },
-    /// A velocity is infinite or not a number.
-    #[error("the velocity of particle {particle} is not finite in step {step} (t = {})", shown(*time))]
-    NotFinite {
-        /// Its number, from 1.
-        particle: usize,
-        /// Steps done before.
-        step: usize,
-        /// Time at the start of the step.
-        time: f64,
-    },
-}
-
-impl<E: std::error::Error + 'static> StepError<E> {
-    /// The same for a wider type of flow errors.
-    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> StepError<W> {
-        match self {
-            Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
-            Self::Forces { step, time, source } => StepError::Forces { step, time, source },
-            Self::Contact { step, time, source } => StepError::Contact { step, time, source },
-            Self::Film { step, time, source } => StepError::Film { step, time, source },
-            Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
-        }
-    }
-}
-
-/// A simulation cannot go on from a state.
-#[derive(Debug, Error)]
-pub enum RestoreError<E: std::error::Error + 'static> {
-    /// It is of other particles.
-    #[error("the state is one of {saved} particles, which are not the {present} particles here")]
-    Particles {
-        /// Particles of the state.
-        saved: usize,
-        /// Particles of the simulation.
-        present: usize,
-    },
-    /// Its flow does not fit.
-    #[error(transparent)]
-    Flow(#[from] ResumeError<E>),
-    /// Its contacts are none.
-    #[error(transparent)]
-    Contact(#[from] MemoryError),
-}
-
-impl<E: std::error::Error + 'static> RestoreError<E> {
-    /// The same for a wider type of flow errors.
-    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> RestoreError<W> {
-        match self {
-            Self::Particles { saved, present } => RestoreError::Particles { saved, present },
-            Self::Flow(error) => RestoreError::Flow(error.widen()),
-            Self::Contact(error) => RestoreError::Contact(error),
-        }
-    }
-}
-
 /// Everything a simulation needs to go on as if it had never stopped.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "")]
@@ -184,6 +87,8 @@ where
     pub reversed: bool,
     /// Shear strain of the periodic images, where they slide.
     pub strain: f64,
+    /// Time, where steps are those of the strain.
+    pub clock: Option<StrainClock>,
     /// Particles.
     pub particles: Vec<Particle<D>>,
     /// Velocity history.
@@ -209,6 +114,7 @@ where
             reversed: false,
             sliding: None,
             repelling: None,
+            clock: None,
             has_forces: false,
             strain: 0.0,
             radii: particles.iter().map(|particle| particle.radius).collect(),
@@ -240,6 +146,19 @@ where
     #[must_use]
     pub fn under_forces(self) -> Self {
         Self { has_forces: true, ..self }
+    }
+
+    /// The same where the shear stress is given: steps are those of the strain, as at the shear rate one, and
+    /// the flow tells at which rate that is.
+    #[must_use]
+    pub fn at_given_stress(self) -> Self {
+        Self { clock: Some(StrainClock::default()), ..self }
+    }
+
+    /// Time and shear rate at the last prediction, where steps are those of the strain.
+    pub fn time_and_rate(&self) -> Option<[f64; 2]> {
+        let rate = self.hydrodynamics.clock_rate() * if self.reversed { -1.0 } else { 1.0 };
+        self.clock.as_ref().map(|clock| [clock.time(), rate])
     }
 
     /// Shear strain of the periodic images, where they slide; zero elsewhere.
@@ -279,6 +198,8 @@ where
         let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
         self.book_flow(start.elapsed().as_secs_f64());
         predicted.map_err(|source| StepError::Flow { step, time, source })?;
+        let rate = self.hydrodynamics.clock_rate();
+        self.clock.iter_mut().for_each(|clock| clock.reach(step, self.dt, rate));
         match self.twists.iter().position(|twist| !is_finite(twist)) {
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),
@@ -294,6 +215,7 @@ where
         self.phases
             .time("flow", || {
                 repelling.update(particles, tilt);
+                hydrodynamics.set_pair_stress(&repelling.stress);
                 hydrodynamics.set_wrenches(&repelling.wrenches)
             })
             .map_err(|source| StepError::Forces { step, time, source })
@@ -405,7 +327,13 @@ where
     pub fn stress(&self) -> Option<MeanStress<D>> {
         let stress = self.hydrodynamics.stress()?;
         let of_repulsion = self.repelling.as_ref().map_or(stress.of_repulsion, |repelling| repelling.stress);
+        let of_repulsion = of_repulsion / self.hydrodynamics.clock_rate();
         Some(MeanStress { of_repulsion, ..stress })
+    }
+
+    /// What held the particles that move as they are told at the last prediction, if there are any.
+    pub fn holding(&self) -> Option<Holding<D>> {
+        self.hydrodynamics.holding()
     }
 
     /// Size and effort of the last prediction.
@@ -432,6 +360,7 @@ where
             step: self.step,
             reversed: self.reversed,
             strain: self.strain,
+            clock: self.clock.clone(),
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
             contact: self.contact.checkpoint(),
@@ -455,6 +384,7 @@ where
         self.step = state.step;
         self.reversed = state.reversed;
         self.strain = state.strain;
+        self.clock = state.clock;
         self.particles = state.particles;
         self.integrator = state.integrator;
         Ok(())

@@ -34,6 +34,9 @@ pub struct Film<const D: usize> {
     /// 10.1088/0022-3719/5/15/006). Taken as constant in the step and the one before, but that it changes
     /// its sign with the flow. Zero for the particle itself and for walls.
     pub slide: Vector<D>,
+    /// Whether the particle, and its partner, move as they are told and yield to nothing. Walls never yield,
+    /// whatever is said of them here.
+    pub is_held: [bool; 2],
     /// Distance of the surfaces; unit: length.
     pub gap: f64,
     /// `A`, with `2/A = 1/a + 1/b`; unit: length.
@@ -64,7 +67,7 @@ const OPENING: f64 = 1e-2;
 
 /// A gap that could not be kept open.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the film between {} would close: its gap of {gap} becomes {left} in a step; take smaller steps", names(*first, *second))]
+#[error("the film between {} would close: its gap of {gap} becomes {left} in a step; {}", names(*first, *second), cure(*is_given))]
 pub struct FilmClosed {
     /// Index of the particle, from 0; messages count from 1.
     pub first: usize,
@@ -74,12 +77,21 @@ pub struct FilmClosed {
     pub gap: f64,
     /// Gap after it.
     pub left: f64,
+    /// Whether both move as they are told.
+    pub is_given: bool,
 }
 
 fn names(first: usize, second: Option<usize>) -> String {
     match second {
         Some(second) => format!("particles {} and {}", first + 1, second + 1),
         None => format!("particle {} and a wall", first + 1),
+    }
+}
+
+fn cure(is_given: bool) -> &'static str {
+    match is_given {
+        true => "both move as the case tells them to: let them pass each other, or end before",
+        false => "take smaller steps",
     }
 }
 
@@ -123,6 +135,11 @@ struct Target<'a, const D: usize> {
 }
 
 impl<const D: usize> Film<D> {
+    /// Whether neither side can yield.
+    fn is_given(&self) -> bool {
+        self.is_held[0] && (self.is_held[1] || self.second.is_none())
+    }
+
     fn thinnest(&self) -> f64 {
         THINNEST * self.curvature_radius
     }
@@ -235,7 +252,7 @@ where
             let impulse = start + step.weight * force + step.history_weight * old_force;
             memory.push(Remembered { first, second, branch, force, impulse });
             let target = film.gap_of(impulse);
-            let is_corrected = gap.min(target) < film.reach_of_correction();
+            let is_corrected = !film.is_given() && gap.min(target) < film.reach_of_correction();
             targets.push(Target { film, gap: target, is_corrected });
         }
         targets.sort_by(|a, b| b.film.gap.total_cmp(&a.film.gap));
@@ -321,9 +338,11 @@ where
                 break;
             }
         }
+        let mut given = targets.iter().filter(|target| target.film.is_given());
+        given.try_for_each(|target| self.check_given(target.film, twists))?;
         for _ in 0..MOST_OPENINGS {
             let mut is_open = true;
-            for target in targets {
+            for target in targets.iter().filter(|target| !target.film.is_given()) {
                 let least = LEAST_SHARE * target.gap.min(target.film.reach_of_correction());
                 if self.gap_after(target.film, twists).0 < least {
                     is_open = false;
@@ -335,12 +354,23 @@ where
                 return Ok(());
             }
         }
-        let closed = targets.iter().find_map(|Target { film, .. }| {
-            let left = self.gap_after(film, twists).0;
-            let Film { first, second, gap, .. } = **film;
-            (left <= 0.0).then_some(FilmClosed { first, second, gap, left })
-        });
+        let closed =
+            targets.iter().filter(|target| !target.film.is_given()).find_map(|Target { film, .. }| {
+                let left = self.gap_after(film, twists).0;
+                let Film { first, second, gap, .. } = **film;
+                (left <= 0.0).then_some(FilmClosed { first, second, gap, left, is_given: false })
+            });
         closed.map_or(Ok(()), Err)
+    }
+
+    /// Refuses given motions that close a film by more than rounding.
+    fn check_given(&self, film: &Film<D>, twists: &[Twist<D>]) -> Result<(), FilmClosed> {
+        let left = self.gap_after(film, twists).0;
+        let Film { first, second, gap, .. } = *film;
+        match left < -film.thinnest() {
+            true => Err(FilmClosed { first, second, gap, left, is_given: true }),
+            false => Ok(()),
+        }
     }
 
     /// Gap of a film after the step, and its direction.
@@ -360,14 +390,18 @@ where
 
     /// Brings a film to its gap and returns by how much it was off, relative to that.
     fn move_to(&self, target: &Target<'_, D>, twists: &mut [Twist<D>]) -> f64 {
-        let Film { first, second, .. } = *target.film;
+        let Film { first, second, is_held, .. } = *target.film;
         let (gap, n) = self.gap_after(target.film, twists);
         let velocity = n * ((target.gap - gap) / self.weight);
-        // By their mobilities, which go like the inverse of the radius.
-        let share = second.map_or(1.0, |second| {
-            let [a, b] = [first, second].map(|k| self.particles[k].radius);
-            b / (a + b)
-        });
+        // By their mobilities, which go like the inverse of the radius, or are zero.
+        let share = match (is_held, second) {
+            ([true, _], _) => 0.0,
+            ([_, true], _) | (_, None) => 1.0,
+            (_, Some(second)) => {
+                let [a, b] = [first, second].map(|k| self.particles[k].radius);
+                b / (a + b)
+            }
+        };
         twists[first].velocity -= velocity * share;
         if let Some(second) = second {
             twists[second].velocity += velocity * (1.0 - share);

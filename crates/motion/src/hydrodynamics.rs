@@ -38,8 +38,23 @@ where
         if wrenches.is_empty() { Ok(()) } else { Err(NoForces) }
     }
 
+    /// Sets the stress of the forces between particles that are among those set by
+    /// [`Hydrodynamics::set_wrenches`]: minus the mean product of forces and lines between centres.
+    fn set_pair_stress(&mut self, _stress: &Matrix<D>) {}
+
+    /// Shear rate of the last prediction over that by which its velocities count, where the stress is given
+    /// and the rate follows; one elsewhere.
+    fn clock_rate(&self) -> f64 {
+        1.0
+    }
+
     /// The mean stress of the last prediction; `None` where the model has none.
     fn stress(&self) -> Option<MeanStress<D>> {
+        None
+    }
+
+    /// What held the particles that move as they are told at the last prediction; `None` where all are free.
+    fn holding(&self) -> Option<Holding<D>> {
         None
     }
 
@@ -71,6 +86,21 @@ where
             bytes => Err(ResumeError::Foreign { bytes }),
         }
     }
+}
+
+/// What holds or drives particles that move as they are told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Holding<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Mean velocity of fluid and particles over the box, in a sheared one less that of the shear.
+    pub mean_velocity: Vector<D>,
+    /// Uniform force per unit of volume on fluid and particles: minus the mean gradient of the pressure.
+    pub force_density: Vector<D>,
+    /// Of each of these particles its index, and the force and torque on it by what holds it: beside those of
+    /// fluid, films, weight and repulsion. Contacts are not counted.
+    pub wrenches: Vec<(usize, Wrench<D>)>,
 }
 
 /// A model does not answer to forces.

@@ -36,7 +36,7 @@ mod pair_mobility;
 
 pub use approach::approach_mobility;
 pub use films::{Film, FilmClosed};
-pub use hydrodynamics::{Fields, FlowStatistics, Hydrodynamics, MeanStress, NoForces, ResumeError};
+pub use hydrodynamics::{Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};

@@ -110,7 +110,8 @@ impl Hydrodynamics<3> for PairMobility {
         let n = r / distance;
         let gap = distance - 2.0 * first.radius;
         let (slide, curvature_radius) = (Vector::zeros(), first.radius);
-        let film = Film { first: 0, second: Some(1), branch: r, slide, gap, curvature_radius };
+        let film =
+            Film { first: 0, second: Some(1), branch: r, slide, is_held: [false; 2], gap, curvature_radius };
         self.film = (gap > 0.0 && self.offset == 0.0).then_some(film);
         let xi = distance / first.radius - 2.0 + self.offset;
         let mobility = self.table.at(xi);

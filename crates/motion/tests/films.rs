@@ -78,7 +78,8 @@ where
     let radius = |k: usize| particles[k].radius;
     let curvature = 1.0 / radius(first) + second.map_or(0.0, |second| 1.0 / radius(second));
     let gap = branch.norm() - radius(first) - second.map_or(0.0, radius);
-    Film { first, second, branch, slide: Vector::zeros(), gap, curvature_radius: 2.0 / curvature }
+    let (slide, curvature_radius) = (Vector::zeros(), 2.0 / curvature);
+    Film { first, second, branch, slide, is_held: [false; 2], gap, curvature_radius }
 }
 
 /// Particles that are driven together against a wall, in steps in which each would move by its diameter.
@@ -112,6 +113,41 @@ where
         integrator.open_films(1.0, &particles, &films, &mut twists).unwrap();
         integrator.advance(1.0, &mut particles, &twists);
     }
+}
+
+/// Three discs in a row whose middle one moves as it is told, towards both others and a wall.
+#[test]
+fn what_is_held_does_not_yield() {
+    let at = |x: f64| Particle::new(Vector::<2>::new(x, 0.0), 1.0);
+    let particles = [at(1.5), at(3.7), at(6.0)];
+    let is_held = |k: usize| k == 1;
+    let films = |particles: &[Particle<2>]| {
+        let mut films = [film(particles, 0, None), film(particles, 0, Some(1)), film(particles, 1, Some(2))];
+        for film in &mut films {
+            film.is_held = [is_held(film.first), film.second.is_some_and(is_held)];
+        }
+        films
+    };
+    let velocities = [0.0, -0.15, -0.4].map(|x| Vector::<2>::new(x, 0.0));
+    let mut twists = velocities.map(|velocity| Twist { velocity, ..Twist::default() });
+    let mut integrator = Integrator::new(Scheme::Euler);
+    integrator.open_films(1.0, &particles, &films(&particles), &mut twists).unwrap();
+    assert_eq!(twists[1].velocity, velocities[1]);
+    // All of what opens a film is done by the side that yields.
+    assert!(twists[0].velocity.x < -0.01 && twists[2].velocity.x > -0.35, "{twists:?}");
+    let mut moved = particles;
+    integrator.advance(1.0, &mut moved, &twists);
+    assert!(films(&moved).iter().all(|film| film.gap > 0.0), "{moved:?}");
+    // Two that are told to meet cannot be helped; nor one that is told to go through a wall.
+    let mut both = films(&particles);
+    both[1].is_held = [true, true];
+    twists[1].velocity.x = -0.5;
+    let error = integrator.open_films(1.0, &particles, &both[1..2], &mut twists).unwrap_err();
+    assert!(error.is_given && error.left < 0.0 && error.to_string().contains("as the case tells"), "{error}");
+    both[0].is_held = [true, false];
+    twists[0].velocity.x = -0.6;
+    let error = integrator.open_films(1.0, &particles, &both[..1], &mut twists).unwrap_err();
+    assert!(error.is_given && error.second.is_none(), "{error:?}");
 }
 
 #[test]

@@ -70,7 +70,15 @@ where
         let relative = free - n * (n.dot(&free) / (1.0 + gap));
         let velocities = [relative * -0.5, relative * 0.5 - slide];
         let mut twists = velocities.map(|velocity| Twist { velocity, ..Twist::default() });
-        let film = Film { first: 0, second: Some(1), branch, slide, gap, curvature_radius: 1.0 };
+        let film = Film {
+            first: 0,
+            second: Some(1),
+            branch,
+            slide,
+            is_held: [false; 2],
+            gap,
+            curvature_radius: 1.0,
+        };
         let reach = self.integrator.film_reach_in_shear(dt, &self.particles, &twists, self.rate);
         let films: Vec<_> = [film].into_iter().filter(|film| film.gap < reach.min(self.widest)).collect();
         self.integrator.open_films(dt, &self.particles, &films, &mut twists).unwrap();
@@ -156,7 +164,8 @@ fn images_of_one_partner_are_told_apart() {
     let film = |x: f64| {
         let branch = Vector::<2>::new(x, 2.1);
         let gap = branch.norm() - 2.0 * radius;
-        Film { first: 0, second: Some(1), branch, slide: Vector::zeros(), gap, curvature_radius: radius }
+        let slide = Vector::zeros();
+        Film { first: 0, second: Some(1), branch, slide, is_held: [false; 2], gap, curvature_radius: radius }
     };
     let (right, left) = (film(2.0), film(-2.0));
     let mut predicted = [Twist::default(); 2];

@@ -1,12 +1,14 @@
 //! Set-ups and measures that several cases share.
 
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::fem::TreeMesh;
-use gluey_stokes::{Flow, FlowSolver, Refinement};
+use gluey_stokes::{Flow, FlowSolver, Refinement, Stress};
+use gluey_testkit::exact::{InclusionViscosity, RigidSphere, ViscousInclusion};
 
 use crate::case::{Table, VerifyError};
-use crate::method::Method;
+use crate::method::{METHODS, Method};
+use crate::norms::Lattice;
 use crate::number::Number;
 use crate::statistics::{mean, scatter};
 
@@ -42,6 +44,75 @@ pub fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
     let mut u = Vector::zeros();
     u[0] = x[1] - 0.5;
     u
+}
+
+/// The methods that know boxes that are sheared for ever.
+pub fn methods_in_sheared_boxes() -> impl Iterator<Item = &'static Method> {
+    METHODS.iter().filter(|method| method.name == "unfitted")
+}
+
+/// The gradient of simple shear at the rate one, `y e_x`.
+pub fn simple_shear<const D: usize>() -> Matrix<D> {
+    let mut gradient = Matrix::zeros();
+    gradient[(0, 1)] = 1.0;
+    gradient
+}
+
+/// The stress of a flow that was asked for it.
+///
+/// # Errors
+/// [`VerifyError::NoReference`] for one that was not.
+pub fn stress_of<const D: usize>(flow: &Flow<D>) -> Result<&Stress<D>, VerifyError>
+where
+    Dim<D>: Space<D>,
+{
+    flow.stress.as_ref().ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))
+}
+
+/// Half the edge of the box around one body of radius one, in radii.
+const HALF_WIDTH: f64 = 2.5;
+
+/// The nodes of a box around one body of radius one, with this many cells in a radius.
+pub fn around_one_body<const D: usize>(cells: f64) -> Lattice<D> {
+    let corner = Vector::<D>::repeat(HALF_WIDTH);
+    let domain = Aabb { lower: -corner, upper: corner };
+    Lattice { domain, cells: (2.0 * HALF_WIDTH * cells).round() as usize }
+}
+
+/// The mesh of equal cells with as few roots as possible.
+pub fn uniform<const D: usize>(lattice: &Lattice<D>) -> Result<TreeMesh<D>, VerifyError> {
+    let level = lattice.cells.trailing_zeros();
+    let roots = (lattice.cells >> level) as u32;
+    Ok(TreeMesh::uniform(lattice.domain, [roots; D], [false; D], level as u8)?)
+}
+
+/// A disc of radius one and of this viscosity in a linear flow, and the strain of that.
+pub fn disc_in_linear_flow(
+    center: Vector<2>,
+    inclusion_viscosity: InclusionViscosity,
+) -> (ViscousInclusion, Matrix<2>) {
+    let (pure_shear, simple_shear, spin) = (0.6, 1.0, -0.5);
+    let disc = ViscousInclusion {
+        center,
+        radius: 1.0,
+        matrix_viscosity: 1.0,
+        inclusion_viscosity,
+        pure_shear,
+        simple_shear,
+        spin,
+    };
+    (disc, Matrix::<2>::new(0.6, 0.5, 0.5, -0.6))
+}
+
+/// A rigid sphere of radius one in a general linear flow.
+pub fn sphere_in_linear_flow(center: Vector<3>) -> RigidSphere {
+    RigidSphere {
+        center,
+        radius: 1.0,
+        viscosity: 1.0,
+        strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
+        spin: Spin::<3>::new(0.3, -0.2, -0.5),
+    }
 }
 
 /// Position number `k` of a body relative to the lattice, in cells from -1/2 to 1/2: multiples of powers of

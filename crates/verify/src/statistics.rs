@@ -6,6 +6,11 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// The statistic of a measure over positions: that of a stresslet has a sign, the size of a vector has none.
+pub fn over_positions(measure: &str, values: &[f64]) -> f64 {
+    if measure == "stresslet" { mean(values) } else { rms(values) }
+}
+
 /// The standard deviation from the mean; NaN for less than two values.
 pub fn scatter(values: &[f64]) -> f64 {
     if values.len() < 2 {

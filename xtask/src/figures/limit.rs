@@ -93,7 +93,15 @@ fn lubricated(s: f64) -> Option<Run> {
         let mut twists = twists(-t.cos() / (1.0 + s / gap));
         let branch = particles[1].pose.position - particles[0].pose.position;
         let slide = Vector::zeros();
-        let film = Film { first: 0, second: Some(1), branch, slide, gap, curvature_radius: 1.0 };
+        let film = Film {
+            first: 0,
+            second: Some(1),
+            branch,
+            slide,
+            is_held: [false; 2],
+            gap,
+            curvature_radius: 1.0,
+        };
         integrator.open_films(STEP, &particles, &[film], &mut twists).ok()?;
         integrator.advance(STEP, &mut particles, &twists);
     }

@@ -65,6 +65,32 @@ where
         parallel::visit_all(takes_part, &neighbours.candidates, admit)
     }
 
+    /// Refuses motions that are given and make particles overlap, or stick in a wall: nothing can yield
+    /// there.
+    pub(super) fn check_given_motions(
+        &self,
+        step: &StepGeometry<'_, D>,
+        tolerance: f64,
+        buffers: &Buffers<D>,
+    ) -> Result<(), ContactError> {
+        let (neighbours, weights) = (&self.neighbours, &buffers.weights);
+        if weights.iter().all(|weight| *weight > 0.0) {
+            return Ok(());
+        }
+        let movable = |place: u32| weights.get(place as usize).is_some_and(|weight| *weight > 0.0);
+        for (k, candidate) in neighbours.candidates.iter().enumerate() {
+            if movable(candidate.head) || movable(candidate.tail) {
+                continue;
+            }
+            let row = Row::new(k, neighbours, &self.domain, step)?;
+            let gap = row.gap_after(&neighbours.positions, &buffers.displacements);
+            if gap < -tolerance {
+                return Err(ContactError::Given { pair: neighbours.key(candidate), gap });
+            }
+        }
+        Ok(())
+    }
+
     /// Lists the candidates that take part, in the order of space.
     pub(super) fn list_rows(
         &self,

@@ -233,6 +233,7 @@ where
             }
             self.neighbours.extend(step, &self.domain, &buffers.free, &needed)?;
         };
+        self.check_given_motions(step, tolerance, buffers)?;
         let report = self.summary(report, buffers);
         self.remember(step, tolerance, buffers);
         for (change, &particle) in buffers.changes.iter().zip(&self.neighbours.order) {

@@ -254,9 +254,11 @@ pub enum Problem {
         /// Coordinates needed.
         dimension: usize,
     },
-    /// A torque with another number of components than the dimension has rotations.
-    #[error("a torque of {found} numbers in {dimension}D")]
-    TorqueCount {
+    /// A torque or a spin with another number of components than the dimension has rotations.
+    #[error("{what} of {found} numbers in {dimension}D")]
+    RotationCount {
+        /// What it is.
+        what: &'static str,
         /// Numbers given.
         found: usize,
         /// Numbers needed.
@@ -439,7 +441,7 @@ impl Problem {
     fn hint_at_places(&self) -> String {
         match self {
             Self::CoordinateCount { dimension, .. } => format!("expected {dimension} coordinates"),
-            Self::TorqueCount { needed, .. } => format!("expected a list of length {needed}"),
+            Self::RotationCount { needed, .. } => format!("expected a list of length {needed}"),
             Self::EmptyBox { .. } => "every coordinate of `upper` must exceed that of `lower`".into(),
             Self::UnevenBox { .. } => format!(
                 "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than \

@@ -69,7 +69,11 @@ fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<P
         2 => pack::<2>(case, &params),
         _ => pack::<3>(case, &params),
     };
-    packed.or_else(|error| {
+    let hold = |mut particles: Vec<ParticleSpec>| {
+        particles.iter_mut().for_each(|particle| particle.held = suspension.held);
+        particles
+    };
+    packed.map(hold).or_else(|error| {
         let key = packing_key(&error).map_or(key.clone(), |name| key.name(name));
         fail(key, ParticleProblem::Packing(error))
     })

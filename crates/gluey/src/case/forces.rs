@@ -6,10 +6,11 @@ use gluey_suspension::{Repulsion, ball_volume};
 use super::{Case, ParticleSpec, RepulsionSpec};
 
 impl Case {
-    /// Whether anything beside fluid and contact acts on a particle.
+    /// Whether anything beside fluid, contact and what drives particles acts, that stays when the shear is
+    /// reversed.
     pub fn has_forces(&self) -> bool {
         let of_particle = |particle: &ParticleSpec| is_given(&particle.force) || is_given(&particle.torque);
-        is_given(&self.gravity) || self.particles.iter().any(of_particle)
+        is_given(&self.gravity) || is_given(&self.body_force) || self.particles.iter().any(of_particle)
     }
 
     /// The law by which particles repel each other, if they do.
@@ -23,12 +24,10 @@ impl Case {
     where
         Dim<D>: Space<D>,
     {
-        if !self.has_forces() {
+        let acts = |particle: &ParticleSpec| is_given(&particle.force) || is_given(&particle.torque);
+        if !(is_given(&self.gravity) || self.particles.iter().any(acts)) {
             return Vec::new();
         }
-        let vector = |numbers: &Option<Vec<f64>>| {
-            numbers.as_ref().map_or(Vector::zeros(), |numbers| Vector::<D>::from_fn(|d, _| numbers[d]))
-        };
         let gravity = vector(&self.gravity);
         let wrench = |particle: &ParticleSpec| {
             let mut torque = Dim::<D>::zero_spin();
@@ -40,8 +39,13 @@ impl Case {
     }
 }
 
+/// The coordinates of a checked case, zero where they are not given.
+pub(super) fn vector<const D: usize>(numbers: &Option<Vec<f64>>) -> Vector<D> {
+    numbers.as_ref().map_or(Vector::zeros(), |numbers| Vector::<D>::from_fn(|d, _| numbers[d]))
+}
+
 /// Whether any of the numbers is not zero.
-fn is_given(numbers: &Option<Vec<f64>>) -> bool {
+pub(super) fn is_given(numbers: &Option<Vec<f64>>) -> bool {
     numbers.iter().flatten().any(|&number| number != 0.0)
 }
 

@@ -23,11 +23,36 @@ pub struct ParticleSpec {
     #[serde(default)]
     #[schemars(length(min = 1, max = 3))]
     pub torque: Option<Vec<f64>>,
+    /// Whether it is held where it is: it neither moves nor turns. What holds it is written to
+    /// `<name>-forces.csv`. In `unfitted`. Default: false.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub held: bool,
+    /// Velocity at which it is driven, one coordinate per dimension: it moves so whatever the fluid does. It
+    /// is reversed with the shear, as that of walls is. In `unfitted`. Unit: length/time. Default: that of
+    /// the fluid, or 0 where `spin` is given.
+    #[serde(default)]
+    #[schemars(length(min = 2, max = 3))]
+    pub velocity: Option<Vec<f64>>,
+    /// Spin with which it is driven: one number in 2D (positive counter-clockwise), three in 3D. It is
+    /// reversed with the shear. In `unfitted`. Unit: 1/time. Default: that of the fluid, or 0 where
+    /// `velocity` is given.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 3))]
+    pub spin: Option<Vec<f64>>,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 impl ParticleSpec {
-    /// A particle without forces but its weight.
+    /// A particle that is free, without forces but its weight.
     pub fn new(position: Vec<f64>, radius: f64) -> Self {
-        Self { position, radius, force: None, torque: None }
+        Self { position, radius, force: None, torque: None, held: false, velocity: None, spin: None }
+    }
+
+    /// Whether it moves as it is told: not at all, or with a given velocity and spin.
+    pub fn is_given_motion(&self) -> bool {
+        self.held || self.velocity.is_some() || self.spin.is_some()
     }
 }

@@ -36,6 +36,8 @@ pub struct SuspensionSpec {
     /// Displacements from the sites of a lattice. Unit: the largest that keep the smallest gap. Default: 0.
     #[schemars(range(min = 0, max = 1))]
     pub jitter: f64,
+    /// Whether all of them are held where they are: a fixed bed. Default: false.
+    pub held: bool,
     /// Distribution of the radii.
     pub radii: RadiiSpec,
 }
@@ -51,6 +53,7 @@ impl Default for SuspensionSpec {
             seed: 1,
             min_gap: 0.01,
             jitter: 0.0,
+            held: false,
             radii: RadiiSpec::default(),
         }
     }

@@ -3,10 +3,12 @@
 use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::findings::Findings;
+use super::given::{check_force_density, check_motion};
+use super::given_stress::{check_shear_stress, check_stress_alone};
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
 use super::neighbours::{Neighbours, nearer_than};
 use super::particle_problem::ParticleProblem;
-use super::{Case, fill};
+use super::{Case, ParticleSpec, fill};
 use crate::reference::Reference;
 
 /// Largest number of steps.
@@ -19,12 +21,18 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     check_name(&case.name, root.name("name"), findings);
     if findings.are_good(&["flow"]) {
         check_force(&case.gravity, case, &root.name("gravity"), findings);
+        if let Some(force) = &case.body_force {
+            check_coordinates(force, case.dimension, root.name("body_force"), findings);
+        }
     }
     if findings.are_good(&["domain"]) {
         check_box(case, &root.name("domain"), findings);
     }
     if findings.are_good(&["domain", "flow"]) {
         check_boundary(case, &root.name("domain"), findings);
+    }
+    if findings.are_good(&["domain", "flow", "shear_rate", "shear_stress"]) {
+        check_shear_stress(case, &root, findings);
     }
     if findings.are_good(&["time"]) {
         check_time(case, &root.name("time"), findings);
@@ -39,6 +47,12 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
     let root = Key::default();
     if findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
         check_particles(case, &root.name("particles"), findings);
+    }
+    if findings.are_good(&fill::NEEDED) {
+        check_stress_alone(case, &root, findings);
+    }
+    if findings.are_good(&fill::NEEDED) && findings.are_good(&["body_force"]) {
+        check_force_density(case, &root.name("body_force"), findings);
     }
     if findings.are_good(&fill::NEEDED) && !case.particles.is_empty() {
         check_flow(case, &root.name("flow"), findings);
@@ -149,6 +163,7 @@ fn check_particles(case: &Case, key: &Key, findings: &mut Findings) {
         let key = key.index(index);
         check_force(&particle.force, case, &key.name("force"), findings);
         check_torque(&particle.torque, case, &key.name("torque"), findings);
+        check_given(case, particle, &key, findings);
         can_meet &= check_coordinates(&particle.position, case.dimension, key.name("position"), findings)
             && check_inside(case, index, &key, findings);
     }
@@ -163,13 +178,29 @@ fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut 
     check_answered(case, key, findings);
 }
 
+/// The motion of a particle that is held or driven.
+fn check_given(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut Findings) {
+    if let Some(velocity) = &particle.velocity {
+        check_coordinates(velocity, case.dimension, key.name("velocity"), findings);
+    }
+    if let Some(spin) = &particle.spin {
+        check_rotation("a spin", spin, case.dimension, &key.name("spin"), findings);
+    }
+    check_motion(case, particle, key, findings);
+}
+
 fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut Findings) {
     let Some(torque) = torque else { return };
-    let (found, needed) = (torque.len(), if case.dimension == 2 { 1 } else { 3 });
-    if found != needed {
-        findings.add(key.clone(), Problem::TorqueCount { found, needed, dimension: case.dimension });
-    }
+    check_rotation("a torque", torque, case.dimension, key, findings);
     check_answered(case, key, findings);
+}
+
+/// Notes a torque or spin that has not as many numbers as there are axes to turn about.
+fn check_rotation(what: &'static str, numbers: &[f64], dimension: usize, key: &Key, findings: &mut Findings) {
+    let (found, needed) = (numbers.len(), if dimension == 2 { 1 } else { 3 });
+    if found != needed {
+        findings.add(key.clone(), Problem::RotationCount { what, found, needed, dimension });
+    }
 }
 
 /// Only the finite-element flow answers to forces.

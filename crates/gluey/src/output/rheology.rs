@@ -40,6 +40,8 @@ pub struct Rheology<'a, const D: usize> {
     pub stress: &'a MeanStress<D>,
     /// Smallest gap in mean radii, if there is any.
     pub smallest_gap_over_a: Option<f64>,
+    /// Time and shear rate, where the stress is given and the time above is the strain.
+    pub time_and_rate: Option<[f64; 2]>,
 }
 
 /// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-rheology.csv` beside the trajectory.
@@ -48,9 +50,10 @@ pub struct RheologyWriter(Draft);
 
 impl RheologyWriter {
     /// Starts the file beside the trajectory `csv`.
-    pub fn create<const D: usize>(csv: &Path) -> Result<Self, RowsError> {
+    pub fn create<const D: usize>(csv: &Path, is_at_given_stress: bool) -> Result<Self, RowsError> {
         let mut draft = Draft::create(&rheology_path(csv))?;
-        draft.write(&format!("{}\n", header::<D>()))?;
+        let more = if is_at_given_stress { ",time,shear_rate" } else { "" };
+        draft.write(&format!("{}{more}\n", header::<D>()))?;
         Ok(Self(draft))
     }
 
@@ -92,7 +95,7 @@ pub fn rheology_path(csv: &Path) -> PathBuf {
     csv.with_file_name(name)
 }
 
-/// The first line.
+/// The first line, but for time and shear rate where the stress is given.
 pub fn header<const D: usize>() -> String {
     let is_there = |name: &&str| D == 3 || !["N2", "viscosity_of_contacts"].contains(name);
     let names: Vec<&str> = NAMES.into_iter().filter(is_there).collect();
@@ -115,7 +118,8 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
     let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]);
     let numbers = first.into_iter().chain(shares).chain(normal).map(|number| format!("{number:.16e}"));
     let gap = row.smallest_gap_over_a.map_or(String::new(), |gap| format!("{gap:.16e}"));
-    let cells: Vec<String> = numbers.chain([gap]).collect();
+    let more = row.time_and_rate.into_iter().flatten().map(|number| format!("{number:.16e}"));
+    let cells: Vec<String> = numbers.chain([gap]).chain(more).collect();
     format!("{}\n", cells.join(","))
 }
 
@@ -139,7 +143,13 @@ mod tests {
             of_repulsion: of_bodies * 0.5,
             dissipation: 1.25,
         };
-        let row = Rheology { time: 1.0, strain: -0.5, stress: &stress, smallest_gap_over_a: Some(0.25) };
+        let row = Rheology {
+            time: 1.0,
+            strain: -0.5,
+            stress: &stress,
+            smallest_gap_over_a: Some(0.25),
+            time_and_rate: None,
+        };
         let line = line(&row);
         let numbers: Vec<f64> =
             line.trim_end().split(',').map(|cell| cell.parse().expect("a number")).collect();

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{ContactLaw, ContactModel, ContactNetwork, PairContact};
+use gluey_contact::{ContactLaw, ContactModel, ContactNetwork};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::Container;
 
+use super::contacts::Contacts;
 use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
@@ -80,7 +81,7 @@ where
 impl<const D: usize> Frames<D>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
 {
     /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
     pub fn create(case: &Case, options: &RunOptions, step: usize) -> Result<Self, OutputError> {
@@ -103,7 +104,7 @@ where
     pub fn write<H>(
         &mut self,
         case: &Case,
-        simulation: &Simulation<D, H, PairContact<D>>,
+        simulation: &Simulation<D, H, Contacts<D>>,
     ) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
@@ -157,11 +158,11 @@ where
 
 /// What contacts exert on each particle; nothing where there is no contact model.
 fn contact_forces<const D: usize, H>(
-    simulation: &Simulation<D, H, PairContact<D>>,
+    simulation: &Simulation<D, H, Contacts<D>>,
 ) -> Result<Option<Vec<Vector<D>>>, RunError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
     let contact = simulation.contact();
@@ -178,10 +179,10 @@ where
 }
 
 /// The box as it is sheared now.
-fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, PairContact<D>>) -> Container<D>
+fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, Contacts<D>>) -> Container<D>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
     let container = case.container();

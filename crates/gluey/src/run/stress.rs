@@ -2,9 +2,11 @@
 
 use std::f64::consts::PI;
 
-use gluey_contact::{ContactError, ContactModel, ContactNetwork, PairContact};
+use gluey_contact::{ContactError, ContactModel, ContactNetwork};
 use gluey_geom::{Dim, Matrix, Particle, Space, Vector};
 use gluey_motion::MeanStress;
+
+use super::contacts::Contacts;
 
 /// Minus the mean product of the contact forces with the lines between centres, in spheres that fill the
 /// periods of `contact`; nothing in 2D.
@@ -12,13 +14,13 @@ use gluey_motion::MeanStress;
 /// A force is `6 pi eta lambda` with lambda from the projection, in whose metric a sphere feels its own
 /// Stokes drag only (Verdon et al. 2010, eq. 29): forces of clusters are as exact as that.
 fn of_contacts<const D: usize>(
-    contact: &PairContact<D>,
+    contact: &Contacts<D>,
     particles: &[Particle<D>],
     viscosity: f64,
 ) -> Result<Option<Matrix<D>>, ContactError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
 {
     if D == 2 {
         return Ok(None);
@@ -37,12 +39,12 @@ where
 /// If the contacts are not those of these particles.
 pub(super) fn with_contacts<const D: usize>(
     stress: MeanStress<D>,
-    contact: &PairContact<D>,
+    contact: &Contacts<D>,
     particles: &[Particle<D>],
 ) -> Result<MeanStress<D>, ContactError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
+    Contacts<D>: ContactModel<D>,
 {
     Ok(MeanStress { of_contacts: of_contacts(contact, particles, stress.viscosity)?, ..stress })
 }

@@ -30,6 +30,8 @@ where
     pub bodies: Given<'a, D>,
     /// Whether [`crate::Flow::stress`] is wanted; `unfitted` only.
     pub stress: bool,
+    /// See [`Conditions::without_mean_flow`].
+    pub without_mean: bool,
 }
 
 /// What is known of the bodies, one entry each in their order; the other follows from the flow.
@@ -42,6 +44,41 @@ where
     Wrenches(&'a [Wrench<D>]),
     /// Velocities and spins of held bodies: the resistance problem.
     Twists(&'a [Twist<D>]),
+    /// The one or the other of each body: free bodies among held ones.
+    Each(&'a [GivenOf<D>]),
+}
+
+/// What is known of one body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GivenOf<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Force and torque on it: it is free.
+    Wrench(Wrench<D>),
+    /// Its velocity and spin: it is held.
+    Twist(Twist<D>),
+}
+
+impl<const D: usize> GivenOf<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The force and torque on a body that is free.
+    pub fn wrench(&self) -> Option<Wrench<D>> {
+        match self {
+            Self::Wrench(wrench) => Some(*wrench),
+            Self::Twist(_) => None,
+        }
+    }
+
+    /// The velocity and spin of a body that is held.
+    pub fn twist(&self) -> Option<Twist<D>> {
+        match self {
+            Self::Wrench(_) => None,
+            Self::Twist(twist) => Some(*twist),
+        }
+    }
 }
 
 impl<'a, const D: usize> Conditions<'a, D>
@@ -50,7 +87,14 @@ where
 {
     /// Free bodies without forces in a flow with this velocity on the boundary.
     pub fn boundary(boundary: Field<'a, D>) -> Self {
-        Self { boundary, force: None, strain: Matrix::zeros(), bodies: Given::Wrenches(&[]), stress: false }
+        Self {
+            boundary,
+            force: None,
+            strain: Matrix::zeros(),
+            bodies: Given::Wrenches(&[]),
+            stress: false,
+            without_mean: false,
+        }
     }
 
     /// Free bodies without forces in the linear flow `G x`, whose trace is zero, in a box that is periodic in
@@ -81,6 +125,14 @@ where
         Self { stress: true, ..self }
     }
 
+    /// The same with a uniform force on fluid and bodies, beside `force`, so that the mean velocity over both
+    /// vanishes: around held bodies in a box that is periodic in all directions, where without it the mean
+    /// gradient of the pressure is zero. It takes a solve more for each axis; `unfitted` only.
+    #[must_use]
+    pub fn without_mean_flow(self) -> Self {
+        Self { without_mean: true, ..self }
+    }
+
     /// The same with forces and torques on the bodies, which are free.
     #[must_use]
     pub fn with_wrenches(self, wrenches: &'a [Wrench<D>]) -> Self {
@@ -91,6 +143,12 @@ where
     #[must_use]
     pub fn with_twists(self, twists: &'a [Twist<D>]) -> Self {
         Self { bodies: Given::Twists(twists), ..self }
+    }
+
+    /// The same with free bodies among held ones, one entry for each.
+    #[must_use]
+    pub fn with_bodies(self, bodies: &'a [GivenOf<D>]) -> Self {
+        Self { bodies: Given::Each(bodies), ..self }
     }
 
     /// The wrenches on the bodies in a flow under these conditions: those given, or what they lack.
@@ -104,31 +162,50 @@ where
             Given::Wrenches([]) => Ok(vec![Wrench::default(); problem.bodies.len()]),
             Given::Wrenches(wrenches) => Ok(wrenches.to_vec()),
             Given::Twists(_) => problem.wrenches(velocity, pressure, self.force, &self.strain),
+            Given::Each(bodies) => {
+                let lacking = problem.wrenches(velocity, pressure, self.force, &self.strain)?;
+                Ok(bodies.iter().zip(lacking).map(|(given, lacks)| given.wrench().unwrap_or(lacks)).collect())
+            }
         }
     }
 
-    /// Whether the bodies are held.
-    pub(super) fn hold_bodies(&self) -> bool {
-        matches!(self.bodies, Given::Twists(_))
+    /// Which of so many bodies are held; no entries for none.
+    pub(super) fn held(&self, count: usize) -> Vec<bool> {
+        match self.bodies {
+            Given::Wrenches(_) => Vec::new(),
+            Given::Twists(_) => vec![true; count],
+            Given::Each(bodies) => bodies.iter().map(|given| given.twist().is_some()).collect(),
+        }
+    }
+
+    /// The twists of the bodies that are held, unless all are free.
+    fn twists(&self) -> Option<Vec<Option<Twist<D>>>> {
+        match self.bodies {
+            Given::Wrenches(_) => None,
+            Given::Twists(twists) => Some(twists.iter().map(|twist| Some(*twist)).collect()),
+            Given::Each(bodies) => Some(bodies.iter().map(GivenOf::twist).collect()),
+        }
+    }
+
+    /// The wrenches on free bodies, none on held ones; no entries where there are none on any.
+    fn wrenches_on_free(&self) -> Vec<Wrench<D>> {
+        match self.bodies {
+            Given::Wrenches(wrenches) => wrenches.to_vec(),
+            Given::Twists(_) => Vec::new(),
+            Given::Each(bodies) => bodies.iter().map(|body| body.wrench().unwrap_or_default()).collect(),
+        }
     }
 
     /// The field that carries the data, and its residual with the loads.
     pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
         let mut lift = problem.lift(self.boundary);
-        match self.bodies {
-            Given::Wrenches(wrenches) => {
-                let mut b = problem.right_hand_side(&lift, self.force);
-                problem.add_strain(&self.strain, &mut b)?;
-                problem.add_wrenches(wrenches, &mut b)?;
-                Ok((lift, b))
-            }
-            Given::Twists(twists) => {
-                problem.set_twists(twists, &mut lift)?;
-                let mut b = problem.right_hand_side(&lift, self.force);
-                problem.add_strain(&self.strain, &mut b)?;
-                problem.system.space.clear_held(&mut b);
-                Ok((lift, b))
-            }
+        if let Some(twists) = self.twists() {
+            problem.set_twists(&twists, &mut lift)?;
         }
+        let mut b = problem.right_hand_side(&lift, self.force);
+        problem.add_strain(&self.strain, &mut b)?;
+        problem.add_wrenches(&self.wrenches_on_free(), &mut b)?;
+        problem.system.space.clear_held(&mut b);
+        Ok((lift, b))
     }
 }

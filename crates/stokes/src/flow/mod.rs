@@ -1,5 +1,7 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
+mod balance;
+mod combined;
 mod conditions;
 mod mean;
 mod prepared;
@@ -22,7 +24,7 @@ use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
 
-pub use conditions::{Conditions, Field, Given};
+pub use conditions::{Conditions, Field, Given, GivenOf};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use stress::Stress;
@@ -76,6 +78,11 @@ where
     pub wrenches: Vec<Wrench<D>>,
     /// Strain of the linear flow that velocities, spins and pressures are relative to; zero for none.
     pub strain: Matrix<D>,
+    /// Mean velocity of fluid and bodies over the box, relative to the linear flow, where bodies are held
+    /// (`unfitted` only; elsewhere conditions at the border give it).
+    pub mean_velocity: Option<Vector<D>>,
+    /// The uniform force per unit of volume that [`Conditions::without_mean_flow`] found; zero elsewhere.
+    pub mean_force: Vector<D>,
     /// Stress of the suspension, where [`Conditions::with_stress`] asked for it.
     pub stress: Option<Stress<D>>,
     /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
@@ -128,7 +135,7 @@ where
     Dim<D>: Space<D>,
 {
     params: FlowParams,
-    /// For free bodies and for held ones.
+    /// For free bodies, and where any is held.
     solvers: [Box<dyn SaddleSolver<D> + Send>; 2],
     method: Arc<dyn Method<D>>,
     /// The last mesh, which the next one is often equal to.
@@ -208,7 +215,7 @@ where
     ) -> Result<Flow<D>, StokesError> {
         let start = Instant::now();
         let mut problem = self.problem(mesh, bodies)?;
-        problem.system.space.hold_twists(conditions.hold_bodies());
+        problem.system.space.hold(&conditions.held(bodies.len()));
         let assembled = Instant::now();
         let mut method = self.method.clone();
         self.prepare(&mut problem, &mut method)?;
@@ -217,6 +224,9 @@ where
         let trusted = self.trusted(&mut problem, &mut method, conditions, &guess)?;
         let (mut flow, x) = (trusted.flow, trusted.x);
         self.keep_for_next(&problem, &x, &flow.pressure, before);
+        if conditions.without_mean {
+            (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;
+        }
         flow.times = PhaseTimes {
             assembly: (assembled - start).as_secs_f64(),
             preparation: (prepared - assembled).as_secs_f64(),
@@ -230,9 +240,9 @@ where
         Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
     }
 
-    /// The solver for free bodies or for held ones.
+    /// The solver for free bodies, or for where any is held.
     fn solver(&mut self, problem: &Problem<D>) -> &mut Box<dyn SaddleSolver<D> + Send> {
-        &mut self.solvers[usize::from(problem.system.space.holds_twists())]
+        &mut self.solvers[usize::from(problem.system.space.holds_any())]
     }
 
     /// The flow under some conditions from the guess `x`, which becomes the reduced vector that it belongs
@@ -253,38 +263,7 @@ where
         };
         let data = Data { lift: &lift, b: &b };
         let multiplier = problem.rigidity.solve(problem, &data, x, &mut solve)?;
-        let mut pressure = problem.pressure_and_films(x);
-        let mut velocity = problem.velocity(&lift, x);
-        if let (false, Some(surfaces)) = (problem.system.space.is_anchored(), &problem.system.surfaces) {
-            let space = &problem.system.space;
-            let mean = mean::mean_velocity(problem, surfaces, &velocity);
-            mean::subtract(space, &mut velocity, &mean, |_| true);
-            // Guesses made of solutions would let what no equation determines grow from step to step.
-            mean::subtract(space, x, &mean, |node| space.is_free(node));
-        }
-        let twists = problem.twists(&velocity)?;
-        let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
-        let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
-        let stress = stress.transpose()?;
-        velocity.truncate(problem.system.space.full_dim());
-        pressure.truncate(problem.system.pressure.dim());
-        let flow = Flow {
-            discretisation: problem.discretisation().clone(),
-            velocity,
-            pressure,
-            multiplier,
-            twists,
-            wrenches,
-            strain: conditions.strain,
-            stress,
-            films: problem.film_forces(x),
-            solve_count: effort.solve_count,
-            iteration_count: effort.iteration_count,
-            residual: effort.residual,
-            fine_operator_applications: effort.fine_operator_applications,
-            times: PhaseTimes::default(),
-        };
-        Ok(flow)
+        flow_of(problem, conditions, (&lift, x), multiplier, &effort)
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.
@@ -355,6 +334,60 @@ where
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }
     }
+}
+
+/// The flow under some conditions that belongs to a lift and a reduced vector, which loses its mean velocity
+/// where no equation determines it.
+fn flow_of<const D: usize>(
+    problem: &Problem<D>,
+    conditions: &Conditions<'_, D>,
+    (lift, x): (&[f64], &mut [f64]),
+    multiplier: Vec<f64>,
+    effort: &Effort,
+) -> Result<Flow<D>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let mut pressure = problem.pressure_and_films(x);
+    let mut velocity = problem.velocity(lift, x);
+    let space = &problem.system.space;
+    let mut mean_velocity = None;
+    if let Some(surfaces) = &problem.system.surfaces
+        && space.holds_any()
+    {
+        mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
+    }
+    if let (false, Some(surfaces)) = (space.is_anchored(), &problem.system.surfaces) {
+        let mean = mean::mean_velocity(problem, surfaces, &velocity);
+        mean::subtract(space, &mut velocity, &mean, |_| true);
+        // Guesses made of solutions would let what no equation determines grow from step to step.
+        mean::subtract(space, x, &mean, |node| space.is_free(node));
+    }
+    let twists = problem.twists(&velocity)?;
+    let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
+    let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
+    let stress = stress.transpose()?;
+    velocity.truncate(problem.system.space.full_dim());
+    pressure.truncate(problem.system.pressure.dim());
+    let flow = Flow {
+        discretisation: problem.discretisation().clone(),
+        velocity,
+        pressure,
+        multiplier,
+        twists,
+        wrenches,
+        strain: conditions.strain,
+        mean_velocity,
+        mean_force: Vector::zeros(),
+        stress,
+        films: problem.film_forces(x),
+        solve_count: effort.solve_count,
+        iteration_count: effort.iteration_count,
+        residual: effort.residual,
+        fine_operator_applications: effort.fine_operator_applications,
+        times: PhaseTimes::default(),
+    };
+    Ok(flow)
 }
 
 /// The stress of a flow: its velocity, nodal and of bodies, and pressure, and the reduced vector.

@@ -15,6 +15,7 @@ use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
 use super::conditions::Conditions;
+use super::trusted::Trusted;
 use super::{Flow, FlowSolver, film_moments};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem, symmetric_and_traceless};
@@ -29,8 +30,8 @@ where
     problem: Problem<D>,
     /// The formulation, with penalties as the flows so far want them.
     method: Arc<dyn Method<D>>,
-    /// Whether the solvers for free and for held bodies are prepared.
-    is_ready: [bool; 2],
+    /// The bodies that are held in the flows that the solvers for free and for held bodies are prepared for.
+    ready: [Option<Vec<bool>>; 2],
 }
 
 /// The solver of prepared flows: that of somebody else, or their own.
@@ -59,7 +60,7 @@ where
     Dim<D>: Space<D>,
 {
     /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first
-    /// needed: once for free bodies and once for held ones.
+    /// needed: once for free bodies and once for each choice of held ones.
     ///
     /// ```
     /// use gluey_stokes::geom::{Aabb, Spin, Vector, Wrench};
@@ -87,7 +88,7 @@ where
     ) -> Result<Prepared<'_, D>, StokesError> {
         let problem = self.problem(mesh, bodies)?;
         let method = self.method.clone();
-        Ok(Prepared { solver: Lent::Borrowed(self), problem, method, is_ready: [false; 2] })
+        Ok(Prepared { solver: Lent::Borrowed(self), problem, method, ready: [None, None] })
     }
 
     /// The same for flows that are kept for longer than anything could be borrowed.
@@ -101,7 +102,7 @@ where
     ) -> Result<Prepared<'static, D>, StokesError> {
         let problem = self.problem(mesh, bodies)?;
         let method = self.method.clone();
-        Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, method, is_ready: [false; 2] })
+        Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, method, ready: [None, None] })
     }
 }
 
@@ -118,25 +119,33 @@ where
     pub fn solve(&mut self, conditions: &Conditions<'_, D>) -> Result<Flow<D>, StokesError> {
         self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
-        let Self { solver, problem, method, is_ready } = self;
-        let trusted = solver.get().trusted(problem, method, conditions, &guess)?;
-        if trusted.is_raised {
-            *is_ready = [false; 2];
-            is_ready[usize::from(conditions.hold_bodies())] = true;
+        let Self { solver, problem, method, ready } = self;
+        let Trusted { mut flow, mut is_raised, .. } =
+            solver.get().trusted(problem, method, conditions, &guess)?;
+        if conditions.without_mean {
+            let raised;
+            (flow, raised) = solver.get().balanced(problem, method, conditions, flow)?;
+            is_raised |= raised;
         }
-        Ok(trusted.flow)
+        if is_raised {
+            let space = &problem.system.space;
+            *ready = [None, None];
+            ready[usize::from(space.holds_any())] = Some(space.held().to_vec());
+        }
+        Ok(flow)
     }
 
     /// Holds or frees the bodies and prepares the solver for that, unless it is.
     fn make_ready(&mut self, conditions: &Conditions<'_, D>) -> Result<(), StokesError> {
-        let hold = conditions.hold_bodies();
-        let Self { solver, problem, method, is_ready } = self;
-        problem.system.space.hold_twists(hold);
-        if !is_ready[usize::from(hold)] {
+        let Self { solver, problem, method, ready } = self;
+        problem.system.space.hold(&conditions.held(problem.bodies.len()));
+        let held = problem.system.space.held().to_vec();
+        let place = usize::from(problem.system.space.holds_any());
+        if ready[place].as_ref() != Some(&held) {
             if solver.get().prepare(problem, method)? {
-                *is_ready = [false; 2];
+                *ready = [None, None];
             }
-            is_ready[usize::from(hold)] = true;
+            ready[place] = Some(held);
         }
         Ok(())
     }

@@ -53,10 +53,10 @@ where
 
     /// The same problem with another method.
     fn rebuild(&self, problem: &mut Problem<D>, method: &dyn Method<D>) -> Result<(), StokesError> {
-        let hold = problem.system.space.holds_twists();
+        let held = problem.system.space.held().to_vec();
         let discretisation = problem.discretisation().clone();
         *problem = Problem::on(&discretisation, &problem.bodies, self.params.viscosity, method)?;
-        problem.system.space.hold_twists(hold);
+        problem.system.space.hold(&held);
         Ok(())
     }
 

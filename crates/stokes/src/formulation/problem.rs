@@ -299,16 +299,17 @@ where
         self.rigidity.add_wrenches(self, wrenches, b)
     }
 
-    /// Makes the bodies move with these twists in a field that [`Problem::lift`] gave, for bodies that are
-    /// held, see [`VelocitySpace::hold_twists`].
+    /// Makes bodies move with these twists, one entry for each body or `None` for one that is free, in a
+    /// field that [`Problem::lift`] gave; for bodies that are held, see [`VelocitySpace::hold`].
     ///
     /// # Errors
     /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::Unsupported`] in a
     /// formulation without unknowns for twists.
-    pub fn set_twists(&self, twists: &[Twist<D>], lift: &mut [f64]) -> Result<(), StokesError> {
+    pub fn set_twists(&self, twists: &[Option<Twist<D>>], lift: &mut [f64]) -> Result<(), StokesError> {
         self.check_count("twists", twists.len())?;
         let space = self.space_with_twists("bodies that are held")?;
-        twists.iter().enumerate().for_each(|(body, twist)| space.set_twist(lift, body, twist));
+        let held = twists.iter().enumerate().filter_map(|(body, twist)| Some((body, twist.as_ref()?)));
+        held.for_each(|(body, twist)| space.set_twist(lift, body, twist));
         space.expand(lift);
         Ok(())
     }

@@ -112,7 +112,10 @@ where
     Dim<D>: Space<D>,
 {
     match k.checked_sub(space.full_dim()) {
-        Some(twist) => !space.holds_twists() && space.is_active(twist / Dim::<D>::RIGID),
+        Some(twist) => {
+            let body = twist / Dim::<D>::RIGID;
+            !space.is_held(body) && space.is_active(body)
+        }
         None => space.is_free(k / D),
     }
 }

@@ -22,9 +22,10 @@ impl BlockDiagonal {
         Self { nodal, twists, rigid }
     }
 
-    /// Leaves the twists alone.
-    pub fn hold_twists(&mut self) {
-        self.twists.fill(0.0);
+    /// Leaves the twists of these bodies alone.
+    pub fn hold(&mut self, is_held: impl Fn(usize) -> bool) {
+        let blocks = self.twists.chunks_exact_mut(self.rigid * self.rigid).enumerate();
+        blocks.filter(|(body, _)| is_held(*body)).for_each(|(_, block)| block.fill(0.0));
     }
 
     /// The nodal entries.

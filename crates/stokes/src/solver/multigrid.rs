@@ -132,14 +132,14 @@ where
 {
     let Problem { system, bodies, rigidity } = problem;
     let levels = CycleLevels { meshes: &hierarchy.meshes, radius: problem.largest_radius() };
-    let holds_twists = system.space.holds_twists();
+    let held = system.space.held();
     let mut finest = rigidity.finest_level(problem);
-    finest.hold_twists(holds_twists);
+    finest.hold(held);
     let correction = rigidity.correction(elements, &finest, levels)?;
     let coarser = hierarchy.meshes[..hierarchy.meshes.len() - 1].iter().map(|mesh| {
         let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, rigidity.coarse_offset());
         let mut space = VelocitySpace::new(mesh, bodies, &solid);
-        space.hold_twists(holds_twists);
+        space.hold(held);
         (space, false)
     });
     let spaces = coarser.chain([(finest, true)]);

@@ -48,8 +48,8 @@ pub struct VelocitySpace<const D: usize> {
     is_ghost: Vec<bool>,
     /// Whether bodies are coupled to the fluid through their surfaces: then no node has to be rigid.
     by_surface: bool,
-    /// See [`VelocitySpace::hold_twists`].
-    holds_twists: bool,
+    /// See [`VelocitySpace::hold`]; empty where none is held.
+    held: Vec<bool>,
 }
 
 impl<const D: usize> VelocitySpace<D>
@@ -72,7 +72,7 @@ where
             ghosts: Vec::new(),
             is_ghost: vec![false; nodes.node_count()],
             by_surface: false,
-            holds_twists: false,
+            held: Vec::new(),
         };
         let fit = &space.fit;
         space.rigid.retain(|r| fit[r.body as usize].is_some());
@@ -123,9 +123,9 @@ where
 
     /// Whether anything fixes a constant velocity: a wall, or bodies that are held.
     pub fn is_anchored(&self) -> bool {
-        let holds_nodes = self.holds_twists && !self.rigid.is_empty();
-        let holds_bodies = self.by_surface && self.holds_twists && !self.radius.is_empty();
-        holds_bodies || holds_nodes || !self.boundary.is_empty()
+        let holds_nodes = || self.rigid.iter().any(|r| self.is_held(r.body as usize));
+        let holds = self.holds_any() && (self.by_surface || holds_nodes());
+        holds || !self.boundary.is_empty()
     }
 
     /// Number of bodies, active or not.
@@ -275,10 +275,11 @@ where
 
     fn solve_grams<T: Scalar>(&self, loads: &mut [T]) {
         let n = Dim::<D>::RIGID;
-        if self.holds_twists {
-            return loads.fill(T::ZERO);
-        }
-        for (load, inverse) in loads.chunks_exact_mut(n).zip(&self.fit) {
+        for (body, (load, inverse)) in loads.chunks_exact_mut(n).zip(&self.fit).enumerate() {
+            if self.is_held(body) {
+                load.fill(T::ZERO);
+                continue;
+            }
             let old: [f64; MOST_RIGID] = std::array::from_fn(|k| if k < n { load[k].to_f64() } else { 0.0 });
             for (i, value) in load.iter_mut().enumerate() {
                 let row = |m: &Vec<f64>| (0..n).map(|j| m[i * n + j] * old[j]).sum::<f64>();

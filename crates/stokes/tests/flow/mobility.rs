@@ -2,11 +2,14 @@
 
 use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
-use gluey_stokes::{Conditions, FlowSolver, Formulation, Prepared, Problem, SolverKind, StokesError};
+use gluey_stokes::{
+    Conditions, FlowSolver, Formulation, GivenOf, Prepared, Problem, SolverKind, StokesError,
+};
 use nalgebra::DMatrix;
 
 use crate::support::{
-    RADIUS, RIGID, SOLVERS, bands, couette, doublet, mesh, paper, params, resolved_gaps, twist_distance,
+    RADIUS, RIGID, SOLVERS, UNFITTED, bands, couette, doublet, mesh, paper, params, resolved_gaps,
+    twist_distance,
 };
 
 /// Two unequal balls, off the middle of the box and off the lines of the mesh.
@@ -119,6 +122,50 @@ fn the_resistance_is_the_inverse_of_the_mobility() {
         resistance_inverts_mobility::<2>(kind);
     }
     resistance_inverts_mobility::<3>(SolverKind::Multigrid);
+}
+
+/// A free body beside a held one: held as the free one moves, both need the same forces, and free under these
+/// they move alike.
+fn a_free_body_beside_a_held_one<const D: usize>(
+    formulation: Formulation,
+    kind: SolverKind,
+    [force, motion]: [f64; 2],
+) where
+    Dim<D>: Space<D>,
+{
+    let mut solver = solver(formulation, kind);
+    let mut prepared = prepared::<D>(&mut solver);
+    let mut driven = Twist { velocity: Vector::from_fn(|d, _| 0.3 - 0.5 * d as f64), ..Twist::default() };
+    driven.spin[Dim::<D>::ROT - 1] = 1.5;
+    let given = [GivenOf::Twist(driven), GivenOf::Wrench(wrenches()[1])];
+    let flow = prepared.solve(&Conditions::at_rest().with_bodies(&given)).unwrap();
+    assert!(twist_distance(&flow.twists[..1], &[driven]) < 1e-14);
+    assert_eq!(flow.wrenches[1], wrenches()[1]);
+    let held = prepared.solve(&Conditions::at_rest().with_twists(&flow.twists)).unwrap();
+    let size = flow.wrenches[0].force.amax();
+    small("forces", wrench_distance(&held.wrenches, &flow.wrenches) / size, force);
+    let free = prepared.solve(&Conditions::at_rest().with_wrenches(&flow.wrenches)).unwrap();
+    small("motions", twist_distance(&free.twists, &flow.twists), motion);
+    // Again, after flows with other bodies held; and with the other one held.
+    let again = prepared.solve(&Conditions::at_rest().with_bodies(&given)).unwrap();
+    assert_eq!(again.twists, flow.twists);
+    let other = [GivenOf::Wrench(flow.wrenches[0]), GivenOf::Twist(flow.twists[1])];
+    let other = prepared.solve(&Conditions::at_rest().with_bodies(&other)).unwrap();
+    small("motions", twist_distance(&other.twists, &flow.twists), motion);
+}
+
+#[test]
+fn free_bodies_and_held_ones_can_be_mixed() {
+    let [direct, multigrid] = SOLVERS;
+    a_free_body_beside_a_held_one::<2>(RIGID, direct, [2.5e-14, 2e-14]);
+    a_free_body_beside_a_held_one::<2>(UNFITTED, direct, [2.5e-14, 2e-14]);
+    a_free_body_beside_a_held_one::<2>(RIGID, multigrid, [7.7e-10, 3.2e-10]);
+    a_free_body_beside_a_held_one::<2>(UNFITTED, multigrid, [5.9e-8, 4.5e-9]);
+    a_free_body_beside_a_held_one::<3>(UNFITTED, multigrid, [8.6e-9, 2.8e-9]);
+    let mut solver = solver::<2>(UNFITTED, SolverKind::Direct);
+    let given = [GivenOf::Twist(Twist::default())];
+    let error = prepared::<2>(&mut solver).solve(&Conditions::at_rest().with_bodies(&given)).unwrap_err();
+    assert_eq!(error, StokesError::Count { what: "twists", found: 1, bodies: 2 });
 }
 
 /// Flows that own their solver are those that borrow one.

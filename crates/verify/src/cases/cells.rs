@@ -1,14 +1,15 @@
 //! Several free discs in a periodic cell in shear.
 
-use gluey_geom::{Aabb, Lattice, Matrix, Vector};
+use gluey_geom::{Aabb, Lattice, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::reference::cells_of_discs;
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::Method;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
+use crate::set_up::{methods_in_sheared_boxes, simple_shear, stress_of};
 
 /// Cells in the table, by their number of discs.
 const CELLS: [usize; 2] = [2, 8];
@@ -28,14 +29,10 @@ pub const CASE: Case = Case {
     plot,
 };
 
-fn methods() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.name == "unfitted")
-}
-
 fn tasks(extent: Extent) -> Vec<Task> {
     let levels: &[u8] = if extent == Extent::Quick { &[4, 5] } else { &[4, 5, 6, 7] };
     let mut tasks = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         for (index, discs) in CELLS.into_iter().enumerate() {
             tasks.extend(levels.iter().map(|&level| {
                 let at = [discs as f64, 2f64.powi(level.into())];
@@ -62,12 +59,9 @@ fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyE
     let balls: Vec<Ball<2>> = x.iter().zip(&y).map(ball).collect();
     let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
     let mesh = refinement.mesh(Aabb::unit(), [1; 2], [true; 2], &balls)?;
-    let mut gradient = Matrix::<2>::zeros();
-    gradient[(0, 1)] = 1.0;
-    let conditions = Conditions::in_linear_flow(&gradient).with_stress();
+    let conditions = Conditions::in_linear_flow(&simple_shear::<2>()).with_stress();
     let flow = FlowSolver::new(method.params::<2>(1e-9))?.solve_under(mesh, &balls, &conditions)?;
-    let stress = flow.stress.as_ref().ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))?;
-    let of_bodies = stress.of_bodies(1.0);
+    let of_bodies = stress_of(&flow)?.of_bodies(1.0);
     let [eta, n1] = [column("eta_r")?[0], column("N1")?[0]];
     let (mut velocity, mut turn) = (0.0f64, 0.0f64);
     for (k, twist) in flow.twists.iter().enumerate() {
@@ -81,7 +75,7 @@ fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyE
 fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         for discs in CELLS {
             for cells in table.steps("cells", method.name, &[("discs", discs as f64)]) {
                 let at = [("discs", discs as f64), ("cells", cells)];

@@ -8,11 +8,11 @@ use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, Stress};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::Method;
 use crate::norms::superficial_velocity;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::shift;
+use crate::set_up::{methods_in_sheared_boxes, shift, simple_shear, stress_of};
 
 /// A crystal: bodies in a box with the edges of `cells`, places in shares of the box.
 struct Crystal {
@@ -96,14 +96,10 @@ pub const CASE: Case = Case {
     plot,
 };
 
-fn methods() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.name == "unfitted")
-}
-
 fn tasks(extent: Extent) -> Vec<Task> {
     let which = usize::from(extent == Extent::Full);
     let mut tasks = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         for (index, crystal) in CRYSTALS.iter().enumerate() {
             for &resolution in RESOLUTIONS[crystal.dimension - 2] {
                 for &phi in crystal.fractions[which] {
@@ -165,9 +161,8 @@ where
     (gradient[(0, 0)], gradient[(1, 1)]) = (1.0, -1.0);
     let of_bodies = stress(&mut prepared, &Conditions::in_linear_flow(&gradient))?.of_bodies(count);
     let alpha = 1.0 + 0.25 * (of_bodies[(0, 0)] - of_bodies[(1, 1)]);
-    let mut gradient = Matrix::<D>::zeros();
-    gradient[(0, 1)] = 1.0;
-    let beta = 1.0 + stress(&mut prepared, &Conditions::in_linear_flow(&gradient))?.of_bodies(count)[(0, 1)];
+    let sheared_flow = Conditions::in_linear_flow(&simple_shear());
+    let beta = 1.0 + stress(&mut prepared, &sheared_flow)?.of_bodies(count)[(0, 1)];
     let mut errors = [alpha / strained - 1.0, beta / sheared - 1.0];
     if crystal.is_isotropic() {
         errors = [0.5 * (errors[0] + errors[1]); 2];
@@ -183,8 +178,7 @@ fn stress<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let flow = prepared.solve(&conditions.with_stress())?;
-    flow.stress.ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))
+    Ok(stress_of(&prepared.solve(&conditions.with_stress())?)?.clone())
 }
 
 impl Crystal {
@@ -229,7 +223,7 @@ impl Crystal {
 fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         for (index, crystal) in CRYSTALS.iter().enumerate() {
             for &resolution in RESOLUTIONS[crystal.dimension - 2] {
                 let at = [("crystal", index as f64), ("resolution", resolution)];

@@ -9,9 +9,10 @@ use gluey_suspension::packing::{Amount, Arrangement, Packing, PackingParams};
 
 use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
 use crate::literature::{settling_lost_in_box, settling_of_spheres, viscosity_of_spheres};
-use crate::method::{METHODS, Method};
+use crate::method::Method;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
+use crate::set_up::methods_in_sheared_boxes;
 use crate::statistics::{mean, scatter};
 
 /// Fractions of the box that particles fill.
@@ -55,7 +56,9 @@ fn tasks(extent: Extent) -> Vec<Task> {
     };
     let [plane, space] = CONFIGURATIONS;
     let mut tasks = Vec::new();
-    for (method, &phi) in methods().flat_map(|method| fractions.iter().map(move |phi| (method, phi))) {
+    for (method, &phi) in
+        methods_in_sheared_boxes().flat_map(|method| fractions.iter().map(move |phi| (method, phi)))
+    {
         tasks.extend((0..plane).map(|seed| task::<2>(method, phi, seed)));
         tasks.extend((0..space).map(|seed| task::<3>(method, phi, seed)));
     }
@@ -63,10 +66,6 @@ fn tasks(extent: Extent) -> Vec<Task> {
 }
 
 /// The formulation that knows the stress in periodic boxes.
-fn methods() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.name == "unfitted")
-}
-
 fn task<const D: usize>(method: &'static Method, phi: f64, seed: usize) -> Task
 where
     Dim<D>: Space<D>,
@@ -182,7 +181,7 @@ fn standard_error(values: &[f64]) -> f64 {
 fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
-    for (method, dimension) in methods().flat_map(|method| [(method, 2), (method, 3)]) {
+    for (method, dimension) in methods_in_sheared_boxes().flat_map(|method| [(method, 2), (method, 3)]) {
         for phi in table.steps("phi", method.name, &[("dimension", dimension as f64)]) {
             let at = [("dimension", dimension as f64), ("phi", phi)];
             let scale = [expected(dimension, phi), 1.0];
@@ -237,7 +236,7 @@ mod tests {
         let lattice = Lattice::new([Some(1.0); 3]);
         let body = [Ball::in_space(&Vector::repeat(0.5), radius, &lattice, 0.0)];
         let mesh = Refinement::to_level(3).mesh(Aabb::unit(), [1; 3], [true; 3], &body).unwrap();
-        let method = methods().next().unwrap();
+        let method = methods_in_sheared_boxes().next().unwrap();
         let mut solver = FlowSolver::new(method.params::<3>(1e-7)).unwrap();
         let settling = settling(&mut solver.prepared(mesh, &body).unwrap(), &body).unwrap();
         assert!((settling - exact).abs() < 2e-3, "{settling} instead of {exact}");
@@ -256,7 +255,7 @@ mod tests {
             let place = Vector::from_fn(|d, _| 0.41 + 0.013 * d as f64);
             let body = [Ball::in_space(&place, radius, &Lattice::new([Some(1.0); D]), 0.0)];
             let mesh = Refinement::to_level(level).mesh(Aabb::unit(), [1; D], [true; D], &body).unwrap();
-            let method = methods().next().unwrap();
+            let method = methods_in_sheared_boxes().next().unwrap();
             let mut solver = FlowSolver::new(method.params::<D>(1e-7)).unwrap();
             (viscosity(&mut solver.prepared(mesh, &body).unwrap()).unwrap() - 1.0) / phi
         }

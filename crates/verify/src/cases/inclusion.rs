@@ -1,23 +1,18 @@
 //! A disc or sphere of another viscosity in a linear flow, with the exact velocity on a box around it.
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Dim, Matrix, Space};
 use gluey_levelset::Ball;
-use gluey_stokes::fem::TreeMesh;
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams};
 use gluey_testkit::convergence_order;
-use gluey_testkit::exact::{
-    InclusionViscosity, RigidSphere, StokesSolution, ViscousInclusion, ViscousSphere,
-};
+use gluey_testkit::exact::{InclusionViscosity, StokesSolution, ViscousSphere};
 
 use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
-use crate::norms::{Lattice, errors};
+use crate::norms::errors;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::shift;
-use crate::statistics::{mean, rms};
+use crate::set_up::{around_one_body, disc_in_linear_flow, shift, sphere_in_linear_flow, uniform};
+use crate::statistics::over_positions;
 
-/// Half the edge of the box in radii.
-const HALF_WIDTH: f64 = 2.5;
 /// Viscosity inside over that around it.
 const RATIOS: [f64; 3] = [2.0, 10.0, 100.0];
 const METHOD: &str = "paper";
@@ -63,28 +58,14 @@ fn tasks(extent: Extent) -> Vec<Task> {
 }
 
 fn disc(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
-    let exact = ViscousInclusion {
-        center: shift::<2>(position) / cells,
-        radius: 1.0,
-        matrix_viscosity: 1.0,
-        inclusion_viscosity: InclusionViscosity::Finite(ratio),
-        pure_shear: 0.6,
-        simple_shear: 1.0,
-        spin: -0.5,
-    };
-    let strain = Matrix::<2>::new(0.6, 0.5, 0.5, -0.6);
+    let viscosity = InclusionViscosity::Finite(ratio);
+    let (exact, strain) = disc_in_linear_flow(shift::<2>(position) / cells, viscosity);
     let stresslet = 4.0 * (ratio - 1.0) / (ratio + 1.0);
     measure(cells, ratio, &exact, Ball::new(exact.center, 1.0), (strain, stresslet))
 }
 
 fn sphere(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
-    let rigid = RigidSphere {
-        center: shift::<3>(position) / cells,
-        radius: 1.0,
-        viscosity: 1.0,
-        strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
-        spin: Spin::<3>::new(0.3, -0.2, -0.5),
-    };
+    let rigid = sphere_in_linear_flow(shift::<3>(position) / cells);
     let exact = ViscousSphere { rigid, ratio };
     let stresslet = 20.0 / 3.0 * exact.share();
     measure(cells, ratio, &exact, Ball::new(rigid.center, 1.0), (rigid.strain, stresslet))
@@ -101,20 +82,15 @@ fn measure<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let corner = Vector::<D>::repeat(HALF_WIDTH);
-    let domain = Aabb { lower: -corner, upper: corner };
-    let lattice = Lattice { domain, cells: (2.0 * HALF_WIDTH * cells).round() as usize };
+    let lattice = around_one_body::<D>(cells);
     let boundary = lattice.without_net_flux(|x| exact.velocity(x));
-    let level = lattice.cells.trailing_zeros();
-    let roots = (lattice.cells >> level) as u32;
-    let mesh = TreeMesh::uniform(domain, [roots; D], [false; D], level as u8)?;
     let params = PaperParams { viscosity_ratio: ratio, uzawa_steps: 1, ..PaperParams::default() };
     let params = FlowParams {
         formulation: Formulation::Paper(params),
         tolerance: 1e-9,
         ..FlowParams::for_dimension(D)
     };
-    let flow = FlowSolver::new(params)?.solve(mesh, &[ball], &boundary)?;
+    let flow = FlowSolver::new(params)?.solve(uniform(&lattice)?, &[ball], &boundary)?;
     let of_strain = stresslet * std::f64::consts::PI * strain.norm_squared();
     let found = lattice.stresslet(&flow, &boundary, &strain);
     Ok(vec![errors(&flow, exact, &[]).velocity, found / of_strain - 1.0])
@@ -122,8 +98,7 @@ where
 
 /// The mean square of the errors of velocities, the mean of those of stresslets.
 fn statistic(table: &Table, measure: &str, at: &[(&str, f64)]) -> f64 {
-    let values = table.values(measure, METHOD, at);
-    if measure == "stresslet" { mean(&values) } else { rms(&values) }
+    over_positions(measure, &table.values(measure, METHOD, at))
 }
 
 fn numbers(tables: &Tables) -> Vec<Number> {

@@ -1,23 +1,20 @@
 //! One disc or sphere in a linear flow, with the exact velocity on a box around it.
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Dim, Matrix, Space, Spin};
 use gluey_levelset::Ball;
-use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::convergence_order;
-use gluey_testkit::exact::{InclusionViscosity, RigidSphere, StokesSolution, ViscousInclusion};
+use gluey_testkit::exact::{InclusionViscosity, StokesSolution};
 
 use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
-use crate::norms::{Lattice, errors};
+use crate::norms::errors;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{shift, solve};
-use crate::statistics::{mean, rms};
+use crate::set_up::{around_one_body, disc_in_linear_flow, shift, solve, sphere_in_linear_flow, uniform};
+use crate::statistics::over_positions;
 
 const KEYS: &[&str] = &["a/h", "position"];
 const MEASURES: &[&str] = &["velocity", "spin", "stresslet", "field", "field, largest", "pressure"];
-/// Half the edge of the box in radii.
-const HALF_WIDTH: f64 = 2.5;
 /// Cells per radius, and positions of the lattice.
 type Meshes = &'static [(f64, usize)];
 
@@ -75,27 +72,13 @@ fn tasks(measure: Measure, meshes: Meshes) -> Vec<Task> {
 }
 
 fn disc(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
-    let exact = ViscousInclusion {
-        center: shift::<2>(position) / cells,
-        radius: 1.0,
-        matrix_viscosity: 1.0,
-        inclusion_viscosity: InclusionViscosity::Rigid,
-        pure_shear: 0.6,
-        simple_shear: 1.0,
-        spin: -0.5,
-    };
-    let far = Far { strain: Matrix::<2>::new(0.6, 0.5, 0.5, -0.6), spin: Spin::<2>::new(exact.spin) };
+    let (exact, strain) = disc_in_linear_flow(shift::<2>(position) / cells, InclusionViscosity::Rigid);
+    let far = Far { strain, spin: Spin::<2>::new(exact.spin) };
     measure(method, cells, &exact, Ball::new(exact.center, 1.0), far)
 }
 
 fn sphere(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
-    let exact = RigidSphere {
-        center: shift::<3>(position) / cells,
-        radius: 1.0,
-        viscosity: 1.0,
-        strain: Matrix::<3>::new(0.5, 0.2, -0.3, 0.2, -0.8, 0.4, -0.3, 0.4, 0.3),
-        spin: Spin::<3>::new(0.3, -0.2, -0.5),
-    };
+    let exact = sphere_in_linear_flow(shift::<3>(position) / cells);
     let far = Far { strain: exact.strain, spin: exact.spin };
     measure(method, cells, &exact, Ball::new(exact.center, 1.0), far)
 }
@@ -119,9 +102,7 @@ fn measure<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let corner = Vector::<D>::repeat(HALF_WIDTH);
-    let domain = Aabb { lower: -corner, upper: corner };
-    let lattice = Lattice { domain, cells: (2.0 * HALF_WIDTH * cells).round() as usize };
+    let lattice = around_one_body::<D>(cells);
     let boundary = lattice.without_net_flux(|x| exact.velocity(x));
     let flow = solve(method, 1e-9, uniform(&lattice)?, &[ball], &boundary)?;
     let twist = flow.twists[0];
@@ -140,17 +121,9 @@ where
     ])
 }
 
-/// The mesh with as few roots as possible.
-fn uniform<const D: usize>(lattice: &Lattice<D>) -> Result<TreeMesh<D>, VerifyError> {
-    let level = lattice.cells.trailing_zeros();
-    let roots = (lattice.cells >> level) as u32;
-    Ok(TreeMesh::uniform(lattice.domain, [roots; D], [false; D], level as u8)?)
-}
-
-/// The statistic of a measure over positions: the stresslet has a sign, errors of vectors do not.
+/// The statistic of a measure over positions.
 fn statistic(table: &Table, method: &str, measure: &str, cells: f64) -> f64 {
-    let values = table.values(measure, method, &[("a/h", cells)]);
-    if measure == "stresslet" { mean(&values) } else { rms(&values) }
+    over_positions(measure, &table.values(measure, method, &[("a/h", cells)]))
 }
 
 fn numbers(table: &Table) -> Vec<Number> {

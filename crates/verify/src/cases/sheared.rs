@@ -2,16 +2,16 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Dim, Lattice, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, Flow, FlowSolver, Refinement};
 use gluey_testkit::reference::{Table, sheared_simple_cubic_lattice, sheared_square_lattice};
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::Method;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::shift;
+use crate::set_up::{methods_in_sheared_boxes, shift, simple_shear, stress_of};
 use crate::statistics::rms;
 
 /// Solid fractions of the square and of the simple cubic lattice.
@@ -47,7 +47,7 @@ fn levels(extent: Extent) -> [&'static [u8]; 2] {
 fn tasks(extent: Extent) -> Vec<Task> {
     let [plane, space] = levels(extent);
     let mut tasks = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         plane.iter().for_each(|&level| tasks.extend(of_mesh::<2>(method, level, FRACTIONS[0])));
         space.iter().for_each(|&level| tasks.extend(of_mesh::<3>(method, level, FRACTIONS[1])));
     }
@@ -55,10 +55,6 @@ fn tasks(extent: Extent) -> Vec<Task> {
 }
 
 /// The formulation that knows boxes that are sheared.
-fn methods() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.name == "unfitted")
-}
-
 fn of_mesh<const D: usize>(
     method: &'static Method,
     level: u8,
@@ -79,7 +75,7 @@ where
     Dim<D>: Space<D>,
 {
     let flow = flow::<D>(method, level, phi, strain)?;
-    let stress = flow.stress.as_ref().ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))?;
+    let stress = stress_of(&flow)?;
     let of_body = stress.of_bodies(1.0);
     let viscosity = 1.0 + of_body[(0, 1)];
     let normal = |d: usize, e: usize| of_body[(d, d)] - of_body[(e, e)];
@@ -101,9 +97,7 @@ where
     let ball = [Ball::in_space(&place, radius, &lattice, 0.0)];
     let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
     let mesh = refinement.mesh(Aabb::unit(), [1; D], [true; D], &ball)?;
-    let mut gradient = Matrix::<D>::zeros();
-    gradient[(0, 1)] = 1.0;
-    let conditions = Conditions::in_linear_flow(&gradient).with_stress();
+    let conditions = Conditions::in_linear_flow(&simple_shear::<D>()).with_stress();
     let tolerance = if D == 2 { 1e-9 } else { 1e-7 };
     Ok(FlowSolver::new(method.params::<D>(tolerance))?.solve_under(mesh, &ball, &conditions)?)
 }
@@ -126,7 +120,7 @@ fn exact(dimension: usize, phi: f64, strain: f64) -> Result<[f64; 4], VerifyErro
 fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
-    for method in methods() {
+    for method in methods_in_sheared_boxes() {
         for dimension in [2.0, 3.0] {
             for cells in table.steps("cells", method.name, &[("dimension", dimension)]) {
                 let at = [("dimension", dimension), ("cells", cells)];

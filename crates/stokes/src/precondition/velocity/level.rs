@@ -88,9 +88,7 @@ where
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
         let mut diagonal = block_diagonal(space, &cells, smoothed)?;
-        if !smooths_twists || space.holds_twists() {
-            diagonal.hold_twists();
-        }
+        diagonal.hold(|body| !smooths_twists || space.is_held(body));
         let lambda_max = cell_lambda_max::<D>(&space.discretisation().reference());
         Ok(Self {
             near_bodies: NearBodies::new(space, &cells, &diagonal, lambda_max),

@@ -59,22 +59,37 @@ where
         wrench
     }
 
-    /// Makes the twists data, which are zero in reduced vectors, or unknowns again. Vectors keep their length
-    /// and maps what they do, but for projections, which leave twists at zero; operators and solvers leave
-    /// out their rows and columns.
-    pub fn hold_twists(&mut self, hold: bool) {
-        self.holds_twists = hold;
+    /// Makes the twists of these bodies data, which are zero in reduced vectors, and those of the others
+    /// unknowns; no entries stand for none. Vectors keep their length and maps what they do, but for
+    /// projections, which leave twists that are data at zero; operators and solvers leave out their rows and
+    /// columns.
+    pub fn hold(&mut self, held: &[bool]) {
+        self.held.clear();
+        if held.contains(&true) {
+            self.held.extend_from_slice(held);
+        }
     }
 
-    /// Whether the twists are data.
-    pub fn holds_twists(&self) -> bool {
-        self.holds_twists
+    /// Which bodies have twists that are data; no entries where none has.
+    pub fn held(&self) -> &[bool] {
+        &self.held
+    }
+
+    /// Whether the twist of a body is data.
+    pub fn is_held(&self, body: usize) -> bool {
+        self.held.get(body) == Some(&true)
+    }
+
+    /// Whether the twist of any body is data.
+    pub fn holds_any(&self) -> bool {
+        !self.held.is_empty()
     }
 
     /// Clears the twists of a reduced vector where they are data.
     pub fn clear_held<T: Scalar>(&self, x: &mut [T]) {
-        if self.holds_twists {
-            x[self.full_dim()..self.dim()].fill(T::ZERO);
+        let twists = x[self.full_dim()..self.dim()].chunks_exact_mut(Dim::<D>::RIGID);
+        for (twist, _) in twists.zip(&self.held).filter(|(_, held)| **held) {
+            twist.fill(T::ZERO);
         }
     }
 }

@@ -1,0 +1,105 @@
+//! Why a simulation cannot go on.
+
+use gluey_contact::{ContactError, MemoryError};
+use gluey_motion::{FilmClosed, NoForces, ResumeError};
+use thiserror::Error;
+
+use crate::shown::shown;
+
+/// A step could not be done.
+#[derive(Debug, Error)]
+pub enum StepError<E: std::error::Error + 'static> {
+    /// The flow could not be computed.
+    #[error("the flow failed in step {step} (t = {})", shown(*time))]
+    Flow {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: E,
+    },
+    /// Particles repel each other, and the model of their motion does not answer to forces.
+    #[error("forces failed in step {step} (t = {})", shown(*time))]
+    Forces {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: NoForces,
+    },
+    /// Contact could not be resolved.
+    #[error("contact failed in step {step} (t = {})", shown(*time))]
+    Contact {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: ContactError,
+    },
+    /// A film could not be kept open.
+    #[error("motion failed in step {step} (t = {})", shown(*time))]
+    Film {
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+        /// Why.
+        source: FilmClosed,
+    },
+    /// A velocity is infinite or not a number.
+    #[error("the velocity of particle {particle} is not finite in step {step} (t = {})", shown(*time))]
+    NotFinite {
+        /// Its number, from 1.
+        particle: usize,
+        /// Steps done before.
+        step: usize,
+        /// Time at the start of the step.
+        time: f64,
+    },
+}
+
+impl<E: std::error::Error + 'static> StepError<E> {
+    /// The same for a wider type of flow errors.
+    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> StepError<W> {
+        match self {
+            Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
+            Self::Forces { step, time, source } => StepError::Forces { step, time, source },
+            Self::Contact { step, time, source } => StepError::Contact { step, time, source },
+            Self::Film { step, time, source } => StepError::Film { step, time, source },
+            Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
+        }
+    }
+}
+
+/// A simulation cannot go on from a state.
+#[derive(Debug, Error)]
+pub enum RestoreError<E: std::error::Error + 'static> {
+    /// It is of other particles.
+    #[error("the state is one of {saved} particles, which are not the {present} particles here")]
+    Particles {
+        /// Particles of the state.
+        saved: usize,
+        /// Particles of the simulation.
+        present: usize,
+    },
+    /// Its flow does not fit.
+    #[error(transparent)]
+    Flow(#[from] ResumeError<E>),
+    /// Its contacts are none.
+    #[error(transparent)]
+    Contact(#[from] MemoryError),
+}
+
+impl<E: std::error::Error + 'static> RestoreError<E> {
+    /// The same for a wider type of flow errors.
+    pub fn widen<W: std::error::Error + From<E> + 'static>(self) -> RestoreError<W> {
+        match self {
+            Self::Particles { saved, present } => RestoreError::Particles { saved, present },
+            Self::Flow(error) => RestoreError::Flow(error.widen()),
+            Self::Contact(error) => RestoreError::Contact(error),
+        }
+    }
+}

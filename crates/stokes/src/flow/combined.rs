@@ -1,0 +1,82 @@
+//! A flow and a multiple of another around the same free bodies, the multiple found from both.
+//!
+//! A suspension that is sheared at a given stress: the stress is `r A + B` with the flow at the rate one, the
+//! flow of the forces between bodies, and the rate `r` that the stress asks for.
+
+use std::time::Instant;
+
+use gluey_fem::TreeMesh;
+use gluey_geom::{Dim, Space, Wrench};
+use gluey_levelset::Ball;
+use gluey_linalg::vector;
+
+use super::conditions::{Conditions, Given};
+use super::trusted::Trusted;
+use super::{Effort, Flow, FlowSolver, PhaseTimes, flow_of};
+use crate::error::StokesError;
+
+impl<const D: usize> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow under some conditions, without forces on the bodies, plus a multiple of the flow that the
+    /// `wrenches` make in a box at rest: `factor` tells the multiple from the two. Without wrenches there is
+    /// one flow, and the factor is not asked for.
+    ///
+    /// # Errors
+    /// Those of [`FlowSolver::solve_under`], and of `factor`.
+    pub fn solve_combined<E: From<StokesError>>(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        conditions: &Conditions<'_, D>,
+        wrenches: &[Wrench<D>],
+        factor: impl FnOnce(&Flow<D>, &Flow<D>) -> Result<f64, E>,
+    ) -> Result<Flow<D>, E> {
+        if wrenches.is_empty() {
+            return Ok(self.solve_under(mesh, bodies, conditions)?);
+        }
+        let start = Instant::now();
+        let mut problem = self.problem(mesh, bodies)?;
+        let assembled = Instant::now();
+        let mut method = self.method.clone();
+        self.prepare(&mut problem, &mut method)?;
+        let prepared = Instant::now();
+        let (guess, before) = self.initial_guess(&problem, conditions)?;
+        let Trusted { flow: first, mut x, .. } =
+            self.trusted(&mut problem, &mut method, conditions, &guess)?;
+        self.keep_for_next(&problem, &x, &first.pressure, before);
+        let pushed =
+            Conditions { stress: conditions.stress, ..Conditions::at_rest().with_wrenches(wrenches) };
+        let guess = vec![0.0; x.len()];
+        let second = self.trusted(&mut problem, &mut method, &pushed, &guess)?;
+        let factor = factor(&first, &second.flow)?;
+        vector::axpy(factor, &second.x, &mut x);
+        let pushes: Vec<Wrench<D>> = wrenches.iter().map(|wrench| *wrench * factor).collect();
+        let both = Conditions { bodies: Given::Wrenches(&pushes), ..*conditions };
+        let lift = problem.lift(conditions.boundary);
+        let effort = Effort::of([&first, &second.flow]);
+        let mut flow = flow_of(&problem, &both, (&lift, &mut x), Vec::new(), &effort)?;
+        flow.times = PhaseTimes {
+            assembly: (assembled - start).as_secs_f64(),
+            preparation: (prepared - assembled).as_secs_f64(),
+            solve: prepared.elapsed().as_secs_f64(),
+        };
+        Ok(flow)
+    }
+}
+
+impl Effort {
+    /// That of two flows together, with the larger residual.
+    fn of<const D: usize>([first, second]: [&Flow<D>; 2]) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        Self {
+            solve_count: first.solve_count + second.solve_count,
+            iteration_count: first.iteration_count + second.iteration_count,
+            residual: first.residual.max(second.residual),
+            fine_operator_applications: first.fine_operator_applications + second.fine_operator_applications,
+        }
+    }
+}
