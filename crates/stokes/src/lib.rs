@@ -44,7 +44,7 @@ pub use flow::{
     Refinement, Stress, WarmStartError,
 };
 // Near bodies and the films between them.
-pub use film::{Film, FilmForce, Lubrication, Partner, films};
+pub use film::{Film, FilmForce, Heights, Lubrication, Partner, films, thin_films};
 // How rigidity is imposed.
 pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
 pub use space::CutCellPressures;

@@ -1,6 +1,6 @@
 //! The formulations that the book compares.
 
-use gluey_stokes::{CutCellPressures, FlowParams, Formulation, Lubrication, PaperParams};
+use gluey_stokes::{CutCellPressures, FlowParams, Formulation, Heights, Lubrication, PaperParams};
 
 /// A formulation with the settings that a case has by default.
 #[derive(Debug)]
@@ -61,11 +61,11 @@ impl Method {
         FlowParams { formulation: (self.formulation)(D), tolerance, ..FlowParams::for_dimension(D) }
     }
 
-    /// The thickness to which films between bodies are widened on cells of this size.
-    pub fn height_of_films<const D: usize>(&self, cell_size: f64) -> f64 {
+    /// The thicknesses to which films are widened on cells of this size.
+    pub fn heights_of_films<const D: usize>(&self, cell_size: f64) -> Heights {
         match (self.formulation)(D) {
-            Formulation::Unfitted { lubrication } => lubrication.heights::<D>(cell_size).between_bodies,
-            _ => 0.0,
+            Formulation::Unfitted { lubrication } => lubrication.heights::<D>(cell_size),
+            _ => Heights::default(),
         }
     }
 }

@@ -4,7 +4,7 @@ use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::fem::cut::{BallInCell, CutRules, FlatInCell, POINTS};
 use gluey_stokes::fem::element::{gauss_cube, gradient, node_count, value};
-use gluey_stokes::{Flat, Flow, films};
+use gluey_stokes::{Flat, Flow, Heights, thin_films};
 use gluey_testkit::exact::StokesSolution;
 
 /// Errors of a flow in the fluid. Those of the velocity are relative to the exact one.
@@ -99,15 +99,14 @@ where
 }
 
 /// The integral of the velocity over the fluid around bodies, which repeat where the box is periodic, over
-/// the volume of the box. Films between bodies that are thinner than `height` are as thick as that, as the
-/// mesh sees them.
-pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], height: f64) -> Vector<D>
+/// the volume of the box. Films between bodies are widened to these heights, as the mesh sees them.
+pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], heights: &Heights) -> Vector<D>
 where
     Dim<D>: Space<D>,
 {
     let mesh = &flow.discretisation.mesh;
     let (points, rules) = (gauss_cube::<D>(POINTS), CutRules::new(0.0));
-    let flats = flats(balls, mesh.domain(), height);
+    let flats = flats(balls, mesh.domain(), heights);
     let of_cell = |(index, cell)| {
         let (lower, h) = (mesh.lower_corner(cell), mesh.size(cell.level));
         let near = balls.iter().zip(&flats).flat_map(|(ball, flats)| {
@@ -126,11 +125,13 @@ where
     mesh.cells().iter().enumerate().map(of_cell).sum::<Vector<D>>() / mesh.domain().extent().product()
 }
 
-/// The planes that cut each of these bodies flat where films are thinner than `height`.
-fn flats<const D: usize>(balls: &[Ball<D>], domain: &Aabb<D>, height: f64) -> Vec<Vec<Flat<D>>> {
+/// The planes that cut each of these bodies flat where films are widened.
+fn flats<const D: usize>(balls: &[Ball<D>], domain: &Aabb<D>, heights: &Heights) -> Vec<Vec<Flat<D>>> {
     let mut flats = vec![Vec::new(); balls.len()];
-    for film in films(balls, domain, height) {
-        for ((side, distance), sign) in film.flats(height).into_iter().enumerate().zip([1.0, -1.0]) {
+    for film in thin_films(balls, domain, heights) {
+        for ((side, distance), sign) in
+            film.flats(film.height(heights)).into_iter().enumerate().zip([1.0, -1.0])
+        {
             if let Some(body) = film.side(side) {
                 flats[body].push(Flat { normal: film.normal * sign, distance });
             }

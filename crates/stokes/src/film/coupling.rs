@@ -34,8 +34,8 @@ const SAME_FILM: f64 = 0.7;
 pub struct FilmCoupling<const D: usize> {
     /// Films with a resistance, each with the number of its first row.
     films: Vec<Film<D>>,
-    /// What flows through each, where the mesh has it.
-    flows: Vec<Option<FilmFlow<D>>>,
+    /// What flows through each in the directions across it, where the mesh has it.
+    flows: Vec<Vec<FilmFlow<D>>>,
     /// Their modes.
     modes: Vec<Vec<Mode<D>>>,
     /// `s B`: entries of reduced velocities.
@@ -80,12 +80,12 @@ where
     /// Numbers that are kept of a film.
     pub const KEPT: usize = 2 + 4 * D;
 
-    /// The forces of `films` that are widened to these heights, each with what flows through it where that
-    /// counts, on the velocities of `space` in a fluid of this viscosity.
+    /// The forces of `films` that are widened to these heights, each with what flows through it in
+    /// the directions across it where that counts, on the velocities of `space` in a fluid of this viscosity.
     pub fn new(
         space: &VelocitySpace<D>,
         films: Vec<Film<D>>,
-        flows: Vec<Option<FilmFlow<D>>>,
+        flows: Vec<Vec<FilmFlow<D>>>,
         heights: &Heights,
         viscosity: f64,
     ) -> Self {
@@ -93,11 +93,12 @@ where
         let mut kinds = Vec::with_capacity(films.len());
         for (film, flow) in films.iter().zip(&flows) {
             let shape = film.shape(film.height(heights));
-            let lacks = if flow.is_some() { shape.deficits_with_flow::<D>() } else { shape.deficits::<D>() };
-            let modes = modes::<D>(film, flow.as_ref(), &shape.resolved::<D>(), &lacks);
+            let lacks = if flow.is_empty() { shape.deficits::<D>() } else { shape.deficits_with_flow::<D>() };
+            let modes = modes::<D>(film, flow, &shape.resolved::<D>(), &lacks);
+            let mut flow = flow.iter();
             for mode in &modes {
                 let scale = (viscosity * mode.lacks).sqrt();
-                let row = mode.row(space, film, flow.as_ref());
+                let row = mode.row(space, film, if mode.is_flow { flow.next() } else { None });
                 rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
                 inverses.push(mode.has / (mode.has + mode.lacks));
                 scales.push(scale);
@@ -226,37 +227,39 @@ where
     /// films between them.
     pub fn add_strain(&self, strain: &Matrix<D>, z: &mut [f64]) {
         self.subtract_partners(|film| (!film.partner.is_wall()).then(|| strain * film.branch()), z);
-        self.for_each_flow(|row, direction, film, flow| {
-            let arm = flow.middle + film.normal * (0.5 * (film.arm(0) - film.arm(1)));
-            z[row] += self.scales[row] * flow.height * (strain * arm).dot(direction);
+        self.for_each_flow(|row, film, flow| {
+            // From the mean place of the two centres to the middle of the film.
+            let arm = film.normal * (0.5 * (film.arm(0) - film.arm(1)));
+            let places = flow.first + flow.total * arm.transpose();
+            z[row] += self.scales[row] * strain.component_mul(&places).sum();
         });
     }
 
     /// `z += s B V` for the velocities of boundary nodes in a nodal field, which are not unknowns.
     pub fn add_boundary(&self, u: &[f64], z: &mut [f64]) {
-        self.for_each_flow(|row, direction, _, flow| {
+        self.for_each_flow(|row, _, flow| {
             let at = |node: u32| Vector::<D>::from_column_slice(&u[node as usize * D..][..D]);
-            let sum: f64 = flow.boundary.iter().map(|&(node, weight)| weight * at(node).dot(direction)).sum();
-            z[row] += self.scales[row] * flow.height * sum;
+            let sum: f64 = flow.boundary.iter().map(|(node, weight)| weight.dot(&at(*node))).sum();
+            z[row] += self.scales[row] * sum;
         });
     }
 
-    fn for_each_flow(&self, mut visit: impl FnMut(usize, &Vector<D>, &Film<D>, &FilmFlow<D>)) {
-        for (index, (film, flow)) in self.films.iter().zip(&self.flows).enumerate() {
-            let Some(flow) = flow else { continue };
+    fn for_each_flow(&self, mut visit: impl FnMut(usize, &Film<D>, &FilmFlow<D>)) {
+        for (index, (film, flows)) in self.films.iter().zip(&self.flows).enumerate() {
             let modes = self.modes[index].iter().enumerate().filter(|(_, mode)| mode.is_flow);
-            modes.for_each(|(k, mode)| visit(index * Self::MODES + k, &mode.direction, film, flow));
+            modes.zip(flows).for_each(|((k, _), flow)| visit(index * Self::MODES + k, film, flow));
         }
     }
 
     /// `z -= s B V` for what the velocities of the partners are beside those of bodies: those of walls, or of
     /// the image of a body in a flow that is not periodic. `at` gives them by the film.
     pub fn subtract_partners(&self, at: impl Fn(&Film<D>) -> Option<Vector<D>>, z: &mut [f64]) {
-        let known = self.films.iter().enumerate().filter_map(|(index, film)| Some((index, at(film)?)));
-        for (index, velocity) in known {
+        let known = self.films.iter().enumerate().filter_map(|(index, film)| Some((index, film, at(film)?)));
+        for (index, film, velocity) in known {
             for (k, mode) in self.modes[index].iter().enumerate() {
                 let row = index * Self::MODES + k;
-                z[row] -= self.scales[row] * mode.slip * velocity.dot(&mode.direction);
+                let motion = velocity.dot(&(mode.direction * mode.slip + film.normal * mode.approach));
+                z[row] -= self.scales[row] * motion;
             }
         }
     }
@@ -271,12 +274,13 @@ fn key<const D: usize>(film: &Film<D>) -> [f64; 2] {
     [f64::from(film.body), partner]
 }
 
-/// A mode of the relative motion of the two sides of a film: `slip v.t + turning ((w_1 - w_2) x n).t` in a
-/// direction `t`, and the flow through the film if it is one of that.
+/// A mode of the relative motion of the two sides of a film: `slip v.t + approach v.n + turning
+/// ((w_1 - w_2) x n).t` in a direction `t`, and the flow through the film if it is one of that.
 #[derive(Clone, Copy, Debug)]
 struct Mode<const D: usize> {
     direction: Vector<D>,
     slip: f64,
+    approach: f64,
     turning: f64,
     is_flow: bool,
     /// About the resistance that the mesh has, and that which it lacks.
@@ -288,13 +292,14 @@ struct Mode<const D: usize> {
 /// diagonal, and the flow through it.
 fn modes<const D: usize>(
     film: &Film<D>,
-    flow: Option<&FilmFlow<D>>,
+    flows: &[FilmFlow<D>],
     has: &Deficits,
     lacks: &Deficits,
 ) -> Vec<Mode<D>> {
     let plain = Mode {
         direction: film.normal,
         slip: 1.0,
+        approach: 0.0,
         turning: 0.0,
         is_flow: false,
         has: has.normal,
@@ -323,16 +328,18 @@ fn modes<const D: usize>(
             ..plain
         }
     };
-    let through = |direction: Vector<D>| Mode {
+    let through = |direction: Vector<D>, flow: Option<&FilmFlow<D>>| Mode {
         direction,
         slip: lacks.carried * roll,
-        turning: lacks.carried + flow.map_or(0.0, FilmFlow::turning),
+        approach: flow.map_or(0.0, |flow| flow.approach),
+        turning: lacks.carried + flow.map_or(0.0, |flow| flow.turning),
         is_flow: true,
         has: has.through,
         lacks: lacks.through,
     };
     let tangents = film.tangents();
-    let tangential = tangents.iter().flat_map(|&t| [across(t, 0), across(t, 1), through(t)]);
+    let tangential = tangents.iter().enumerate();
+    let tangential = tangential.flat_map(|(k, &t)| [across(t, 0), across(t, 1), through(t, flows.get(k))]);
     std::iter::once(plain).chain(tangential).collect()
 }
 
@@ -343,7 +350,6 @@ impl<const D: usize> Mode<D> {
         Dim<D>: Space<D>,
     {
         let (t, n) = (&self.direction, &film.normal);
-        let flow = flow.filter(|_| self.is_flow);
         let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             let Some(body) = film.side(side) else { continue };
@@ -351,20 +357,17 @@ impl<const D: usize> Mode<D> {
             // From the centre to the middle of the film.
             let arm = n * (sign * film.arm(side));
             let turn = Dim::<D>::moment(&arm, t) * self.slip + Dim::<D>::moment(n, t) * self.turning;
-            let (mut force, mut turn) = (t * (sign * self.slip), turn * sign);
+            let (mut force, mut turn) = ((t * self.slip + n * self.approach) * sign, turn * sign);
             if let Some(flow) = flow {
-                let half = -0.5 * flow.height;
-                force += t * half;
-                turn += Dim::<D>::moment(&(arm + flow.middle), t) * half;
+                force -= flow.total * 0.5;
+                turn += flow.of_spin(&arm) * -0.5;
             }
             let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
             let entries = force.iter().copied().chain(spins).enumerate();
             row.extend(entries.map(|(k, weight)| ((first + k) as u32, weight)));
         }
         if let Some(flow) = flow {
-            flow.nodes.iter().for_each(|&(node, weight)| {
-                space.push_load(node as usize, &(t * (weight * flow.height)), &mut row);
-            });
+            flow.nodes.iter().for_each(|(node, weight)| space.push_load(*node as usize, weight, &mut row));
         }
         row
     }

@@ -94,6 +94,11 @@ impl FilmShape {
         }
     }
 
+    /// Thickness that the mesh sees where the distance from the line of centres has this square.
+    pub fn seen(&self, square: f64) -> f64 {
+        self.height.max(self.gap + square / self.radius)
+    }
+
     /// Where the film has the thickness `height`.
     pub fn edge(&self) -> f64 {
         (self.radius * (self.height - self.gap)).max(0.0).sqrt()

@@ -14,8 +14,9 @@ mod near;
 mod through;
 
 pub use coupling::{FilmCoupling, FilmForce};
+pub use deficit::FilmShape;
 pub use near::{Film, Heights, Partner, films, thin_films};
-pub use through::{FilmFlow, weight};
+pub use through::FilmFlow;
 
 /// Treatment of films between bodies that are too thin for the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,11 +33,17 @@ pub enum Lubrication {
 impl Lubrication {
     /// The thicknesses to which films are widened in `D` dimensions on cells of this size.
     pub fn heights<const D: usize>(self, cell_size: f64) -> Heights {
-        let [between_bodies, at_walls] = match self {
-            Self::Deficit => [1.25, 0.4],
-            Self::None if D == 3 => [0.6, 0.0],
-            Self::None => [0.0, 0.0],
+        let [at_contact, per_gap, largest, at_walls] = match self {
+            Self::Deficit if D == 3 => [0.55, 0.8, 1.25, 0.4],
+            Self::Deficit => [1.3, 0.0, 1.3, 0.4],
+            Self::None if D == 3 => [0.6, 0.0, 0.6, 0.0],
+            Self::None => [0.0; 4],
         };
-        Heights { between_bodies: between_bodies * cell_size, at_walls: at_walls * cell_size }
+        Heights {
+            at_contact: at_contact * cell_size,
+            per_gap,
+            largest: largest * cell_size,
+            at_walls: at_walls * cell_size,
+        }
     }
 }

@@ -8,11 +8,15 @@ use super::deficit::FilmShape;
 /// Films thinner than this share of their `A`, also where bodies overlap, resist like one of this thickness.
 const THINNEST: f64 = 1e-9;
 
-/// Thicknesses to which films are widened.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Thicknesses to which films are widened; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heights {
-    /// Between bodies.
-    pub between_bodies: f64,
+    /// Between bodies that touch.
+    pub at_contact: f64,
+    /// By how much that grows with the gap.
+    pub per_gap: f64,
+    /// Between bodies at most.
+    pub largest: f64,
     /// At walls, on which faces of cells lie: there the mesh resolves thinner films.
     pub at_walls: f64,
 }
@@ -81,7 +85,8 @@ impl<const D: usize> Film<D> {
 
     /// The one of these to which it is widened.
     pub fn height(&self, heights: &Heights) -> f64 {
-        if self.partner.is_wall() { heights.at_walls } else { heights.between_bodies }
+        let Heights { at_contact, per_gap, largest, at_walls } = *heights;
+        if self.partner.is_wall() { at_walls } else { largest.min(at_contact + per_gap * self.gap.max(0.0)) }
     }
 
     /// The body on a side, the first or its partner; `None` for a wall.
@@ -144,7 +149,7 @@ impl<const D: usize> Film<D> {
 
 /// The films that are widened to these heights.
 pub fn thin_films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, heights: &Heights) -> Vec<Film<D>> {
-    let mut films = films(bodies, domain, heights.at_walls.max(heights.between_bodies));
+    let mut films = films(bodies, domain, heights.at_walls.max(heights.largest));
     films.retain(|film| film.gap < film.height(heights));
     films
 }

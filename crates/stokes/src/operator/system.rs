@@ -79,8 +79,8 @@ where
     pub(crate) fn with_films(self, bodies: &[Ball<D>], films: Vec<Film<D>>, heights: &Heights) -> Self {
         let cut = self.surfaces.as_ref().map(|surfaces| &surfaces.cut);
         let flows = cut.map_or_else(
-            || vec![None; films.len()],
-            |cut| flows_through_films(&self.space, cut, bodies, &films, heights),
+            || vec![Vec::new(); films.len()],
+            |cut| flows_through_films((&self.space, &self.pressure), cut, (bodies, &films, heights)),
         );
         let films = FilmCoupling::new(&self.space, films, flows, heights, self.viscosity);
         Self { films: Some(Arc::new(films)), ..self }

@@ -49,7 +49,27 @@ fn numbers(tables: &Tables) -> Vec<Number> {
             }
         }
     }
+    let spheres = tables.of("spheres");
+    let enough = "spheres, CPU seconds for 1 % at a gap of a and 5 % at 0.2 a";
+    let reached = METHODS.iter().filter_map(|method| Some((method.name, cheapest(&spheres, method.name)?)));
+    numbers.extend(
+        reached.map(|(method, seconds)| Number::new(Kind::Remark, enough.to_owned(), method, seconds)),
+    );
     numbers
+}
+
+/// Seconds on the coarsest mesh on which errors at all places are at most one per cent at a gap of a radius
+/// and five at a fifth of that.
+fn cheapest(table: &Table, method: &str) -> Option<f64> {
+    let holds = |cells: f64| {
+        [(1.0, 0.01), (0.2, 0.05)].into_iter().all(|(gap, most)| {
+            let at = [("a/h", cells), ("gap", gap), ("angle", 135.0)];
+            let errors = table.values("approach", method, &at);
+            !errors.is_empty() && errors.iter().all(|error| error.abs() <= most)
+        })
+    };
+    let cells = table.steps("a/h", method, &[]).into_iter().find(|&cells| holds(cells))?;
+    Some(mean(&table.values(CPU_TIME, method, &[("a/h", cells), ("gap", 0.2), ("angle", 135.0)])))
 }
 
 fn plot(tables: &Tables) -> Plot {

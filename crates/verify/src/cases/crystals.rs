@@ -148,13 +148,13 @@ where
     let [drag, strained, sheared] = crystal.exact(phi)?;
     let scale = if D == 2 { 1.0 } else { 6.0 * PI * radius };
     let directions = if crystal.is_isotropic() { 2 } else { 1 };
-    let height = method.height_of_films::<D>(h);
+    let heights = method.heights_of_films::<D>(h);
     let held = vec![Twist::default(); balls.len()];
     let mut drags = 0.0;
     for direction in 0..directions {
         let force = |_: &Vector<D>| Vector::from_fn(|d, _| if d == direction { 1.0 } else { 0.0 });
         let conditions = Conditions::at_rest().with_force(Some(&force)).with_twists(&held);
-        let velocity = superficial_velocity(&prepared.solve(&conditions)?, &balls, height);
+        let velocity = superficial_velocity(&prepared.solve(&conditions)?, &balls, &heights);
         drags += 1.0 / velocity[direction];
     }
     let mut gradient = Matrix::<D>::zeros();

@@ -89,7 +89,7 @@ where
     let conditions = Conditions::at_rest().with_force(Some(&force)).with_twists(&still);
     let tolerance = if D == 2 { 1e-9 } else { 1e-7 };
     let flow = FlowSolver::new(method.params::<D>(tolerance))?.solve_under(mesh, &ball, &conditions)?;
-    let drag = 1.0 / superficial_velocity(&flow, &ball, method.height_of_films::<D>(mesh_size))[0];
+    let drag = 1.0 / superficial_velocity(&flow, &ball, &method.heights_of_films::<D>(mesh_size))[0];
     let scale = if D == 2 { 1.0 } else { 6.0 * PI * radius };
     Ok(vec![drag / scale / exact(D, phi)? - 1.0, -flow.wrenches[0].force[0] - 1.0])
 }

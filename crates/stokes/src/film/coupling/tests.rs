@@ -30,13 +30,13 @@ fn coupling<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> (VelocitySpac
 where
     Dim<D>: Space<D>,
 {
-    coupling_with(bodies, cell_size, None)
+    coupling_with(bodies, cell_size, Vec::new())
 }
 
 fn coupling_with<const D: usize>(
     bodies: &[Ball<D>],
     cell_size: f64,
-    flow: Option<FilmFlow<D>>,
+    flows: Vec<FilmFlow<D>>,
 ) -> (VelocitySpace<D>, FilmCoupling<D>)
 where
     Dim<D>: Space<D>,
@@ -44,7 +44,7 @@ where
     let space = space_of(bodies);
     let heights = Lubrication::Deficit.heights::<D>(cell_size);
     let films = thin_films(bodies, &Aabb::unit(), &heights);
-    let flows = vec![flow; films.len()];
+    let flows = vec![flows; films.len()];
     let coupling = FilmCoupling::new(&space, films, flows, &heights, 1.0);
     (space, coupling)
 }
@@ -198,12 +198,12 @@ where
     let flow = FilmFlow {
         nodes: Vec::new(),
         boundary: Vec::new(),
-        middle: Vector::zeros(),
-        height: 0.02,
-        reach: 0.03,
-        edge: 0.01,
+        total: Vector::repeat(0.02),
+        first: Matrix::zeros(),
+        approach: 0.0,
+        turning: 1e-4,
     };
-    let (_, coupling) = coupling_with(&pair::<D>([0.07, 0.11], 0.004), 0.02, Some(flow));
+    let (_, coupling) = coupling_with(&pair::<D>([0.07, 0.11], 0.004), 0.02, vec![flow; D - 1]);
     assert_eq!(coupling.dim(), FilmCoupling::<D>::MODES);
     assert!(coupling.modes[0].iter().filter(|mode| mode.is_flow && mode.lacks > 0.0).count() == D - 1);
     // Forces of what the mesh does not lack are zero.
