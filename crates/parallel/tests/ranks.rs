@@ -145,6 +145,18 @@ fn a_rank_that_dies_ends_all_and_is_named() {
 }
 
 #[test]
+fn all_ranks_take_what_rank_zero_shares() {
+    for size in SIZES {
+        let shared = Threads::run(size, |ranks| {
+            let mut values = [0.5 + ranks.rank() as f64, -0.0, 1e300];
+            ranks.share(&mut values);
+            values.map(f64::to_bits)
+        });
+        assert_eq!(shared.unwrap(), vec![[0.5, -0.0, 1e300].map(f64::to_bits); size]);
+    }
+}
+
+#[test]
 fn traffic_is_counted() {
     let traffic = Threads::run(4, |ranks| {
         let next = Message { rank: (ranks.rank() + 1) % 4, bytes: vec![7; 100] };
