@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, equal_cuts};
 use gluey_fem::ImplicitTree;
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Communicator, Threads, Traffic};
 use serde::Serialize;
 
@@ -96,7 +96,10 @@ fn run(options: &Options, ranks: &dyn Communicator) -> String {
     }
 }
 
-fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String {
+fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
+where
+    Dim<D>: Space<D>,
+{
     let wants = |lower: &Vector<D>, h: f64, level: u8| {
         let distance = (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.45)).norm() - 0.3;
         !options.adaptive || level < 2 || distance.abs() < h
@@ -169,7 +172,10 @@ struct Record {
 }
 
 impl Record {
-    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self {
+    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
         let bits = mine.velocity.iter().flatten().chain(&mine.pressure).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
         let &Options { dimension, level, adaptive, tolerance, .. } = options;
