@@ -16,7 +16,7 @@
 //!     let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true, false], 3, &wants).expect("a tree");
 //!     let cuts = equal_cuts(&tree, ranks);
 //!     let shear = |x: &Vector<2>| Vector::<2>::new(x[1], 0.0);
-//!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 50 };
+//!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 100 };
 //!     let mine = flow.solve(&mut tree, &cuts, ranks, &shear).expect("a flow");
 //!     // Between moving walls every node moves with its height.
 //!     mine.points.iter().zip(&mine.velocity).all(|(x, u)| (u - shear(x)).norm() < 1e-8)
