@@ -1,18 +1,61 @@
 //! `cargo xtask test-mpi`: what is there under MPI, as processes on this machine: the same bits as by
-//! threads, for several numbers of ranks, and an end for all when one rank fails.
+//! threads, for several numbers of ranks; cases of `gluey run` as one process computes them, through contact;
+//! and an end for all when one rank fails or is killed.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 /// Numbers of ranks.
 const RANKS: [&str; 5] = ["1", "2", "3", "4", "8"];
 /// Flows that are computed.
-const FLOWS: [&str; 4] = [
+const FLOWS: [&str; 6] = [
     "--dimension 2 --level 5",
     "--dimension 2 --level 6 --adaptive --tolerance 1e-11",
     "--dimension 3 --level 3",
     "--dimension 3 --level 4 --adaptive --tolerance 1e-11",
+    "--dimension 2 --level 5 --bodies",
+    "--dimension 3 --level 4 --bodies",
 ];
+/// Two spheres that the shear drives at each other.
+const CASE: &str = r#"name = "near"
+dimension = 3
+particles = [
+    { position = [0.4, 0.53, 0.5], radius = 0.1 },
+    { position = [0.597, 0.47, 0.5], radius = 0.1 },
+]
+
+[time]
+step = 0.1
+end = 0.4
+
+[contact]
+strategy = "gluey"
+exact_gap = false
+
+[flow]
+formulation = "rigid-dofs"
+solver = "multigrid"
+tolerance = 1e-11
+
+[flow.mesh]
+cells_per_radius = 1.6
+band = 1
+"#;
+/// Its trajectory.
+const TRAJECTORY: &str = "near-gluey-rigid-dofs.csv";
+/// Largest difference of the numbers in it from those of one process.
+const LIMIT: f64 = 1e-9;
+/// Its checkpoint.
+const CHECKPOINT: &str = "near-gluey-rigid-dofs.checkpoint";
+/// A key that makes the run longer.
+const LONG: &str = "time.end=2";
+/// Ranks of a run that loses one.
+const LOSING: &str = "3";
+/// What is said of a case that ranks cannot share.
+const REFUSAL: &str = "several ranks cannot share a formulation other than rigid-dofs";
+/// How long the others may go on.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// What to install where something is missing.
 const PACKAGES: &str = "on Debian and Ubuntu: apt-get install libopenmpi-dev openmpi-bin libclang-dev";
 
@@ -53,6 +96,14 @@ pub enum MpiError {
         /// The line of threads.
         threads: String,
     },
+    /// A run of a case could not be read or compared.
+    #[error("{ranks} ranks, a case: {what}")]
+    Case {
+        /// Number of ranks.
+        ranks: &'static str,
+        /// What is wrong.
+        what: String,
+    },
     /// A failure went unnoticed.
     #[error("a rank failed and `{0}` ended as if nothing had happened, or without the reason: {1}")]
     Unnoticed(String, String),
@@ -85,13 +136,155 @@ pub fn run(root: &Path) -> Result<(), MpiError> {
         return Err(MpiError::Unnoticed(command, text));
     }
     println!("a rank that fails ends all of 3 ranks, and says why");
-    Ok(())
+    let case = Case { launcher, root: root.to_owned() };
+    case.compare()?;
+    case.refuse()?;
+    case.lose_a_rank()
+}
+
+/// Runs of a case by `gluey`.
+struct Case {
+    launcher: Launcher,
+    root: PathBuf,
+}
+
+impl Case {
+    /// The places of the particles are those of one process, and the same bits run after run.
+    fn compare(&self) -> Result<(), MpiError> {
+        let alone = self.rows("1")?;
+        for ranks in RANKS.into_iter().skip(1) {
+            let rows = self.rows(ranks)?;
+            if self.rows(ranks)? != rows {
+                return Err(MpiError::Case { ranks, what: "two runs have other bits".into() });
+            }
+            let difference = largest_difference(&alone, &rows);
+            if difference.is_none_or(|difference| difference > LIMIT) {
+                let what = format!("rows differ from those of one process by {difference:?}, not {LIMIT}");
+                return Err(MpiError::Case { ranks, what });
+            }
+            println!("{ranks} ranks, a case: {:e} from one process", difference.unwrap_or(0.0));
+        }
+        Ok(())
+    }
+
+    /// The table of the trajectory.
+    fn rows(&self, ranks: &'static str) -> Result<String, MpiError> {
+        line(&mut self.command(ranks, "time.end=0.4")?)?;
+        self.read(ranks)
+    }
+
+    fn read(&self, ranks: &'static str) -> Result<String, MpiError> {
+        let file = self.folder().join(TRAJECTORY);
+        std::fs::read_to_string(&file)
+            .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.root.join("target/test-mpi")
+    }
+
+    fn command(&self, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
+        let (program, folder) = (self.root.join("target/release/gluey"), self.folder());
+        let file = folder.join("near.toml");
+        std::fs::create_dir_all(&folder)
+            .and_then(|()| std::fs::write(&file, CASE))
+            .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })?;
+        let (file, folder) = (file.display(), folder.display());
+        let words = format!("run {file} --quiet --force --threads 1 --out {folder} --set {key}");
+        Ok(self.launcher.command(ranks, &program, &words))
+    }
+
+    /// What ranks cannot share is refused with a reason, by one of them.
+    fn refuse(&self) -> Result<(), MpiError> {
+        let mut command = self.command(LOSING, "flow.formulation=paper")?;
+        let (said, output) = (words(&command), outcome(&mut command)?);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.success() || text.matches(REFUSAL).count() != 1 {
+            return Err(MpiError::Unnoticed(said, text));
+        }
+        println!("a case that ranks cannot share is refused");
+        Ok(())
+    }
+
+    /// A rank is killed in the middle of a run: the others end soon, with a message and an error, and the
+    /// last checkpoint goes on with another number of ranks.
+    fn lose_a_rank(&self) -> Result<(), MpiError> {
+        let mut command = self.command(LOSING, LONG)?;
+        command.args(["--checkpoint-every", "1"]);
+        let checkpoint = self.folder().join(CHECKPOINT);
+        let _ = std::fs::remove_file(&checkpoint);
+        let said = words(&command);
+        let failed = |source| MpiError::Start { program: "mpirun".into(), source };
+        let mut run = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(failed)?;
+        let start = Instant::now();
+        while !checkpoint.is_file() && start.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        let Some(&victim) = children_of(run.id()).last() else {
+            return Err(MpiError::Unnoticed(said, "it ended before a rank was killed".into()));
+        };
+        let killed = Command::new("kill").args(["-9", &victim.to_string()]).status().map_err(failed)?;
+        let start = Instant::now();
+        while run.try_wait().map_err(failed)?.is_none() {
+            if !killed.success() || start.elapsed() > PATIENCE {
+                let _ = run.kill();
+                return Err(MpiError::Unnoticed(said, format!("still there after {PATIENCE:?}")));
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        println!("a rank that is killed ends all of {LOSING} ranks in {:.1?}", start.elapsed());
+        let output = run.wait_with_output().map_err(failed)?;
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.success() || text.trim().is_empty() {
+            return Err(MpiError::Unnoticed(said, text));
+        }
+        self.go_on(&checkpoint)
+    }
+
+    /// From a checkpoint to where one process ends.
+    fn go_on(&self, checkpoint: &Path) -> Result<(), MpiError> {
+        let ranks = RANKS[1];
+        let mut command = self.command(ranks, LONG)?;
+        command.arg("--resume").arg(checkpoint);
+        line(&mut command)?;
+        let resumed = self.read(ranks)?;
+        line(&mut self.command(RANKS[0], LONG)?)?;
+        let alone = self.read(RANKS[0])?;
+        let difference = largest_difference(&alone, &resumed);
+        if difference.is_none_or(|difference| difference > LIMIT) {
+            let what = format!("a resumed run differs from one process by {difference:?}, not {LIMIT}");
+            return Err(MpiError::Case { ranks, what });
+        }
+        println!(
+            "its checkpoint goes on with {ranks} ranks: {:e} from one process",
+            difference.unwrap_or(0.0)
+        );
+        Ok(())
+    }
+}
+
+/// The processes that a process started.
+fn children_of(parent: u32) -> Vec<u32> {
+    let file = format!("/proc/{parent}/task/{parent}/children");
+    let listed = std::fs::read_to_string(file).unwrap_or_default();
+    listed.split_whitespace().filter_map(|child| child.parse().ok()).collect()
+}
+
+/// Largest difference of the numbers in two tables; nothing where the tables have other shapes.
+fn largest_difference(one: &str, other: &str) -> Option<f64> {
+    let numbers = |text: &str| -> Vec<f64> {
+        let rows = text.lines().skip(1).flat_map(|row| row.split(',').map(str::to_owned).collect::<Vec<_>>());
+        rows.filter_map(|cell| cell.parse().ok()).collect()
+    };
+    let (one, other) = (numbers(one), numbers(other));
+    let is_same_shape = one.len() == other.len() && !one.is_empty();
+    is_same_shape.then(|| one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }
 
 fn build(root: &Path) -> Result<(), MpiError> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut command = Command::new(&cargo);
-    command.args(["build", "--release", "-p", "gluey-distributed", "--features", "mpi"]);
+    command.args(["build", "--release", "--workspace", "--features", "gluey/mpi", "--bin", "gluey"]);
     let status = command.args(["--example", "box_flow"]).current_dir(root).status();
     let status = status.map_err(|source| MpiError::Start { program: cargo, source })?;
     if status.success() { Ok(()) } else { Err(MpiError::Build) }

@@ -7,16 +7,19 @@
 //! ```
 //!
 //! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
-//! only), `--tolerance T`, `--ranks N,M,...` (threads; without it, the processes of `mpirun`),
-//! `--fail-rank R` (this rank fails before the solve, to see that all end). The time goes to the standard
-//! error, so that equal runs print equal lines.
+//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--tolerance T`,
+//! `--ranks N,M,...` (threads; without it, the processes of `mpirun`), `--fail-rank R` (this rank fails
+//! before the solve, to see that all end). The time goes to the standard error, so that equal runs print
+//! equal lines.
 
 use std::time::Instant;
 
-use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, equal_cuts};
+use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, RigidBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Threads, Traffic};
+use gluey_stokes::Refinement;
 use serde::Serialize;
 
 /// Latency of a message and bytes a second of a rank, of the model.
@@ -28,17 +31,23 @@ struct Options {
     dimension: usize,
     level: u8,
     adaptive: bool,
+    bodies: bool,
     tolerance: f64,
     fail_rank: Option<usize>,
 }
 
 fn main() {
-    let mut options = Options { dimension: 2, level: 5, adaptive: false, tolerance: 1e-8, fail_rank: None };
+    let mut options =
+        Options { dimension: 2, level: 5, adaptive: false, bodies: false, tolerance: 1e-8, fail_rank: None };
     let mut ranks: Option<Vec<usize>> = None;
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
-        if name == "--adaptive" {
-            options.adaptive = true;
+        match name.as_str() {
+            "--adaptive" => options.adaptive = true,
+            "--bodies" => options.bodies = true,
+            _ => {}
+        }
+        if name == "--adaptive" || name == "--bodies" {
             continue;
         }
         let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
@@ -49,7 +58,7 @@ fn main() {
             "--fail-rank" => options.fail_rank = Some(number(&name, &value)),
             "--ranks" => ranks = Some(value.split(',').map(|n| number(&name, n)).collect()),
             _ => fail(&format!(
-                "{name} is no option: --dimension, --level, --adaptive, --tolerance, --ranks, --fail-rank"
+                "{name} is no option: --dimension, --level, --adaptive, --bodies, --tolerance, --ranks, --fail-rank"
             )),
         }
     }
@@ -96,8 +105,23 @@ fn run(options: &Options, ranks: &dyn Communicator) -> String {
     }
 }
 
-fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String {
+fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
+where
+    Dim<D>: Space<D>,
+{
+    let balls = if options.bodies { bodies::<D>() } else { Vec::new() };
+    let tree_of_balls = BallTree::new(&balls);
+    let around = Refinement {
+        coarsest: options.level.saturating_sub(2),
+        surface: options.level,
+        band: 2.0,
+        gap_fraction: 0.0,
+        gap_levels: 0,
+    };
     let wants = |lower: &Vector<D>, h: f64, level: u8| {
+        if options.bodies {
+            return around.wants(lower, h, level, &tree_of_balls);
+        }
         let distance = (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.45)).norm() - 0.3;
         !options.adaptive || level < 2 || distance.abs() < h
     };
@@ -113,13 +137,34 @@ fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String 
     let cuts = equal_cuts(&tree, ranks);
     assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
     let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
-    let mine = flow.solve(&mut tree, &cuts, ranks, &walls);
+    let wrenches = wrenches(balls.len());
+    let bodies = RigidBodies { balls: &balls, offset: -0.1, wrenches: &wrenches };
+    let mine = flow.solve_around(&bodies, &mut tree, &cuts, ranks, &walls);
     let mine = mine.unwrap_or_else(|error| fail(&error.to_string()));
     if ranks.rank() == 0 {
         eprintln!("{} ranks, {:.2} s", ranks.size(), start.elapsed().as_secs_f64());
     }
     let line = serde_json::to_string(&Record::new(options, ranks, &mine));
     line.unwrap_or_else(|error| fail(&error.to_string()))
+}
+
+/// Three bodies of unlike sizes.
+fn bodies<const D: usize>() -> Vec<Ball<D>> {
+    let at = |x: [f64; 3], radius| Ball::new(Vector::from_fn(|d, _| x[d]), radius);
+    vec![at([0.31, 0.4, 0.52], 0.17), at([0.7, 0.33, 0.45], 0.13), at([0.58, 0.72, 0.6], 0.19)]
+}
+
+/// A force on each body, and a torque on it.
+fn wrenches<const D: usize>(count: usize) -> Vec<Wrench<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let wrench = |k: usize| {
+        let mut wrench = Wrench::default();
+        (wrench.force[k % D], wrench.torque[0]) = (0.3, 0.01 * (k + 1) as f64);
+        wrench
+    };
+    (0..count).map(wrench).collect()
 }
 
 /// A number of each rank: the mean and the largest.
@@ -154,11 +199,12 @@ struct Record {
     dimension: usize,
     level: u8,
     adaptive: bool,
+    bodies: bool,
     tolerance: f64,
     ranks: usize,
     iterations: usize,
     relative_residual: f64,
-    /// Of the bits of all velocities and pressures.
+    /// Of the bits of all velocities, pressures and motions of bodies.
     checksum: String,
     levels: Vec<LevelRecord>,
     setup: TrafficRecord,
@@ -169,10 +215,17 @@ struct Record {
 }
 
 impl Record {
-    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self {
-        let bits = mine.velocity.iter().flatten().chain(&mine.pressure).map(|x| x.to_bits());
+    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let motions = mine
+            .twists
+            .iter()
+            .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
+        let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
-        let &Options { dimension, level, adaptive, tolerance, .. } = options;
+        let &Options { dimension, level, adaptive, bodies, tolerance, .. } = options;
         let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
         let hops = 2.0 * (ranks.size() as f64).log2().ceil() * solve.reductions as f64;
         let modelled_communication_seconds =
@@ -181,6 +234,7 @@ impl Record {
             dimension,
             level,
             adaptive,
+            bodies,
             tolerance,
             ranks: ranks.size(),
             iterations: mine.iterations,

@@ -1,12 +1,12 @@
 //! One V-cycle on the velocities, as the serial solver runs it for bodies that are eliminated: loads go down
 //! as they are, and each level smooths once on the way up.
 
-use gluey_fem::{Cuts, ImplicitTree};
-use gluey_parallel::Communicator;
+use gluey_fem::ImplicitTree;
 
+use crate::bodies::Shared;
 use crate::coarse::CoarseFactor;
 use crate::flow::FlowError;
-use crate::level::Level;
+use crate::level::{Level, LevelOperator};
 use crate::space::{LevelSpace, ghost_plan};
 use crate::transfer::Transfer;
 
@@ -25,20 +25,19 @@ pub struct VCycle<'a, const D: usize> {
 impl<'a, const D: usize> VCycle<'a, D> {
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
-        (cuts, ranks): (&Cuts, &'a dyn Communicator),
+        shared: &Shared<'a, '_, D>,
         viscosity: f64,
     ) -> Result<Self, FlowError> {
-        let own = cuts.of(ranks.rank());
+        let ranks = shared.ranks;
         let finest = tree.max_level();
         let coarsest = coarsest_level(tree).min(finest);
         let mut levels = Vec::new();
         for depth in coarsest..=finest {
             // Rank zero holds all of the coarsest level: what it lacks are ghosts.
             let all = (depth == coarsest && ranks.rank() == 0).then(|| 0..tree.end());
-            let space = LevelSpace::new(tree, depth, &own, all);
-            let nodes = space.velocity.clone();
-            let plan = ghost_plan(tree, (cuts, ranks), &space.part, &nodes, |node| nodes.is_free(node));
-            levels.push(Level::new(ranks, space, plan, viscosity)?);
+            let space = LevelSpace::new(tree, depth, shared, all);
+            let plans = ghost_plan(tree, shared, &space);
+            levels.push(Level::new(ranks, space, plans, viscosity)?);
         }
         let pairs = levels.windows(2);
         let transfers =
@@ -57,21 +56,25 @@ impl<'a, const D: usize> VCycle<'a, D> {
     pub fn run(&mut self) {
         for fine in (1..self.levels.len()).rev() {
             let (below, above) = self.levels.split_at_mut(fine);
-            let (coarse, fine_level) = (&mut below[fine - 1], &above[0]);
-            let operator = &mut coarse.operator;
-            self.transfers[fine - 1].restrict(&operator.space, &fine_level.b, &mut operator.y);
-            operator.space.velocity.map.condense(D, |w| w as f32, &mut operator.y);
-            operator.clear_boundary();
-            operator.gather(&mut coarse.b);
+            let (coarse, fine_level) = (&mut below[fine - 1], &mut above[0]);
+            let Level { operator, b, nodal, .. } = fine_level;
+            operator.spread(b, nodal);
+            let LevelOperator { space, y, .. } = &mut coarse.operator;
+            self.transfers[fine - 1].restrict(space, nodal, &mut y[..space.nodal_dim()]);
+            coarse.operator.reduce();
+            coarse.operator.gather(&mut coarse.b);
         }
         self.solve_coarsest();
         for fine in 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(fine);
             let (coarse, fine_level) = (&mut below[fine - 1], &mut above[0]);
-            let operator = &mut coarse.operator;
-            operator.scatter(&coarse.z);
-            operator.space.velocity.map.distribute(D, |w| w as f32, &mut operator.x);
-            self.transfers[fine - 1].prolong(&operator.space, &operator.x, &mut fine_level.z);
+            coarse.operator.scatter(&coarse.z);
+            coarse.operator.expand();
+            let LevelOperator { space, x, .. } = &coarse.operator;
+            let Level { operator, z, .. } = fine_level;
+            let nodal = operator.space.owned_nodal_dim();
+            self.transfers[fine - 1].prolong(space, &x[..space.nodal_dim()], &mut z[..nodal]);
+            operator.project(z);
             fine_level.smooth();
         }
     }
@@ -85,18 +88,6 @@ impl<'a, const D: usize> VCycle<'a, D> {
             factor.solve(&operator.x, &mut operator.y);
         }
         operator.gather(z);
-    }
-}
-
-impl<const D: usize> crate::level::LevelOperator<'_, D> {
-    /// Loads on nodes at the walls move nothing.
-    fn clear_boundary(&mut self) {
-        let map = &self.space.velocity.map;
-        for (node, load) in self.y.chunks_exact_mut(D).enumerate() {
-            if map.is_on_boundary(node) {
-                load.fill(0.0);
-            }
-        }
     }
 }
 

@@ -1,14 +1,17 @@
 //! A flow in a box that ranks share.
 
 use gluey_fem::{Cuts, ImplicitTree};
-use gluey_geom::Vector;
-use gluey_linalg::{BadDiagonal, DirectError, Gcr, GcrParams, KrylovError, LinOp, Reference};
+use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree, Body};
+use gluey_linalg::{BadDiagonal, BlockError, DirectError, Gcr, GcrParams, KrylovError, LinOp, Reference};
 use gluey_parallel::{Communicator, Traffic};
 
+use crate::bodies::{Shared, rigid};
 use crate::cycle::VCycle;
-use crate::operator::{Plans, StokesOperator};
-use crate::precondition::BlockTriangular;
-use crate::space::{LevelSpace, ghost_plan};
+use crate::operator::StokesOperator;
+use crate::precondition::{BlockTriangular, lumped_mass};
+use crate::pressures::SharedPressures;
+use crate::space::{LevelSpace, Plans};
 
 /// Iterations between restarts.
 const RESTART: usize = 60;
@@ -22,6 +25,23 @@ pub struct BoxFlow {
     pub tolerance: f64,
     /// Give up after so many.
     pub max_iterations: usize,
+}
+
+/// Rigid bodies in a flow, all of which every rank knows.
+///
+/// As in the formulation `rigid-dofs` of the serial solver: nodes inside a body take part in its motion, and
+/// pressures of cut cells follow from those outside.
+#[derive(Clone, Copy, Debug)]
+pub struct RigidBodies<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The bodies.
+    pub balls: &'a [Ball<D>],
+    /// Nodes with a level set of at least this many cells are rigid.
+    pub offset: f64,
+    /// Force and torque on each body, or no entries for none on any.
+    pub wrenches: &'a [Wrench<D>],
 }
 
 /// Why there is no flow.
@@ -39,6 +59,34 @@ pub enum FlowError {
     /// The same, on rank zero, which has that matrix and says more.
     #[error("coarsest level: no factor on rank 0")]
     CoarseElsewhere,
+    /// The motion of a body has no equation.
+    #[error("body {body}: {source}")]
+    Body {
+        /// Which.
+        body: usize,
+        /// Its rows.
+        source: BlockError,
+    },
+    /// A body that the mesh does not resolve.
+    #[error(
+        "body {body} with radius {radius} has no rigid motion on cells of size {cell_size}: refine the mesh"
+    )]
+    Unresolved {
+        /// Which, the first of them.
+        body: usize,
+        /// Its radius.
+        radius: f64,
+        /// Edge length of the smallest cells.
+        cell_size: f64,
+    },
+    /// As many wrenches as bodies are needed, or none.
+    #[error("{found} wrenches for {bodies} bodies")]
+    Count {
+        /// Wrenches given.
+        found: usize,
+        /// Bodies.
+        bodies: usize,
+    },
 }
 
 /// What one rank holds of one level.
@@ -52,6 +100,10 @@ pub struct LevelSizes {
     pub nodes: usize,
     /// Velocity nodes of other ranks that it reads or adds to.
     pub ghost_nodes: usize,
+    /// Bodies whose twists it owns.
+    pub bodies: usize,
+    /// Bodies of other ranks that it has nodes of.
+    pub ghost_bodies: usize,
     /// Ranks that it sends velocities to.
     pub neighbours: usize,
 }
@@ -59,13 +111,22 @@ pub struct LevelSizes {
 /// The part of a flow at the nodes of one rank. The parts of all ranks, in their order, are the flow at all
 /// nodes in the order of the serial solver.
 #[derive(Clone, Debug)]
-pub struct MyFlow<const D: usize> {
+pub struct MyFlow<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
     /// Places of the velocity nodes.
     pub points: Vec<Vector<D>>,
     /// Velocities at them.
     pub velocity: Vec<Vector<D>>,
-    /// Pressures at the pressure nodes, without their mean.
+    /// Pressures at the pressure nodes, without their mean; zero at hanging nodes and in bodies.
     pub pressure: Vec<f64>,
+    /// Velocity and spin of each body, the same on all ranks.
+    pub twists: Vec<Twist<D>>,
+    /// Cells of all ranks.
+    pub cell_count: usize,
+    /// Velocity and pressure unknowns of all ranks, as if there were no bodies and no hanging nodes.
+    pub dof_count: usize,
     /// Iterations of the solver.
     pub iterations: usize,
     /// Norm of the true residual, over that of a fluid at rest.
@@ -80,7 +141,7 @@ pub struct MyFlow<const D: usize> {
 
 impl BoxFlow {
     /// The flow with the velocity `walls` on the walls of the box. All ranks call this with the same tree and
-    /// cuts.
+    /// cuts. The function is also taken for the undisturbed flow inside.
     ///
     /// # Errors
     /// [`FlowError`], on all ranks.
@@ -90,32 +151,63 @@ impl BoxFlow {
         cuts: &Cuts,
         ranks: &dyn Communicator,
         walls: &dyn Fn(&Vector<D>) -> Vector<D>,
-    ) -> Result<MyFlow<D>, FlowError> {
+    ) -> Result<MyFlow<D>, FlowError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let none = RigidBodies { balls: &[], offset: 0.0, wrenches: &[] };
+        self.solve_around(&none, tree, cuts, ranks, walls)
+    }
+
+    /// The same around rigid bodies, which all ranks know.
+    ///
+    /// # Errors
+    /// [`FlowError`], on all ranks.
+    pub fn solve_around<const D: usize>(
+        &self,
+        bodies: &RigidBodies<'_, D>,
+        tree: &mut ImplicitTree<'_, D>,
+        cuts: &Cuts,
+        ranks: &dyn Communicator,
+        walls: &dyn Fn(&Vector<D>) -> Vector<D>,
+    ) -> Result<MyFlow<D>, FlowError>
+    where
+        Dim<D>: Space<D>,
+    {
+        bodies.check()?;
         let start = ranks.traffic();
-        let cycle = VCycle::new(tree, (cuts, ranks), self.viscosity)?;
+        let tree_of_balls = BallTree::new(bodies.balls);
+        let shared = Shared { cuts, ranks, bodies: &tree_of_balls, offset: bodies.offset };
+        let cycle = VCycle::new(tree, &shared, self.viscosity)?;
         let top = &cycle.levels[cycle.levels.len() - 1].operator;
         let space = top.space.clone();
-        let pressure = ghost_plan(tree, (cuts, ranks), &space.part, &space.pressure, |_| true);
-        let plans = Plans { velocity: top.plan.clone(), pressure };
-        let levels = cycle.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plan));
+        check_resolved(bodies.balls, &space, ranks)?;
+        let pressures = SharedPressures::new(tree, &shared, &space);
+        let levels = cycle.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plans));
         let levels = levels.collect();
-        let mut preconditioner = BlockTriangular::new(cycle, plans.pressure.clone(), self.viscosity);
-        let mut operator = StokesOperator::new(ranks, space, plans, self.viscosity);
+        let mass = lumped_mass(&space, &pressures, ranks);
+        let mut operator = StokesOperator::new(ranks, space, &top.plans, pressures.clone(), self.viscosity);
+        let mut preconditioner =
+            BlockTriangular::new(cycle, pressures, &mass, [operator.unit, self.viscosity]);
         let points = operator.space.velocity.clone();
-        let on_wall = |node: usize| -> [f64; D] { walls(&points.map.point(node)).into() };
-        let b = right_hand_side(&mut operator, &preconditioner.mass, &on_wall);
+        let lift = operator.lift(|node| walls(&points.map.point(node)).into());
+        let b = right_hand_side(&mut operator, bodies, &lift);
         let setup_traffic = ranks.traffic().since(start);
         let mut x = vec![0.0; b.len()];
         let report =
             self.krylov().solve(&mut operator, &mut preconditioner, &b, &mut x, Reference::RightHandSide)?;
         let solve_traffic = ranks.traffic().since(start).since(setup_traffic);
-        remove_mean(ranks, &preconditioner.mass, &mut x[operator.velocity_dim()..]);
-        let (velocity, pressure) = operator.nodal_values(&x, on_wall);
+        remove_mean(ranks, &mass, &mut x[operator.velocity_dim()..]);
+        let [velocity, twists, pressure] = operator.nodal_values(&lift, &x);
+        let counts = counts_of_all(&operator.space, ranks);
         let reference = if report.reference_norm > 0.0 { report.reference_norm } else { 1.0 };
         Ok(MyFlow {
             points: points.owned.clone().map(|node| points.map.point(node)).collect(),
             velocity: velocity.as_chunks::<D>().0.iter().map(|&u| u.into()).collect(),
             pressure,
+            twists: twists_of_all(bodies.balls, &operator.space, ranks, &twists),
+            cell_count: counts[0] as usize,
+            dof_count: counts[1] as usize,
             iterations: report.iterations,
             relative_residual: report.residual_norm / reference,
             levels,
@@ -135,34 +227,116 @@ impl BoxFlow {
     }
 }
 
-fn sizes<const D: usize>(space: &LevelSpace<D>, plan: &gluey_parallel::GhostPlan) -> LevelSizes {
+impl<const D: usize> RigidBodies<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn check(&self) -> Result<(), FlowError> {
+        let (found, bodies) = (self.wrenches.len(), self.balls.len());
+        if found == 0 || found == bodies { Ok(()) } else { Err(FlowError::Count { found, bodies }) }
+    }
+}
+
+/// All ranks learn of the first body that is too small.
+fn check_resolved<const D: usize>(
+    balls: &[Ball<D>],
+    space: &LevelSpace<D>,
+    ranks: &dyn Communicator,
+) -> Result<(), FlowError> {
+    let mesh = &space.part.mesh;
+    let cell_size = mesh.size(mesh.max_level());
+    let is_lost = |place: &usize| {
+        let ball = &balls[space.bodies.ids[*place] as usize];
+        !space.bodies.is_active(*place) || ball.bounding_radius() < cell_size
+    };
+    let lost =
+        (0..space.bodies.owned).find(is_lost).map_or(u64::MAX, |place| u64::from(space.bodies.ids[place]));
+    let first = ranks.all_gather(&[lost]).into_iter().min().unwrap_or(u64::MAX);
+    match balls.get(first as usize) {
+        Some(ball) => {
+            Err(FlowError::Unresolved { body: first as usize, radius: ball.bounding_radius(), cell_size })
+        }
+        None => Ok(()),
+    }
+}
+
+fn sizes<const D: usize>(space: &LevelSpace<D>, plans: &Plans) -> LevelSizes {
     let cells = space.part.own().len();
     LevelSizes {
         cells,
         ghost_cells: space.part.mesh.cell_count() - cells,
         nodes: space.velocity.owned.len(),
-        ghost_nodes: plan.ghost_count(),
-        neighbours: plan.neighbour_count(),
+        ghost_nodes: plans.nodes.ghost_count(),
+        bodies: space.bodies.owned,
+        ghost_bodies: space.bodies.plan.ghost_count(),
+        neighbours: plans.all.neighbour_count(),
     }
 }
 
-/// Minus what the walls' velocities give, without the part that no flow can take: a net flux through them.
+/// Forces and torques on the bodies, less what the lift gives, without the part that no flow can take: a net
+/// flux through the walls.
 fn right_hand_side<const D: usize>(
     operator: &mut StokesOperator<'_, D>,
-    mass: &[f64],
-    on_wall: &dyn Fn(usize) -> [f64; D],
-) -> Vec<f64> {
+    bodies: &RigidBodies<'_, D>,
+    lift: &[f64],
+) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
     let mut b = vec![0.0; operator.dim()];
-    operator.apply_to_walls(on_wall, &mut b);
-    b.iter_mut().for_each(|b| *b = -*b);
+    let nodal = operator.space.owned_nodal_dim();
+    let own = &operator.space.bodies.ids[..operator.space.bodies.owned];
+    let rows = b[nodal..].chunks_exact_mut(rigid::<D>());
+    for (&body, rows) in own.iter().zip(rows) {
+        let Some(wrench) = bodies.wrenches.get(body as usize) else { continue };
+        let radius = bodies.balls[body as usize].bounding_radius();
+        rows[..D].copy_from_slice(wrench.force.as_slice());
+        let torque = Dim::<D>::spin_slice(&wrench.torque);
+        rows[D..].iter_mut().zip(torque).for_each(|(row, torque)| *row = torque / radius);
+    }
+    operator.subtract_lift(lift, &mut b);
     let divergence = &mut b[operator.velocity_dim()..];
-    let mut sums = [divergence.iter().sum(), mass.iter().sum()];
-    operator.ranks.sum(&mut sums);
-    divergence.iter_mut().zip(mass).for_each(|(q, mass)| *q -= sums[0] / sums[1] * mass);
+    operator.pressures.remove_mean(operator.ranks, divergence);
     b
 }
 
-/// Subtracts the mean from pressures that are zero at hanging nodes.
+/// Cells and unknowns of all ranks.
+fn counts_of_all<const D: usize>(space: &LevelSpace<D>, ranks: &dyn Communicator) -> [f64; 2] {
+    let unknowns = space.owned_nodal_dim() + space.pressure.owned.len();
+    let mut counts = [space.part.own().len() as f64, unknowns as f64];
+    ranks.sum(&mut counts);
+    counts
+}
+
+/// The twists of all bodies, of which each rank has its own.
+fn twists_of_all<const D: usize>(
+    balls: &[Ball<D>],
+    space: &LevelSpace<D>,
+    ranks: &dyn Communicator,
+    own: &[f64],
+) -> Vec<Twist<D>>
+where
+    Dim<D>: Space<D>,
+{
+    if balls.is_empty() {
+        return Vec::new();
+    }
+    let n = rigid::<D>();
+    let mut all = vec![0.0; balls.len() * n];
+    for (&body, twist) in space.bodies.ids.iter().zip(own.chunks_exact(n)) {
+        all[body as usize * n..][..n].copy_from_slice(twist);
+    }
+    ranks.sum(&mut all);
+    let twist = |(ball, entries): (&Ball<D>, &[f64])| {
+        let mut twist = Twist::default();
+        twist.velocity.copy_from_slice(&entries[..D]);
+        (D..n).for_each(|k| twist.spin[k - D] = entries[k] / ball.bounding_radius());
+        twist
+    };
+    balls.iter().zip(all.chunks_exact(n)).map(twist).collect()
+}
+
+/// Subtracts the mean from pressures that are zero where they are no unknowns.
 fn remove_mean(ranks: &dyn Communicator, mass: &[f64], p: &mut [f64]) {
     let mut sums = [p.iter().zip(mass).map(|(p, mass)| p * mass).sum(), mass.iter().sum()];
     ranks.sum(&mut sums);

@@ -4,52 +4,116 @@
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_linalg::{
-    Chebyshev, ChebyshevParams, FnOp, Guess, Identity, Jacobi, KrylovError, LinOp, estimate_lambda_max,
+    BadDiagonal, Chebyshev, ChebyshevParams, FnOp, Guess, Identity, KrylovError, LinOp, Preconditioner,
+    estimate_lambda_max, invert_spd, vector,
 };
 use gluey_parallel::{Communicator, GhostPlan};
 
+use crate::bodies::{rigid, rows};
 use crate::flow::FlowError;
-use crate::space::LevelSpace;
+use crate::space::{LevelSpace, Plans};
 
-/// Applications in a sweep, and the part of the spectrum that it damps, as in the serial solver.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.01, lanczos_steps: 60 };
+/// Applications in a sweep, and the part of the spectrum that it damps, as in the serial solver. The largest
+/// eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.05, lanczos_steps: 60 };
 
-/// The viscous operator on the owned nodes.
+/// The viscous operator on the owned nodes and twists.
 pub struct LevelOperator<'a, const D: usize> {
     pub ranks: &'a dyn Communicator,
     pub space: LevelSpace<D>,
-    pub plan: GhostPlan,
+    pub plans: Plans,
     pub cells: CellOperator<f32, D>,
     pub work: Workspace<f32>,
-    /// At all nodes of the part.
+    /// Velocities at all nodes of the part, then twists.
     pub x: Vec<f32>,
     pub y: Vec<f32>,
 }
 
 impl<const D: usize> LevelOperator<'_, D> {
-    /// The owned entries of a field at all nodes of the part.
-    fn owned(&self) -> std::ops::Range<usize> {
-        let owned = &self.space.velocity.owned;
-        owned.start * D..owned.end * D
-    }
-
-    /// Sends what own cells gave to other ranks' nodes in `y`, and copies the rest.
+    /// Sends what own cells gave to other ranks' nodes and bodies in `y`, and copies the rest.
     pub fn gather(&mut self, y: &mut [f32]) {
-        self.plan.accumulate::<f32, D>(self.ranks, &mut self.y);
-        y.copy_from_slice(&self.y[self.owned()]);
+        self.plans.all.accumulate::<f32, 1>(self.ranks, &mut self.y);
+        self.space.copy_owned(&self.y, y);
     }
 
     /// Fills `x` from the owned entries and those of other ranks.
     pub fn scatter(&mut self, x: &[f32]) {
-        let owned = self.owned();
-        self.x[owned].copy_from_slice(x);
-        self.plan.update::<f32, D>(self.ranks, &mut self.x);
+        self.space.set_owned(x, &mut self.x);
+        self.plans.all.update::<f32, 1>(self.ranks, &mut self.x);
+    }
+
+    /// Values at hanging and rigid nodes in `x`.
+    pub fn expand(&mut self) {
+        let (nodal, twists) = self.x.split_at_mut(self.space.nodal_dim());
+        self.space.bodies.expand(nodal, twists);
+        self.space.velocity.map.distribute(D, |w| w as f32, nodal);
+    }
+
+    /// The transpose: loads in `y` on unknowns alone.
+    pub fn reduce(&mut self) {
+        let (nodal, twists) = self.y.split_at_mut(self.space.nodal_dim());
+        let map = &self.space.velocity.map;
+        map.condense(D, |w| w as f32, nodal);
+        self.space.bodies.reduce(nodal, twists);
+        for (node, load) in nodal.chunks_exact_mut(D).enumerate() {
+            if map.is_on_boundary(node) {
+                load.fill(0.0);
+            }
+        }
+    }
+
+    /// Loads `b` on the owned unknowns as loads on the owned nodes: those on twists spread over the nodes of
+    /// the body.
+    pub fn spread(&mut self, b: &[f32], nodal: &mut [f32]) {
+        let (loads, twists) = b.split_at(nodal.len());
+        nodal.copy_from_slice(loads);
+        if !self.has_bodies() {
+            return;
+        }
+        let (bodies, first) = (&self.space.bodies, self.space.nodal_dim());
+        let own = &mut self.x[first..][..twists.len()];
+        own.copy_from_slice(twists);
+        bodies.fit(own);
+        self.plans.twists.update::<f32, 1>(self.ranks, &mut self.x);
+        let (of_nodes, twists) = self.x.split_at_mut(first);
+        bodies.expand(of_nodes, twists);
+        let owned = &self.space.velocity.owned;
+        for rigid in bodies.nodes.iter().filter(|rigid| owned.contains(&(rigid.node as usize))) {
+            let at = rigid.node as usize;
+            nodal[(at - owned.start) * D..][..D].copy_from_slice(&of_nodes[at * D..][..D]);
+        }
+    }
+
+    /// Velocities of the owned nodes, those of bodies replaced by the motions that are closest to them, as
+    /// owned unknowns `z`, which begin with the former.
+    pub fn project(&mut self, z: &mut [f32]) {
+        if !self.has_bodies() {
+            return z[self.space.owned_nodal_dim()..].fill(0.0);
+        }
+        let (bodies, first) = (&self.space.bodies, self.space.nodal_dim());
+        let (nodal, twists) = z.split_at_mut(self.space.owned_nodal_dim());
+        self.y.fill(0.0);
+        let owned = &self.space.velocity.owned;
+        self.y[owned.start * D..owned.end * D].copy_from_slice(nodal);
+        let (of_nodes, sums) = self.y.split_at_mut(first);
+        bodies.reduce(of_nodes, sums);
+        nodal.copy_from_slice(&of_nodes[owned.start * D..owned.end * D]);
+        self.plans.twists.accumulate::<f32, 1>(self.ranks, &mut self.y);
+        twists.copy_from_slice(&self.y[first..][..twists.len()]);
+        bodies.fit(twists);
+    }
+}
+
+impl<const D: usize> LevelOperator<'_, D> {
+    /// Whether there are rigid nodes here, or elsewhere of bodies owned here.
+    fn has_bodies(&self) -> bool {
+        self.space.bodies.plan.neighbour_count() > 0 || !self.space.bodies.nodes.is_empty()
     }
 }
 
 impl<const D: usize> LinOp<f32> for LevelOperator<'_, D> {
     fn dim(&self) -> usize {
-        self.owned().len()
+        self.space.owned_dim()
     }
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
@@ -59,52 +123,129 @@ impl<const D: usize> LinOp<f32> for LevelOperator<'_, D> {
     }
 }
 
+/// The inverse of the diagonal at nodes, and of the blocks of twists.
+struct BlockDiagonal {
+    nodal: Vec<f32>,
+    blocks: Vec<f32>,
+    rigid: usize,
+}
+
+impl Preconditioner<f32> for BlockDiagonal {
+    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+        let split = self.nodal.len();
+        vector::multiply(&self.nodal, &r[..split], &mut z[..split]);
+        self.apply_rest(&r[split..], &mut z[split..]);
+    }
+
+    fn diagonal(&self) -> &[f32] {
+        &self.nodal
+    }
+
+    fn apply_rest(&mut self, r: &[f32], z: &mut [f32]) {
+        let n = self.rigid;
+        for (body, block) in self.blocks.chunks_exact(n * n).enumerate() {
+            for (i, row) in block.chunks_exact(n).enumerate() {
+                z[body * n + i] = row.iter().zip(&r[body * n..]).map(|(m, r)| m * r).sum();
+            }
+        }
+    }
+}
+
 /// One level.
 pub struct Level<'a, const D: usize> {
     pub operator: LevelOperator<'a, D>,
-    diagonal: Jacobi<f32>,
+    diagonal: BlockDiagonal,
     chebyshev: Chebyshev<f32>,
-    /// Right-hand side and solution at the owned nodes.
+    /// Right-hand side and solution at the owned nodes and twists.
     pub b: Vec<f32>,
     pub z: Vec<f32>,
+    /// Loads or velocities at the owned nodes on their way between levels.
+    pub nodal: Vec<f32>,
 }
 
 impl<'a, const D: usize> Level<'a, D> {
     pub fn new(
         ranks: &'a dyn Communicator,
         space: LevelSpace<D>,
-        plan: GhostPlan,
+        plans: Plans,
         viscosity: f64,
     ) -> Result<Self, FlowError> {
-        let map = &space.velocity.map;
-        let cells = CellOperator::new(&space.chunks, map, space.cells(viscosity), 1, &[], 0);
-        let zeros = || vec![0.0; map.node_count() * D];
-        let (x, y) = (zeros(), zeros());
-        let mut operator = LevelOperator { ranks, space, plan, cells, work: Workspace::default(), x, y };
+        let cells = space.operator(viscosity);
+        let [x, y] = [0, 1].map(|_| vec![0.0; space.dim()]);
+        let mut operator = LevelOperator { ranks, space, plans, cells, work: Workspace::default(), x, y };
+        let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
-        let mut diagonal = vec![0.0; dim];
-        operator.fill_diagonal(viscosity);
-        operator.gather(&mut diagonal);
-        let first = operator.space.velocity.owned.start;
-        for (k, entry) in diagonal.iter_mut().enumerate() {
-            if !operator.space.velocity.is_free(first + k / D) {
-                *entry = 1.0;
-            }
-        }
-        let diagonal = Jacobi::new(&diagonal)?;
         let chebyshev = Chebyshev::below(cell_lambda_max::<D>()?, dim, &SWEEP);
-        Ok(Self { operator, diagonal, chebyshev, b: vec![0.0; dim], z: vec![0.0; dim] })
+        let nodal = vec![0.0; operator.space.owned_nodal_dim()];
+        Ok(Self { operator, diagonal, chebyshev, b: vec![0.0; dim], z: vec![0.0; dim], nodal })
     }
 
     /// Improves `z`.
     pub fn smooth(&mut self) {
-        let Self { operator, diagonal, chebyshev, b, z } = self;
+        let Self { operator, diagonal, chebyshev, b, z, .. } = self;
         chebyshev.smooth(operator, diagonal, b, z, Guess::Given);
     }
 }
 
 impl<const D: usize> LevelOperator<'_, D> {
-    /// What own cells add to the diagonal, in `y`.
+    fn diagonal(&mut self, viscosity: f64) -> Result<BlockDiagonal, FlowError> {
+        let mut nodal = vec![0.0; self.space.owned_dim()];
+        self.fill_diagonal(viscosity);
+        self.gather(&mut nodal);
+        nodal.truncate(self.space.owned_nodal_dim());
+        let first = self.space.velocity.owned.start;
+        for (row, entry) in nodal.iter_mut().enumerate() {
+            *entry = match self.space.is_free(first + row / D) {
+                true if *entry > 0.0 => 1.0 / *entry,
+                true => return Err(BadDiagonal { row, value: f64::from(*entry) }.into()),
+                false => 0.0,
+            };
+        }
+        Ok(BlockDiagonal { nodal, blocks: self.blocks(viscosity)?, rigid: rigid::<D>() })
+    }
+
+    /// Inverses of `R^T A R` for the owned bodies, zero for those that are not rigid here.
+    fn blocks(&self, viscosity: f64) -> Result<Vec<f32>, FlowError> {
+        let (bodies, map) = (&self.space.bodies, &self.space.velocity.map);
+        let (n, size) = (rigid::<D>(), rigid::<D>() * rigid::<D>());
+        let viscous = ReferenceMatrices::<D>::new().viscous;
+        let velocities = ReferenceMatrices::<D>::VELOCITY;
+        let viscous = nalgebra::DMatrix::from_row_slice(velocities, velocities, &viscous);
+        let mut blocks = vec![0.0; bodies.ids.len() * size];
+        for cell in self.space.cells(viscosity) {
+            let nodes = map.cell(cell.cell);
+            let mut here: Vec<u32> = nodes.iter().filter_map(|&node| bodies.body_of(node as usize)).collect();
+            here.sort_unstable();
+            here.dedup();
+            for body in here {
+                let mut motion = nalgebra::DMatrix::zeros(velocities, n);
+                for (i, &node) in nodes.iter().enumerate() {
+                    if bodies.body_of(node as usize) == Some(body)
+                        && let Ok(place) = bodies.nodes.binary_search_by_key(&node, |rigid| rigid.node)
+                    {
+                        let rows = rows(&bodies.nodes[place]);
+                        (0..D * n).for_each(|k| motion[(i * D + k / n, k % n)] = rows[k]);
+                    }
+                }
+                let product = motion.transpose() * (&viscous * &motion) * cell.viscous;
+                let block = &mut blocks[body as usize * size..][..size];
+                block.iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
+            }
+        }
+        let mut plan = GhostPlan::joined(&[(&bodies.plan, size, 0)]);
+        plan.accumulate::<f64, 1>(self.ranks, &mut blocks);
+        blocks.truncate(bodies.owned * size);
+        for (body, block) in blocks.chunks_exact_mut(size).enumerate() {
+            match bodies.is_active(body) {
+                true => invert_spd(n, block)
+                    .map_err(|source| FlowError::Body { body: bodies.ids[body] as usize, source })?,
+                false => block.fill(0.0),
+            }
+        }
+        Ok(blocks.into_iter().map(|entry| entry as f32).collect())
+    }
+
+    /// What own cells add to the diagonal at nodes, in `y`.
     fn fill_diagonal(&mut self, viscosity: f64) {
         let Self { space, y, .. } = self;
         let nodes = &space.velocity;

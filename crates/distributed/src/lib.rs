@@ -1,9 +1,9 @@
-//! Stokes flow in a box whose cells are shared by ranks.
+//! Stokes flow around rigid bodies in a box whose cells are shared by ranks.
 //!
-//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0` in a box without bodies, `u = g` on its walls: the same
-//! elements, kernels and Krylov method as in the serial solver, and multigrid on the same levels. A rank
-//! holds the cells of its run in the Morton order of the tree, with those around them, on every level; no
-//! vector is longer than that, and no rank has the whole tree.
+//! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0`, `u = g` on the walls, rigid motions under given forces and
+//! torques in the bodies: the same elements, kernels and Krylov method as in the serial solver, and multigrid
+//! on the same levels. A rank holds the cells of its run in the Morton order of the tree, with those around
+//! them, on every level; no vector is longer than that, and no rank has the whole tree.
 //!
 //! ```
 //! use gluey_distributed::{BoxFlow, equal_cuts};
@@ -16,7 +16,7 @@
 //!     let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true, false], 3, &wants).expect("a tree");
 //!     let cuts = equal_cuts(&tree, ranks);
 //!     let shear = |x: &Vector<2>| Vector::<2>::new(x[1], 0.0);
-//!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 50 };
+//!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 100 };
 //!     let mine = flow.solve(&mut tree, &cuts, ranks, &shear).expect("a flow");
 //!     // Between moving walls every node moves with its height.
 //!     mine.points.iter().zip(&mine.velocity).all(|(x, u)| (u - shear(x)).norm() < 1e-8)
@@ -25,21 +25,25 @@
 //! # Ok::<(), gluey_parallel::RankFailure>(())
 //! ```
 //!
-//! A model problem that is complete: `docs/decisions/0030-ranks.md` says what separates it from `gluey run`
-//! under MPI. Not for bodies, viscosities that vary, or boxes without a wall.
+//! `docs/decisions/0030-ranks.md` says what separates it from the serial solver. Not for surfaces that cut
+//! cells, viscosities that vary, or boxes without a wall.
 
+mod bodies;
 mod coarse;
 mod cuts;
 mod cycle;
 mod flow;
 mod level;
+mod moving;
 mod operator;
 mod precondition;
+mod pressures;
 mod space;
 mod transfer;
 
 pub use cuts::equal_cuts;
-pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow};
+pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
+pub use moving::{SharedHydrodynamics, Suspension, SuspensionError};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

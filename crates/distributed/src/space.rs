@@ -4,9 +4,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_fem::cells::CellData;
-use gluey_fem::{Chunks, Cuts, ImplicitTree, NodeMap, Part};
-use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_fem::cells::{CellData, CellOperator, CellScalar};
+use gluey_fem::{Chunks, ImplicitTree, NodeMap, Part};
+use gluey_parallel::{GhostPlan, Wanted};
+
+use crate::bodies::{LevelBodies, Shared, rigid};
 
 /// Velocities of one level.
 #[derive(Clone)]
@@ -15,6 +17,7 @@ pub struct LevelSpace<const D: usize> {
     pub velocity: Arc<Nodes<D>>,
     pub pressure: Arc<Nodes<D>>,
     pub chunks: Arc<Chunks<D>>,
+    pub bodies: Arc<LevelBodies<D>>,
 }
 
 /// Nodes of one degree.
@@ -46,62 +49,147 @@ impl<const D: usize> Nodes<D> {
         itself.into_iter().chain(constraint.into_iter().flat_map(|c| c.masters.iter().copied()))
     }
 
-    /// Whether a node has an unknown velocity.
-    pub fn is_free(&self, node: usize) -> bool {
+    /// Whether the value of a node is its own: it neither hangs nor lies on a wall.
+    pub fn is_loose(&self, node: usize) -> bool {
         self.constraint_of[node] == u32::MAX && !self.map.is_on_boundary(node)
+    }
+
+    /// Which nodes the inner cells of a part depend on: their own, and the masters of hanging ones.
+    pub fn needed(&self, part: &Part<D>) -> Vec<bool> {
+        let mut needed = vec![false; self.map.node_count()];
+        for &node in self.map.cells(part.inner()) {
+            self.regular(node).for_each(|(node, _)| needed[node as usize] = true);
+        }
+        needed
+    }
+
+    /// Where an owned node stands, by its key.
+    pub fn finder(&self) -> impl Fn(u64) -> Option<u32> {
+        let mut owned: Vec<(u64, u32)> =
+            self.owned.clone().map(|node| (self.map.key(node), node as u32)).collect();
+        owned.sort_unstable();
+        move |key| owned.binary_search_by_key(&key, |owned| owned.0).ok().map(|k| owned[k].1)
     }
 }
 
 impl<const D: usize> LevelSpace<D> {
-    /// The tree cut at `depth`, around the keys `inner` or else those of the rank.
+    /// The tree cut at `depth`, around the keys `inner` or else those of the rank. All ranks call this.
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
         depth: u8,
-        own: &Range<u64>,
+        shared: &Shared<'_, '_, D>,
         inner: Option<Range<u64>>,
     ) -> Self {
-        let part = Part::new(tree, depth, own, &inner.unwrap_or(own.clone()));
+        let own = shared.cuts.of(shared.ranks.rank());
+        let part = Part::new(tree, depth, &own, &inner.unwrap_or(own.clone()));
         let (velocity, pressure) = (Nodes::new(&part, 2), Nodes::new(&part, 1));
         let chunks = Arc::new(Chunks::new(&velocity.map, &pressure.map));
-        Self { part: part.into(), velocity: velocity.into(), pressure: pressure.into(), chunks }
+        let bodies = LevelBodies::new(tree, shared, &part, &velocity).into();
+        Self { part: part.into(), velocity: velocity.into(), pressure: pressure.into(), chunks, bodies }
     }
 
-    /// Own cells, in a fluid of this viscosity.
+    /// Whether a node has an unknown velocity of its own.
+    pub fn is_free(&self, node: usize) -> bool {
+        self.velocity.is_loose(node) && self.bodies.body_of(node).is_none()
+    }
+
+    /// Cells of the rank that do not move as one body.
+    pub fn own_cells(&self) -> impl Iterator<Item = usize> {
+        self.part.own().filter(|&cell| !self.bodies.is_rigid(self.velocity.map.cell(cell)))
+    }
+
+    /// The same in a fluid of this viscosity.
     pub fn cells(&self, viscosity: f64) -> impl Iterator<Item = CellData<'static>> {
         let mesh = &self.part.mesh;
-        self.part.own().map(move |cell| {
+        self.own_cells().map(move |cell| {
             let h = mesh.size(mesh.cells()[cell].level);
             let (viscous, divergence) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
             CellData { cell, viscous, divergence, points: &[] }
         })
     }
+
+    /// The operator of these cells.
+    pub fn operator<T: CellScalar>(&self, viscosity: f64) -> CellOperator<T, D> {
+        let (map, bodies) = (&self.velocity.map, &self.bodies);
+        CellOperator::new(&self.chunks, map, self.cells(viscosity), 1, &bodies.nodes, bodies.ids.len())
+    }
+
+    /// Length of the velocities and twists in a vector at all nodes of the part.
+    pub fn dim(&self) -> usize {
+        self.nodal_dim() + self.bodies.dim()
+    }
+
+    /// Length of the velocities alone.
+    pub fn nodal_dim(&self) -> usize {
+        self.velocity.map.node_count() * D
+    }
+
+    /// Length of the owned velocities.
+    pub fn owned_nodal_dim(&self) -> usize {
+        self.velocity.owned.len() * D
+    }
+
+    /// Length of the owned velocities and twists.
+    pub fn owned_dim(&self) -> usize {
+        self.owned_nodal_dim() + self.bodies.owned_dim()
+    }
+
+    /// Copies owned velocities and twists out of a vector at all nodes of the part.
+    pub fn copy_owned<T: Copy>(&self, from: &[T], to: &mut [T]) {
+        let (nodal, twists) = to.split_at_mut(self.owned_nodal_dim());
+        nodal.copy_from_slice(&from[self.velocity.owned.start * D..self.velocity.owned.end * D]);
+        twists.copy_from_slice(&from[self.nodal_dim()..][..self.bodies.owned_dim()]);
+    }
+
+    /// The other way round.
+    pub fn set_owned<T: Copy>(&self, from: &[T], to: &mut [T]) {
+        let (nodal, twists) = from.split_at(self.owned_nodal_dim());
+        to[self.velocity.owned.start * D..self.velocity.owned.end * D].copy_from_slice(nodal);
+        to[self.nodal_dim()..][..self.bodies.owned_dim()].copy_from_slice(twists);
+    }
 }
 
-/// The plan of the ghosts among the nodes that the inner cells of a part depend on, for nodes that `keep`.
+/// The plan of velocities and twists in one vector.
 pub fn ghost_plan<const D: usize>(
     tree: &mut ImplicitTree<'_, D>,
-    (cuts, ranks): (&Cuts, &dyn Communicator),
+    shared: &Shared<'_, '_, D>,
+    space: &LevelSpace<D>,
+) -> Plans {
+    let needed = space.velocity.needed(&space.part);
+    let keep = |node: usize| needed[node] && space.is_free(node);
+    let wanted = wanted_nodes(tree, shared, &space.part, &space.velocity, keep);
+    let nodes = GhostPlan::new(shared.ranks, wanted, space.velocity.finder());
+    let twists = GhostPlan::joined(&[(&space.bodies.plan, rigid::<D>(), space.nodal_dim())]);
+    Plans {
+        all: GhostPlan::joined(&[(&nodes, D, 0), (&space.bodies.plan, rigid::<D>(), space.nodal_dim())]),
+        nodes,
+        twists,
+    }
+}
+
+/// Plans of a vector of velocities and twists.
+#[derive(Clone)]
+pub struct Plans {
+    /// Of its entries.
+    pub all: GhostPlan,
+    /// Of its nodes.
+    pub nodes: GhostPlan,
+    /// Of the entries of twists alone.
+    pub twists: GhostPlan,
+}
+
+/// The nodes of a part that others own, of those that `keep`.
+pub fn wanted_nodes<const D: usize>(
+    tree: &mut ImplicitTree<'_, D>,
+    shared: &Shared<'_, '_, D>,
     part: &Part<D>,
     nodes: &Nodes<D>,
     keep: impl Fn(usize) -> bool,
-) -> GhostPlan {
+) -> Vec<Wanted> {
     let (depth, degree) = (part.mesh.max_level(), nodes.map.degree() as u32);
-    let mut is_wanted = vec![false; nodes.map.node_count()];
-    for &node in nodes.map.cells(part.inner()) {
-        for (node, _) in nodes.regular(node) {
-            is_wanted[node as usize] |= keep(node as usize);
-        }
-    }
-    is_wanted[nodes.owned.clone()].fill(false);
     let wanted = |node: usize| {
         let first = tree.first_touching(depth, degree, nodes.map.lattice_point(node));
-        Wanted { owner: cuts.owner(first), key: nodes.map.key(node), place: node as u32 }
+        Wanted { owner: shared.cuts.owner(first), key: nodes.map.key(node), place: node as u32 }
     };
-    let wanted = (0..is_wanted.len()).filter(|&node| is_wanted[node]).map(wanted).collect();
-    let mut owned: Vec<(u64, u32)> =
-        nodes.owned.clone().map(|node| (nodes.map.key(node), node as u32)).collect();
-    owned.sort_unstable();
-    GhostPlan::new(ranks, wanted, |key| {
-        owned.binary_search_by_key(&key, |owned| owned.0).ok().map(|k| owned[k].1)
-    })
+    (0..nodes.map.node_count()).filter(|&n| !nodes.owned.contains(&n) && keep(n)).map(wanted).collect()
 }

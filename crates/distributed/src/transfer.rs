@@ -41,7 +41,7 @@ impl<const D: usize> Transfer<D> {
                     continue;
                 }
                 is_placed[k] = true;
-                if fine.velocity.is_free(node as usize) {
+                if fine.velocity.is_loose(node as usize) {
                     let index = multi_index::<D>(i, 3);
                     let along = |d: usize| match is_refined {
                         true => index[d] + 2 * (own.coords[d] & 1) as usize,

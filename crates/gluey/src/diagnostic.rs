@@ -105,6 +105,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
             "resume with the case file, strategy and formulation of the interrupted run".into()
         }
         RunError::Checkpoint(error) => checkpoint_hint(error, case),
+        RunError::NotShared { .. } => "take that out of the case, or run it on one machine without mpirun".into(),
         RunError::Occupied(_) => {
             "write elsewhere with --out DIR, or replace those results with --force".into()
         }

@@ -24,8 +24,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Lubrication};
 
-use params::{flow_params, refinement, tree};
+use params::flow_params;
 use stress_control::StressControl;
+
+pub(crate) use params::{refinement, tree};
 
 pub use error::FlowError;
 pub use estimate::{MeshEstimate, MeshSize};

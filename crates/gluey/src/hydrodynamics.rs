@@ -16,6 +16,10 @@ pub enum HydrodynamicsError {
     /// By the finite-element solver.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// By the finite-element solver on several ranks.
+    #[cfg(feature = "mpi")]
+    #[error(transparent)]
+    Shared(#[from] gluey_distributed::SuspensionError),
     /// The model does not exist in this dimension.
     #[error("there is no {hydrodynamics} hydrodynamics in {dimension}D")]
     Unfit {

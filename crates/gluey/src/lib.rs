@@ -53,6 +53,8 @@ pub use output::{ClaimError, OutputError, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
+#[cfg(feature = "mpi")]
+pub use run::run_shared;
 pub use run::{
     FolderError, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths,
     ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,

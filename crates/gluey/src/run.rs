@@ -15,6 +15,8 @@ mod record;
 mod recorded;
 mod recorder;
 mod resumption;
+#[cfg(feature = "mpi")]
+mod shared;
 mod stress;
 mod tables;
 
@@ -34,6 +36,8 @@ pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 pub use recorded::{FolderError, recorded_runs};
 pub use resumption::{ResumeError, Resumption};
+#[cfg(feature = "mpi")]
+pub use shared::run_shared;
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
@@ -63,11 +67,21 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
+    logged(case, options, progress, |log| match case.dimension {
+        2 => run_2d(case, options, log),
+        _ => run_3d(case, options, log),
+    })
+}
+
+/// Does `work` with a log of it beside the results.
+fn logged(
+    case: &Case,
+    options: &RunOptions,
+    progress: &dyn Progress,
+    work: impl FnOnce(&Log<'_>) -> Result<RunReport, RunError>,
+) -> Result<RunReport, RunError> {
     let log = Log::begin(case, options, progress)?;
-    let outcome = match case.dimension {
-        2 => run_2d(case, options, &log),
-        _ => run_3d(case, options, &log),
-    };
+    let outcome = work(&log);
     log.end(&outcome);
     outcome
 }

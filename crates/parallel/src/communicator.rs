@@ -89,10 +89,15 @@ pub trait Communicator {
                 }
             }
         }
+        self.share(values);
+    }
+
+    /// Replaces `values`, of which all ranks have as many, by those of rank zero.
+    fn share(&self, values: &mut [f64]) {
         let mut bytes = Vec::new();
         write_all(values, &mut bytes);
         broadcast(self, &mut bytes);
-        values.iter_mut().zip(read_all(&bytes)).for_each(|(value, sum)| *value = sum);
+        values.iter_mut().zip(read_all(&bytes)).for_each(|(value, shared)| *value = shared);
     }
 
     /// The items of all ranks, of each as many, in the order of the ranks, for all of them.

@@ -75,6 +75,40 @@ impl Side {
     fn count(&self) -> usize {
         self.places.iter().map(Vec::len).sum()
     }
+
+    /// The places rank by rank.
+    fn by_rank(&self) -> impl Iterator<Item = (usize, &Vec<u32>)> {
+        self.messages.iter().map(|message| message.rank).zip(&self.places)
+    }
+
+    /// Places that `keep`, which is asked once for each in this order.
+    fn filtered(&self, mut keep: impl FnMut(u32) -> bool) -> Self {
+        let mut kept = Self::default();
+        for (rank, places) in self.by_rank() {
+            kept.push(rank, places.iter().copied().filter(|&place| keep(place)).collect());
+        }
+        kept
+    }
+
+    /// The places of several sides in one, entry by entry.
+    fn joined(sides: &[(&Self, usize, usize)]) -> Self {
+        let ranks = sides.iter().flat_map(|(side, ..)| side.messages.iter().map(|message| message.rank));
+        let mut ranks: Vec<usize> = ranks.collect();
+        ranks.sort_unstable();
+        ranks.dedup();
+        let mut joined = Self::default();
+        for rank in ranks {
+            let mut entries = Vec::new();
+            for &(side, width, first) in sides {
+                let of_rank = side.by_rank().filter(|of| of.0 == rank).flat_map(|of| of.1);
+                let of_place =
+                    |&place: &u32| (0..width).map(move |c| (first + place as usize * width + c) as u32);
+                entries.extend(of_rank.flat_map(of_place));
+            }
+            joined.push(rank, entries);
+        }
+        joined
+    }
 }
 
 impl GhostPlan {
@@ -99,6 +133,74 @@ impl GhostPlan {
             plan.owned.push(rank, read_all(&bytes).map(place).collect());
         }
         plan
+    }
+
+    /// Several plans in one message to each rank: each a plan, the number of components of its fields, and
+    /// where these begin in a vector that holds them all. The plan is one of entries of that vector, with one
+    /// component each.
+    #[must_use]
+    pub fn joined(plans: &[(&Self, usize, usize)]) -> Self {
+        let side = |of: fn(&Self) -> &Side| {
+            Side::joined(
+                &plans.iter().map(|&(plan, width, first)| (of(plan), width, first)).collect::<Vec<_>>(),
+            )
+        };
+        Self { owned: side(|plan| &plan.owned), ghosts: side(|plan| &plan.ghosts) }
+    }
+
+    /// The plan of the ghosts that `keep` here, and elsewhere as it does there.
+    #[must_use]
+    pub fn restricted(&self, ranks: &dyn Communicator, keep: impl Fn(u32) -> bool) -> Self {
+        let kept = |(rank, places): (usize, &Vec<u32>)| Message {
+            rank,
+            bytes: places.iter().map(|&place| u8::from(keep(place))).collect(),
+        };
+        let told: Vec<Message> = self.ghosts.by_rank().map(kept).collect();
+        let mut heard: Vec<Message> = (self.owned.by_rank())
+            .map(|(rank, places)| Message { rank, bytes: vec![0; places.len()] })
+            .collect();
+        ranks.exchange(&told, &mut heard);
+        let mut wanted = heard.iter().flat_map(|message| &message.bytes);
+        Self { owned: self.owned.filtered(|_| wanted.next() == Some(&1)), ghosts: self.ghosts.filtered(keep) }
+    }
+
+    /// Lists of any length from the owners, which `write` them, for each ghost here.
+    pub fn lists(
+        &self,
+        ranks: &dyn Communicator,
+        mut write: impl FnMut(u32, &mut Vec<u64>),
+    ) -> Vec<(u32, Vec<u64>)> {
+        let mut list = Vec::new();
+        let mut message = |(rank, places): (usize, &Vec<u32>)| {
+            let mut numbers: Vec<u64> = Vec::new();
+            for &place in places {
+                list.clear();
+                write(place, &mut list);
+                numbers.push(list.len() as u64);
+                numbers.extend_from_slice(&list);
+            }
+            let mut bytes = Vec::new();
+            write_all(&numbers, &mut bytes);
+            Message { rank, bytes }
+        };
+        let told: Vec<Message> = self.owned.by_rank().map(&mut message).collect();
+        let lengths = told.iter().map(|m| Message { rank: m.rank, bytes: length_of(m) });
+        let empty = |(rank, _): (usize, &Vec<u32>)| Message { rank, bytes: vec![0; u64::SIZE] };
+        let mut coming: Vec<Message> = self.ghosts.by_rank().map(empty).collect();
+        ranks.exchange(&lengths.collect::<Vec<_>>(), &mut coming);
+        for message in &mut coming {
+            message.bytes = vec![0; u64::read(&message.bytes) as usize];
+        }
+        ranks.exchange(&told, &mut coming);
+        let mut lists = Vec::with_capacity(self.ghost_count());
+        for ((_, places), message) in self.ghosts.by_rank().zip(&coming) {
+            let mut numbers = read_all(&message.bytes);
+            for &place in places {
+                let length = numbers.next().map_or(0, |length: u64| length as usize);
+                lists.push((place, numbers.by_ref().take(length).collect()));
+            }
+        }
+        lists
     }
 
     /// Number of ghosts here.
@@ -151,7 +253,7 @@ fn deliver(ranks: &dyn Communicator, messages: &[Message]) -> Vec<Message> {
     for message in messages {
         assert_ne!(message.rank, ranks.rank(), "a rank asks others only");
         let own = usize::from(message.rank > ranks.rank());
-        lengths[message.rank - own].bytes = (message.bytes.len() as u64).to_le_bytes().to_vec();
+        lengths[message.rank - own].bytes = length_of(message);
     }
     ranks.exchange(&lengths, &mut coming);
     let length = |message: &Message| u64::read(&message.bytes) as usize;
@@ -162,4 +264,9 @@ fn deliver(ranks: &dyn Communicator, messages: &[Message]) -> Vec<Message> {
         .collect();
     ranks.exchange(messages, &mut received);
     received
+}
+
+/// The length of a message, as bytes.
+fn length_of(message: &Message) -> Vec<u8> {
+    (message.bytes.len() as u64).to_le_bytes().to_vec()
 }

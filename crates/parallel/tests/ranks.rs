@@ -145,6 +145,18 @@ fn a_rank_that_dies_ends_all_and_is_named() {
 }
 
 #[test]
+fn all_ranks_take_what_rank_zero_shares() {
+    for size in SIZES {
+        let shared = Threads::run(size, |ranks| {
+            let mut values = [0.5 + ranks.rank() as f64, -0.0, 1e300];
+            ranks.share(&mut values);
+            values.map(f64::to_bits)
+        });
+        assert_eq!(shared.unwrap(), vec![[0.5, -0.0, 1e300].map(f64::to_bits); size]);
+    }
+}
+
+#[test]
 fn traffic_is_counted() {
     let traffic = Threads::run(4, |ranks| {
         let next = Message { rank: (ranks.rank() + 1) % 4, bytes: vec![7; 100] };
@@ -164,4 +176,68 @@ fn traffic_is_counted() {
     let bytes: u64 = traffic.iter().map(|t| t.1.bytes).sum();
     assert_eq!((messages, bytes), (6, 96));
     assert!(traffic.iter().all(|t| t.1.reductions == 1));
+}
+
+/// Two fields in one vector, of one component and of two, whose ghosts travel together.
+#[test]
+fn joined_plans_do_what_each_does() {
+    for size in SIZES {
+        Threads::run(size, |ranks| {
+            let Line { plan, own, below, .. } = line(ranks);
+            let length = own + plan.ghost_count();
+            let value = |k: usize| (k as f64 + 0.3 * ranks.rank() as f64).sin();
+            let mut one: Vec<f64> = (0..length).map(value).collect();
+            let mut two: Vec<f64> = (0..2 * length).map(|k| value(k + 7)).collect();
+            let mut both: Vec<f64> = one.iter().chain(&two).copied().collect();
+            let mut joined = GhostPlan::joined(&[(&plan, 1, 0), (&plan, 2, length)]);
+            let mut plan = plan;
+            let before = ranks.traffic();
+            joined.accumulate::<f64, 1>(ranks, &mut both);
+            joined.update::<f64, 1>(ranks, &mut both);
+            let of_joined = ranks.traffic().since(before);
+            plan.accumulate::<f64, 1>(ranks, &mut one);
+            plan.accumulate::<f64, 2>(ranks, &mut two);
+            plan.update::<f64, 1>(ranks, &mut one);
+            plan.update::<f64, 2>(ranks, &mut two);
+            let of_each = ranks.traffic().since(before).since(of_joined);
+            assert_eq!(both, [one, two].concat());
+            assert_eq!((2 * of_joined.messages, of_joined.bytes), (of_each.messages, of_each.bytes));
+            assert!(own == 0 || below + own <= length);
+        })
+        .unwrap();
+    }
+}
+
+#[test]
+fn restricted_plans_leave_out_what_a_rank_does_not_keep() {
+    for size in SIZES {
+        Threads::run(size, |ranks| {
+            let Line { plan, first, own, below } = line(ranks);
+            let length = own + plan.ghost_count();
+            // Each rank keeps other ghosts.
+            let keeps = |place: u32| (first + place as usize + ranks.rank()).is_multiple_of(3);
+            let mut few = plan.restricted(ranks, keeps);
+            let mut x = vec![f64::NAN; length];
+            (below..below + own).for_each(|k| x[k] = (first + k) as f64);
+            few.update::<f64, 1>(ranks, &mut x);
+            for k in (0..length).filter(|k| !(below..below + own).contains(k)) {
+                assert_eq!(x[k] == (first + k) as f64, keeps(k as u32));
+            }
+        })
+        .unwrap();
+    }
+}
+
+#[test]
+fn owners_send_lists_of_any_length() {
+    for size in SIZES {
+        Threads::run(size, |ranks| {
+            let Line { plan, first, .. } = line(ranks);
+            let list_of = |k: usize| (0..k % 4).map(|n| (10 * k + n) as u64).collect::<Vec<u64>>();
+            let lists = plan.lists(ranks, |place, list| list.extend(list_of(first + place as usize)));
+            assert_eq!(lists.len(), plan.ghost_count());
+            assert!(lists.iter().all(|(place, list)| *list == list_of(first + *place as usize)));
+        })
+        .unwrap();
+    }
 }

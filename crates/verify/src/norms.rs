@@ -293,8 +293,9 @@ mod tests {
         let exact = 1.0 - std::f64::consts::PI * 0.48 * 0.48;
         assert!((fluid * h * h - exact).abs() < 1e-12, "{} {exact}", fluid * h * h);
         // Film to its images are 0.04 thick, widened to 0.1: two flats along each axis.
-        assert_eq!(flats(&[ball], &Aabb::unit(), 0.03)[0].len(), 0);
-        let flats = flats(&[ball], &Aabb::unit(), 0.1);
+        let heights = |height| Heights { at_contact: height, largest: height, ..Heights::default() };
+        assert_eq!(flats(&[ball], &Aabb::unit(), &heights(0.03))[0].len(), 0);
+        let flats = flats(&[ball], &Aabb::unit(), &heights(0.1));
         assert_eq!(flats[0].len(), 4);
         assert!(flats[0].iter().all(|flat| (flat.distance - 0.45).abs() < 1e-12), "{flats:?}");
     }

@@ -14,9 +14,9 @@ pub struct RigidNode<T, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> RigidNode<T, D> {
-    /// `u = U + w x arm`.
+    /// `u = U + w x arm`, in the first `D` places.
     #[inline(always)]
-    pub(super) fn set_velocity<X: Scalar>(&self, twist: &[X], u: &mut [T; 4]) {
+    pub fn set_velocity<X: Scalar>(&self, twist: &[X], u: &mut [T; 4]) {
         let a = &self.arm;
         let entry = |k: usize| T::from_f64(twist[k].to_f64());
         (0..D).for_each(|c| u[c] = entry(c));
@@ -33,7 +33,7 @@ impl<T: Scalar, const D: usize> RigidNode<T, D> {
 
     /// Adds the force and its moment `arm x f`.
     #[inline(always)]
-    pub(super) fn add_moment<X: Scalar>(&self, f: &[T; D], load: &mut [X]) {
+    pub fn add_moment<X: Scalar>(&self, f: &[T; D], load: &mut [X]) {
         let a = &self.arm;
         let mut add = |k: usize, value: T| load[k] += X::from_f64(value.to_f64());
         (0..D).for_each(|c| add(c, f[c]));

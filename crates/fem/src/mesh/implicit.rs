@@ -205,9 +205,28 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
 
     /// Key of the first leaf that touches a point of the lattice of `degree` points a cell of level `depth`.
     pub fn first_touching(&mut self, depth: u8, degree: u32, point: &[u32; D]) -> u64 {
+        let mut first = u64::MAX;
+        self.for_each_touching(depth, degree, point, |tree, leaf| first = first.min(tree.key(leaf)));
+        first
+    }
+
+    /// Level of the smallest leaves that touch such a point.
+    pub fn finest_touching(&mut self, depth: u8, degree: u32, point: &[u32; D]) -> u8 {
+        let mut finest = 0;
+        self.for_each_touching(depth, degree, point, |_, leaf| finest = finest.max(leaf.level));
+        finest
+    }
+
+    /// Visits the leaves that touch a point, some more than once.
+    fn for_each_touching(
+        &mut self,
+        depth: u8,
+        degree: u32,
+        point: &[u32; D],
+        mut visit: impl FnMut(&Self, &Cell<D>),
+    ) {
         let counts = self.frame.roots().map(|r| i64::from(r) << depth);
         let periodic = self.frame.periodic();
-        let mut first = u64::MAX;
         for corner in 0..1u32 << D {
             let along = |d: usize| {
                 let upper = i64::from(point[d] / degree);
@@ -220,10 +239,9 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
             if coords.iter().all(Option::is_some) {
                 let cell = Cell { level: depth, coords: coords.map(|c| c.unwrap_or_default()) };
                 let leaf = self.covering(depth, &cell);
-                first = first.min(self.key(&leaf));
+                visit(self, &leaf);
             }
         }
-        first
     }
 
     /// The leaves around some leaves: those that touch one, and coarser ones that touch those, and so on.

@@ -43,6 +43,21 @@ impl Manner {
         outcome.map_err(|error| Failure::of_run(error, file))
     }
 
+    /// The same with a flow that `ranks` share; a report comes on rank zero.
+    #[cfg(feature = "mpi")]
+    pub fn run_on(
+        &self,
+        ranks: &dyn gluey_parallel::Communicator,
+        case: &Case,
+        options: &RunOptions,
+        file: &Path,
+    ) -> Result<Option<RunReport>, Failure> {
+        let reporter = Reporter::new(&case.name, self.quiet || ranks.rank() > 0).verbose(self.verbose);
+        let outcome = gluey::run_shared(case, options, &reporter as &dyn Progress, ranks);
+        reporter.finish();
+        outcome.map_err(|error| Failure::of_run(error, file))
+    }
+
     /// What shows where a run of this name is.
     pub fn reporter(&self, name: &str) -> Reporter {
         Reporter::new(name, self.quiet).verbose(self.verbose)

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use gluey::case::Override;
 use gluey::{Case, Formulation, ResultPaths, RunOptions, Strategy};
+#[cfg(feature = "mpi")]
+use gluey_parallel::Communicator;
 
 use super::failure::Failure;
 use super::interrupt::interrupt_flag;
@@ -45,9 +47,55 @@ pub struct RunArguments {
     manner: Manner,
 }
 
+/// A case that not all ranks can read.
+#[cfg(feature = "mpi")]
+#[derive(Debug, thiserror::Error)]
+#[error("rank {rank} cannot read the case, which this one can: is the file there on all machines?")]
+struct UnreadElsewhere {
+    rank: usize,
+}
+
 impl RunArguments {
     /// Runs the case that they name, and tells what came out.
+    #[cfg(not(feature = "mpi"))]
     pub fn run(&self) -> Result<(), Failure> {
+        self.run_alone()
+    }
+
+    /// The same on the processes that `mpirun` started.
+    #[cfg(feature = "mpi")]
+    pub fn run(&self) -> Result<(), Failure> {
+        let outcome = gluey_parallel::Processes::run(|ranks| match ranks.size() {
+            1 => self.run_alone(),
+            _ => self.run_on(ranks),
+        });
+        outcome.unwrap_or_else(|error| Err(Failure::new(error, None)))
+    }
+
+    /// Rank zero speaks for all: what goes wrong before the first flow goes wrong on each of them.
+    #[cfg(feature = "mpi")]
+    fn run_on(&self, ranks: &dyn Communicator) -> Result<(), Failure> {
+        let outcome = self.share(ranks);
+        if ranks.rank() == 0 { outcome } else { Ok(()) }
+    }
+
+    #[cfg(feature = "mpi")]
+    fn share(&self, ranks: &dyn Communicator) -> Result<(), Failure> {
+        self.manner.set_threads()?;
+        let case = self.case();
+        let unread = ranks.all_gather(&[u64::from(case.is_err())]);
+        let case = case?;
+        if let Some(rank) = unread.iter().position(|&failed| failed > 0) {
+            return Err(Failure::new(UnreadElsewhere { rank }, None));
+        }
+        let options = self.options(&case);
+        if let Some(report) = self.manner.run_on(ranks, &case, &options, &self.case)? {
+            self.manner.tell(&report, print_report);
+        }
+        Ok(())
+    }
+
+    fn run_alone(&self) -> Result<(), Failure> {
         self.manner.set_threads()?;
         let case = self.case()?;
         let options = self.options(&case);

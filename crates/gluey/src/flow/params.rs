@@ -7,14 +7,14 @@ use super::error::FlowError;
 use crate::case::{Case, Formulation, Lubrication, Solver};
 
 /// The root cells along each axis of a box, and the level of the surfaces.
-pub(super) fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
+pub(crate) fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
     let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
     let uneven = || FlowError::Box { extent: domain.extent().iter().copied().collect() };
     roots.zip(case.surface_level()).ok_or_else(uneven)
 }
 
 /// Refinement of the mesh of a checked case, whose surfaces are at `level`.
-pub(super) fn refinement(case: &Case, level: f64) -> Refinement {
+pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
     let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
     let surface = level as u8;
     let rigid = case.flow.formulation == Formulation::RigidDofs;

@@ -37,6 +37,12 @@ pub enum RunError {
     /// A checkpoint could not be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// Several ranks cannot share such a case.
+    #[error("several ranks cannot share {what}")]
+    NotShared {
+        /// What the case or the options ask for.
+        what: &'static str,
+    },
     /// The flow could not be set up.
     #[error("the flow could not be set up")]
     Flow(#[from] HydrodynamicsError),

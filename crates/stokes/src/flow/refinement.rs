@@ -41,19 +41,34 @@ impl Refinement {
         periodic: [bool; D],
         bodies: &[Ball<D>],
     ) -> Result<TreeMesh<D>, MeshError> {
-        let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
-        let deepest = self.surface.saturating_add(gap_levels);
         let shear = bodies.first().map_or(0.0, |body| body.lattice().shear());
         let bodies = &BallTree::new(bodies);
-        let mesh = TreeMesh::refine(domain, roots, periodic, deepest, |lower, h, level| {
-            let center = lower + Vector::repeat(0.5 * h);
-            level < self.coarsest
-                || (level < self.surface && self.is_near_surface(&center, h, bodies))
-                || (level >= self.surface && self.is_in_gap(&center, h, bodies))
-        })?;
+        let wants = |lower: &Vector<D>, h: f64, level: u8| self.wants(lower, h, level, bodies);
+        let deepest = self.deepest();
+        let mesh = TreeMesh::refine(domain, roots, periodic, deepest, wants)?;
         let mesh = mesh.sheared(shear);
         let used = mesh.cells().iter().map(|c| c.level).max().unwrap_or(0);
         Ok(if used < deepest { mesh.coarsened(used) } else { mesh })
+    }
+
+    /// Level of the smallest cells that there may be.
+    pub fn deepest(&self) -> u8 {
+        let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
+        self.surface.saturating_add(gap_levels)
+    }
+
+    /// Whether a cell with this lower corner, size and level is to be refined.
+    pub fn wants<const D: usize>(
+        &self,
+        lower: &Vector<D>,
+        h: f64,
+        level: u8,
+        bodies: &BallTree<'_, D>,
+    ) -> bool {
+        let center = lower + Vector::repeat(0.5 * h);
+        level < self.coarsest
+            || (level < self.surface && self.is_near_surface(&center, h, bodies))
+            || (level >= self.surface && self.is_in_gap(&center, h, bodies))
     }
 
     /// Whether a cell of size `h` comes closer to a body than the band of its children.

@@ -1,0 +1,267 @@
+//! The flow around particles that move, step after step, on ranks.
+//!
+//! Ranks share the flow. What is small is not shared: where particles are, how they move, which of them
+//! touch. Rank zero leads: it knows when a flow is wanted and tells the others where the particles are. The
+//! others follow, or do the same work on their particles beside it; what rank zero says holds.
+
+use gluey_fem::{ImplicitTree, MeshError};
+use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree};
+use gluey_motion::{FlowStatistics, Hydrodynamics, NoForces};
+use gluey_parallel::Communicator;
+use gluey_stokes::Refinement;
+
+use crate::cuts::equal_cuts;
+use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
+
+/// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls.
+#[derive(Clone, Debug)]
+pub struct Suspension<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Fluid and tolerance.
+    pub flow: BoxFlow,
+    /// The box.
+    pub domain: Aabb<D>,
+    /// Cells along its edges before any is refined.
+    pub roots: [u32; D],
+    /// Periods along its axes, where it has some; at least one has none.
+    pub periods: [Option<f64>; D],
+    /// How the mesh follows the particles.
+    pub refinement: Refinement,
+    /// Nodes with a level set of at least this many cells are rigid.
+    pub offset: f64,
+    /// Radii of the particles.
+    pub radii: Vec<f64>,
+    /// Forces and torques on them, or no entries for none on any.
+    pub wrenches: Vec<Wrench<D>>,
+    /// The shear rate.
+    pub shear_rate: f64,
+}
+
+/// Why there is no flow around the particles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SuspensionError {
+    /// The box has no mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The flow failed, on all ranks.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+}
+
+/// What rank zero wants of the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    End,
+    Predict,
+}
+
+impl<const D: usize> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow around particles at these places, under these forces and torques, with this multiple of the
+    /// shear. All ranks call this with the same numbers.
+    ///
+    /// # Errors
+    /// [`SuspensionError`], on all ranks.
+    pub fn solve(
+        &self,
+        ranks: &dyn Communicator,
+        positions: &[Vector<D>],
+        wrenches: &[Wrench<D>],
+        shear_factor: f64,
+    ) -> Result<MyFlow<D>, SuspensionError> {
+        let ball = |(&place, &radius): (&Vector<D>, &f64)| Ball::periodic(place, radius, self.periods);
+        let balls: Vec<Ball<D>> = positions.iter().zip(&self.radii).map(ball).collect();
+        let tree_of_balls = BallTree::new(&balls);
+        let wants =
+            |lower: &Vector<D>, h: f64, level: u8| self.refinement.wants(lower, h, level, &tree_of_balls);
+        let periodic = self.periods.map(|period| period.is_some());
+        let tree = |depth: u8| ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants);
+        let deepest = self.refinement.deepest();
+        let mut whole = tree(deepest)?;
+        let mut cuts = equal_cuts(&whole, ranks);
+        let used = finest_level(&mut whole, &cuts.of(ranks.rank()), ranks);
+        if used < deepest {
+            // Cells as deep as gaps might ask for are not there: the lattice is that of the finest there are.
+            whole = tree(used)?;
+            cuts = equal_cuts(&whole, ranks);
+        }
+        let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
+        let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 });
+        let bodies = RigidBodies { balls: &balls, offset: self.offset, wrenches };
+        Ok(self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?)
+    }
+
+    /// Does what rank zero asks for with its [`SharedHydrodynamics::leading`], until that ends. All other
+    /// ranks call this.
+    pub fn follow(&self, ranks: &dyn Communicator) {
+        let mut told = Told::new(self);
+        while told.share(ranks, Order::End) == Order::Predict {
+            // An error is one on all ranks: rank zero says what it is.
+            let _ = self.solve(ranks, &told.positions, &told.wrenches, told.shear_factor);
+        }
+    }
+}
+
+/// Level of the smallest leaves of all ranks.
+fn finest_level<const D: usize>(
+    tree: &mut ImplicitTree<'_, D>,
+    own: &std::ops::Range<u64>,
+    ranks: &dyn Communicator,
+) -> u8 {
+    let mut finest = 0;
+    let depth = tree.max_level();
+    tree.for_each_leaf(depth, own, |leaf| finest = finest.max(leaf.level));
+    ranks.all_gather(&[u64::from(finest)]).into_iter().max().map_or(0, |level| level as u8)
+}
+
+/// What rank zero tells the others.
+#[derive(Clone, Debug)]
+struct Told<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    positions: Vec<Vector<D>>,
+    wrenches: Vec<Wrench<D>>,
+    shear_factor: f64,
+}
+
+impl<const D: usize> Told<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(suspension: &Suspension<D>) -> Self {
+        let count = suspension.radii.len();
+        let wrenches = match suspension.wrenches.len() {
+            0 => vec![Wrench::default(); count],
+            _ => suspension.wrenches.clone(),
+        };
+        Self { positions: vec![Vector::zeros(); count], wrenches, shear_factor: 1.0 }
+    }
+
+    /// Replaces all by what rank zero says, and returns its order.
+    fn share(&mut self, ranks: &dyn Communicator, order: Order) -> Order {
+        let mut numbers = vec![f64::from(u8::from(order == Order::Predict)), self.shear_factor];
+        numbers.extend(self.positions.iter().flatten());
+        for wrench in &self.wrenches {
+            numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
+        }
+        ranks.share(&mut numbers);
+        let mut told = numbers.into_iter();
+        let mut next = || told.next().unwrap_or_default();
+        let order = if next() > 0.0 { Order::Predict } else { Order::End };
+        self.shear_factor = next();
+        for position in &mut self.positions {
+            position.iter_mut().for_each(|x| *x = next());
+        }
+        for wrench in &mut self.wrenches {
+            wrench.force.iter_mut().for_each(|f| *f = next());
+            (0..Dim::<D>::ROT).for_each(|k| wrench.torque[k] = next());
+        }
+        order
+    }
+}
+
+/// The flow of a suspension as a model of how its particles move.
+pub struct SharedHydrodynamics<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    suspension: &'a Suspension<D>,
+    ranks: &'a dyn Communicator,
+    told: Told<D>,
+    /// Whether others follow and are to be told of the end.
+    leads: bool,
+    /// Whether a prediction has begun and not ended.
+    is_predicting: bool,
+    statistics: FlowStatistics,
+}
+
+impl<'a, const D: usize> SharedHydrodynamics<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// For ranks that all make the same predictions.
+    pub fn beside(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+        let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
+        Self { suspension, ranks, told, leads: false, is_predicting: false, statistics }
+    }
+
+    /// For rank zero, while the others [`Suspension::follow`].
+    pub fn leading(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+        let mut new = Self::beside(suspension, ranks);
+        new.leads = true;
+        new
+    }
+}
+
+impl<const D: usize> Drop for SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn drop(&mut self) {
+        // A rank that panics ends the others anyhow.
+        if std::thread::panicking() {
+            return;
+        }
+        assert!(!self.is_predicting, "a flow that other ranks share was broken off");
+        if self.leads {
+            self.told.share(self.ranks, Order::End);
+        }
+    }
+}
+
+impl<const D: usize> Hydrodynamics<D> for SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    type Error = SuspensionError;
+
+    fn predict(
+        &mut self,
+        _t: f64,
+        particles: &[Particle<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), SuspensionError> {
+        let Self { suspension, ranks, told, .. } = self;
+        let places = particles.iter().map(|particle| particle.pose.position);
+        told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
+        self.is_predicting = true;
+        told.share(*ranks, Order::Predict);
+        let start = std::time::Instant::now();
+        let flow = suspension.solve(*ranks, &told.positions, &told.wrenches, told.shear_factor);
+        self.is_predicting = false;
+        let flow = flow?;
+        twists.copy_from_slice(&flow.twists);
+        self.statistics = FlowStatistics {
+            cell_count: flow.cell_count,
+            dof_count: flow.dof_count,
+            solve_count: 1,
+            iteration_count: flow.iterations,
+            residual: flow.relative_residual,
+            phases: vec![("shared flow", start.elapsed().as_secs_f64())],
+        };
+        Ok(())
+    }
+
+    fn set_shear_factor(&mut self, factor: f64) {
+        self.told.shear_factor = factor;
+    }
+
+    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
+        self.told.wrenches = Told::new(self.suspension).wrenches;
+        for (acting, more) in self.told.wrenches.iter_mut().zip(wrenches) {
+            acting.force += more.force;
+            acting.torque += more.torque;
+        }
+        Ok(())
+    }
+
+    fn statistics(&self) -> FlowStatistics {
+        self.statistics.clone()
+    }
+}

@@ -1,0 +1,219 @@
+//! Rigid bodies whose cells ranks share: their flow and their motions are those of the serial solver of
+//! `rigid-dofs`, and the same on any number of ranks.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use gluey_distributed::{BoxFlow, FlowError, MyFlow, RigidBodies, equal_cuts};
+use gluey_fem::ImplicitTree;
+use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree};
+use gluey_parallel::{Alone, Communicator, Threads};
+use gluey_stokes::{
+    Conditions, CutCellPressures, FlowParams, FlowSolver, Formulation, Refinement, SolverKind,
+};
+
+const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 };
+const OFFSET: f64 = -0.1;
+
+/// Bodies in a box, with fine cells around them.
+#[derive(Clone, Copy)]
+struct Example<'a> {
+    /// Places and radii in the unit box; the third coordinate counts in 3D only.
+    bodies: &'a [([f64; 3], f64)],
+    refinement: Refinement,
+    /// In the first direction.
+    is_periodic: bool,
+}
+
+/// Finest cells everywhere within two cells of a body.
+const fn to_level(coarsest: u8, surface: u8) -> Refinement {
+    Refinement { coarsest, surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
+}
+
+const ONE_SMALL: Example<'_> =
+    Example { bodies: &[([0.2, 0.22, 0.2], 0.09)], refinement: to_level(4, 5), is_periodic: false };
+const PAIR: Example<'_> = Example {
+    bodies: &[([0.37, 0.45, 0.5], 0.2), ([0.71, 0.62, 0.48], 0.12)],
+    refinement: to_level(3, 5),
+    is_periodic: false,
+};
+/// The second lies across the border.
+const PERIODIC: Example<'_> = Example {
+    bodies: &[([0.4, 0.35, 0.52], 0.14), ([0.98, 0.6, 0.4], 0.16), ([0.5, 0.76, 0.7], 0.1)],
+    refinement: to_level(3, 5),
+    is_periodic: true,
+};
+
+/// A film a tenth of a cell thick, and cells that both bodies fill.
+const TOUCHING: Example<'_> = Example {
+    bodies: &[([0.32, 0.45, 0.5], 0.17), ([0.663, 0.47, 0.48], 0.17)],
+    refinement: to_level(3, 5),
+    is_periodic: false,
+};
+
+impl Example<'_> {
+    fn balls<const D: usize>(&self) -> Vec<Ball<D>> {
+        let period = std::array::from_fn(|d| (self.is_periodic && d == 0).then_some(1.0));
+        let place = |x: &[f64; 3]| Vector::<D>::from_fn(|d, _| x[d]);
+        self.bodies.iter().map(|(x, radius)| Ball::periodic(place(x), *radius, period)).collect()
+    }
+
+    fn periodic<const D: usize>(&self) -> [bool; D] {
+        std::array::from_fn(|d| self.is_periodic && d == 0)
+    }
+
+    fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>>
+    where
+        Dim<D>: Space<D>,
+    {
+        let wrench = |k: usize| {
+            let mut wrench = Wrench::default();
+            wrench.force[k % D] = 0.3;
+            wrench.torque[0] = 0.02 * (1.0 + k as f64);
+            wrench
+        };
+        (0..self.bodies.len()).map(wrench).collect()
+    }
+
+    fn solve<const D: usize>(&self, ranks: &dyn Communicator) -> MyFlow<D>
+    where
+        Dim<D>: Space<D>,
+    {
+        let (balls, wrenches) = (self.balls(), self.wrenches());
+        let tree_of_balls = BallTree::new(&balls);
+        let wants =
+            |lower: &Vector<D>, h: f64, level: u8| self.refinement.wants(lower, h, level, &tree_of_balls);
+        let deepest = self.refinement.deepest();
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), deepest, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        let bodies = RigidBodies { balls: &balls, offset: OFFSET, wrenches: &wrenches };
+        FLOW.solve_around(&bodies, &mut tree, &cuts, ranks, &walls).unwrap()
+    }
+
+    /// Velocities and twists of the serial solver, more exact than those of the ranks.
+    fn serial<const D: usize>(&self, solver: SolverKind) -> (Vec<Vector<D>>, Vec<Twist<D>>)
+    where
+        Dim<D>: Space<D>,
+    {
+        let (balls, wrenches) = (self.balls(), self.wrenches());
+        let mesh = self.refinement.mesh(Aabb::unit(), [1; D], self.periodic(), &balls).unwrap();
+        let cut_cell_pressures = CutCellPressures::Aggregate;
+        let params = FlowParams {
+            viscosity: FLOW.viscosity,
+            formulation: Formulation::RigidDofs { offset: OFFSET, cut_cell_pressures },
+            solver,
+            tolerance: 1e-13,
+        };
+        let conditions = Conditions::boundary(&walls).with_wrenches(&wrenches);
+        let flow = FlowSolver::<D>::new(params).unwrap().solve_under(mesh, &balls, &conditions).unwrap();
+        (flow.velocity.as_chunks::<D>().0.iter().map(|&u| u.into()).collect(), flow.twists)
+    }
+}
+
+/// Divergence-free, and as much in as out on every mesh.
+fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
+    let mut u = Vector::zeros();
+    u[0] = x[1] * (0.3 + x[D - 1]) - 0.2;
+    u
+}
+
+fn largest_difference<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
+    let scale = a.iter().map(Vector::norm).fold(0.0, largest);
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, largest) / scale
+}
+
+/// Velocities and spins, one after the other.
+fn motions<const D: usize>(twists: &[Twist<D>]) -> Vec<Vector<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let spin = |twist: &Twist<D>| {
+        Vector::from_fn(|d, _| Dim::<D>::spin_slice(&twist.spin).get(d).copied().unwrap_or(0.0))
+    };
+    twists.iter().flat_map(|twist| [twist.velocity, spin(twist)]).collect()
+}
+
+fn velocities<const D: usize>(parts: &[MyFlow<D>]) -> Vec<Vector<D>>
+where
+    Dim<D>: Space<D>,
+{
+    parts.iter().flat_map(|part| part.velocity.iter().copied()).collect()
+}
+
+fn ranks_move_bodies_as_the_serial_solver_does<const D: usize>(example: Example<'_>, solver: SolverKind)
+where
+    Dim<D>: Space<D>,
+{
+    let (velocity, twists) = example.serial::<D>(solver);
+    let alone = example.solve::<D>(&Alone::default());
+    for size in [1, 2, 3, 4, 8] {
+        let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
+        let parts = run();
+        let found = velocities(&parts);
+        let difference = largest_difference(&velocity, &found);
+        let motion = largest_difference(&motions(&twists), &motions(&parts[0].twists));
+        assert!(difference < 8e-11, "{size} ranks: velocities {difference:e}");
+        assert!(motion < 6e-10, "{size} ranks: bodies {motion:e}");
+        let is_close = |part: &MyFlow<D>| part.iterations.abs_diff(alone.iterations) <= 1;
+        assert!(parts.iter().all(is_close), "{} {}", parts[0].iterations, alone.iterations);
+        assert!(parts.iter().all(|part| part.twists == parts[0].twists), "ranks agree on all bodies");
+        let again = run();
+        assert_eq!((velocities(&again), &again[0].twists), (found, &parts[0].twists), "the same bits");
+    }
+}
+
+#[test]
+fn ranks_move_bodies_as_the_serial_solver_does_in_2d() {
+    for example in [ONE_SMALL, PAIR, PERIODIC] {
+        ranks_move_bodies_as_the_serial_solver_does::<2>(example, SolverKind::Direct);
+    }
+    // Where bodies share cells velocities depend on the mean of the pressures, a little; the direct solver
+    // has another one.
+    ranks_move_bodies_as_the_serial_solver_does::<2>(TOUCHING, SolverKind::Multigrid);
+}
+
+#[test]
+fn ranks_move_bodies_as_the_serial_solver_does_in_3d() {
+    for example in [ONE_SMALL, PAIR, PERIODIC, TOUCHING] {
+        let Refinement { coarsest, surface, .. } = example.refinement;
+        let example = Example { refinement: to_level(coarsest - 1, surface - 1), ..example };
+        ranks_move_bodies_as_the_serial_solver_does::<3>(example, SolverKind::Multigrid);
+    }
+}
+
+/// Copies of twists on ranks that do not own the body.
+fn ghost_bodies(example: Example<'_>, size: usize) -> usize {
+    let parts = Threads::run(size, |ranks| example.solve::<2>(ranks)).unwrap();
+    let finest = parts.iter().map(|part| part.levels[part.levels.len() - 1]);
+    assert_eq!(finest.clone().map(|level| level.bodies).sum::<usize>(), example.bodies.len());
+    finest.map(|level| level.ghost_bodies).sum()
+}
+
+#[test]
+fn a_body_is_known_to_the_ranks_whose_cells_it_touches() {
+    assert_eq!(ghost_bodies(ONE_SMALL, 2), 0, "a body in the first half of the cells");
+    assert!(ghost_bodies(PAIR, 8) >= 6);
+}
+
+/// What all ranks say.
+fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
+    let (balls, wants) = (example.balls::<2>(), |_: &Vector<2>, _: f64, _: u8| true);
+    let found = Threads::run(3, |ranks| {
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], 3, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        let bodies = RigidBodies { balls: &balls, offset: OFFSET, wrenches };
+        FLOW.solve_around(&bodies, &mut tree, &cuts, ranks, &walls).unwrap_err()
+    });
+    found.unwrap()
+}
+
+#[test]
+fn all_ranks_refuse_what_cannot_be_computed() {
+    let tiny = Example { bodies: &[([0.4, 0.5, 0.5], 0.2), ([0.81, 0.3, 0.5], 0.05)], ..PAIR };
+    let (radius, cell_size) = (0.05, 0.125);
+    assert_eq!(errors(tiny, &[]), vec![FlowError::Unresolved { body: 1, radius, cell_size }; 3]);
+    let one = [Wrench::default()];
+    assert_eq!(errors(PAIR, &one), vec![FlowError::Count { found: 1, bodies: 2 }; 3]);
+}

@@ -1,0 +1,167 @@
+//! Particles that move through contact on ranks: where the serial solver takes them, and the same bits for
+//! the same number of ranks.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
+use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
+use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_levelset::Ball;
+use gluey_motion::{Hydrodynamics, Integrator, Scheme};
+use gluey_parallel::{Communicator, Threads};
+use gluey_stokes::{
+    Conditions, CutCellPressures, FlowParams, FlowSolver, Formulation, Refinement, SolverKind, StokesError,
+};
+
+const STEP: f64 = 0.05;
+const STEPS: usize = 12;
+const RADIUS: f64 = 0.12;
+
+fn suspension<const D: usize>(surface: u8) -> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    let mut lighter = Wrench::default();
+    lighter.force[1] = 0.01;
+    Suspension {
+        flow: BoxFlow { viscosity: 1.0, tolerance: 1e-11, max_iterations: 500 },
+        domain: Aabb::unit(),
+        roots: [1; D],
+        periods: std::array::from_fn(|d| (d == 0).then_some(1.0)),
+        refinement: Refinement {
+            coarsest: surface - 1,
+            surface,
+            band: 1.0,
+            gap_fraction: 0.0,
+            gap_levels: 0,
+        },
+        offset: 0.0,
+        radii: vec![RADIUS; 2],
+        wrenches: vec![Wrench::default(), lighter],
+        shear_rate: 1.0,
+    }
+}
+
+/// Two particles that the shear drives at each other, one across the border.
+fn particles<const D: usize>() -> Vec<Particle<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let at = |x: f64, y: f64| Particle::new(Vector::from_fn(|d, _| [x, y, 0.5][d]), RADIUS);
+    vec![at(0.86, 0.54), at(1.091, 0.46)]
+}
+
+/// Places after all steps, and whether the particles ever touched.
+fn trajectory<const D: usize, H: Hydrodynamics<D>>(mut flow: H) -> (Vec<Vector<D>>, bool)
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+{
+    let (mut particles, mut integrator) = (particles::<D>(), Integrator::new(Scheme::AdamsBashforth2));
+    let mut contact = PairContact::new(ContactParams::default());
+    let (radii, mut touched) = ([RADIUS; 2], false);
+    let [mut twists, mut drift] = [(); 2].map(|()| vec![Twist::default(); 2]);
+    for step in 0..STEPS {
+        flow.predict(step as f64 * STEP, &particles, &mut twists).unwrap();
+        integrator.body_drift(STEP, &mut drift);
+        let poses: Vec<_> = particles.iter().map(|particle| particle.pose).collect();
+        let velocity_weight = integrator.velocity_weight(STEP);
+        let body_step = BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight, dt: STEP };
+        contact.correct_bodies(&body_step, &mut twists).unwrap();
+        touched |= !contact.contacts().is_empty();
+        integrator.advance(STEP, &mut particles, &twists);
+    }
+    (particles.iter().map(|particle| particle.pose.position).collect(), touched)
+}
+
+/// The serial solver of the same flow.
+struct Serial<'a, const D: usize>(&'a Suspension<D>)
+where
+    Dim<D>: Space<D>;
+
+impl<const D: usize> Hydrodynamics<D> for Serial<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    type Error = StokesError;
+
+    fn predict(
+        &mut self,
+        _: f64,
+        particles: &[Particle<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), StokesError> {
+        let Suspension { domain, roots, periods, refinement, offset, wrenches, flow, .. } = self.0;
+        let ball = |particle: &Particle<D>| Ball::periodic(particle.pose.position, RADIUS, *periods);
+        let balls: Vec<Ball<D>> = particles.iter().map(ball).collect();
+        let mesh = refinement.mesh(*domain, *roots, periods.map(|p| p.is_some()), &balls)?;
+        let cut_cell_pressures = CutCellPressures::Aggregate;
+        let formulation = Formulation::RigidDofs { offset: *offset, cut_cell_pressures };
+        let solver = SolverKind::Multigrid;
+        let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance };
+        let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
+        let conditions = Conditions::boundary(&shear).with_wrenches(wrenches);
+        let flow = FlowSolver::<D>::new(params)?.solve_under(mesh, &balls, &conditions)?;
+        twists.copy_from_slice(&flow.twists);
+        Ok(())
+    }
+
+    fn set_shear_factor(&mut self, _: f64) {}
+}
+
+fn ranks_take_particles_where_the_serial_solver_does<const D: usize>(surface: u8, sizes: &[usize], limit: f64)
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+{
+    let suspension = suspension::<D>(surface);
+    let (serial, touched) = trajectory(Serial(&suspension));
+    assert!(touched, "the particles meet");
+    for &size in sizes {
+        let run = || {
+            // Every second number of ranks is led by rank zero, which alone knows particles and contacts.
+            Threads::run(size, |ranks| match (size % 2, ranks.rank()) {
+                (0, 0) => Some(trajectory(SharedHydrodynamics::leading(&suspension, ranks)).0),
+                (0, _) => {
+                    suspension.follow(ranks);
+                    None
+                }
+                _ => Some(trajectory(SharedHydrodynamics::beside(&suspension, ranks)).0),
+            })
+            .unwrap()
+        };
+        let found: Vec<_> = run().into_iter().flatten().collect();
+        assert_eq!(found.len(), if size % 2 == 0 { 1 } else { size });
+        assert!(found.iter().all(|places| *places == found[0]), "ranks agree");
+        let difference = serial.iter().zip(&found[0]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(difference < limit, "{size} ranks: {difference:e}");
+        assert_eq!(run()[0].as_ref(), Some(&found[0]), "the same bits");
+    }
+}
+
+#[test]
+fn ranks_take_particles_where_the_serial_solver_does_in_2d() {
+    ranks_take_particles_where_the_serial_solver_does::<2>(5, &[1, 2, 3, 4, 8], 1.5e-11);
+}
+
+#[test]
+fn ranks_take_particles_where_the_serial_solver_does_in_3d() {
+    ranks_take_particles_where_the_serial_solver_does::<3>(4, &[1, 2, 3], 1.4e-13);
+}
+
+/// The others end with rank zero, whatever ends it.
+#[test]
+fn followers_end_when_the_leader_fails() {
+    let suspension = Suspension { radii: vec![0.001; 2], ..suspension::<2>(4) };
+    let errors = Threads::run(3, |ranks| {
+        if ranks.rank() > 0 {
+            suspension.follow(ranks);
+            return None;
+        }
+        let mut twists = vec![Twist::default(); 2];
+        let mut flow = SharedHydrodynamics::leading(&suspension, ranks);
+        flow.predict(0.0, &particles(), &mut twists).err().map(|error| error.to_string())
+    });
+    let first = errors.unwrap()[0].clone().unwrap();
+    assert!(first.starts_with("body 0 with radius 0.001"), "{first}");
+}

@@ -1,0 +1,97 @@
+//! Cases whose flow is shared by ranks, with the feature `mpi`: which can be, and what becomes of them.
+
+use gluey_contact::{ContactModel, PairContact};
+use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
+use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_parallel::Communicator;
+
+use super::{Run, RunError, RunOptions, claim_outputs, leftovers, logged, occupied};
+use crate::case::{Case, Formulation, Hydrodynamics, OutputKind, Solver};
+use crate::flow::{FlowError, refinement, tree};
+use crate::hydrodynamics::HydrodynamicsError;
+use crate::progress::Progress;
+use crate::report::RunReport;
+
+/// Iterations after which a flow is given up.
+const MOST_ITERATIONS: usize = 500;
+
+/// Runs `case` like [`run`] with a flow that `ranks` share. All ranks call this; rank zero moves the
+/// particles, writes the results and returns a report.
+pub fn run_shared(
+    case: &Case,
+    options: &RunOptions,
+    progress: &dyn Progress,
+    ranks: &dyn Communicator,
+) -> Result<Option<RunReport>, RunError> {
+    case.check()?;
+    check(case, options)?;
+    match case.dimension {
+        2 => run_beside::<2>(case, options, progress, ranks),
+        _ => run_beside::<3>(case, options, progress, ranks),
+    }
+}
+
+fn run_beside<const D: usize>(
+    case: &Case,
+    options: &RunOptions,
+    progress: &dyn Progress,
+    ranks: &dyn Communicator,
+) -> Result<Option<RunReport>, RunError>
+where
+    Dim<D>: Space<D>,
+    PairContact<D>: ContactModel<D>,
+{
+    let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
+    if ranks.rank() > 0 {
+        suspension.follow(ranks);
+        return Ok(None);
+    }
+    // However this ends, the others learn of it when the leader is dropped.
+    let leader = SharedHydrodynamics::leading(&suspension, ranks);
+    let _claims = claim_outputs(case, options, progress)?;
+    occupied::check_free(case, options)?;
+    leftovers::remove(case, options)?;
+    logged(case, options, progress, |log| Run::start(case, options, log, leader)?.finish()).map(Some)
+}
+
+/// Refuses what ranks cannot share.
+fn check(case: &Case, options: &RunOptions) -> Result<(), RunError> {
+    let has_fields = |kind: OutputKind, fields: bool| kind == OutputKind::Vtk && fields;
+    let refused = [
+        (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
+        (case.flow.formulation != Formulation::RigidDofs, "a formulation other than rigid-dofs"),
+        (case.is_sheared(), "a box that is sheared for ever"),
+        (case.flow.solver == Solver::Direct, "the direct solver"),
+        (options.vtk.is_some(), "frames with the fields of the flow (--vtk)"),
+        (
+            case.output.iter().any(|output| has_fields(output.kind, output.fields)),
+            "frames with the fields of the flow (output.fields)",
+        ),
+    ];
+    match refused.into_iter().find(|(is_asked, _)| *is_asked) {
+        Some((_, what)) => Err(RunError::NotShared { what }),
+        None => Ok(()),
+    }
+}
+
+/// The flow of a checked case.
+fn suspension<const D: usize>(case: &Case) -> Result<Suspension<D>, FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
+    let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
+    let (roots, level) = tree(case, &domain)?;
+    let tolerance = case.flow.tolerance;
+    Ok(Suspension {
+        flow: BoxFlow { viscosity: 1.0, tolerance, max_iterations: MOST_ITERATIONS },
+        domain,
+        roots,
+        periods: std::array::from_fn(|axis| case.period(axis)),
+        refinement: refinement(case, level),
+        offset: case.rigid_offset(),
+        radii: case.particles.iter().map(|particle| particle.radius).collect(),
+        wrenches: case.wrenches(),
+        shear_rate: case.shear_rate,
+    })
+}
