@@ -62,7 +62,7 @@ fn spheres_approach_at_these_speeds_by_default() {
         (RigidDofs, 0.05, 0.1, 1.5),
         (Unfitted, 1.0, -5e-4, 5e-4),
         (Unfitted, 0.2, -0.01, 0.02),
-        (Unfitted, 0.05, -0.01, 0.04),
+        (Unfitted, 0.05, -0.04, 0.01),
         (Unfitted, 1e-3, -0.005, 0.005),
         (Unfitted, 1e-4, -0.005, 0.005),
     ] {
