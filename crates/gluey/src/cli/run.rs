@@ -90,7 +90,7 @@ impl RunArguments {
         }
         let options = self.options(&case);
         if let Some(report) = self.manner.run_on(ranks, &case, &options, &self.case)? {
-            self.manner.tell(&report, print_report);
+            self.manner.tell(&report, |report| print_report(report, &options.csv));
         }
         Ok(())
     }
