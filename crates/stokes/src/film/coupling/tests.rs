@@ -124,7 +124,7 @@ fn spheres_resist_as_jeffrey_and_onishi_say() {
     for (a, b) in [(0.1, 0.1), (0.12, 0.06), (0.05, 0.15)] {
         let (near, far) = (1e-8, 1e-7);
         let [first, second] =
-            [near, far].map(|gap| resistance::<3>(&pair([a, b], gap * a), 1e-3 * a) / 10f64.ln());
+            [near, far].map(|gap| resistance::<3>(&pair([a, b], gap * a), 1e-2 * a) / 10f64.ln());
         let grown = first - second;
         let n = (pair::<3>([a, b], 0.0)[1].center() - pair::<3>([a, b], 0.0)[0].center()).normalize();
         let t = n.cross(&Vector::<3>::new(0.0, 0.0, 1.0)).normalize();
