@@ -8,8 +8,8 @@ const STEPS: usize = 48;
 const STEPS_AT_ONCE: usize = 4;
 /// The eigenvalue has converged when it changes by no more than this share from one look to the next.
 const TOLERANCE: f64 = 1e-7;
-/// The start vector is used up where the next one is shorter than this share of the eigenvalue: it is found to
-/// that share, and rounding is below it for a `B` of condition 1e10.
+/// The start vector is used up where the next one is shorter than this share of the eigenvalue, which is
+/// found to that share; rounding is below it for a `B` of condition 1e10.
 const USED_UP: f64 = 1e-5;
 /// Vectors of the inverse iteration for the lowest modes, side by side.
 const MODES: usize = 16;
@@ -210,8 +210,8 @@ mod tests {
         assert_eq!(largest_ratio(&with_eigenvalues(&[0.0; 3]), &mut with_eigenvalues(&[1.0; 3])), Ok(0.0));
     }
 
-    /// A surface that is flat has few strains, fluid that is moved rigidly none: what rounding leaves of a used
-    /// up start vector is as large as the least eigenvalue of `B` is small.
+    /// A surface that is flat has few strains, fluid that is moved rigidly none: what rounding leaves of a
+    /// used up start vector is as large as the least eigenvalue of `B` is small.
     #[test]
     fn rounding_is_not_taken_for_a_ratio() {
         let few = [1.0, 1.5, 2.0, 3.5, 5.0, 6.0, 7.5];

@@ -118,7 +118,8 @@ fn iterations_do_not_grow_with_resolution_or_the_number_of_spheres() {
 }
 
 /// A cluster of eight spheres that touch, at a/h = 1.6: without forces of films the solver sees slabs, not
-/// films. With them counts grow with the twelve stiff modes of the cluster, whose slabs are half a cell thick.
+/// films. With them counts grow with the twelve stiff modes of the cluster, whose slabs are half a cell
+/// thick.
 #[test]
 fn iterations_are_bounded_where_spheres_touch() {
     for (lubrication, most) in [(Lubrication::Deficit, [24, 38, 64, 120]), (Lubrication::None, [38; 4])] {
