@@ -9,7 +9,7 @@ const STEPS_AT_ONCE: usize = 4;
 /// The eigenvalue has converged when it changes by no more than this share from one look to the next.
 const TOLERANCE: f64 = 1e-7;
 /// The start vector is used up where the next one is shorter than this share of the eigenvalue, which is
-/// found to that share; rounding is below it for a `B` of condition 1e10.
+/// found to that share.
 const USED_UP: f64 = 1e-5;
 /// Vectors of the inverse iteration for the lowest modes, side by side.
 const MODES: usize = 16;
@@ -22,32 +22,30 @@ const NEGLIGIBLE: f64 = 1e-3;
 
 /// The largest `x.A x / x.B x`, `B` being positive definite, to five digits: Lanczos' method for `B^-1 A` in
 /// the scalar product of `B` (Golub and Van Loan 2013, section 10.1). Directions lose their orthogonality,
-/// which repeats eigenvalues and adds none. `B` is overwritten.
+/// which repeats eigenvalues and adds none. `B` multiplies every vector: with products that follow the
+/// recurrence of the vectors, rounding in directions without energy would pass for a ratio. `B` is
+/// overwritten.
 ///
 /// # Errors
 /// If `B` is not positive definite.
 pub fn largest_ratio(above: &DenseSymmetric, below: &mut DenseSymmetric) -> Result<f64, BlockError> {
     let dim = above.dim();
+    let metric = below.clone();
     below.eliminate(dim)?;
+    let [mut vector, mut last, mut next, mut image, mut load] = [(); 5].map(|()| vec![0.0; dim]);
     let start: Vec<f64> = (0..dim).map(|k| (1.0 + k as f64).sin()).collect();
-    // `images` are `B` times `vectors`: the present one and the one before.
-    let [mut vector, mut image, mut last_vector, mut last_image] = [(); 4].map(|()| vec![0.0; dim]);
-    above.multiply(&start, &mut image);
-    vector.copy_from_slice(&image);
+    above.multiply(&start, &mut vector);
     below.solve(vector.as_chunks_mut::<1>().0);
-    let (mut direction, mut load) = (vec![0.0; dim], vec![0.0; dim]);
     let mut projected = Tridiagonal::default();
     let (mut largest, mut first) = (0.0, 0.0);
     for step in 1..=STEPS.min(dim) {
+        metric.multiply(&vector, &mut image);
         let norm = inner(&vector, &image).max(0.0).sqrt();
-        // The start vector is used up.
         if norm <= USED_UP * first || !norm.is_normal() {
             break;
         }
-        [&mut vector, &mut image].into_iter().for_each(|x| x.iter_mut().for_each(|x| *x /= norm));
+        vector.iter_mut().for_each(|x| *x /= norm);
         above.multiply(&vector, &mut load);
-        direction.copy_from_slice(&load);
-        below.solve(direction.as_chunks_mut::<1>().0);
         let value = inner(&vector, &load);
         let coupling = if step == 1 { 0.0 } else { norm };
         projected.push(value, coupling);
@@ -59,17 +57,13 @@ pub fn largest_ratio(above: &DenseSymmetric, below: &mut DenseSymmetric) -> Resu
             }
             largest = now;
         }
-        for (next, [own, before]) in
-            [(&mut direction, [&vector, &last_vector]), (&mut load, [&image, &last_image])]
-        {
-            for ((next, own), before) in next.iter_mut().zip(own).zip(before) {
-                *next -= value * own + coupling * before;
-            }
+        next.copy_from_slice(&load);
+        below.solve(next.as_chunks_mut::<1>().0);
+        for ((next, own), before) in next.iter_mut().zip(&vector).zip(&last) {
+            *next -= value * own + coupling * before;
         }
-        std::mem::swap(&mut last_vector, &mut vector);
-        std::mem::swap(&mut last_image, &mut image);
-        std::mem::swap(&mut vector, &mut direction);
-        std::mem::swap(&mut image, &mut load);
+        std::mem::swap(&mut last, &mut vector);
+        std::mem::swap(&mut vector, &mut next);
     }
     Ok(projected.largest_eigenvalue())
 }
