@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
 use crate::phases::PhaseTable;
+use crate::shown::shown_to;
 use crate::trajectory::PairHistory;
 
 /// Gaps below this many radii are contact, and no measure of anything.
@@ -119,7 +120,7 @@ impl fmt::Display for RunReport {
 
 fn write_number(f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>) -> fmt::Result {
     match value {
-        Some(value) => writeln!(f, "  {name}: {value:.6e}"),
+        Some(value) => writeln!(f, "  {name}: {}", shown_to(value, 7)),
         None => Ok(()),
     }
 }

@@ -110,7 +110,12 @@ fn paths(source: &Source, across: &str, count: usize) -> Result<Chart, PlotError
     }
     let starts = curves.iter().filter_map(|curve| curve.pieces.first()?.first().copied());
     let marks = starts.map(|at| Mark { at, label: String::new() }).collect();
-    let axis = |label: String, values: Vec<f64>| Axis::around(&label, values);
+    // Dots lie beside the frame, not on it.
+    let axis = |label: String, values: Vec<f64>| {
+        let (low, high) = ends(&values);
+        let room = 0.02 * (high - low);
+        Axis::around(&label, [low - room, high + room].into_iter().filter(|end| end.is_finite()))
+    };
     let x = axis("*x*".into(), points(&curves).map(|point| point.0).collect());
     let y = axis(format!("*{across}*"), points(&curves).map(|point| point.1).collect());
     let notes = if across == "y" { vec!["Dots: where particles begin".to_owned()] } else { Vec::new() };
