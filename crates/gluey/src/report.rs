@@ -108,7 +108,7 @@ impl fmt::Display for RunReport {
             writeln!(f, "  mesh: {} cells, {} unknowns", self.cells, self.dofs)?;
         }
         write_number(f, "smallest gap / a", self.min_gap_over_a)?;
-        write_number(f, "gap at the end / a", self.end_gap_over_a)?;
+        write_number(f, "gap of 1 and 2 at the end / a", self.end_gap_over_a)?;
         write_number(f, "reversibility error", self.reversibility_error)?;
         if let Some(reference) = &self.reference {
             writeln!(f, "  compared with {reference}:")?;

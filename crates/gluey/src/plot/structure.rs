@@ -133,8 +133,8 @@ fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErr
     let x = Axis::around(label, lags.iter().copied().chain([0.0]));
     let mut chart = over(x, "mean square displacement / *a*^{2}", curves, &[0.0]);
     let unit = if name == "lag_strain" { "strain" } else { "time" };
-    let note = format!("Black: fits of the second half, of slope 2 *D*; *D* in *a*^{{2}} per unit of {unit}");
-    chart.notes.push(note);
+    chart.notes.push("Black: fits of the second half, of slope 2 *D*".to_owned());
+    chart.notes.push(format!("*D* in *a*^{{2}} per unit of {unit}"));
     Ok(vec![chart])
 }
 
