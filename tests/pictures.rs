@@ -123,6 +123,27 @@ fn results_are_drawn() {
     assert!(png.starts_with(b"\x89PNG") && png[16..20] == 1275u32.to_be_bytes());
 }
 
+/// What a run wrote that was killed, down to half a line, is drawn as far as it goes.
+#[test]
+fn results_that_are_not_complete_are_drawn() {
+    let folder = TempDir::new().expect("a folder");
+    succeeds(folder.path(), &["run", CASE]);
+    let drawn = || {
+        let stdout = succeeds(folder.path(), &["plot", "out", "--format", "svg"]);
+        let read = |picture: &str| fs::read_to_string(folder.path().join(picture)).expect("a picture");
+        stdout.lines().map(read).collect::<Vec<_>>()
+    };
+    let complete = drawn();
+    assert_eq!(complete.len(), 2);
+    let table = folder.path().join(format!("out/{STEM}.csv"));
+    let text = fs::read_to_string(&table).expect("a table");
+    let draft = |number: u8| table.with_extension(format!("csv.partial-{number}"));
+    fs::write(draft(9), &text[..text.len() / 2]).expect("an earlier start");
+    fs::write(draft(10), format!("{text}1.6e1,0.5,")).expect("the last start");
+    fs::remove_file(&table).expect("a table");
+    assert!(drawn() == complete, "other pictures");
+}
+
 /// Without a mesh there are no iterations of the flow, and the picture is drawn only if asked for.
 #[test]
 fn the_cost_of_steps_is_drawn() {
@@ -161,7 +182,7 @@ fn results_that_are_missing_or_malformed_are_named() {
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
     fails(folder.path(), &["plot", "nowhere"], &["nowhere: cannot be listed"]);
     fs::write(folder.path().join("other.csv"), b"\xff\xfe, not ours").expect("a file");
-    fails(folder.path(), &["plot", "."], &["no complete trajectory"]);
+    fails(folder.path(), &["plot", "."], &["no trajectory"]);
     write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n1,0.5,half,0.1\n");
     fails(folder.path(), &["plot", "."], &["a.csv: line 3: expected 4 numbers"]);
     write("a.csv", "t,x1,y1,min_gap_over_a\n0,0.5,0.5,0.1\n");

@@ -72,6 +72,11 @@ fn every_point_is_a_run_and_the_table_has_them_all() {
         (&"0.01".into(), &"complete".into())
     );
     assert_eq!(json[3]["report"]["steps"], 79);
+    for command in ["info", "resume", "plot", "view", "analyse"] {
+        let refused = gluey(folder, &[command, "study"]);
+        let stderr = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(refused.status.code() == Some(1) && stderr.contains("of one of its points"), "{stderr}");
+    }
 }
 
 #[test]

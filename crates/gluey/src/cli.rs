@@ -123,6 +123,8 @@ impl AnalyseArguments {
         let summary = gluey::analyse::analyse(&self.options())
             .map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_summary(&summary);
+        let tables = self.out.as_ref().unwrap_or(&self.folder).display();
+        terminal::say(&format!("tables: {tables}/series.csv and beside it; pictures: gluey plot {tables}"));
         Ok(())
     }
 

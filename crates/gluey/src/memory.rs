@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::case::Case;
 use crate::flow::MeshEstimate;
+use crate::shown::shown_to;
 
 /// Nodes and cells are numbered in 32 bits.
 const MOST_UNKNOWNS: f64 = u32::MAX as f64;
@@ -15,8 +16,9 @@ const MOST_UNKNOWNS: f64 = u32::MAX as f64;
 /// A case that needs more memory than there is.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error(
-    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {} of memory; {}",
-    .estimate.cell_count, .estimate.unknown_count, size(.estimate.bytes), there(*.available, *.limit)
+    "the mesh would have about {} cells and {} unknowns, which need about {} of memory; {}",
+    shown_to(.estimate.cell_count, 3), shown_to(.estimate.unknown_count, 3), size(.estimate.bytes),
+    there(*.available, *.limit)
 )]
 pub struct TooLarge {
     /// Size of its mesh.

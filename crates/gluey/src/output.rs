@@ -88,6 +88,15 @@ pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
     list().map_err(|error| OutputError::new(folder_of(path), "list the folder", error))
 }
 
+/// Where the rows of `path` are: in the complete file or, where there is none, in the last draft of it.
+pub(crate) fn rows_of(path: &Path) -> Option<PathBuf> {
+    if path.exists() {
+        return Some(path.to_owned());
+    }
+    let number = |draft: &PathBuf| draft.to_str()?.rsplit_once('-')?.1.parse::<u32>().ok();
+    drafts(path).ok()?.into_iter().max_by_key(number)
+}
+
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

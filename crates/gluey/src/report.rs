@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
 use crate::phases::PhaseTable;
+use crate::shown::shown_to;
 use crate::trajectory::PairHistory;
 
 /// Gaps below this many radii are contact, and no measure of anything.
@@ -107,7 +108,7 @@ impl fmt::Display for RunReport {
             writeln!(f, "  mesh: {} cells, {} unknowns", self.cells, self.dofs)?;
         }
         write_number(f, "smallest gap / a", self.min_gap_over_a)?;
-        write_number(f, "gap at the end / a", self.end_gap_over_a)?;
+        write_number(f, "gap of 1 and 2 at the end / a", self.end_gap_over_a)?;
         write_number(f, "reversibility error", self.reversibility_error)?;
         if let Some(reference) = &self.reference {
             writeln!(f, "  compared with {reference}:")?;
@@ -119,7 +120,7 @@ impl fmt::Display for RunReport {
 
 fn write_number(f: &mut fmt::Formatter<'_>, name: &str, value: Option<f64>) -> fmt::Result {
     match value {
-        Some(value) => writeln!(f, "  {name}: {value:.6e}"),
+        Some(value) => writeln!(f, "  {name}: {}", shown_to(value, 7)),
         None => Ok(()),
     }
 }

@@ -34,6 +34,7 @@ pub use occupied::OccupiedError;
 pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
 pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
+pub(crate) use recorded::TABLE_OF_STUDY;
 pub use recorded::{FolderError, recorded_runs};
 pub use resumption::{ResumeError, Resumption};
 #[cfg(feature = "mpi")]

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use gluey::analyse::Summary;
 use gluey::output::solver_log::SolverRow;
 use gluey::view::Viewed;
-use gluey::{Notice, Progress, ProgressState, RunReport};
+use gluey::{Notice, Progress, ProgressState, ResultPaths, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -121,7 +121,9 @@ pub fn print_report(report: &RunReport, csv: &Path) {
     }
     let folder = csv.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (table, folder) = (csv.display(), folder.display());
-    text.push_str(&format!("  results: {table} and beside it; pictures: gluey plot {folder}\n"));
+    text.push_str(&format!("  results: {table} and beside it; pictures: gluey plot {folder}"));
+    let has_frames = ResultPaths::of_csv(csv).xyz().is_dir();
+    text.push_str(&if has_frames { format!("; a page: gluey view {folder}\n") } else { "\n".to_owned() });
     // All results are on disk: that nobody reads this is no failure.
     let _ = stdout().write_all(text.as_bytes());
 }

@@ -20,7 +20,10 @@ pub enum FramesError {
         source: io::Error,
     },
     /// No frames.
-    #[error("{}: no particles in extended XYZ: run with --xyz N", folder.display())]
+    #[error(
+        "{}: no particles in extended XYZ: run with --xyz N, or with an [[output]] of kind \"xyz\" in the case",
+        folder.display()
+    )]
     None {
         /// The folder.
         folder: PathBuf,

@@ -6,6 +6,7 @@ use gluey_geom::{Dim, Space};
 use gluey_suspension::statistics::Estimate;
 
 use super::observe::{Distributions, Instant};
+use crate::shown::shown_to;
 
 /// Means over the frames behind the transient.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +69,14 @@ impl Summary {
     }
 }
 
+fn number(value: f64) -> String {
+    format!("{:>12}", shown_to(value, 6))
+}
+
+fn error(value: f64) -> String {
+    shown_to(value, 2)
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { particle_count, fraction, frame_count, skipped, .. } = self;
@@ -76,13 +85,13 @@ impl fmt::Display for Summary {
         for (name, estimate) in &self.means {
             if let Some(Estimate { mean, half_width, is_resolved, .. }) = estimate {
                 let remark = if *is_resolved { "" } else { "   (too short a series for this interval)" };
-                writeln!(f, "  {name:<22} {mean:>12.5e} +- {half_width:.1e}{remark}")?;
+                writeln!(f, "  {name:<22} {} +- {}{remark}", number(*mean), error(*half_width))?;
             }
         }
         let unit = if self.is_sheared { "a^2 |rate|" } else { "a^2 per unit of time" };
-        for (axis, (value, error)) in ["x", "y", "z"].into_iter().zip(&self.diffusivities) {
+        for (axis, (value, deviation)) in ["x", "y", "z"].into_iter().zip(&self.diffusivities) {
             let name = format!("self-diffusivity {axis}");
-            writeln!(f, "  {name:<22} {value:>12.5e} +- {:.1e} {unit}", 2.0 * error)?;
+            writeln!(f, "  {name:<22} {} +- {} {unit}", number(*value), error(2.0 * deviation))?;
         }
         Ok(())
     }

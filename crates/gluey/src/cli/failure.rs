@@ -27,8 +27,12 @@ impl Failure {
 
     /// A failure to show the results in `folder`, which may be none.
     pub fn of_results(error: impl std::error::Error + Send + Sync + 'static, folder: &Path) -> Self {
-        let hint = "give the folder that a run wrote to, the DIR of its --out";
-        Self::new(error, (!folder.is_dir()).then(|| hint.to_owned()))
+        let hint = match (folder.is_dir(), folder.join("sweep.csv").exists()) {
+            (false, _) => Some("give the folder that a run wrote to, the DIR of its --out"),
+            (true, true) => Some("this is the folder of a study: give that of one of its points"),
+            (true, false) => None,
+        };
+        Self::new(error, hint.map(str::to_owned))
     }
 
     /// Any other failure, and what to do about it.

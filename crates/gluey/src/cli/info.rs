@@ -119,7 +119,7 @@ impl Info {
 
 fn failure(error: InfoError) -> Failure {
     let hint = match &error {
-        InfoError::Record(_) => None,
+        InfoError::Record(_) | InfoError::Folder(FolderError::Study { .. }) => None,
         _ => Some("give a case file, a checkpoint, or the folder that a run wrote to".to_owned()),
     };
     Failure::new(error, hint)

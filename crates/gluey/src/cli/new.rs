@@ -9,8 +9,8 @@ use thiserror::Error;
 
 use super::failure::Failure;
 
-/// What stands for the name of the case in a template.
-const NAME: &str = "@name@";
+/// What stands for the name of the case in a template, up to the column of comments.
+const NAME: &str = "\"@name@\"         ";
 
 /// Arguments of `gluey new`.
 #[derive(Debug, Args)]
@@ -81,11 +81,17 @@ impl NewArguments {
             return Err(NewError::Name { name: self.name.clone() });
         }
         let path = PathBuf::from(format!("{name}.toml"));
-        match create(&path, &self.template.text(self.dimension).replace(NAME, name)) {
+        match create(&path, &self.text(name)) {
             Ok(()) => Ok(path),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(NewError::Exists { path }),
             Err(source) => Err(NewError::Write { path, source }),
         }
+    }
+
+    fn text(&self, name: &str) -> String {
+        let quoted = format!("\"{name}\"");
+        let width = NAME.len() - 1;
+        self.template.text(self.dimension).replace(NAME, &format!("{quoted:<width$} "))
     }
 }
 

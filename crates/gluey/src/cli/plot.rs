@@ -41,7 +41,7 @@ pub struct PlotArguments {
     #[arg(long, value_name = "WHAT", default_value = "speed")]
     colour: Coloring,
     /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.
-    #[arg(long, value_name = "GAP", value_parser = reach)]
+    #[arg(long, value_name = "GAP", value_parser = reach, allow_negative_numbers = true)]
     contacts: Option<f64>,
     /// Animate the particles of all frames that were written with --xyz, as a GIF.
     #[arg(long)]

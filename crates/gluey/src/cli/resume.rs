@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::{Case, ResumeError, Resumption, RunOptions};
+use gluey::{Case, FolderError, ResumeError, Resumption, RunOptions};
 
 use super::failure::Failure;
 use super::interrupt::interrupt_flag;
@@ -45,6 +45,9 @@ impl ResumeArguments {
     /// What can be done instead.
     fn hint(&self, error: &ResumeError) -> Option<String> {
         Some(match error {
+            ResumeError::Folder(FolderError::Study { .. }) => {
+                "all of it goes on with the same `gluey sweep` once more".into()
+            }
             ResumeError::Folder(_) => "give the folder that a run wrote to, the DIR of its --out".into(),
             ResumeError::Several { names, .. } | ResumeError::Unknown { names, .. } => {
                 format!("choose one, such as --case {}", names[0])

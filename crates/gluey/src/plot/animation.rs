@@ -51,7 +51,9 @@ where
     Dim<D>: Space<D>,
 {
     look.check(frames, first)?;
-    let views = frames.par_iter().map(|frame| Scene::of(frame, look).view());
+    let is_sheared = frames.iter().any(|frame| frame.strain != 0.0);
+    let scene = |frame: &XyzFrame<D>| Scene::of(frame, look, is_sheared);
+    let views = frames.par_iter().map(|frame| scene(frame).view());
     let Some(view) = views.reduce_with(View::around) else { return Ok(Vec::new()) };
     let still = |canvas: &Canvas| {
         let still = Still::new(canvas, options.pixels);
@@ -60,7 +62,7 @@ where
     let failed = |source| PlotError::Animation { path: path.to_owned(), source };
     let mut animation: Option<Animation> = None;
     for batch in frames.chunks(BATCH) {
-        let draw = |frame: &XyzFrame<D>| still(&Scene::of(frame, look).draw(&view, WIDTH));
+        let draw = |frame: &XyzFrame<D>| still(&scene(frame).draw(&view, WIDTH));
         let stills = batch.par_iter().map(draw).collect::<Result<Vec<Still>, _>>()?;
         for still in stills {
             match &mut animation {

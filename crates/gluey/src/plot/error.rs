@@ -25,7 +25,7 @@ pub enum PlotError {
         source: io::Error,
     },
     /// No trajectory.
-    #[error("{}: no complete trajectory <name>.csv of `gluey run`", folder.display())]
+    #[error("{}: no trajectory <name>.csv of `gluey run`", folder.display())]
     NoResults {
         /// The folder.
         folder: PathBuf,

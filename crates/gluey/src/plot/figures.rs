@@ -16,6 +16,8 @@ pub(super) const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: 
 const THIN: Stroke = Stroke { color: "#0b4f9e", width: 1.0, dashes: None };
 /// Height of a frame over the width of the picture.
 const HEIGHT: f64 = 0.5;
+/// Least height of a frame: what the longest of the labels beside it takes.
+const LEAST_HEIGHT_MM: f64 = 42.5;
 /// Ratio of the largest to the smallest gap from which on their axis is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
 /// Largest gap below which it is too, since its ticks would have many digits.
@@ -110,7 +112,12 @@ fn paths(source: &Source, across: &str, count: usize) -> Result<Chart, PlotError
     }
     let starts = curves.iter().filter_map(|curve| curve.pieces.first()?.first().copied());
     let marks = starts.map(|at| Mark { at, label: String::new() }).collect();
-    let axis = |label: String, values: Vec<f64>| Axis::around(&label, values);
+    // Dots lie beside the frame, not on it.
+    let axis = |label: String, values: Vec<f64>| {
+        let (low, high) = ends(&values);
+        let room = 0.02 * (high - low);
+        Axis::around(&label, [low - room, high + room].into_iter().filter(|end| end.is_finite()))
+    };
     let x = axis("*x*".into(), points(&curves).map(|point| point.0).collect());
     let y = axis(format!("*{across}*"), points(&curves).map(|point| point.1).collect());
     let notes = if across == "y" { vec!["Dots: where particles begin".to_owned()] } else { Vec::new() };
@@ -220,5 +227,5 @@ pub(super) fn chart(x: Axis, y: Axis, curves: Vec<Curve>) -> Chart {
 
 pub(super) fn stacked(charts: &[Chart], width_mm: f64) -> Canvas {
     let width = width_mm * PIXELS_PER_MM;
-    stack_to_width(charts, width, |_| HEIGHT * width)
+    stack_to_width(charts, width, |_| (HEIGHT * width).max(LEAST_HEIGHT_MM * PIXELS_PER_MM))
 }

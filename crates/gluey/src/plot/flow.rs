@@ -79,15 +79,18 @@ where
     picture.draw(&caption(frame, &picture.plane), &frame.fields)
 }
 
-/// Time, strain and, in 3D, where the slice is.
+/// Time, strain of what is sheared and, in 3D, where the slice is.
 fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
-    let Case { time, .. } = &frame.case;
+    let Case { time, shear_rate, shear_stress, .. } = &frame.case;
     let slice = match D {
         2 => String::new(),
         _ => format!(", *{}* = {}", AXES[plane.normal], rounded(plane.at)),
     };
-    let (now, strain) = (time.step * frame.step as f64, frame.case.strain_after(frame.step));
-    format!("*t* = {}, strain *γ* = {}{slice}", rounded(now), rounded(strain))
+    let strain = match *shear_rate != 0.0 || shear_stress.is_some() {
+        true => format!(", strain *γ* = {}", rounded(frame.case.strain_after(frame.step))),
+        false => String::new(),
+    };
+    format!("*t* = {}{strain}{slice}", rounded(time.step * frame.step as f64))
 }
 
 /// Where the plane cuts particles and their images: centres in the plane and radii.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::PlotError;
 use super::figure::Figure;
+use crate::output::{rows_of, undrafted};
 use crate::run::ResultPaths;
 use crate::table::Table;
 
@@ -49,39 +50,39 @@ impl Results {
 
     /// Where particles were.
     pub fn trajectory(&self, figure: Figure) -> Result<Source, PlotError> {
-        read(self.paths.csv())?.with_rows(figure)
+        let csv = self.paths.csv();
+        read(rows_of(&csv).unwrap_or(csv))?.with_rows(figure)
     }
 
     /// Near pairs, which runs of ten and more particles list.
     pub fn near_pairs(&self) -> Result<Option<Source>, PlotError> {
-        let path = self.beside("-gaps.csv");
-        path.exists().then(|| read(path)).transpose()
+        rows_of(&self.beside("-gaps.csv")).map(read).transpose()
     }
 
     /// Stresses; an error where they are needed and not there.
     pub fn rheology(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
-        let path = self.beside("-rheology.csv");
-        let figure = Figure::Rheology;
-        match (path.exists(), is_needed) {
-            (true, _) => Ok(Some(read(path)?.with_rows(figure)?)),
-            (false, false) => Ok(None),
-            (false, true) => {
-                let hint = "runs in boxes with domain.boundary = \"sheared\" write it";
-                Err(PlotError::Missing { path, figure, hint })
-            }
-        }
+        let hint = "runs in boxes with domain.boundary = \"sheared\" write it";
+        self.table("-rheology.csv", Figure::Rheology, is_needed, hint)
     }
 
     /// What the steps cost; an error where it is needed and not there.
     pub fn solver(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
-        let (path, figure) = (self.beside("-solver.csv"), Figure::Solver);
-        match (path.exists(), is_needed) {
-            (true, _) => Ok(Some(read(path)?.with_rows(figure)?)),
-            (false, false) => Ok(None),
-            (false, true) => {
-                let hint = "a run writes it beside its trajectory";
-                Err(PlotError::Missing { path, figure, hint })
-            }
+        self.table("-solver.csv", Figure::Solver, is_needed, "a run writes it beside its trajectory")
+    }
+
+    /// A table beside the trajectory; an error where it is needed and not there.
+    fn table(
+        &self,
+        suffix: &str,
+        figure: Figure,
+        is_needed: bool,
+        hint: &'static str,
+    ) -> Result<Option<Source>, PlotError> {
+        let path = self.beside(suffix);
+        match (rows_of(&path), is_needed) {
+            (Some(rows), _) => Ok(Some(read(rows)?.with_rows(figure)?)),
+            (None, false) => Ok(None),
+            (None, true) => Err(PlotError::Missing { path, figure, hint }),
         }
     }
 
@@ -131,17 +132,20 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// All runs with a trajectory in a folder, by name.
+/// All runs with a trajectory in a folder, by name; one that is not complete has the rows that it wrote.
 pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
     let failed = |source| PlotError::List { folder: folder.to_owned(), source };
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        if path.extension().is_some_and(|extension| extension == "csv") && is_trajectory(&path)? {
-            found.push(path);
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+        let complete = path.with_file_name(undrafted(name).unwrap_or(name));
+        if complete.extension().is_some_and(|extension| extension == "csv") && is_trajectory(&path)? {
+            found.push(complete);
         }
     }
     found.sort();
+    found.dedup();
     if found.is_empty() {
         return Err(PlotError::NoResults { folder: folder.to_owned() });
     }
@@ -163,7 +167,12 @@ fn text(path: &Path) -> Result<String, PlotError> {
 }
 
 fn read(path: PathBuf) -> Result<Source, PlotError> {
-    match Table::parse(&numbers(&text(&path)?)) {
+    let mut text = text(&path)?;
+    if path.extension().is_some_and(|extension| extension != "csv") {
+        // The last line of a run that goes on, or was killed, may be half a line.
+        text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
+    }
+    match Table::parse(&numbers(&text)) {
         Ok(table) => Ok(Source { path, table }),
         Err(source) => Err(PlotError::Table { path, source }),
     }

@@ -88,7 +88,8 @@ where
     Dim<D>: Space<D>,
 {
     look.check(frames, file)?;
-    Ok(Scene::of(&frames[0], look).draw_alone(width))
+    let is_sheared = frames[0].strain != 0.0 || frames[0].time == 0.0;
+    Ok(Scene::of(&frames[0], look, is_sheared).draw_alone(width))
 }
 
 /// The number in `particles-<step>.xyz`.
@@ -158,8 +159,8 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// What is seen of this frame.
-    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look) -> Self
+    /// What is seen of this frame; the strain is told of runs that are sheared.
+    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look, is_sheared: bool) -> Self
     where
         Dim<D>: Space<D>,
     {
@@ -178,7 +179,8 @@ impl Scene {
         }
         balls.sort_by(|one, other| one.at[2].total_cmp(&other.at[2]));
         let links = look.network.map_or(Vec::new(), |reach| links(frame, &container, view, reach));
-        let caption = format!("*t* = {:.4}, strain *γ* = {:.4}", frame.time, frame.strain);
+        let strain = if is_sheared { format!(", strain *γ* = {:.4}", frame.strain) } else { String::new() };
+        let caption = format!("*t* = {:.4}{strain}", frame.time);
         Self { is_flat: D == 2, look: *look, balls, links, edges: edges(&container, view), caption }
     }
 

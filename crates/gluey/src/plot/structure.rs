@@ -13,6 +13,8 @@ type Column = (&'static str, &'static str, Stroke);
 
 /// Levels to compare with.
 const LEVEL: Stroke = Stroke { dashes: Some("4 3"), ..FAINT };
+/// What has a chart for itself, above others that share a legend.
+const ALONE: Stroke = Stroke { color: "#1c1c1c", width: 1.4, dashes: None };
 /// How lines that fit are drawn over what they fit.
 const FIT: Stroke = Stroke { color: "#1c1c1c", width: 1.0, dashes: Some("6 3") };
 
@@ -46,18 +48,12 @@ fn contacts(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
         ("fabric_zz", "fabric *zz*", PALETTE[3]),
     ];
     Ok(vec![
-        of_columns(
-            &source,
-            (name, label),
-            "contacts of a particle",
-            &[("contacts", "", PALETTE[0])],
-            &[0.0],
-        )?,
+        of_columns(&source, (name, label), "contacts of a particle", &[("contacts", "", ALONE)], &[0.0])?,
         of_columns(
             &source,
             (name, label),
             "part in the largest cluster",
-            &[("largest_cluster", "", PALETTE[0])],
+            &[("largest_cluster", "", ALONE)],
             &[0.0],
         )?,
         of_columns(&source, (name, label), "fabric", &fabric, &[0.0])?,
@@ -104,7 +100,7 @@ fn profiles(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
         ("velocity_z", "along *z*", PALETTE[3]),
     ];
     Ok(vec![
-        of_columns(&source, height, "volume fraction", &[("fraction", "", PALETTE[0])], &[0.0])?,
+        of_columns(&source, height, "volume fraction", &[("fraction", "", ALONE)], &[0.0])?,
         of_columns(&source, height, "velocity (length / time)", &velocities, &[])?,
     ])
 }
@@ -136,7 +132,9 @@ fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErr
     }
     let x = Axis::around(label, lags.iter().copied().chain([0.0]));
     let mut chart = over(x, "mean square displacement / *a*^{2}", curves, &[0.0]);
-    chart.notes.push("Black: lines that fit the second half; their slopes are 2 *D*".to_owned());
+    let unit = if name == "lag_strain" { "strain" } else { "time" };
+    chart.notes.push("Black: fits of the second half, of slope 2 *D*".to_owned());
+    chart.notes.push(format!("*D* in *a*^{{2}} per unit of {unit}"));
     Ok(vec![chart])
 }
 

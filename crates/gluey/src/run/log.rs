@@ -57,8 +57,12 @@ impl<'a> Log<'a> {
         Ok(Self { listener, file: Some(Mutex::new(lines)) })
     }
 
-    /// Writes how the run ended.
+    /// Writes what came out, and how the run ended.
     pub fn end(&self, outcome: &Result<RunReport, RunError>) {
+        if let Ok(report) = outcome {
+            // What the first line says is told at the end.
+            report.to_string().lines().skip(1).for_each(|line| self.add(line.trim_start()));
+        }
         self.add(&match outcome {
             Ok(report) => ending(report),
             Err(error) => in_full(error),

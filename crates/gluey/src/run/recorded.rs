@@ -7,6 +7,9 @@ use thiserror::Error;
 
 use super::paths::ResultPaths;
 
+/// What `gluey sweep` leaves in its folder.
+pub(crate) const TABLE_OF_STUDY: &str = "sweep.csv";
+
 /// A folder in which no run can be found.
 #[derive(Debug, Error)]
 pub enum FolderError {
@@ -24,6 +27,12 @@ pub enum FolderError {
         /// The folder.
         folder: PathBuf,
     },
+    /// It is that of a study.
+    #[error("{}: a study, whose table is {TABLE_OF_STUDY}: name the folder of one of its points", folder.display())]
+    Study {
+        /// The folder.
+        folder: PathBuf,
+    },
 }
 
 /// The runs, sorted by name; one at least.
@@ -33,6 +42,9 @@ pub enum FolderError {
 pub fn recorded_runs(folder: &Path) -> Result<Vec<ResultPaths>, FolderError> {
     let folder = folder.to_owned();
     match ResultPaths::in_folder(&folder) {
+        Ok(runs) if runs.is_empty() && folder.join(TABLE_OF_STUDY).exists() => {
+            Err(FolderError::Study { folder })
+        }
         Ok(runs) if runs.is_empty() => Err(FolderError::NoRun { folder }),
         Ok(runs) => Ok(runs),
         Err(source) => Err(FolderError::Read { folder, source }),

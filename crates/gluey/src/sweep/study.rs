@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Point, PointState, SweepError};
 use crate::output::{OutputError, write_atomically};
+use crate::run::TABLE_OF_STUDY;
 
 /// Counts changes of the layout of [`Manifest`].
 const LAYOUT: u32 = 1;
@@ -62,7 +63,7 @@ impl Study {
 
     /// The table of results.
     pub fn table(&self) -> PathBuf {
-        self.folder.join("sweep.csv")
+        self.folder.join(TABLE_OF_STUDY)
     }
 
     fn manifest(&self) -> PathBuf {

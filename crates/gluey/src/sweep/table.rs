@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Axis;
 use crate::report::RunReport;
+use crate::shown::shown_to;
 
 /// What came out of a point.
 #[derive(Clone, Debug, Serialize)]
@@ -48,7 +49,7 @@ pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
 
 /// In the order of the head.
 fn numbers_of(report: &RunReport) -> Vec<String> {
-    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| shown_to(value, 7));
     vec![
         report.steps.to_string(),
         format!("{:.3}", report.wall_s),

@@ -336,9 +336,10 @@ function drawLegend(eye) {
 function describe(now, drawn) {
   const smallest = pairs(now).reduce((least, { gap }) => Math.min(least, gap), Infinity);
   const gap = smallest > 1 ? "above 1" : smallest < SMALLEST_GAP ? `below ${SMALLEST_GAP}` : smallest.toPrecision(2);
+  const strain = run.frames.some((one) => one.strain !== 0) ? `strain ${now.strain.toPrecision(4)}, ` : "";
   const linked = element("links").checked ? `, pairs drawn: ${drawn}` : "";
   element("facts").textContent = `frame ${frame + 1} of ${run.frames.length}, t = ${now.time.toPrecision(4)}, `
-    + `strain ${now.strain.toPrecision(4)}, ${count} particles, smallest gap ${gap} radii${linked}`;
+    + `${strain}${count} particles, smallest gap ${gap} radii${linked}`;
   element("reach-text").textContent = (10 ** Number(element("reach").value)).toPrecision(2);
   element("frame").value = frame;
   canvas.setAttribute("aria-label", element("facts").textContent);
