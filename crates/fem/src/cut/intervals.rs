@@ -1,7 +1,7 @@
 //! Quadrature of functions that are analytic between given points.
 
 /// Longest part of an interval that one rule is used on, in radians.
-const LONGEST: f64 = 0.5;
+pub const LONGEST: f64 = 0.75;
 /// A square root this near to the end of a part is taken to be there.
 const AT_END: f64 = 1e-12;
 
@@ -15,26 +15,45 @@ pub struct Breakpoint {
     pub is_root: bool,
 }
 
+/// A part of an interval on which a function is analytic, but for square roots at its ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Where it begins.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// Whether there are square roots at its ends, at one of them at most.
+    roots: [bool; 2],
+}
+
 /// Memory for the parts of an interval.
 #[derive(Debug, Default)]
 pub struct Parts {
     breakpoints: Vec<Breakpoint>,
     cuts: Vec<f64>,
-    parts: Vec<[f64; 2]>,
+    stack: Vec<[f64; 2]>,
+    parts: Vec<Part>,
 }
 
 impl Parts {
     /// Calls `visit(x, weight)` for the points of a composite Gauss rule on `[from, to]`, cut at the
-    /// breakpoints inside. Parts are no longer than twice their distance from a square root, wherever
-    /// that is.
+    /// breakpoints inside.
     pub fn for_each_point(
         &mut self,
-        [from, to]: [f64; 2],
+        range: [f64; 2],
         breakpoints: impl Iterator<Item = Breakpoint>,
         rule: &[(f64, f64)],
         mut visit: impl FnMut(f64, f64),
     ) {
-        let Self { breakpoints: all, cuts, parts } = self;
+        for part in self.split(range, breakpoints) {
+            rule.iter().map(|&point| part.mapped(point)).for_each(|(x, weight)| visit(x, weight));
+        }
+    }
+
+    /// The parts of `[from, to]`, cut at the breakpoints inside, in ascending order. They are no longer than
+    /// twice their distance from a square root, wherever that is.
+    pub fn split(&mut self, [from, to]: [f64; 2], breakpoints: impl Iterator<Item = Breakpoint>) -> &[Part] {
+        let Self { breakpoints: all, cuts, stack, parts } = self;
         all.clear();
         all.extend(breakpoints);
         cuts.clear();
@@ -42,33 +61,36 @@ impl Parts {
         cuts.extend([from, to]);
         cuts.sort_unstable_by(f64::total_cmp);
         all.retain(|b| b.is_root);
+        stack.clear();
+        stack.extend(cuts.windows(2).rev().map(|pair| [pair[0], pair[1]]));
         parts.clear();
-        parts.extend(cuts.windows(2).rev().map(|pair| [pair[0], pair[1]]));
-        while let Some(part) = parts.pop() {
-            let [start, end] = part;
+        while let Some([start, end]) = stack.pop() {
             let length = end - start;
             let is_at = |x: f64| all.iter().any(|root| (root.at - x).abs() <= AT_END);
-            let ends = [is_at(start), is_at(end)];
+            let roots = [is_at(start), is_at(end)];
             let beyond = |root: &Breakpoint| (root.at - end).max(start - root.at);
             let distance = all.iter().map(beyond).filter(|&d| d > AT_END).fold(f64::INFINITY, f64::min);
-            if length > AT_END && (length > LONGEST.min(2.0 * distance) || ends == [true; 2]) {
+            if length > AT_END && (length > LONGEST.min(2.0 * distance) || roots == [true; 2]) {
                 let middle = 0.5 * (start + end);
-                parts.extend([[middle, end], [start, middle]]);
+                stack.extend([[middle, end], [start, middle]]);
             } else {
-                rule.iter().map(|&point| mapped(part, ends, point)).for_each(|(x, weight)| visit(x, weight));
+                parts.push(Part { from: start, to: end, roots });
             }
         }
+        parts
     }
 }
 
-/// A point of the rule on `[0, 1]`, with its weight, on an interval with a square root at one of its ends or
-/// none.
-fn mapped([from, to]: [f64; 2], roots: [bool; 2], (t, weight): (f64, f64)) -> (f64, f64) {
-    let length = to - from;
-    match roots {
-        [true, _] => (from + length * t * t, 2.0 * length * t * weight),
-        [_, true] => (to - length * t * t, 2.0 * length * t * weight),
-        _ => (from + length * t, length * weight),
+impl Part {
+    /// A point of a rule on `[0, 1]`, with its weight.
+    fn mapped(&self, (t, weight): (f64, f64)) -> (f64, f64) {
+        let Self { from, to, roots } = self;
+        let length = to - from;
+        match roots {
+            [true, _] => (from + length * t * t, 2.0 * length * t * weight),
+            [_, true] => (to - length * t * t, 2.0 * length * t * weight),
+            _ => (from + length * t, length * weight),
+        }
     }
 }
 

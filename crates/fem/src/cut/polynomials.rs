@@ -10,7 +10,7 @@ pub const POINTS: usize = 5;
 pub type Line = [f64; POINTS];
 
 /// Legendre polynomials of degrees 0 to 4 at `x` in the unit interval.
-#[inline]
+#[inline(always)]
 pub fn legendre(x: f64) -> Line {
     let s = 2.0 * x - 1.0;
     let square = s * s;
@@ -18,7 +18,7 @@ pub fn legendre(x: f64) -> Line {
 }
 
 /// Their integrals from zero to `x`, `int P_k = (P_(k+1) - P_(k-1)) / (2 (2 k + 1))`.
-#[inline]
+#[inline(always)]
 pub fn integrals(x: f64) -> Line {
     let s = 2.0 * x - 1.0;
     let square = s * s;

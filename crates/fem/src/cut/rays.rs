@@ -9,18 +9,18 @@
 
 use super::ball::BallInCell;
 use super::corners::{self, HalfSpace};
-use super::disc::{Disc, Ray};
+use super::disc::Disc;
 use super::frame::Frame;
-use super::intervals::{Breakpoint, Parts};
+use super::intervals::{Breakpoint, Part, Parts};
 use super::slice::Slice;
 
-/// The rays through the disc of `slice` that lie in the unit interval, by this rule.
-pub fn for_each_ray(slice: &Slice, (rule, parts): (&[(f64, f64)], &mut Parts), mut visit: impl FnMut(Ray)) {
+/// The parts of the angle of the rays through the disc of `slice` that lie in the unit interval, on each of
+/// which chords are analytic.
+pub fn parts_of_rays<'a>(slice: &Slice, parts: &'a mut Parts) -> &'a [Part] {
     let disc = &slice.disc;
     let corners = slice.ends_on_faces().chain(slice.corners());
-    let breakpoints = corners.map(|at| Breakpoint { at, is_root: false });
-    let range = angles(disc.across, disc.radius * disc.widths[1]);
-    parts.for_each_point(range, breakpoints, rule, |angle, weight| visit(disc.ray(angle.sin_cos(), weight)));
+    let kinks = corners.map(|at| Breakpoint { at, is_root: false });
+    parts.split(angles(disc.across, disc.radius * disc.widths[1]), kinks)
 }
 
 /// Calls `visit(disc, z, width)` for the planes of rays across a ball, cut by these flats.

@@ -2,16 +2,17 @@
 
 use super::ball::BallInCell;
 use super::corners::HalfSpace;
-use super::disc::Ray;
+use super::disc::{AngleRule, Lanes, RAYS, Ray, Rays};
 use super::flat::FlatInCell;
 use super::frame::Frame;
-use super::intervals::Parts;
+use super::intervals::{Part, Parts};
 use super::polynomials::{Line, POINTS, Polynomials, integrals, legendre};
-use super::rays::{for_each_plane, for_each_ray};
-use super::slice::{Edge, Slice};
+use super::rays::{for_each_plane, parts_of_rays};
+use super::slice::{Edge, End, Slice};
 use crate::element::gauss;
+use gluey_linalg::vectorised;
 
-/// Points of the rule on the parts of an angle.
+/// Points of the rule on the parts of the angle of planes.
 const RULE: usize = 8;
 /// Points of a face, at most.
 const FACE: usize = POINTS * POINTS;
@@ -34,8 +35,10 @@ pub struct Body<const D: usize> {
 pub struct Sections<const D: usize> {
     /// By the direction of the rays.
     frames: [Frame; D],
-    /// On parts of angles.
-    angles: Vec<(f64, f64)>,
+    /// On parts of the angles of planes.
+    heights: Vec<(f64, f64)>,
+    /// On those of the angles of rays.
+    angles: AngleRule,
     /// Of one direction.
     pub polynomials: Polynomials,
 }
@@ -51,7 +54,8 @@ impl<const D: usize> Sections<D> {
     pub fn new(shear: f64) -> Self {
         Self {
             frames: std::array::from_fn(|direction| Frame::new::<D>(shear, direction)),
-            angles: gauss(RULE),
+            heights: gauss(RULE),
+            angles: AngleRule::new(),
             polynomials: Polynomials::new(),
         }
     }
@@ -103,7 +107,7 @@ impl<const D: usize> Sections<D> {
         let half_spaces: Vec<HalfSpace> =
             flats.iter().map(|flat| frame.half_space(&in_3d, &flat.in_3d())).collect();
         let mut inner = Parts::default();
-        for_each_plane(&in_3d, frame, &half_spaces, (&self.angles, parts), |disc, z, width| {
+        for_each_plane(&in_3d, frame, &half_spaces, (&self.heights, parts), |disc, z, width| {
             let slice = Slice { disc, edges: edges(frame, flats, z) };
             if !slice.is_empty() {
                 self.add_plane(&slice, &legendre(z).map(|p| p * width), &mut sums, &mut inner);
@@ -114,18 +118,35 @@ impl<const D: usize> Sections<D> {
 
     /// Adds the rays of a plane to layers with these weights.
     fn add_plane(&self, slice: &Slice, layers: &[f64], sums: &mut Sums, parts: &mut Parts) {
-        let mut plane = Plane::default();
-        for_each_ray(slice, (&self.angles, parts), |ray| {
-            let Some(ends) = slice.ends(&ray) else { return };
-            add_product(&chord([ends[0].at, ends[1].at]), &ray, 1.0, &mut plane);
+        let Sums { volume, flats } = sums;
+        let of_flats = |ray: &Ray, ends: &[End; 2]| {
             for end in ends.iter().filter(|end| end.is_in_cell) {
                 let Some((flat, share)) = end.flat else { continue };
                 let mut own = Plane::default();
-                add_product(&legendre(end.at), &ray, share, &mut own);
-                add_layers(&own, layers, &mut sums.flats[flat]);
+                add_product(&legendre(end.at), ray, share, &mut own);
+                add_layers(&own, layers, &mut flats[flat]);
             }
-        });
-        add_layers(&plane, layers, &mut sums.volume);
+        };
+        let parts = parts_of_rays(slice, parts);
+        vectorised(
+            #[inline(always)]
+            || add_layers(&self.plane(slice, parts, of_flats), layers, volume),
+        );
+    }
+
+    /// The sums of the chords of a plane.
+    #[inline(always)]
+    fn plane(&self, slice: &Slice, parts: &[Part], mut visit: impl FnMut(&Ray, &[End; 2])) -> Plane {
+        // By ray of a part.
+        let mut sums = [[[0.0; RAYS]; POINTS]; POINTS];
+        for part in parts {
+            let rays = slice.disc.rays(part, &self.angles);
+            add_chords(&slice.chords(&rays, &mut visit), &rays, &mut sums);
+        }
+        sums.map(
+            #[inline(always)]
+            |row| row.map(sum_of_lanes),
+        )
     }
 
     /// The section of a body with a face.
@@ -141,7 +162,8 @@ impl<const D: usize> Sections<D> {
         if D == 2 {
             let slice = Slice { disc: frame.section(ball, 0.0).0, edges: edges(frame, flats, 0.0) };
             let ends = slice.disc.ray_at(place).and_then(|ray| slice.ends(&ray));
-            face[..POINTS].copy_from_slice(&ends.map_or([0.0; POINTS], |[from, to]| chord([from.at, to.at])));
+            let ends = ends.map_or([0.0; 2], |ends| ends.map(|end| end.at));
+            face[..POINTS].copy_from_slice(&chord(ends));
             self.polynomials.convert(&mut face[..POINTS], 1);
             return face;
         }
@@ -153,11 +175,11 @@ impl<const D: usize> Sections<D> {
         if slice.is_empty() {
             return face;
         }
-        let mut plane = Plane::default();
-        for_each_ray(&slice, (&self.angles, parts), |ray| {
-            let Some([from, to]) = slice.ends(&ray) else { return };
-            add_product(&chord([from.at, to.at]), &ray, 1.0, &mut plane);
-        });
+        let parts = parts_of_rays(&slice, parts);
+        let plane = vectorised(
+            #[inline(always)]
+            || self.plane(&slice, parts, |_, _| ()),
+        );
         // The rays of the second axis run along the last one, across the first.
         let is_turned = axis == 1;
         for (j, row) in plane.iter().enumerate() {
@@ -197,7 +219,6 @@ fn edges<const D: usize>(frame: &Frame, flats: &[FlatInCell<D>], place: f64) -> 
 }
 
 /// Integrals over the part of an interval in the cell, zero if there is none.
-#[inline]
 fn chord([from, to]: [f64; 2]) -> Line {
     let [from, to] = [from.max(0.0), to.min(1.0)];
     if from >= to {
@@ -207,8 +228,34 @@ fn chord([from, to]: [f64; 2]) -> Line {
     std::array::from_fn(|k| to[k] - from[k])
 }
 
+/// Adds integrals over chords, for each ray of a part by itself.
+#[inline(always)]
+fn add_chords([from, to]: &[Lanes; 2], rays: &Rays, sums: &mut [[Lanes; POINTS]; POINTS]) {
+    let [mut along, mut across] = [[[0.0; RAYS]; POINTS]; 2];
+    for q in 0..RAYS {
+        let [start, end, polynomials] = [integrals(from[q]), integrals(to[q]), legendre(rays.at[q])];
+        for k in 0..POINTS {
+            along[k][q] = end[k] - start[k];
+            across[k][q] = rays.weight[q] * polynomials[k];
+        }
+    }
+    for (row, across) in sums.iter_mut().zip(&across) {
+        for (sum, along) in row.iter_mut().zip(&along) {
+            for q in 0..RAYS {
+                sum[q] += across[q] * along[q];
+            }
+        }
+    }
+}
+
+/// The sum of the numbers of all rays.
+#[inline(always)]
+fn sum_of_lanes(lanes: Lanes) -> f64 {
+    let [a, b, c, d, e, f, g, h] = lanes;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
 /// `sum += factor along across^T` for the polynomials across a ray.
-#[inline]
 fn add_product(along: &Line, ray: &Ray, factor: f64, sum: &mut Plane) {
     let across = legendre(ray.at);
     for (row, across) in sum.iter_mut().zip(across) {
@@ -217,6 +264,7 @@ fn add_product(along: &Line, ray: &Ray, factor: f64, sum: &mut Plane) {
     }
 }
 
+#[inline(always)]
 fn add_layers(plane: &Plane, layers: &[f64], sums: &mut [Plane; POINTS]) {
     for (sum, layer) in sums.iter_mut().zip(layers) {
         for (sum, own) in sum.as_flattened_mut().iter_mut().zip(plane.as_flattened()) {

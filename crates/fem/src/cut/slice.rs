@@ -7,7 +7,7 @@
 //! The part `dA` of a plane across an axis `d` of the cell through which a flat with the covector `m` is seen
 //! belongs to the part `dA / |m_d|` of the flat.
 
-use super::disc::{Disc, Ray};
+use super::disc::{Disc, Lanes, RAYS, Ray, Rays};
 
 /// How far outside the section a corner may lie, by rounding.
 const SLACK: f64 = 1e-9;
@@ -66,6 +66,32 @@ impl Slice {
         (entry.at <= exit.at).then_some([entry, exit])
     }
 
+    /// The chords of rays in the unit interval, empty for rays that miss; `visit` gets the ends of each ray
+    /// whose section is cut flat.
+    #[inline(always)]
+    pub fn chords(&self, rays: &Rays, mut visit: impl FnMut(&Ray, &[End; 2])) -> [Lanes; 2] {
+        let mut chords = [[0.0; RAYS]; 2];
+        for q in 0..RAYS {
+            chords[0][q] = rays.middle[q] - rays.half[q];
+            chords[1][q] = rays.middle[q] + rays.half[q];
+        }
+        if !self.edges.is_empty() {
+            for q in 0..RAYS {
+                let ray = rays.ray(q);
+                let ends = self.ends(&ray);
+                ends.iter().for_each(|ends| visit(&ray, ends));
+                let ends = ends.map_or([0.0; 2], |ends| ends.map(|end| end.at));
+                (chords[0][q], chords[1][q]) = (ends[0], ends[1]);
+            }
+        }
+        let [from, to] = &mut chords;
+        for (from, to) in from.iter_mut().zip(to) {
+            *from = from.clamp(0.0, 1.0);
+            *to = to.min(1.0).max(*from);
+        }
+        chords
+    }
+
     /// Whether one of the lines leaves nothing of the disc.
     pub fn is_empty(&self) -> bool {
         self.edges.iter().any(|line| self.distance(line) <= -self.disc.radius)
@@ -87,7 +113,7 @@ impl Slice {
 
     /// The angles of the rays whose chords end on the faces they stand on.
     pub fn ends_on_faces(&self) -> impl Iterator<Item = f64> {
-        FACES.iter().flat_map(|face| self.ends_on_line(face)).filter(|angle| !angle.is_nan()).map(folded)
+        FACES.iter().flat_map(|face| self.ends_on_line(face)).filter(|end| !end[0].is_nan()).map(angle_of)
     }
 
     /// Normal of a line in coordinates in which the section is round.
@@ -103,19 +129,23 @@ impl Slice {
         (line.offset - x * self.disc.along - y * self.disc.across) / u.hypot(v)
     }
 
-    /// The angles on the round section where a line cuts it; not numbers if it does not.
-    fn ends_on_line(&self, line: &Edge) -> [f64; 2] {
+    /// The points of the unit circle, for the round section, where a line cuts it; not numbers if it does
+    /// not.
+    fn ends_on_line(&self, line: &Edge) -> [[f64; 2]; 2] {
         let [u, v] = self.round_normal(line);
-        let half = (self.distance(line) / self.disc.radius).acos();
-        [v.atan2(u) - half, v.atan2(u) + half]
+        let length = u.hypot(v);
+        let [u, v] = [u / length, v / length];
+        let near = self.distance(line) / self.disc.radius;
+        let half = ((1.0 - near) * (1.0 + near)).sqrt();
+        [[near * u + half * v, near * v - half * u], [near * u - half * v, near * v + half * u]]
     }
 
     fn corners_on_circle(&self, line: &Edge) -> impl Iterator<Item = f64> {
         let Disc { along, across, radius, widths, lean } = self.disc;
-        self.ends_on_line(line).into_iter().filter_map(move |angle| {
-            let arm = [radius * angle.cos(), radius * angle.sin()];
+        self.ends_on_line(line).into_iter().filter_map(move |end| {
+            let arm = end.map(|x| radius * x);
             let point = [along + lean * arm[1] + widths[0] * arm[0], across + widths[1] * arm[1]];
-            self.angle(point).map(|_| folded(angle))
+            self.angle(point).map(|_| angle_of(end))
         })
     }
 
@@ -131,9 +161,9 @@ impl Slice {
     }
 }
 
-/// The angle of the ray through a point of the round section.
-fn folded(angle: f64) -> f64 {
-    angle.sin().atan2(angle.cos().abs())
+/// The angle of the ray through a point of the unit circle.
+fn angle_of([x, y]: [f64; 2]) -> f64 {
+    y.atan2(x.abs())
 }
 
 /// The faces of the cell that rays stand on.

@@ -9,8 +9,10 @@ use rayon::prelude::*;
 use super::flats::Flats;
 use crate::space::Discretisation;
 
-/// A cut cell with at least this share of fluid needs no other to be stable.
-const GOOD_SHARE: f64 = 0.3;
+/// A cut cell with at least this share of fluid needs no other to be stable. Less than half the thickness of
+/// the thinnest slab between two bodies in cells ([`Heights`](crate::film::Heights)): one of two cells that
+/// share it is good.
+const GOOD_SHARE: f64 = 0.25;
 /// A cell with no more fluid than this is solid: what is left is rounding.
 const LEAST_SHARE: f64 = 1e-12;
 /// A cell with no more of a surface than this, in units of its faces, does not touch it.
