@@ -7,9 +7,10 @@
 //! ```
 //!
 //! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
-//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--tolerance T`,
-//! `--ranks N,M,...` (threads; without it, the processes of `mpirun`), `--fail-rank R` (this rank fails
-//! before the solve, to see that all end). The time goes to the standard error, so that equal runs print
+//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--pair` (the two bodies of
+//! S2 and S3 in the shear of `bench-stokes`, all cells as fine), `--tolerance T`, `--ranks N,M,...` (threads;
+//! without it, the processes of `mpirun`), `--fail-rank R` (this rank fails before the solve, to see that all
+//! end). Times, and the most memory that a process held, go to the standard error, so that equal runs print
 //! equal lines.
 
 use std::time::Instant;
@@ -32,22 +33,32 @@ struct Options {
     level: u8,
     adaptive: bool,
     bodies: bool,
+    pair: bool,
     tolerance: f64,
     fail_rank: Option<usize>,
 }
 
 fn main() {
-    let mut options =
-        Options { dimension: 2, level: 5, adaptive: false, bodies: false, tolerance: 1e-8, fail_rank: None };
+    let mut options = Options {
+        dimension: 2,
+        level: 5,
+        adaptive: false,
+        bodies: false,
+        pair: false,
+        tolerance: 1e-8,
+        fail_rank: None,
+    };
     let mut ranks: Option<Vec<usize>> = None;
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
-        match name.as_str() {
-            "--adaptive" => options.adaptive = true,
-            "--bodies" => options.bodies = true,
-            _ => {}
-        }
-        if name == "--adaptive" || name == "--bodies" {
+        let switch = match name.as_str() {
+            "--adaptive" => Some(&mut options.adaptive),
+            "--bodies" => Some(&mut options.bodies),
+            "--pair" => Some(&mut options.pair),
+            _ => None,
+        };
+        if let Some(switch) = switch {
+            *switch = true;
             continue;
         }
         let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
@@ -58,7 +69,7 @@ fn main() {
             "--fail-rank" => options.fail_rank = Some(number(&name, &value)),
             "--ranks" => ranks = Some(value.split(',').map(|n| number(&name, n)).collect()),
             _ => fail(&format!(
-                "{name} is no option: --dimension, --level, --adaptive, --bodies, --tolerance, --ranks, --fail-rank"
+                "{name} is no option: --dimension, --level, --adaptive, --bodies, --pair, --tolerance, --ranks, --fail-rank"
             )),
         }
     }
@@ -109,7 +120,11 @@ fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
 where
     Dim<D>: Space<D>,
 {
-    let balls = if options.bodies { bodies::<D>() } else { Vec::new() };
+    let balls = match options {
+        Options { pair: true, .. } => pair::<D>(),
+        Options { bodies: true, .. } => bodies::<D>(),
+        _ => Vec::new(),
+    };
     let tree_of_balls = BallTree::new(&balls);
     let around = Refinement {
         coarsest: options.level.saturating_sub(2),
@@ -127,6 +142,10 @@ where
     };
     let walls = |x: &Vector<D>| {
         let mut u = Vector::<D>::zeros();
+        if options.pair {
+            u[0] = x[1] - 0.5;
+            return u;
+        }
         u[0] = x[1] * (0.3 + x[D - 1]);
         u[1] = (2.0 * std::f64::consts::TAU * x[0]).sin() * (1.0 - x[1]) * x[1];
         u
@@ -137,15 +156,32 @@ where
     let cuts = equal_cuts(&tree, ranks);
     assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
     let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
-    let wrenches = wrenches(balls.len());
-    let bodies = RigidBodies { balls: &balls, offset: -0.1, wrenches: &wrenches };
+    let wrenches = if options.pair { Vec::new() } else { wrenches(balls.len()) };
+    let offset = if options.pair { gluey_stokes::default_offset(D) } else { -0.1 };
+    let bodies = RigidBodies { balls: &balls, offset, wrenches: &wrenches };
     let mine = flow.solve_around(&bodies, &mut tree, &cuts, ranks, &walls);
     let mine = mine.unwrap_or_else(|error| fail(&error.to_string()));
+    let seconds = start.elapsed().as_secs_f64();
+    let peaks = ranks.all_gather(&[peak_kibibytes()]);
     if ranks.rank() == 0 {
-        eprintln!("{} ranks, {:.2} s", ranks.size(), start.elapsed().as_secs_f64());
+        let most = peaks.into_iter().max().unwrap_or(0) / 1024;
+        eprintln!("{} ranks, {seconds:.2} s, at most {most} MiB in a process", ranks.size());
     }
     let line = serde_json::to_string(&Record::new(options, ranks, &mine));
     line.unwrap_or_else(|error| fail(&error.to_string()))
+}
+
+/// The most memory that this process has held, where the system tells.
+fn peak_kibibytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(0)
+}
+
+/// Two bodies a tenth of a radius apart or less.
+fn pair<const D: usize>() -> Vec<Ball<D>> {
+    let at = |x: [f64; 3]| Ball::new(Vector::from_fn(|d, _| x[d]), 0.05);
+    vec![at([0.45, 0.51, 0.5]), at([0.55, 0.49, 0.5])]
 }
 
 /// Three bodies of unlike sizes.
@@ -200,6 +236,7 @@ struct Record {
     level: u8,
     adaptive: bool,
     bodies: bool,
+    pair: bool,
     tolerance: f64,
     ranks: usize,
     iterations: usize,
@@ -225,7 +262,7 @@ impl Record {
             .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
         let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
-        let &Options { dimension, level, adaptive, bodies, tolerance, .. } = options;
+        let &Options { dimension, level, adaptive, bodies, pair, tolerance, .. } = options;
         let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
         let hops = 2.0 * (ranks.size() as f64).log2().ceil() * solve.reductions as f64;
         let modelled_communication_seconds =
@@ -235,6 +272,7 @@ impl Record {
             level,
             adaptive,
             bodies,
+            pair,
             tolerance,
             ranks: ranks.size(),
             iterations: mine.iterations,

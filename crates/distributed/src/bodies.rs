@@ -38,7 +38,7 @@ pub struct Shared<'a, 'b, const D: usize> {
 
 impl<const D: usize> Shared<'_, '_, D> {
     /// The rank whose run holds the centre of a body.
-    fn owner(&self, tree: &ImplicitTree<'_, D>, body: &Ball<D>) -> usize {
+    pub fn owner(&self, tree: &ImplicitTree<'_, D>, body: &Ball<D>) -> usize {
         let (frame, level) = (tree.frame(), tree.max_level());
         let (arm, h) = (body.center() - frame.domain().lower, frame.size(level));
         let coords = std::array::from_fn(|d| {

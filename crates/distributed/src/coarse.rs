@@ -47,10 +47,10 @@ impl CoarseFactor {
 }
 
 /// A term of a nodal velocity: its unknown, and the factor.
-type Term = (u32, f64);
+pub type Term = (u32, f64);
 
 /// The velocity of a node in the unknowns: for each component its terms.
-fn forms<const D: usize>(space: &LevelSpace<D>, node: u32) -> [Vec<Term>; D] {
+pub fn forms<const D: usize>(space: &LevelSpace<D>, node: u32) -> [Vec<Term>; D] {
     let mut forms: [Vec<Term>; D] = std::array::from_fn(|_| Vec::new());
     let (bodies, n) = (&space.bodies, rigid::<D>());
     for (node, weight) in space.velocity.regular(node) {

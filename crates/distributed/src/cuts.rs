@@ -1,37 +1,70 @@
-//! Where the order of cells is cut: as many leaves for each rank.
+//! Where the order of cells is cut: as much work for each rank.
 
 use std::ops::Range;
 
-use gluey_fem::{Cuts, ImplicitTree};
+use gluey_fem::{Cell, Cuts, ImplicitTree};
+use gluey_geom::Vector;
+use gluey_levelset::BallTree;
 use gluey_parallel::Communicator;
 
 /// Blocks of keys a rank counts, at least: a cut is searched in one of them.
 const BLOCKS_OF_A_RANK: usize = 16;
 
+/// Work on a cell that flows, and on one that moves as a body does (measured: `docs/ranks.md`).
+const OF_CELL: u64 = 10;
+const OF_RIGID_CELL: u64 = 12;
+
 /// Cuts the whole tree into runs that differ by one leaf at most. Each rank counts its share of the tree; all
 /// know of the others are the numbers of leaves in some dozen blocks of each.
 pub fn equal_cuts<const D: usize>(tree: &ImplicitTree<'_, D>, ranks: &dyn Communicator) -> Cuts {
+    weighted_cuts(tree, ranks, &|_| 1)
+}
+
+/// Cuts it into runs of equal weight, as near as leaves allow.
+pub fn weighted_cuts<const D: usize>(
+    tree: &ImplicitTree<'_, D>,
+    ranks: &dyn Communicator,
+    weight: &dyn Fn(&Cell<D>) -> u64,
+) -> Cuts {
     let (end, size) = (tree.end(), ranks.size());
     let share = blocks_of_a_rank::<D>(end, size);
     let block = |k: usize| blocks(end, share * size, k)..blocks(end, share * size, k + 1);
     // Answers of other parts of the tree are not needed again.
     let mut asked = tree.forgotten();
     let own = ranks.rank() * share..(ranks.rank() + 1) * share;
-    let counts: Vec<u64> = own.map(|k| asked.count_leaves(&block(k)) as u64).collect();
-    let counts = ranks.all_gather(&counts);
-    let total: u64 = counts.iter().sum();
-    let first = ranks.rank() as u64 * total / size as u64;
+    let weights: Vec<u64> = own.map(|k| asked.weigh_leaves(&block(k), weight)).collect();
+    let weights = ranks.all_gather(&weights);
+    let total: u64 = weights.iter().sum();
+    let first = (u128::from(total) * ranks.rank() as u128 / size as u128) as u64;
     let mut before = 0;
-    let holder = counts.iter().position(|&count| {
-        before += count;
+    let holder = weights.iter().position(|&weight| {
+        before += weight;
         before > first
     });
     let key = holder.and_then(|k| {
-        let within = first + counts[k] - before;
-        tree.forgotten().nth_key(&block(k), within as usize)
+        let within = first + weights[k] - before;
+        let mut asked = tree.forgotten();
+        // The last leaves of a block may weigh less than what is left: the next begins then.
+        asked.key_after(&block(k), within, weight).or(Some(block(k).end))
     });
     let key = if ranks.rank() == 0 { 0 } else { key.unwrap_or(end) };
     Cuts::new(ranks.all_gather(&[key]), end)
+}
+
+/// Cuts it into runs of equal work around these bodies.
+pub fn cuts_of_work<const D: usize>(
+    tree: &ImplicitTree<'_, D>,
+    bodies: &BallTree<'_, D>,
+    ranks: &dyn Communicator,
+) -> Cuts {
+    let frame = tree.frame();
+    let weight = |cell: &Cell<D>| {
+        let h = frame.size(cell.level);
+        let center: Vector<D> = frame.lower_corner(cell).add_scalar(0.5 * h);
+        let is_rigid = bodies.nearest_within(&center, -frame.half_diagonal(h)).is_some();
+        if is_rigid { OF_RIGID_CELL } else { OF_CELL }
+    };
+    weighted_cuts(tree, ranks, &weight)
 }
 
 /// Blocks of each rank: as many as there are keys, at most.

@@ -37,7 +37,11 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let all = (depth == coarsest && ranks.rank() == 0).then(|| 0..tree.end());
             let space = LevelSpace::new(tree, depth, shared, all);
             let plans = ghost_plan(tree, shared, &space);
-            levels.push(Level::new(ranks, space, plans, viscosity)?);
+            let mut level = Level::new(ranks, space, plans, viscosity, depth == finest)?;
+            if depth > coarsest {
+                level.relax_near_bodies(tree, shared, viscosity)?;
+            }
+            levels.push(level);
         }
         let pairs = levels.windows(2);
         let transfers =
@@ -92,7 +96,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
 }
 
 /// Depth of the coarsest mesh.
-fn coarsest_level<const D: usize>(tree: &ImplicitTree<'_, D>) -> u8 {
+pub fn coarsest_level<const D: usize>(tree: &ImplicitTree<'_, D>) -> u8 {
     let roots = tree.frame().roots().into_iter().min().unwrap_or(1);
     (COARSEST_CELLS / roots).max(1).ilog2() as u8
 }

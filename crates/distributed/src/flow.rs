@@ -3,16 +3,24 @@
 use gluey_fem::{Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
-use gluey_linalg::{BadDiagonal, BlockError, DirectError, Gcr, GcrParams, KrylovError, LinOp, Reference};
+use gluey_linalg::{
+    BadDiagonal, BlockError, DirectError, Gcr, GcrParams, KrylovError, KrylovReport, LinOp, Reference,
+    SparseError,
+};
 use gluey_parallel::{Communicator, Traffic};
+use gluey_stokes::StokesError;
 
 use crate::bodies::{Shared, rigid};
 use crate::cycle::VCycle;
 use crate::operator::StokesOperator;
 use crate::precondition::{BlockTriangular, lumped_mass};
 use crate::pressures::SharedPressures;
+use crate::schur::SchurInverse;
 use crate::space::{LevelSpace, Plans};
 
+/// Largest change of the viscous force when a velocity is rounded to single precision, over the force of a
+/// velocity as smooth as the box, with which steps are taken in it, as in the serial solver.
+const MOST_NOISE: f64 = 1.0;
 /// Iterations between restarts.
 const RESTART: usize = 60;
 
@@ -79,6 +87,15 @@ pub enum FlowError {
         /// Edge length of the smallest cells.
         cell_size: f64,
     },
+    /// Small matrices of pressures, in a gap or of the box.
+    #[error(transparent)]
+    Pressures(#[from] StokesError),
+    /// The same, on a rank that has none of them.
+    #[error("matrices of pressures: not positive definite on another rank")]
+    PressuresElsewhere,
+    /// A matrix of pressures is too large.
+    #[error(transparent)]
+    Sparse(#[from] SparseError),
     /// As many wrenches as bodies are needed, or none.
     #[error("{found} wrenches for {bodies} bodies")]
     Count {
@@ -186,16 +203,15 @@ impl BoxFlow {
         let levels = cycle.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plans));
         let levels = levels.collect();
         let mass = lumped_mass(&space, &pressures, ranks);
+        let schur = SchurInverse::new(tree, &shared, &space, &top.plans.nodes, &pressures, self.viscosity)?;
         let mut operator = StokesOperator::new(ranks, space, &top.plans, pressures.clone(), self.viscosity);
-        let mut preconditioner =
-            BlockTriangular::new(cycle, pressures, &mass, [operator.unit, self.viscosity]);
+        let mut preconditioner = BlockTriangular::new(cycle, pressures, schur);
         let points = operator.space.velocity.clone();
         let lift = operator.lift(|node| walls(&points.map.point(node)).into());
         let b = right_hand_side(&mut operator, bodies, &lift);
         let setup_traffic = ranks.traffic().since(start);
         let mut x = vec![0.0; b.len()];
-        let report =
-            self.krylov().solve(&mut operator, &mut preconditioner, &b, &mut x, Reference::RightHandSide)?;
+        let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x)?;
         let solve_traffic = ranks.traffic().since(start).since(setup_traffic);
         remove_mean(ranks, &mass, &mut x[operator.velocity_dim()..]);
         let [velocity, twists, pressure] = operator.nodal_values(&lift, &x);
@@ -216,14 +232,34 @@ impl BoxFlow {
         })
     }
 
-    /// Directions in single precision, as exact as the preconditioner that gives them.
-    fn krylov(&self) -> Gcr<f64, f64, f32> {
-        Gcr::with_directions(GcrParams {
+    /// Steps in single precision, where rounding does not disturb them, as in the serial solver.
+    fn krylov<const D: usize>(
+        &self,
+        operator: &mut StokesOperator<'_, D>,
+        preconditioner: &mut BlockTriangular<'_, D>,
+        b: &[f64],
+        x: &mut [f64],
+    ) -> Result<KrylovReport, KrylovError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let params = GcrParams {
             relative_tolerance: self.tolerance,
             max_iterations: self.max_iterations,
             restart: RESTART,
             ..GcrParams::default()
-        })
+        };
+        let mesh = &operator.space.part.mesh;
+        let cells = mesh.domain().extent().max() / mesh.size(mesh.max_level());
+        let reference = Reference::RightHandSide;
+        match f64::from(f32::EPSILON) * cells * cells {
+            ..=MOST_NOISE => {
+                Gcr::<f64, f32>::with_steps(params).solve(operator, preconditioner, b, x, reference)
+            }
+            _ => {
+                Gcr::<f64, f64, f32>::with_directions(params).solve(operator, preconditioner, b, x, reference)
+            }
+        }
     }
 }
 
@@ -283,7 +319,7 @@ fn right_hand_side<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let mut b = vec![0.0; operator.dim()];
+    let mut b = vec![0.0; LinOp::<f64>::dim(operator)];
     let nodal = operator.space.owned_nodal_dim();
     let own = &operator.space.bodies.ids[..operator.space.bodies.owned];
     let rows = b[nodal..].chunks_exact_mut(rigid::<D>());

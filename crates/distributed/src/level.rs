@@ -1,21 +1,24 @@
 //! One level of the multigrid on the velocities, in `f32`: the viscous operator on shared vectors, and the
 //! smoother.
 
-use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::{CellOperator, Workspace};
+use gluey_fem::{ImplicitTree, ReferenceMatrices};
 use gluey_linalg::{
     BadDiagonal, Chebyshev, ChebyshevParams, FnOp, Guess, Identity, KrylovError, LinOp, Preconditioner,
     estimate_lambda_max, invert_spd, vector,
 };
 use gluey_parallel::{Communicator, GhostPlan};
 
-use crate::bodies::{rigid, rows};
+use crate::bodies::{Shared, rigid, rows};
 use crate::flow::FlowError;
+use crate::near_bodies::NearBodies;
 use crate::space::{LevelSpace, Plans};
 
-/// Applications in a sweep, and the part of the spectrum that it damps, as in the serial solver. The largest
-/// eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
+/// Applications in a sweep of the finest level, and the part of the spectrum that it damps, as in the serial
+/// solver. The largest eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
 const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.05, lanczos_steps: 60 };
+/// Applications in a sweep of the others.
+const DEGREE_BELOW: usize = 5;
 
 /// The viscous operator on the owned nodes and twists.
 pub struct LevelOperator<'a, const D: usize> {
@@ -124,8 +127,9 @@ impl<const D: usize> LinOp<f32> for LevelOperator<'_, D> {
 }
 
 /// The inverse of the diagonal at nodes, and of the blocks of twists.
-struct BlockDiagonal {
-    nodal: Vec<f32>,
+#[derive(Clone)]
+pub struct BlockDiagonal {
+    pub nodal: Vec<f32>,
     blocks: Vec<f32>,
     rigid: usize,
 }
@@ -154,8 +158,9 @@ impl Preconditioner<f32> for BlockDiagonal {
 /// One level.
 pub struct Level<'a, const D: usize> {
     pub operator: LevelOperator<'a, D>,
-    diagonal: BlockDiagonal,
+    pub diagonal: BlockDiagonal,
     chebyshev: Chebyshev<f32>,
+    near_bodies: Option<NearBodies<'a, D>>,
     /// Right-hand side and solution at the owned nodes and twists.
     pub b: Vec<f32>,
     pub z: Vec<f32>,
@@ -169,21 +174,38 @@ impl<'a, const D: usize> Level<'a, D> {
         space: LevelSpace<D>,
         plans: Plans,
         viscosity: f64,
+        is_finest: bool,
     ) -> Result<Self, FlowError> {
         let cells = space.operator(viscosity);
         let [x, y] = [0, 1].map(|_| vec![0.0; space.dim()]);
         let mut operator = LevelOperator { ranks, space, plans, cells, work: Workspace::default(), x, y };
         let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
-        let chebyshev = Chebyshev::below(cell_lambda_max::<D>()?, dim, &SWEEP);
+        let degree = if is_finest { SWEEP.degree } else { DEGREE_BELOW };
+        let chebyshev = Chebyshev::below(cell_lambda_max::<D>()?, dim, &ChebyshevParams { degree, ..SWEEP });
         let nodal = vec![0.0; operator.space.owned_nodal_dim()];
-        Ok(Self { operator, diagonal, chebyshev, b: vec![0.0; dim], z: vec![0.0; dim], nodal })
+        let [b, z] = [0, 1].map(|_| vec![0.0; dim]);
+        Ok(Self { operator, diagonal, chebyshev, near_bodies: None, b, z, nodal })
     }
 
-    /// Improves `z`.
+    /// Has the nodes around bodies smoothed once more, in 2D. All ranks call this.
+    pub fn relax_near_bodies(
+        &mut self,
+        tree: &mut ImplicitTree<'_, D>,
+        shared: &Shared<'a, '_, D>,
+        viscosity: f64,
+    ) -> Result<(), FlowError> {
+        self.near_bodies = NearBodies::new(tree, shared, self, viscosity, cell_lambda_max::<D>()?);
+        Ok(())
+    }
+
+    /// Improves `z`, then once more around the bodies.
     pub fn smooth(&mut self) {
-        let Self { operator, diagonal, chebyshev, b, z, .. } = self;
+        let Self { operator, diagonal, chebyshev, near_bodies, b, z, .. } = self;
         chebyshev.smooth(operator, diagonal, b, z, Guess::Given);
+        if let Some(near_bodies) = near_bodies {
+            near_bodies.smooth(operator, b, z);
+        }
     }
 }
 

@@ -35,13 +35,15 @@ mod cycle;
 mod flow;
 mod level;
 mod moving;
+mod near_bodies;
 mod operator;
 mod precondition;
 mod pressures;
+mod schur;
 mod space;
 mod transfer;
 
-pub use cuts::equal_cuts;
+pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
 pub use moving::{SharedHydrodynamics, Suspension, SuspensionError};
 

@@ -11,7 +11,7 @@ use gluey_motion::{FlowStatistics, Hydrodynamics, NoForces};
 use gluey_parallel::Communicator;
 use gluey_stokes::Refinement;
 
-use crate::cuts::equal_cuts;
+use crate::cuts::cuts_of_work;
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
 
 /// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls.
@@ -83,12 +83,12 @@ where
         let tree = |depth: u8| ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants);
         let deepest = self.refinement.deepest();
         let mut whole = tree(deepest)?;
-        let mut cuts = equal_cuts(&whole, ranks);
+        let mut cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
         let used = finest_level(&mut whole, &cuts.of(ranks.rank()), ranks);
         if used < deepest {
             // Cells as deep as gaps might ask for are not there: the lattice is that of the finest there are.
             whole = tree(used)?;
-            cuts = equal_cuts(&whole, ranks);
+            cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
         }
         let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 });

@@ -1,13 +1,11 @@
 //! The Stokes operator on shared vectors: velocities at the owned nodes, owned twists, pressures at the owned
 //! nodes.
 //!
-//! Pressures are in units of `eta / h` with the size `h` of the smallest cells, and so are the rows of
-//! divergences: those that a velocity leaves count like the forces it leaves. In plain units the norm of a
-//! residual forgives divergences, by a factor of `h / eta`, and velocities are less exact than it says.
+//! Units are those of the serial solver, so that a tolerance means the same on any number of ranks.
 
-use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_linalg::LinOp;
-use gluey_parallel::{Communicator, GhostPlan};
+use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
+use gluey_linalg::{LinOp, Scalar};
+use gluey_parallel::{Communicator, GhostPlan, Number};
 
 use crate::bodies::rigid;
 use crate::pressures::SharedPressures;
@@ -18,15 +16,20 @@ pub struct StokesOperator<'a, const D: usize> {
     pub ranks: &'a dyn Communicator,
     pub space: LevelSpace<D>,
     pub pressures: SharedPressures,
-    /// Unit of the pressures.
-    pub unit: f64,
-    plan: GhostPlan,
     twists: GhostPlan,
-    cells: CellOperator<f64, D>,
-    work: Workspace<f64>,
+    wide: Kernel<f64, D>,
+    /// For steps in single precision.
+    narrow: Kernel<f32, D>,
+}
+
+/// The operator in one precision.
+struct Kernel<T, const D: usize> {
+    plan: GhostPlan,
+    cells: CellOperator<T, D>,
+    work: Workspace<T>,
     /// Velocities, twists and pressures at all nodes of the part, in one vector.
-    x: Vec<f64>,
-    y: Vec<f64>,
+    x: Vec<T>,
+    y: Vec<T>,
 }
 
 impl<'a, const D: usize> StokesOperator<'a, D> {
@@ -42,12 +45,10 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
             (&space.bodies.plan, rigid::<D>(), space.nodal_dim()),
             (&pressures.plan, 1, space.dim()),
         ]);
-        let cells = space.operator(viscosity);
-        let [x, y] = [0, 1].map(|_| vec![0.0; space.dim() + pressures.dim()]);
-        let (twists, work) = (plans.twists.clone(), Workspace::default());
-        let mesh = &space.part.mesh;
-        let unit = viscosity / mesh.size(mesh.max_level());
-        Self { ranks, unit, plan, twists, cells, work, x, y, space, pressures }
+        let dim = space.dim() + pressures.dim();
+        let wide = Kernel::new(plan.clone(), space.operator(viscosity), dim);
+        let narrow = Kernel::new(plan, space.operator(viscosity), dim);
+        Self { ranks, twists: plans.twists.clone(), space, pressures, wide, narrow }
     }
 
     /// Entries of the owned velocities and twists in a vector; those of the pressures follow.
@@ -77,28 +78,30 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
 
     /// `b -= A (u, 0)` for a field that [`StokesOperator::lift`] gave.
     pub fn subtract_lift(&mut self, lift: &[f64], b: &mut [f64]) {
+        let Self { ranks, space, pressures, wide, .. } = self;
         let mut y = vec![0.0; b.len()];
-        let at_rest = vec![0.0; self.pressures.dim()];
-        let (velocity, pressure) = self.y.split_at_mut(self.space.dim());
-        let nodes = self.space.pressure.map.node_count();
-        self.cells.stokes_of_field(lift, &at_rest[..nodes], velocity, &mut pressure[..nodes], &mut self.work);
-        self.gather(&mut y);
+        let at_rest = vec![0.0; pressures.dim()];
+        let (velocity, pressure) = wide.y.split_at_mut(space.dim());
+        let nodes = space.pressure.map.node_count();
+        wide.cells.stokes_of_field(lift, &at_rest[..nodes], velocity, &mut pressure[..nodes], &mut wide.work);
+        wide.gather(*ranks, space, pressures, &mut y);
         b.iter_mut().zip(y).for_each(|(b, y)| *b -= y);
     }
 
     /// Values of `lift + T x` at the owned nodes and of all own twists, and the pressures.
     pub fn nodal_values(&mut self, lift: &[f64], x: &[f64]) -> [Vec<f64>; 3] {
-        self.fill(x);
-        let (velocity, p) = self.x.split_at_mut(self.space.dim());
-        let (nodal, twists) = velocity.split_at_mut(self.space.nodal_dim());
-        self.space.bodies.expand(nodal, twists);
-        self.space.velocity.map.distribute(D, |w| w, nodal);
+        let Self { ranks, space, pressures, wide, .. } = self;
+        wide.fill(*ranks, space, pressures, x);
+        let (velocity, p) = wide.x.split_at_mut(space.dim());
+        let (nodal, twists) = velocity.split_at_mut(space.nodal_dim());
+        space.bodies.expand(nodal, twists);
+        space.velocity.map.distribute(D, |w| w, nodal);
         velocity.iter_mut().zip(lift).for_each(|(u, lift)| *u += lift);
-        let mut owned = vec![0.0; self.space.owned_dim()];
-        self.space.copy_owned(velocity, &mut owned);
-        let twists = owned.split_off(self.space.owned_nodal_dim());
-        let pressure = p[self.space.pressure.owned.clone()].to_vec();
-        self.x.fill(0.0);
+        let mut owned = vec![0.0; space.owned_dim()];
+        space.copy_owned(velocity, &mut owned);
+        let twists = owned.split_off(space.owned_nodal_dim());
+        let pressure = p[space.pressure.owned.clone()].to_vec();
+        wide.x.fill(0.0);
         [owned, twists, pressure]
     }
 
@@ -107,50 +110,96 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
         owned.start * D..owned.end * D
     }
 
+    fn dim(&self) -> usize {
+        self.velocity_dim() + self.space.pressure.owned.len()
+    }
+}
+
+impl<T: CellScalar + Scalar + Number, const D: usize> Kernel<T, D> {
+    fn new(plan: GhostPlan, cells: CellOperator<T, D>, dim: usize) -> Self {
+        let [x, y] = [0, 1].map(|_| vec![T::ZERO; dim]);
+        Self { plan, cells, work: Workspace::default(), x, y }
+    }
+
+    fn apply(
+        &mut self,
+        ranks: &dyn Communicator,
+        space: &LevelSpace<D>,
+        pressures: &SharedPressures,
+        x: &[T],
+        y: &mut [T],
+    ) {
+        self.fill(ranks, space, pressures, x);
+        let nodes = space.pressure.map.node_count();
+        let (u, p) = self.x.split_at(space.dim());
+        let (yu, yp) = self.y.split_at_mut(space.dim());
+        self.cells.stokes(u, &p[..nodes], yu, &mut yp[..nodes], &mut self.work);
+        self.gather(ranks, space, pressures, y);
+    }
+
     /// Unknowns at all nodes of the part.
-    fn fill(&mut self, x: &[f64]) {
-        let (u, p) = x.split_at(self.space.owned_dim());
-        let first = self.space.dim();
-        self.space.set_owned(u, &mut self.x);
-        let owned = &self.space.pressure.owned;
-        let own = self.x[first + owned.start..first + owned.end].iter_mut();
-        own.zip(p).for_each(|(own, p)| *own = self.unit * p);
-        self.plan.update::<f64, 1>(self.ranks, &mut self.x);
+    fn fill(
+        &mut self,
+        ranks: &dyn Communicator,
+        space: &LevelSpace<D>,
+        pressures: &SharedPressures,
+        x: &[T],
+    ) {
+        let (u, p) = x.split_at(space.owned_dim());
+        let first = space.dim();
+        space.set_owned(u, &mut self.x);
+        let owned = &space.pressure.owned;
+        self.x[first + owned.start..first + owned.end].copy_from_slice(p);
+        self.plan.update::<T, 1>(ranks, &mut self.x);
         let pressure = &mut self.x[first..];
-        self.pressures.expand(pressure);
-        self.space.pressure.map.distribute(1, |w| w, pressure);
+        pressures.expand(pressure);
+        space.pressure.map.distribute(1, T::from_f64, pressure);
     }
 
     /// What cells gave, added up at the owners.
-    fn gather(&mut self, out: &mut [f64]) {
-        let first = self.space.dim();
+    fn gather(
+        &mut self,
+        ranks: &dyn Communicator,
+        space: &LevelSpace<D>,
+        pressures: &SharedPressures,
+        out: &mut [T],
+    ) {
+        let first = space.dim();
         let pressure = &mut self.y[first..];
-        self.space.pressure.map.condense(1, |w| w, pressure);
-        self.pressures.reduce(pressure);
-        self.plan.accumulate::<f64, 1>(self.ranks, &mut self.y);
-        let (y, q) = out.split_at_mut(self.space.owned_dim());
-        self.space.copy_owned(&self.y, y);
-        let owned = &self.space.pressure.owned;
-        let own = &self.y[first + owned.start..first + owned.end];
-        q.iter_mut().zip(own).for_each(|(q, own)| *q = self.unit * own);
-        if self.pressures.has_bridges {
-            self.pressures.remove_mean(self.ranks, q);
+        space.pressure.map.condense(1, T::from_f64, pressure);
+        pressures.reduce(pressure);
+        self.plan.accumulate::<T, 1>(ranks, &mut self.y);
+        let (y, q) = out.split_at_mut(space.owned_dim());
+        space.copy_owned(&self.y, y);
+        let owned = &space.pressure.owned;
+        q.copy_from_slice(&self.y[first + owned.start..first + owned.end]);
+        if pressures.has_bridges {
+            pressures.remove_mean(ranks, q);
         }
     }
 }
 
 impl<const D: usize> LinOp<f64> for StokesOperator<'_, D> {
     fn dim(&self) -> usize {
-        self.velocity_dim() + self.space.pressure.owned.len()
+        self.dim()
     }
 
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        self.fill(x);
-        let nodes = self.space.pressure.map.node_count();
-        let (u, p) = self.x.split_at(self.space.dim());
-        let (yu, yp) = self.y.split_at_mut(self.space.dim());
-        self.cells.stokes(u, &p[..nodes], yu, &mut yp[..nodes], &mut self.work);
-        self.gather(y);
+        self.wide.apply(self.ranks, &self.space, &self.pressures, x, y);
+    }
+
+    fn complete(&self, sums: &mut [f64]) {
+        self.ranks.sum(sums);
+    }
+}
+
+impl<const D: usize> LinOp<f32> for StokesOperator<'_, D> {
+    fn dim(&self) -> usize {
+        self.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.narrow.apply(self.ranks, &self.space, &self.pressures, x, y);
     }
 
     fn complete(&self, sums: &mut [f64]) {

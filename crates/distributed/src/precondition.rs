@@ -1,33 +1,29 @@
-//! The block triangular preconditioner of the serial solver: `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`,
-//! with the lumped mass over the viscosity for the Schur complement `S`.
+//! The block triangular preconditioner of the serial solver: `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`.
 
-use gluey_linalg::Preconditioner;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Preconditioner, Scalar, vector};
 
 use crate::cycle::VCycle;
 use crate::pressures::SharedPressures;
+use crate::schur::SchurInverse;
 use crate::space::LevelSpace;
 
-pub struct BlockTriangular<'a, 'b, const D: usize> {
+pub struct BlockTriangular<'a, const D: usize> {
     cycle: VCycle<'a, D>,
     pressures: SharedPressures,
-    /// Lumped mass at the owned pressure nodes; zero where no pressure is unknown.
-    mass: &'b [f64],
-    /// Unit of pressures and of rows of divergences, see [`crate::operator`].
-    unit: f64,
-    viscosity: f64,
+    schur: SchurInverse<'a, D>,
+    /// At the owned pressures.
+    r: Vec<f32>,
+    z: Vec<f32>,
     /// At all pressure nodes of the part, and elsewhere.
     p: Vec<f32>,
 }
 
-impl<'a, 'b, const D: usize> BlockTriangular<'a, 'b, D> {
-    pub fn new(
-        cycle: VCycle<'a, D>,
-        pressures: SharedPressures,
-        mass: &'b [f64],
-        [unit, viscosity]: [f64; 2],
-    ) -> Self {
+impl<'a, const D: usize> BlockTriangular<'a, D> {
+    pub fn new(cycle: VCycle<'a, D>, pressures: SharedPressures, schur: SchurInverse<'a, D>) -> Self {
         let p = vec![0.0; pressures.dim()];
-        Self { cycle, pressures, mass, unit, viscosity, p }
+        let [r, z] = [0, 1].map(|_| vec![0.0; pressures.is_free.len()]);
+        Self { cycle, pressures, schur, r, z, p }
     }
 }
 
@@ -49,31 +45,35 @@ pub fn lumped_mass<const D: usize>(
     mass[space.pressure.owned.clone()].to_vec()
 }
 
-impl<const D: usize> Preconditioner<f64> for BlockTriangular<'_, '_, D> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let Self { cycle, pressures, mass, unit, viscosity, p } = self;
+impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn apply(&mut self, r: &[S], z: &mut [S]) {
+        let Self { cycle, pressures, schur, r: rhs, z: answer, p } = self;
         let top = cycle.levels.len() - 1;
         let level = &mut cycle.levels[top];
         let operator = &mut level.operator;
         let (ru, rp) = r.split_at(operator.space.owned_dim());
         let (zu, zp) = z.split_at_mut(ru.len());
-        for ((z, &r), &mass) in zp.iter_mut().zip(rp).zip(*mass) {
-            *z = if mass > 0.0 { -*viscosity * r / (*unit * *unit * mass) } else { 0.0 };
-        }
+        vector::convert(-1.0, rp, rhs);
+        schur.apply(rhs, answer);
+        answer.iter_mut().zip(&pressures.is_free).filter(|e| !*e.1).for_each(|(z, _)| *z = 0.0);
         if pressures.has_bridges {
             // Constants are not quite in the kernel then: as in the serial solver pressures have no mean.
-            pressures.remove_mean(operator.ranks, zp);
+            pressures.remove_mean(operator.ranks, answer);
         }
+        vector::convert(1.0, answer, zp);
         let owned = operator.space.pressure.owned.clone();
-        p[owned].iter_mut().zip(&*zp).for_each(|(p, &z)| *p = (*unit * z) as f32);
+        p[owned].copy_from_slice(answer);
         pressures.plan.update::<f32, 1>(operator.ranks, p);
         pressures.expand(p);
         let map = &operator.space.pressure.map;
         map.distribute(1, |w| w as f32, p);
         operator.cells.gradient(&p[..map.node_count()], &mut operator.y, &mut operator.work);
         operator.gather(&mut level.b);
-        level.b.iter_mut().zip(ru).for_each(|(b, &r)| *b = r as f32 - *b);
+        vector::residual_from_product(ru, &mut level.b);
         cycle.run();
-        zu.iter_mut().zip(&cycle.levels[top].z).for_each(|(zu, &z)| *zu = f64::from(z));
+        vector::convert(1.0, &cycle.levels[top].z, zu);
     }
 }

@@ -11,7 +11,7 @@ use gluey_parallel::{Communicator, GhostPlan, Wanted};
 use rustc_hash::FxHashMap;
 
 use crate::bodies::Shared;
-use crate::space::{LevelSpace, wanted_nodes};
+use crate::space::{LevelSpace, Nodes, wanted_nodes};
 
 /// The pressures of a part: at its nodes, and after these at nodes elsewhere that rows name.
 #[derive(Clone)]
@@ -24,8 +24,15 @@ pub struct SharedPressures {
     pub free_count: f64,
     /// Whether bodies share cells without a free node anywhere: divergences need not sum to zero then.
     pub has_bridges: bool,
+    /// Owned unknowns inside bodies, which no outer one can speak for: they lie in gaps.
+    pub is_poor: Vec<bool>,
+    /// Number of these on all ranks.
+    pub poor_count: f64,
+    /// The ghosts of `plan`, by their places.
+    pub ghosts: Vec<Wanted>,
     /// Free ones at all nodes of the part and elsewhere.
     keeps: Vec<bool>,
+    /// By their nodes.
     rows: Vec<Constraint>,
 }
 
@@ -51,7 +58,8 @@ impl SharedPressures {
         let needed = nodes.needed(&space.part);
         let places = Places { rank: ranks.rank(), owners: &owners };
         let hot = wide.restricted(ranks, |node| needed[node as usize]);
-        let (rows, elsewhere) = places.gathered_rows(ranks, space, &hot, own_rows, &follows);
+        let (mut rows, elsewhere) = places.gathered_rows(ranks, space, &hot, own_rows, &follows);
+        rows.sort_unstable_by_key(|row| row.node);
         let mut is_needed = needed;
         rows.iter().flat_map(|row| &row.masters).for_each(|&(master, _)| {
             if let Some(needed) = is_needed.get_mut(master as usize) {
@@ -60,19 +68,40 @@ impl SharedPressures {
         });
         let in_part =
             everywhere.into_iter().filter(|w| is_needed[w.place as usize] && free[w.place as usize]);
-        let wanted = in_part.chain(elsewhere.iter().copied()).collect();
-        let plan = GhostPlan::new(ranks, wanted, nodes.finder());
+        let mut ghosts: Vec<Wanted> = in_part.chain(elsewhere.iter().copied()).collect();
+        ghosts.sort_unstable_by_key(|ghost| ghost.place);
+        let plan = GhostPlan::new(ranks, ghosts.clone(), nodes.finder());
         let is_free = free[nodes.owned.clone()].to_vec();
+        let is_poor: Vec<bool> = nodes.owned.clone().map(|node| free[node] && inside[node]).collect();
         let bridges = space.own_cells().filter(|&cell| !space.bodies.is_fluid(space.velocity.map.cell(cell)));
-        let mut sums = [is_free.iter().filter(|free| **free).count() as f64, bridges.count() as f64];
+        let count = |of: &[bool]| of.iter().filter(|is| **is).count() as f64;
+        let mut sums = [count(&is_free), bridges.count() as f64, count(&is_poor)];
         ranks.sum(&mut sums);
         free.resize(free.len() + elsewhere.len(), true);
-        Self { plan, is_free, free_count: sums[0], has_bridges: sums[1] > 0.0, keeps: free, rows }
+        let [free_count, bridge_count, poor_count] = sums;
+        let has_bridges = bridge_count > 0.0;
+        Self { plan, is_free, free_count, has_bridges, is_poor, poor_count, ghosts, keeps: free, rows }
     }
 
     /// Length of a vector at the nodes of the part and elsewhere.
     pub fn dim(&self) -> usize {
         self.keeps.len()
+    }
+
+    /// Passes on the unknowns that the pressure at a node of an own cell stands for, with their weights.
+    pub fn for_each_term<const D: usize>(
+        &self,
+        nodes: &Nodes<D>,
+        node: u32,
+        mut visit: impl FnMut(u32, f64),
+    ) {
+        for (node, weight) in nodes.regular(node) {
+            if self.keeps[node as usize] {
+                visit(node, weight);
+            } else if let Ok(row) = self.rows.binary_search_by_key(&node, |row| row.node) {
+                self.rows[row].masters.iter().for_each(|&(master, w)| visit(master, weight * w));
+            }
+        }
     }
 
     /// Sets the pressures that follow from others, all of which are known, but for hanging nodes.
@@ -93,10 +122,10 @@ impl SharedPressures {
     }
 
     /// Makes the entries at owned nodes sum to zero over all ranks.
-    pub fn remove_mean(&self, ranks: &dyn Communicator, q: &mut [f64]) {
-        let mut sum = [q.iter().zip(&self.is_free).filter(|e| *e.1).map(|e| *e.0).sum()];
+    pub fn remove_mean<T: Scalar>(&self, ranks: &dyn Communicator, q: &mut [T]) {
+        let mut sum = [q.iter().zip(&self.is_free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum()];
         ranks.sum(&mut sum);
-        let mean = sum[0] / self.free_count.max(1.0);
+        let mean = T::from_f64(sum[0] / self.free_count.max(1.0));
         q.iter_mut().zip(&self.is_free).filter(|e| *e.1).for_each(|(q, _)| *q -= mean);
     }
 }

@@ -43,7 +43,8 @@ pub use direct::{
 };
 pub use jagged::Jagged;
 pub use krylov::{
-    Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max, largest_ratio, lowest_modes,
+    Gcr, GcrParams, KrylovError, KrylovReport, Reference, estimate_lambda_max, estimate_lambda_max_from,
+    largest_ratio, lowest_modes,
 };
 pub use operator::{BadDiagonal, FnOp, Identity, Jacobi, LinOp, Preconditioner};
 pub use scalar::Scalar;

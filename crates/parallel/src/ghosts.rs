@@ -243,6 +243,35 @@ impl GhostPlan {
     }
 }
 
+/// Records for ranks that do not expect them. Returns what came, in the order of the ranks, of each in the
+/// order in which it was given; what a rank has for itself is among it.
+pub fn route<const N: usize>(ranks: &dyn Communicator, records: Vec<(usize, [u64; N])>) -> Vec<[u64; N]> {
+    let mut records = records;
+    records.sort_by_key(|record| record.0);
+    let (mut messages, mut own) = (Vec::new(), Vec::new());
+    for of_rank in records.chunk_by(|a, b| a.0 == b.0) {
+        let (rank, mut bytes) = (of_rank[0].0, Vec::new());
+        if rank == ranks.rank() {
+            own.extend(of_rank.iter().map(|record| record.1));
+            continue;
+        }
+        let numbers: Vec<u64> = of_rank.iter().flat_map(|record| record.1).collect();
+        write_all(&numbers, &mut bytes);
+        messages.push(Message { rank, bytes });
+    }
+    drop(records);
+    let (mut all, mut own) = (Vec::new(), Some(own));
+    for message in deliver(ranks, &messages) {
+        if message.rank > ranks.rank() {
+            all.extend(own.take().into_iter().flatten());
+        }
+        let numbers: Vec<u64> = read_all(&message.bytes).collect();
+        all.extend_from_slice(numbers.as_chunks::<N>().0);
+    }
+    all.extend(own.into_iter().flatten());
+    all
+}
+
 /// Messages of any length to ranks that do not expect them: lengths go before. Returns what came, in the
 /// order of the ranks.
 fn deliver(ranks: &dyn Communicator, messages: &[Message]) -> Vec<Message> {

@@ -32,7 +32,7 @@ mod threads;
 
 pub use alone::Alone;
 pub use communicator::{Communicator, Message, Traffic};
-pub use ghosts::{GhostPlan, Wanted};
+pub use ghosts::{GhostPlan, Wanted, route};
 pub use number::Number;
 #[cfg(feature = "mpi")]
 pub use processes::{Processes, StartError};

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
-use gluey_parallel::{Alone, Communicator, GhostPlan, Message, Threads, Wanted};
+use gluey_parallel::{Alone, Communicator, GhostPlan, Message, Threads, Wanted, route};
 
 const SIZES: [usize; 7] = [1, 2, 3, 4, 5, 8, 13];
 
@@ -239,5 +239,29 @@ fn owners_send_lists_of_any_length() {
             assert!(lists.iter().all(|(place, list)| *list == list_of(first + *place as usize)));
         })
         .unwrap();
+    }
+}
+
+/// Records come by rank, of each in the order in which they were given, those of a rank for itself among
+/// them.
+#[test]
+fn records_reach_ranks_that_do_not_expect_them() {
+    for size in SIZES {
+        let received = Threads::run(size, |ranks| {
+            let me = ranks.rank() as u64;
+            // To every second rank, twice to itself.
+            let others = (0..size).filter(|rank| rank % 2 == 0).map(|rank| (rank, [me, 7]));
+            let own = [(ranks.rank(), [me, 8]), (ranks.rank(), [me, 9])];
+            route(ranks, others.chain(own).collect())
+        })
+        .unwrap();
+        for (rank, records) in received.into_iter().enumerate() {
+            let of = |other: u64| {
+                let all = if rank % 2 == 0 { vec![[other, 7]] } else { Vec::new() };
+                let own = if other == rank as u64 { vec![[other, 8], [other, 9]] } else { Vec::new() };
+                [all, own].concat()
+            };
+            assert_eq!(records, (0..size as u64).flat_map(of).collect::<Vec<_>>());
+        }
     }
 }

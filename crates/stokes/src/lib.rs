@@ -53,6 +53,7 @@ pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
+pub use precondition::schur::BoxCorrection;
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
 // The parts of the system: unknowns, where the penalised solid is, planes that cut bodies flat.
 pub use solid::{PointMatrices, SolidRegion};

@@ -154,20 +154,38 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
 
     /// Number of leaves of the whole tree that begin in a range of keys.
     pub fn count_leaves(&mut self, keys: &Range<u64>) -> usize {
-        let (mut count, depth, end) = (0, self.max_level(), self.max_level());
-        let key = |cell: &Cell<D>| cell.morton(end);
-        self.for_each_leaf(depth, keys, |cell| count += usize::from(key(&cell) >= keys.start));
-        count
+        self.weigh_leaves(keys, &|_| 1) as usize
+    }
+
+    /// Their weights, added up.
+    pub fn weigh_leaves(&mut self, keys: &Range<u64>, weight: &dyn Fn(&Cell<D>) -> u64) -> u64 {
+        let (mut sum, depth) = (0, self.max_level());
+        self.for_each_leaf(depth, keys, |cell| {
+            sum += if cell.morton(depth) >= keys.start { weight(&cell) } else { 0 };
+        });
+        sum
     }
 
     /// Key of leaf `n` among those of the whole tree that begin in a range of keys.
     pub fn nth_key(&mut self, keys: &Range<u64>, n: usize) -> Option<u64> {
-        let (mut found, mut count, depth) = (None, 0, self.max_level());
+        self.key_after(keys, n as u64, &|_| 1)
+    }
+
+    /// Key of the first leaf among them before which leaves weigh `least` or more, but for those without a
+    /// weight before it.
+    pub fn key_after(
+        &mut self,
+        keys: &Range<u64>,
+        least: u64,
+        weight: &dyn Fn(&Cell<D>) -> u64,
+    ) -> Option<u64> {
+        let (mut found, mut before, depth) = (None, 0, self.max_level());
         self.for_each_leaf(depth, keys, |cell| {
             let key = cell.morton(depth);
-            if key >= keys.start {
-                found = found.or((count == n).then_some(key));
-                count += 1;
+            if key >= keys.start && found.is_none() {
+                let own = weight(&cell);
+                found = (before >= least && own > 0).then_some(key);
+                before += own;
             }
         });
         found

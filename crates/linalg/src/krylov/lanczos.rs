@@ -16,22 +16,33 @@ pub fn estimate_lambda_max<T: Scalar>(
     m: &mut (impl Preconditioner<T> + ?Sized),
     iterations: usize,
 ) -> Result<f64, KrylovError> {
-    let lanczos = lanczos(a, m, iterations)?;
-    Ok(lanczos.largest_eigenvalue())
+    let mut start = vec![T::ZERO; a.dim()];
+    vector::fill_pseudo_random(1, &mut start);
+    estimate_lambda_max_from(start, a, m, iterations)
+}
+
+/// The same from a start vector, for operators on vectors that ranks share: their number decides on no
+/// entry of it.
+pub fn estimate_lambda_max_from<T: Scalar>(
+    start: Vec<T>,
+    a: &mut (impl LinOp<T> + ?Sized),
+    m: &mut (impl Preconditioner<T> + ?Sized),
+    iterations: usize,
+) -> Result<f64, KrylovError> {
+    Ok(lanczos(start, a, m, iterations)?.largest_eigenvalue())
 }
 
 fn lanczos<T: Scalar>(
+    mut r: Vec<T>,
     a: &mut (impl LinOp<T> + ?Sized),
     m: &mut (impl Preconditioner<T> + ?Sized),
     iterations: usize,
 ) -> Result<Tridiagonal, KrylovError> {
-    let mut r = vec![T::ZERO; a.dim()];
-    vector::fill_pseudo_random(1, &mut r);
     let mut z = vec![T::ZERO; a.dim()];
     m.apply(&r, &mut z);
     let mut p = z.clone();
     let mut q = vec![T::ZERO; a.dim()];
-    let mut rz = vector::dot(&r, &z);
+    let mut rz = dot(a, &r, &z);
     let first = rz;
     let (mut alpha, mut beta) = (1.0, 0.0);
     let mut matrix = Tridiagonal::default();
@@ -42,7 +53,7 @@ fn lanczos<T: Scalar>(
         }
         let alpha_before = alpha;
         a.apply(&p, &mut q);
-        let curvature = vector::dot(&p, &q);
+        let curvature = dot(a, &p, &q);
         if !(rz.is_finite() && curvature.is_finite()) {
             return Err(KrylovError::NotFinite { iteration });
         }
@@ -55,12 +66,18 @@ fn lanczos<T: Scalar>(
         matrix.push(1.0 / alpha + beta / alpha_before, beta.sqrt() / alpha_before);
         vector::axpy(-alpha, &q, &mut r);
         m.apply(&r, &mut z);
-        let rz_next = vector::dot(&r, &z);
+        let rz_next = dot(a, &r, &z);
         beta = rz_next / rz;
         vector::axpby(1.0, &z, beta, &mut p);
         rz = rz_next;
     }
     Ok(matrix)
+}
+
+fn dot<T: Scalar>(a: &(impl LinOp<T> + ?Sized), x: &[T], y: &[T]) -> f64 {
+    let mut sum = [vector::dot(x, y)];
+    a.complete(&mut sum);
+    sum[0]
 }
 
 /// A symmetric tridiagonal matrix.

@@ -8,7 +8,7 @@ mod lanczos;
 
 pub use eigen::{largest_ratio, lowest_modes};
 pub use gcr::{Gcr, GcrParams};
-pub use lanczos::estimate_lambda_max;
+pub use lanczos::{estimate_lambda_max, estimate_lambda_max_from};
 
 use crate::operator::LinOp;
 use crate::scalar::Scalar;

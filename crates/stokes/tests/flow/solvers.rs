@@ -138,8 +138,8 @@ fn iterations_are_bounded_where_spheres_touch() {
 }
 
 /// Half of the slab between two spheres lies on either side of a plane of the mesh: no cell in it has more
-/// than 0.29 of fluid, four cells across. Where such cells had the unknowns of others, 200 iterations were
-/// not enough.
+/// than 0.29 of fluid, four cells across. Where such cells had the unknowns of others, 200 iterations did
+/// not do.
 #[test]
 fn films_that_two_layers_of_cells_share_are_solved_for() {
     let sphere =

@@ -12,7 +12,7 @@
 
 use std::sync::Arc;
 
-use gluey_fem::Interpolation;
+use gluey_fem::{Interpolation, TreeMesh};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Ordering, Preconditioner, Subset, vector};
 use nalgebra::{DMatrix, DVector};
@@ -114,6 +114,35 @@ where
     }
 }
 
+/// The correction of a small mesh without bodies, for solvers that have meshes of their own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoxCorrection {
+    /// The unknown pressures of the mesh.
+    pub unknowns: Vec<u32>,
+    /// `S_0^-1 - T_0^-1` for them.
+    pub matrix: DMatrix<f32>,
+}
+
+impl BoxCorrection {
+    /// `None` where the matrix would be too large.
+    ///
+    /// # Errors
+    /// [`StokesError::BoxPressures`] if a matrix is not positive.
+    pub fn new<const D: usize>(mesh: TreeMesh<D>, viscosity: f64) -> Result<Option<Self>, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let discretisation = Discretisation::new(mesh);
+        if discretisation.pressure.node_count() > MOST_PRESSURES {
+            return Ok(None);
+        }
+        let system = without_bodies(&discretisation, viscosity);
+        let unknowns = Subset::new(system.pressure.dim(), |q| system.pressure.is_free(q));
+        let matrix = correction(&system, viscosity, unknowns.positions())?;
+        Ok(Some(Self { unknowns: unknowns.positions().to_vec(), matrix }))
+    }
+}
+
 /// The meshes, with coarser ones put before them until the first has few enough pressures.
 fn with_small_coarsest<const D: usize>(
     meshes: &[Discretisation<D>],
@@ -195,7 +224,6 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
 
     /// Meshes of a long box, from level 2 on, the finest with hanging nodes.

@@ -18,6 +18,8 @@ mod weights;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max};
 
+pub use coarse::BoxCorrection;
+
 use crate::error::StokesError;
 use crate::operator::Elements;
 use crate::space::{Discretisation, PressureSpace};

@@ -1,0 +1,109 @@
+//! Approximate inverse of the pressure Schur complement, as in the serial solver: the weighted mass of the
+//! pressures over twice the viscosity by Chebyshev's method, dense inverses in gaps narrower than a cell, and
+//! the pressures as large as the box from a small mesh.
+
+mod cluster;
+mod gap;
+mod mass;
+mod weights;
+mod whole_box;
+
+use gluey_fem::ImplicitTree;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::{Chebyshev, Guess, Jacobi, SpectralInterval, estimate_lambda_max_from};
+use gluey_parallel::GhostPlan;
+use gluey_stokes::StokesError;
+
+use crate::bodies::Shared;
+use crate::flow::FlowError;
+use crate::pressures::SharedPressures;
+use crate::space::LevelSpace;
+use gap::Gaps;
+use mass::SharedMass;
+use whole_box::WholeBox;
+
+/// As in the serial solver: bound of the relative error of the inverse mass, most steps for it, Lanczos steps
+/// for the largest eigenvalue, and the factor by which the estimate is raised.
+const LARGEST_ERROR: f64 = 1.0 / 16.0;
+const MOST_STEPS: usize = 32;
+const LANCZOS_STEPS: usize = 15;
+const SAFETY: f64 = 1.1;
+
+/// What a pressure is of a rank: its own ones first, then ghosts.
+pub struct SchurInverse<'a, const D: usize> {
+    mass: SharedMass<'a>,
+    jacobi: Jacobi<f32>,
+    chebyshev: Chebyshev<f32>,
+    gaps: Gaps,
+    whole_box: Option<WholeBox<D>>,
+}
+
+impl<'a, const D: usize> SchurInverse<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// All ranks call this.
+    pub fn new(
+        tree: &mut ImplicitTree<'_, D>,
+        shared: &Shared<'a, '_, D>,
+        space: &LevelSpace<D>,
+        nodes: &GhostPlan,
+        pressures: &SharedPressures,
+        viscosity: f64,
+    ) -> Result<Self, FlowError> {
+        let ranks = shared.ranks;
+        let weights = weights::weights(ranks, space, pressures, viscosity);
+        let mut mass = SharedMass::new(ranks, space, pressures, viscosity, &weights)?;
+        let gaps = Gaps::new(tree, shared, space, nodes, pressures, &mass);
+        let gaps = agreed(ranks, gaps)?;
+        let whole_box = agreed(ranks, WholeBox::new(tree, ranks, space, pressures, viscosity))?;
+        let mut jacobi = Jacobi::new(&mass.diagonal())?;
+        let start = space.pressure.owned.clone().zip(&pressures.is_free);
+        let start: Vec<f32> = start.map(|(q, &is_free)| pseudo_random(space, q, is_free)).collect();
+        let largest = estimate_lambda_max_from(start, &mut mass, &mut jacobi, LANCZOS_STEPS)?;
+        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
+        let chebyshev = Chebyshev::new(space.pressure.owned.len(), steps(interval), interval);
+        // Entries of the diagonal were needed for the gaps.
+        mass.forget_entries();
+        Ok(Self { mass, jacobi, chebyshev, gaps, whole_box })
+    }
+
+    /// `z` close to `S^-1 r` at the owned pressures, up to a constant. Both are zero but at unknowns.
+    pub fn apply(&mut self, r: &[f32], z: &mut [f32]) {
+        let Self { mass, jacobi, chebyshev, gaps, whole_box } = self;
+        chebyshev.smooth(mass, jacobi, r, z, Guess::Zero);
+        gaps.add(mass.ranks, r, z);
+        if let Some(whole_box) = whole_box {
+            whole_box.add(mass.ranks, r, z);
+        }
+    }
+}
+
+/// A failure of one rank is one of all; only the first says more.
+fn agreed<T>(
+    ranks: &dyn gluey_parallel::Communicator,
+    outcome: Result<T, StokesError>,
+) -> Result<T, FlowError> {
+    let mut failures = [f64::from(u8::from(outcome.is_err()))];
+    ranks.sum(&mut failures);
+    match outcome {
+        Ok(_) if failures[0] > 0.0 => Err(FlowError::PressuresElsewhere),
+        outcome => Ok(outcome?),
+    }
+}
+
+/// A number between -1/2 and 1/2 that depends on the place of a node alone, zero where no pressure is
+/// unknown.
+fn pseudo_random<const D: usize>(space: &LevelSpace<D>, node: usize, is_free: bool) -> f32 {
+    let mut x = space.pressure.map.key(node).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    let fraction = ((x ^ (x >> 31)) >> 40) as f32 / (1u32 << 24) as f32;
+    if is_free { fraction - 0.5 } else { 0.0 }
+}
+
+/// The smallest even number of steps whose error is small enough, as in the serial solver.
+fn steps(interval: SpectralInterval) -> usize {
+    let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
+    (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)
+}

@@ -1,0 +1,70 @@
+//! What a rank allocates shrinks with the number of ranks: no array is as large as the mesh.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use gluey_distributed::{BoxFlow, Suspension};
+use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_parallel::{Communicator, Threads};
+use gluey_stokes::Refinement;
+use gluey_testkit::allocation::{CountingAllocator, largest_in_thread};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const RANKS: usize = 16;
+
+/// The most bytes of one allocation of a rank, among all.
+fn largest<const D: usize>(level: u8, ranks: usize) -> usize
+where
+    Dim<D>: Space<D>,
+{
+    // Libraries take what they need once in each thread, whatever the mesh.
+    let [small, whole] = [4, level].map(suspension::<D>);
+    // They nearly touch, so that there is a gap.
+    let places = [[0.3, 0.4, 0.5], [0.651, 0.4, 0.5]].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
+    let solve = |suspension: &Suspension<D>, ranks: &dyn Communicator| {
+        suspension.solve(ranks, &places, &[], 1.0).unwrap().iterations
+    };
+    let found = Threads::run(ranks, |ranks| {
+        solve(&small, ranks);
+        largest_in_thread(|| solve(&whole, ranks)).1
+    });
+    found.unwrap().into_iter().max().unwrap()
+}
+
+/// Two bodies among cells of one level.
+fn suspension<const D: usize>(level: u8) -> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    Suspension {
+        flow: BoxFlow { viscosity: 1.0, tolerance: 1e-3, max_iterations: 50 },
+        domain: Aabb::unit(),
+        roots: [1; D],
+        periods: [None; D],
+        refinement: Refinement { coarsest: level, ..Refinement::to_level(level) },
+        offset: -0.1,
+        radii: vec![0.2, 0.15],
+        wrenches: Vec::new(),
+        shear_rate: 1.0,
+    }
+}
+
+/// A rank holds its part of the whole and what is around it.
+fn allocations_shrink<const D: usize>(level: u8, share: f64)
+where
+    Dim<D>: Space<D>,
+{
+    let (alone, shared) = (largest::<D>(level, 1), largest::<D>(level, RANKS));
+    let nodes = ((1usize << (level + 1)) + 1).pow(D as u32);
+    assert!(alone >= nodes * D * size_of::<f32>(), "one rank has vectors of all velocities: {alone}");
+    println!("{alone} and {shared}");
+    assert!((shared as f64) < share * alone as f64, "{shared} of {alone}");
+}
+
+/// In 2D; in 3D the coarsest level and blocks of dense products are as large as a mesh that tests have time
+/// for.
+#[test]
+fn no_rank_allocates_an_array_as_large_as_the_mesh() {
+    allocations_shrink::<2>(9, 0.12);
+}
