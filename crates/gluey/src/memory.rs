@@ -15,16 +15,23 @@ const MOST_UNKNOWNS: f64 = u32::MAX as f64;
 /// A case that needs more memory than there is.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error(
-    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {} of memory; {}",
-    .estimate.cell_count, .estimate.unknown_count, size(.estimate.bytes), there(*.available, *.limit)
+    "the mesh would have about {:.2e} cells and {:.2e} unknowns, which need about {} of memory{}; {}",
+    .estimate.cell_count, .estimate.unknown_count, size(.estimate.bytes), of_each(*.ranks),
+    there(*.available, *.limit)
 )]
 pub struct TooLarge {
     /// Size of its mesh.
     pub estimate: MeshEstimate,
-    /// Bytes there are, if that is known.
+    /// Processes that would share it, each of which takes the bytes of the estimate.
+    pub ranks: usize,
+    /// Bytes there are for one of them, if that is known.
     pub available: Option<u64>,
-    /// Bytes it may take, if that was limited.
+    /// Bytes that one of them may take, if that was limited.
     pub limit: Option<u64>,
+}
+
+fn of_each(ranks: usize) -> String {
+    if ranks > 1 { format!(" in each of {ranks} processes") } else { String::new() }
 }
 
 fn there(available: Option<u64>, limit: Option<u64>) -> String {
@@ -59,17 +66,36 @@ pub fn check(case: &Case) -> Result<(), TooLarge> {
 /// # Errors
 /// [`TooLarge`] with the size expected.
 pub fn check_within(case: &Case, limit: Option<u64>) -> Result<(), TooLarge> {
-    let available = available();
+    check_shared(case, limit, Sharing { ranks: 1, available: available() })
+}
+
+/// Processes that share a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sharing {
+    /// How many.
+    pub ranks: usize,
+    /// Bytes that there are for each of them, if that is known.
+    pub available: Option<u64>,
+}
+
+/// The same for a case that several processes share, of which each may take `limit` bytes.
+///
+/// # Errors
+/// [`TooLarge`] with the size expected.
+pub fn check_shared(case: &Case, limit: Option<u64>, sharing: Sharing) -> Result<(), TooLarge> {
+    let Sharing { ranks, available } = sharing;
     let least = available.into_iter().chain(limit).min();
-    match MeshEstimate::of(case) {
-        Some(estimate) if !fits(&estimate, least) => Err(TooLarge { estimate, available, limit }),
+    match MeshEstimate::of_rank(case, ranks) {
+        Some(estimate) if !fits(&estimate, ranks, least) => {
+            Err(TooLarge { estimate, ranks, available, limit })
+        }
         _ => Ok(()),
     }
 }
 
-fn fits(estimate: &MeshEstimate, available: Option<u64>) -> bool {
+fn fits(estimate: &MeshEstimate, ranks: usize, available: Option<u64>) -> bool {
     let enough = available.is_none_or(|bytes| estimate.bytes <= bytes as f64);
-    enough && estimate.unknown_count <= MOST_UNKNOWNS
+    enough && estimate.unknown_count <= MOST_UNKNOWNS * ranks as f64
 }
 
 /// Bytes this process may still take: what the machine has left, and what its control groups and the limit of
@@ -197,6 +223,26 @@ mod tests {
         assert_eq!((size(20.4e6), size(2.04e9)), ("20 MB".to_owned(), "2.0 GB".to_owned()));
     }
 
+    /// Eight processes run under a limit what one refuses.
+    #[test]
+    fn processes_that_share_a_case_need_less_each() {
+        let toml = "name = \"many\"\ndimension = 3\nparticles = [{ position = [0.5, 0.5, 0.5], radius = 0.05 }]\n\
+                    [time]\nstep = 0.1\nend = 0.1\n[flow]\nformulation = \"rigid-dofs\"\n\
+                    [flow.mesh]\nband = 40\n";
+        let case = Case::parse(toml, "many.toml").unwrap();
+        let bytes = |ranks| MeshEstimate::of_rank(&case, ranks).unwrap().bytes;
+        assert_eq!(bytes(1), MeshEstimate::of(&case).unwrap().bytes);
+        assert!(bytes(8) > bytes(1) / 8.0 && bytes(8) < 0.5 * bytes(1), "{} {}", bytes(8), bytes(1));
+        let limit = Some((0.5 * (bytes(1) + bytes(8))) as u64);
+        let check = |ranks| check_shared(&case, limit, Sharing { ranks, available: None });
+        assert!(check(8).is_ok());
+        let refused = check(1).unwrap_err();
+        assert!(!refused.to_string().contains("processes"), "{refused}");
+        let refused =
+            check_shared(&case, Some(1 << 20), Sharing { ranks: 8, available: Some(1 << 40) }).unwrap_err();
+        assert!(refused.to_string().contains("in each of 8 processes"), "{refused}");
+    }
+
     #[test]
     fn what_is_too_large_does_not_fit() {
         let estimate = |unknown_count: f64| MeshEstimate {
@@ -204,8 +250,9 @@ mod tests {
             unknown_count,
             bytes: 1e3 * unknown_count,
         };
-        assert!(fits(&estimate(1e6), Some(2_000_000_000)) && !fits(&estimate(1e6), Some(900_000_000)));
-        assert!(fits(&estimate(1e9), None) && !fits(&estimate(5e9), None));
-        assert!(!fits(&estimate(f64::INFINITY), Some(u64::MAX)));
+        assert!(fits(&estimate(1e6), 1, Some(2_000_000_000)) && !fits(&estimate(1e6), 1, Some(900_000_000)));
+        assert!(fits(&estimate(1e9), 1, None) && !fits(&estimate(5e9), 1, None));
+        assert!(fits(&estimate(5e9), 2, None), "each numbers its own");
+        assert!(!fits(&estimate(f64::INFINITY), 1, Some(u64::MAX)));
     }
 }

@@ -53,7 +53,8 @@ impl Manner {
         file: &Path,
     ) -> Result<Option<RunReport>, Failure> {
         let reporter = Reporter::new(&case.name, self.quiet || ranks.rank() > 0).verbose(self.verbose);
-        let outcome = gluey::run_shared(case, options, &reporter as &dyn Progress, ranks);
+        let options = RunOptions { memory_limit: self.memory_limit, ..options.clone() };
+        let outcome = gluey::run_shared(case, &options, &reporter as &dyn Progress, ranks);
         reporter.finish();
         outcome.map_err(|error| Failure::of_run(error, file))
     }

@@ -22,6 +22,10 @@ use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 const UNKNOWNS_PER_CELL: [f64; 2] = [11.0, 29.0];
 /// The program and its tables; unit: bytes.
 const PROGRAM: f64 = 16e6;
+/// The same of a process that shares a case over MPI.
+const PROGRAM_OF_RANK: f64 = 24e6;
+/// What an unknown takes there; unit: bytes.
+const OF_RANK: f64 = 500.0;
 /// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
 /// penalties; unit: bytes.
 const CUT_CELL: [f64; 2] = [40e3, 55e3];
@@ -43,13 +47,22 @@ impl MeshEstimate {
     /// The estimate for a checked case; `None` if its flow has no mesh. Takes as long as looking at each
     /// particle once per level.
     pub fn of(case: &Case) -> Option<Self> {
+        Self::of_rank(case, 1)
+    }
+
+    /// The same where several processes share the case: `bytes` are those of one of them.
+    pub fn of_rank(case: &Case, ranks: usize) -> Option<Self> {
         if case.flow.hydrodynamics != Hydrodynamics::Stokes {
             return None;
         }
         let tree = Tree::of(case)?;
         let cell_count = tree.cell_count(case);
         let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
-        Some(Self { cell_count, unknown_count, bytes: memory(case, &tree, (cell_count, unknown_count)) })
+        let bytes = match ranks {
+            0 | 1 => memory(case, &tree, (cell_count, unknown_count)),
+            _ => memory_of_rank(case.dimension, (cell_count, unknown_count), ranks as f64),
+        };
+        Some(Self { cell_count, unknown_count, bytes })
     }
 }
 
@@ -220,6 +233,14 @@ fn memory(case: &Case, tree: &Tree, counts: (f64, f64)) -> f64 {
         Formulation::Paper | Formulation::RigidDofs => 0.0,
     };
     PROGRAM + of_cuts + memory_of_solver(case, tree, counts)
+}
+
+/// Memory of one of the processes that share a case, in bytes (measured: see `docs/ranks.md`). Each holds
+/// its cells and those around them, as many as the surface of a cube of them has.
+fn memory_of_rank(dimension: usize, (cell_count, unknown_count): (f64, f64), ranks: f64) -> f64 {
+    let side = (cell_count / ranks).powf(1.0 / dimension as f64);
+    let with_ghosts = (1.0 + 2.0 / side).powi(dimension as i32);
+    PROGRAM_OF_RANK + OF_RANK * unknown_count / ranks * with_ghosts
 }
 
 fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64)) -> f64 {

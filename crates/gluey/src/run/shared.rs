@@ -9,6 +9,7 @@ use super::{Run, RunError, RunOptions, claim_outputs, leftovers, logged, occupie
 use crate::case::{Case, Formulation, Hydrodynamics, OutputKind, Solver};
 use crate::flow::{FlowError, refinement, tree};
 use crate::hydrodynamics::HydrodynamicsError;
+use crate::memory::{Sharing, available};
 use crate::progress::Progress;
 use crate::report::RunReport;
 
@@ -25,6 +26,7 @@ pub fn run_shared(
 ) -> Result<Option<RunReport>, RunError> {
     case.check()?;
     check(case, options)?;
+    crate::memory::check_shared(case, options.memory_limit, sharing(ranks))?;
     match case.dimension {
         2 => run_beside::<2>(case, options, progress, ranks),
         _ => run_beside::<3>(case, options, progress, ranks),
@@ -52,6 +54,18 @@ where
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
     logged(case, options, progress, |log| Run::start(case, options, log, leader)?.finish()).map(Some)
+}
+
+/// How many ranks there are, and what memory there is for each: those on one machine, by its name, share what
+/// is left there. All of them come to the same answer.
+fn sharing(ranks: &dyn Communicator) -> Sharing {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let machine = name.bytes().fold(0u64, |hash, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)));
+    let machines = ranks.all_gather(&[machine]);
+    let here = machines.into_iter().filter(|&other| other == machine).count() as u64;
+    let own = available().map_or(u64::MAX, |bytes| bytes / here);
+    let least = ranks.all_gather(&[own]).into_iter().min();
+    Sharing { ranks: ranks.size(), available: least.filter(|&bytes| bytes < u64::MAX) }
 }
 
 /// Refuses what ranks cannot share.
