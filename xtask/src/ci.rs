@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::python::{self, PythonError};
+use crate::test_mpi::{self, MpiError};
 
 /// A step that did not pass.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +23,9 @@ pub enum CiError {
     /// The Python package does not pass.
     #[error(transparent)]
     Python(PythonError),
+    /// What ranks share does not pass under MPI.
+    #[error(transparent)]
+    Mpi(MpiError),
 }
 
 /// A command of cargo, or of another program that may be missing.
@@ -78,11 +82,13 @@ impl Step {
 }
 
 /// Spelling, formatting, lints, documentation, features, packages, the tests, of which tidy is one, those of
-/// the Python package, a quick verification and a quick reproduction; stops at the first failure.
+/// the Python package and those of ranks under MPI, a quick verification and a quick reproduction; stops at
+/// the first failure.
 pub fn run(root: &Path) -> Result<(), CiError> {
     check_spelling(root)?;
     STEPS.iter().try_for_each(|step| step.run(root))?;
     check_python(root)?;
+    check_mpi(root)?;
     LATER_STEPS.iter().try_for_each(|step| step.run(root))
 }
 
@@ -94,6 +100,17 @@ fn check_python(root: &Path) -> Result<(), CiError> {
             Ok(())
         }
         other => other.map_err(CiError::Python),
+    }
+}
+
+/// Flows and cases on several processes, where MPI is there; says so where it is not.
+fn check_mpi(root: &Path) -> Result<(), CiError> {
+    match test_mpi::run(root) {
+        Err(missing @ MpiError::Missing(_)) => {
+            eprintln!("nothing is tested under MPI: {missing}");
+            Ok(())
+        }
+        other => other.map_err(CiError::Mpi),
     }
 }
 

@@ -45,7 +45,7 @@ band = 1
 /// Its trajectory.
 const TRAJECTORY: &str = "near-gluey-rigid-dofs.csv";
 /// Largest difference of the numbers in it from those of one process.
-const LIMIT: f64 = 1e-9;
+const LIMIT: f64 = 1e-11;
 /// Its checkpoint.
 const CHECKPOINT: &str = "near-gluey-rigid-dofs.checkpoint";
 /// A key that makes the run longer.
@@ -54,6 +54,10 @@ const LONG: &str = "time.end=2";
 const LOSING: &str = "3";
 /// What is said of a case that ranks cannot share.
 const REFUSAL: &str = "several ranks cannot share a formulation other than rigid-dofs";
+/// A limit of memory in gigabytes that one process refuses the case under, and eight do not.
+const LIMIT_OF_MEMORY: &str = "0.043";
+/// What is said of a case that needs more.
+const TOO_LARGE: &str = "the limit is";
 /// How long the others may go on.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// What to install where something is missing.
@@ -139,6 +143,7 @@ pub fn run(root: &Path) -> Result<(), MpiError> {
     let case = Case { launcher, root: root.to_owned() };
     case.compare()?;
     case.refuse()?;
+    case.share_memory()?;
     case.lose_a_rank()
 }
 
@@ -203,6 +208,27 @@ impl Case {
             return Err(MpiError::Unnoticed(said, text));
         }
         println!("a case that ranks cannot share is refused");
+        Ok(())
+    }
+
+    /// Eight processes run under a limit of memory what one refuses.
+    fn share_memory(&self) -> Result<(), MpiError> {
+        let within = |ranks: &'static str| {
+            let mut command = self.command(ranks, "flow.mesh.cells_per_radius=3.2")?;
+            command.args(["--set", "time.end=0.1", "--memory-limit", LIMIT_OF_MEMORY]);
+            let output = outcome(&mut command)?;
+            let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            Ok((words(&command), output.status.success(), text))
+        };
+        let (said, was_run, text) = within("1")?;
+        if was_run || !text.contains(TOO_LARGE) {
+            return Err(MpiError::Unnoticed(said, text));
+        }
+        let (command, was_run, text) = within("8")?;
+        if !was_run {
+            return Err(MpiError::Run { command, text });
+        }
+        println!("8 ranks run under a limit of {LIMIT_OF_MEMORY} GB what one refuses");
         Ok(())
     }
 
