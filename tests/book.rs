@@ -10,8 +10,9 @@ use gluey::Case;
 use pulldown_cmark::{CodeBlockKind, Event, Parser, Tag, TagEnd};
 use tempfile::TempDir;
 
-/// What may stand in a block and is no code: formulas in letters, and drawings of how parts hang together.
-const NOT_CODE: [&str; 2] = ["formula", "diagram"];
+/// What may stand in a block and is not executed: formulas in letters, drawings of how parts hang together, and
+/// what only a cluster can run (modules, containers, batch scripts).
+const NOT_CODE: [&str; 3] = ["formula", "diagram", "cluster"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")

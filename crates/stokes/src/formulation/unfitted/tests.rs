@@ -271,7 +271,7 @@ where
 }
 
 /// All cells in the slab between flats that face each other have roots and moderate eigenvalues, whatever its
-/// direction: 78 is the largest.
+/// direction: 95 is the largest.
 fn slabs_are_resolved<const D: usize>(level: u8, radius: f64, count: usize)
 where
     Dim<D>: Space<D>,
@@ -283,7 +283,7 @@ where
         for width in [1.0, 1.5] {
             let largest = penalty_around_slab(level, [middle, normal.normalize()], radius, width).unwrap();
             let largest = largest / PENALTY;
-            assert!(largest < 88.0, "{D}D, {k}: {largest}");
+            assert!(largest < 108.0, "{D}D, {k}: {largest}");
         }
     }
 }
