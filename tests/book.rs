@@ -10,8 +10,8 @@ use gluey::Case;
 use pulldown_cmark::{CodeBlockKind, Event, Parser, Tag, TagEnd};
 use tempfile::TempDir;
 
-/// What may stand in a block and is not executed: formulas in letters, drawings of how parts hang together, and
-/// what only a cluster can run (modules, containers, batch scripts).
+/// What may stand in a block and is not executed: formulas in letters, drawings of how parts hang together,
+/// and what only a cluster can run (modules, containers, batch scripts).
 const NOT_CODE: [&str; 3] = ["formula", "diagram", "cluster"];
 
 fn root() -> PathBuf {

@@ -20,11 +20,11 @@ const INVERSE_STEPS: usize = 2;
 const SWEEPS: usize = 6;
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// The largest `x.A x / x.B x`, `B` being positive definite, to six digits, or five where the start vector is
-/// used up: Lanczos' method for `B^-1 A` in the scalar product of `B` (Golub and Van Loan 2013, section 10.1).
-/// Directions lose their orthogonality, which repeats eigenvalues and adds none. `B` multiplies every vector:
-/// with products that follow the recurrence of the vectors, rounding in directions without energy would pass
-/// for a ratio. `B` is overwritten.
+/// The largest `x.A x / x.B x`, `B` being positive definite, to six digits, or five where the start vector
+/// is used up: Lanczos' method for `B^-1 A` in the scalar product of `B` (Golub and Van Loan 2013, section
+/// 10.1). Directions lose their orthogonality, which repeats eigenvalues and adds none. `B` multiplies every
+/// vector: with products that follow the recurrence of the vectors, rounding in directions without energy
+/// would pass for a ratio. `B` is overwritten.
 ///
 /// # Errors
 /// If `B` is not positive definite.
