@@ -9,7 +9,7 @@ fn case(text: &str) -> Case {
     Case::parse(text, "case.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The pair of pair-2d in a periodic box, moved along x.
+/// The pair of pair-2d in a periodic box, moved along x; soft near contact, so that there is some.
 fn pair(shift: f64, strategy: &str) -> Case {
     let x = [0.451, 0.549].map(|x: f64| (x + shift).rem_euclid(1.0));
     case(&format!(
@@ -20,6 +20,7 @@ domain.boundary = "periodic"
 particles = [{{ position = [{}, 0.51], radius = 0.05 }}, {{ position = [{}, 0.49], radius = 0.05 }}]
 time = {{ step = 0.025, end = 0.75 }}
 contact = {{ strategy = "{strategy}", exact_gap = true }}
+flow.formulation = "paper"
 "#,
         x[0], x[1]
     ))
@@ -35,7 +36,7 @@ domain.boundary = "periodic"
 particles = [{{ position = [0.5, 0.0501], radius = 0.05 }}, {{ position = [0.425, 0.1165], radius = 0.05 }}]
 time = {{ step = 0.05, end = 2.0 }}
 contact = {{ strategy = "{strategy}", exact_gap = true }}
-flow.paper.viscosity_ratio = 100.0
+flow.formulation = "paper"
 "#
     ))
 }

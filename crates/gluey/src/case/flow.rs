@@ -12,7 +12,7 @@ use super::names::{Formulation, Hydrodynamics, Lubrication, ParticleVelocity, So
 pub struct FlowSpec {
     /// Who predicts the velocities. Default: "stokes".
     pub hydrodynamics: Hydrodynamics,
-    /// How rigidity enters. Default: "paper".
+    /// How rigidity enters. Default: "unfitted".
     pub formulation: Formulation,
     /// What acts in films that are too thin for the mesh. Default: "deficit" in `unfitted`, "none"
     /// elsewhere.

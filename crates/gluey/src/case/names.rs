@@ -90,11 +90,11 @@ named! {
     /// How rigidity of the particles enters the flow equations.
     Formulation, "formulation" {
         /// Viscosity ratio and Uzawa multiplier, as in the paper: soft near contact.
-        #[default]
         Paper = "paper",
         /// Velocity nodes inside particles take part in their rigid motion exactly.
         RigidDofs = "rigid-dofs",
         /// The fluid ends at the true surfaces, wherever these cut the mesh.
+        #[default]
         Unfitted = "unfitted",
     }
 }
