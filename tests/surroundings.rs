@@ -119,6 +119,30 @@ fn a_particle_that_leaves_the_box_leaves_a_checkpoint() {
     assert_eq!(std::fs::read_to_string(csv).expect("a trajectory"), rows);
 }
 
+/// Where the flow comes in through a side, a disc that nearly touches it moves in with the flow, in any step.
+#[test]
+fn open_sides_hold_nothing() {
+    let moved = |step: f64| {
+        let text = format!(
+            r#"
+name = "entering"
+dimension = 2
+particles = [{{ position = [0.11217, 0.88], radius = 0.112 }}]
+time = {{ step = {step}, end = 0.01 }}
+contact.strategy = "none"
+flow = {{ formulation = "unfitted", mesh.cells_per_radius = 3.2 }}
+"#
+        );
+        let folder = TempDir::new().expect("a folder");
+        run_in(&case(&text), folder.path()).unwrap_or_else(|error| panic!("{error}"));
+        let places = columns(folder.path(), "x1");
+        places[places.len() - 1][0] - places[0][0]
+    };
+    let [coarse, fine] = [0.01, 0.001].map(moved);
+    assert!((fine / 0.01 - 0.38).abs() < 0.02, "{fine}");
+    assert!((coarse / fine - 1.0).abs() < 0.03, "{coarse} {fine}");
+}
+
 #[test]
 fn particles_that_overlap_across_the_border_are_refused() {
     let text = |boundary: &str| {

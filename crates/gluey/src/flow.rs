@@ -19,7 +19,7 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement};
+use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, Partner, PhaseTimes, Refinement};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Lubrication};
@@ -253,6 +253,13 @@ where
     }
 }
 
+/// Whether a film lies at a side through which the undisturbed flow goes, which is along x. The fluid there
+/// moves along the normal and a particle with it, whatever the resistance: such a gap is no measure of a
+/// force.
+fn is_at_open_side<const D: usize>(film: &gluey_stokes::Film<D>) -> bool {
+    matches!(film.partner, Partner::Wall { axis: 0, .. })
+}
+
 impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
 where
     Dim<D>: Space<D>,
@@ -346,7 +353,8 @@ where
         if !self.keeps_films_open {
             return Vec::new();
         }
-        let films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
+        let mut films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
+        films.retain(|film| !is_at_open_side(film));
         let film = |film: gluey_stokes::Film<D>| Film {
             first: film.body as usize,
             second: film.side(1),
