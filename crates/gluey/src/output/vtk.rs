@@ -8,10 +8,13 @@
 //! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
 //! nothing touches).
 //!
+//! Where ranks share the flow, each has its cells in a file of its own, and `.pvtu` files name those of a step.
+//!
 //! In periodic boxes particles are where the fields are, in the box, and images that reach into it follow
 //! them, so that pictures are whole.
 
 mod background;
+mod pieces;
 mod read;
 mod shown;
 mod xml;
@@ -22,10 +25,11 @@ use gluey_contact::{Contact, Domain, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
 
-use super::{OutputError, prepare_folder_of, pvd, write_atomically};
+use super::{OutputError, prepare_folder_of, pvd, remove_stale};
 
 pub use crate::case::Precision;
 pub(crate) use background::FrameWriter;
+pub use pieces::write_piece;
 pub use read::{VtkReadError, read_fields, read_particles};
 pub use shown::ShownBox;
 use shown::{Shown, shown};
@@ -42,6 +46,9 @@ const HEXAHEDRON_ORDER: [usize; 27] =
 
 /// What rounding may do to a place, relative to the distance of centres.
 const ROUNDING: f64 = 1e-6;
+
+/// The series of the fields.
+const FIELDS: &str = "fields";
 
 /// Particles, contacts and fields at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -79,6 +86,8 @@ pub struct VtkWriter {
 #[derive(Debug)]
 struct Series {
     name: &'static str,
+    /// How many files a step has, of which this writer writes the first; none for one file.
+    pieces: Option<usize>,
     entries: Vec<(f64, String)>,
 }
 
@@ -87,9 +96,11 @@ impl VtkWriter {
     /// time)`, those with a file in the folder stay in the collections.
     pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, OutputError> {
         prepare_folder_of(&folder.join("fields.pvd"))?;
-        let series = ["fields", "particles", "contacts"].map(|name| {
-            let entries = done.iter().map(|&(step, time)| (time, file_name(name, step)));
-            Series { name, entries: entries.filter(|(_, file)| folder.join(file).is_file()).collect() }
+        let series = [FIELDS, "particles", "contacts"].map(|name| {
+            let files = |step| [file_name(name, step), pieces::index_name(name, step)];
+            let there = |step| files(step).into_iter().find(|file| folder.join(file).is_file());
+            let entries = done.iter().filter_map(|&(step, time)| Some((time, there(step)?)));
+            Series { name, pieces: None, entries: entries.collect() }
         });
         Ok(Self { folder: folder.to_owned(), encoding: VtkEncoding::default(), series })
     }
@@ -97,6 +108,14 @@ impl VtkWriter {
     /// The same with other numbers in the files.
     pub fn encoded(mut self, encoding: VtkEncoding) -> Self {
         self.encoding = encoding;
+        self
+    }
+
+    /// The same where fields come in so many pieces, of which frames have the first. The others have to be
+    /// there ([`write_piece`]) when a frame is written.
+    pub fn in_pieces(mut self, count: usize) -> Self {
+        let fields = self.series.iter_mut().filter(|series| series.name == FIELDS);
+        fields.for_each(|series| series.pieces = Some(count));
         self
     }
 
@@ -129,11 +148,19 @@ impl Series {
         piece: Piece,
         encoding: VtkEncoding,
     ) -> Result<(), OutputError> {
-        let file = file_name(self.name, step);
-        let path = folder.join(&file);
-        let text = xml::document(piece, encoding);
-        let text = text.map_err(|error| OutputError::new(&path, "encode the file", error))?;
-        write_atomically(&path, text.as_bytes())?;
+        let (whole, index) = (file_name(self.name, step), pieces::index_name(self.name, step));
+        // A run that was resumed may have written the step in the other way before.
+        let (file, other) = match self.pieces {
+            None => {
+                pieces::write_document(&folder.join(&whole), piece, encoding)?;
+                (whole, index)
+            }
+            Some(count) => {
+                pieces::write_first(folder, (self.name, step, count), piece, encoding)?;
+                (index, whole)
+            }
+        };
+        remove_stale(&folder.join(other))?;
         self.entries.push((time, file));
         pvd::write(&folder.join(format!("{}.pvd", self.name)), &self.entries)
     }

@@ -62,8 +62,9 @@ pub(super) struct Piece {
 
 /// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in
 /// blocks, since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears
-/// 32 kB.
+/// 32 kB. What is empty stays as it is: vtkio does not read arrays of no block.
 pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+    let compression = if piece.points.is_empty() { 0 } else { encoding.compression };
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
         title: String::new(),
@@ -74,14 +75,14 @@ pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String
     let mut bytes = Vec::new();
     vtk.try_into_xml_format(Compressor::None, 0)
         .and_then(|mut file| {
-            if encoding.compression > 0 {
+            if compression > 0 {
                 file.compressor = Compressor::ZLib;
             }
             file.write(&mut bytes)
         })
         .map_err(|error| io::Error::other(error.to_string()))?;
     let text = String::from_utf8(bytes).map_err(io::Error::other)?;
-    match encoding.compression {
+    match compression {
         0 => Ok(signed_indices(&text)),
         level => compressed_arrays(&signed_indices(&text), level.min(9)),
     }
