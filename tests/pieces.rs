@@ -89,8 +89,8 @@ fn cells<const D: usize>(fields: &Fields<D>) -> BTreeMap<Vec<u64>, &[u32]> {
 const SKIN: f64 = 0.01;
 
 /// Largest differences at the points of the same cells: of velocities and pressures over the largest of them,
-/// of level sets. Pressures may differ by a constant, which comes last: the solver of one process keeps that of
-/// the step before.
+/// of level sets. Pressures may differ by a constant, which comes last: the solver of one process keeps that
+/// of the step before.
 fn differences<const D: usize>(one: &Fields<D>, other: &Fields<D>) -> [f64; 4] {
     let (cells_of_one, cells_of_other) = (cells(one), cells(other));
     assert!(cells_of_one.keys().eq(cells_of_other.keys()), "the same cells");

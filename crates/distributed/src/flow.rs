@@ -138,7 +138,8 @@ where
     pub points: Vec<Vector<D>>,
     /// Velocities at them.
     pub velocity: Vec<Vector<D>>,
-    /// Pressures at the pressure nodes, without the mean of the unknown ones; zero where bodies are all around.
+    /// Pressures at the pressure nodes, without the mean of the unknown ones; zero where bodies are all
+    /// around.
     pub pressure: Vec<f64>,
     /// Velocity and spin of each body, the same on all ranks.
     pub twists: Vec<Twist<D>>,
@@ -163,9 +164,9 @@ impl<const D: usize> MyFlow<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The fields in the cells of the rank, around the bodies of the flow: cells of all ranks, in their order,
-    /// are those of the serial solver, each once. Points on borders are points of every rank that has a cell
-    /// there.
+    /// The fields in the cells of the rank, around the bodies of the flow: cells of all ranks, in their
+    /// order, are those of the serial solver, each once. Points on borders are points of every rank that has
+    /// a cell there.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         self.cells.fields(balls)
     }

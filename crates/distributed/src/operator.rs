@@ -88,8 +88,8 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
         b.iter_mut().zip(y).for_each(|(b, y)| *b -= y);
     }
 
-    /// Values of `lift + T x` at all nodes of the part, of which those of other ranks' cells may be wrong, all
-    /// own twists, and the pressures, as the velocities.
+    /// Values of `lift + T x` at all nodes of the part, right at those of own cells, all own twists, and the
+    /// pressures, as the velocities.
     pub fn nodal_values(&mut self, lift: &[f64], x: &[f64]) -> [Vec<f64>; 3] {
         let Self { ranks, space, pressures, wide, .. } = self;
         wide.fill(*ranks, space, pressures, x);

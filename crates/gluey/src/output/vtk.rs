@@ -8,12 +8,14 @@
 //! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
 //! nothing touches).
 //!
-//! Where ranks share the flow, each has its cells in a file of its own, and `.pvtu` files name those of a step.
+//! Where ranks share the flow, each has its cells in a file of its own, and `.pvtu` files name those of a
+//! step.
 //!
 //! In periodic boxes particles are where the fields are, in the box, and images that reach into it follow
 //! them, so that pictures are whole.
 
 mod background;
+mod grid;
 mod pieces;
 mod read;
 mod shown;
@@ -29,6 +31,7 @@ use super::{OutputError, prepare_folder_of, pvd, remove_stale};
 
 pub use crate::case::Precision;
 pub(crate) use background::FrameWriter;
+use grid::{FIELDS, fields_piece, in_space, scalars, vectors};
 pub use pieces::write_piece;
 pub use read::{VtkReadError, read_fields, read_particles};
 pub use shown::ShownBox;
@@ -37,18 +40,8 @@ use vtkio::model::CellType;
 pub use xml::VtkEncoding;
 use xml::{Array, Piece};
 
-/// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's
-/// order: corners, edges, centre.
-const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
-/// The same for a triquadratic hexahedron (type 29): corners, edges, faces -x +x -y +y -z +z, centre.
-const HEXAHEDRON_ORDER: [usize; 27] =
-    [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
-
 /// What rounding may do to a place, relative to the distance of centres.
 const ROUNDING: f64 = 1e-6;
-
-/// The series of the fields.
-const FIELDS: &str = "fields";
 
 /// Particles, contacts and fields at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -152,7 +145,7 @@ impl Series {
         // A run that was resumed may have written the step in the other way before.
         let (file, other) = match self.pieces {
             None => {
-                pieces::write_document(&folder.join(&whole), piece, encoding)?;
+                xml::write(&folder.join(&whole), piece, encoding)?;
                 (whole, index)
             }
             Some(count) => {
@@ -168,29 +161,6 @@ impl Series {
 
 fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
-}
-
-fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
-    let (order, cell_type): (&[usize], _) = match D {
-        2 => (&QUAD_ORDER, CellType::BiquadraticQuad),
-        _ => (&HEXAHEDRON_ORDER, CellType::TriquadraticHexahedron),
-    };
-    let cells = fields.cells.chunks_exact(order.len());
-    let count = cells.len();
-    Piece {
-        points: in_space(&fields.points),
-        connectivity: cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect(),
-        offsets: (1..=count).map(|cell| (cell * order.len()) as u64).collect(),
-        types: vec![cell_type; count],
-        of_points: vec![
-            vectors("velocity", &fields.velocity),
-            scalars("pressure", fields.pressure.clone()),
-            scalars("viscosity", fields.viscosity.clone()),
-            scalars("level_set", fields.level_set.clone()),
-            vectors("lambda", &fields.multiplier),
-        ],
-        of_cells: Vec::new(),
-    }
 }
 
 fn particles_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
@@ -265,19 +235,6 @@ where
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
     Piece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
-}
-
-fn scalars(name: &'static str, values: Vec<f64>) -> Array {
-    Array { name, components: 1, values }
-}
-
-fn vectors<const D: usize>(name: &'static str, values: &[Vector<D>]) -> Array {
-    Array { name, components: 3, values: in_space(values) }
-}
-
-/// VTK's vectors have three components.
-fn in_space<const D: usize>(vectors: &[Vector<D>]) -> Vec<f64> {
-    vectors.iter().flat_map(|v| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)]).collect()
 }
 
 /// A plane spin turns about z.

@@ -2,13 +2,12 @@
 //! section "Parallel XML file formats"), which vtkio reads and does not write.
 
 use std::fmt::Write;
-use std::io;
 use std::path::Path;
 
 use gluey_motion::Fields;
 
+use super::grid::{FIELDS, fields_piece};
 use super::xml::{self, Piece, VtkEncoding};
-use super::{FIELDS, fields_piece};
 use crate::case::Precision;
 use crate::output::{OutputError, write_atomically};
 
@@ -19,7 +18,7 @@ pub fn write_piece<const D: usize>(
     fields: &Fields<D>,
     encoding: VtkEncoding,
 ) -> Result<(), OutputError> {
-    write_document(&folder.join(piece_name(FIELDS, step, rank)), fields_piece(fields), encoding)
+    xml::write(&folder.join(piece_name(FIELDS, step, rank)), fields_piece(fields), encoding)
 }
 
 /// Writes the piece of rank zero and, when those of all others are there, the file that names all `count`.
@@ -31,15 +30,8 @@ pub(super) fn write_first(
 ) -> Result<(), OutputError> {
     let names: Vec<String> = (0..count).map(|rank| piece_name(series, step, rank)).collect();
     let index = index(&piece, encoding.precision, &names);
-    write_document(&folder.join(piece_name(series, step, 0)), piece, encoding)?;
+    xml::write(&folder.join(piece_name(series, step, 0)), piece, encoding)?;
     write_atomically(&folder.join(index_name(series, step)), index.as_bytes())
-}
-
-/// Writes a piece, whole or not at all.
-pub(super) fn write_document(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), OutputError> {
-    let text = xml::document(piece, encoding);
-    let text = text.map_err(|error: io::Error| OutputError::new(path, "encode the file", error))?;
-    write_atomically(path, text.as_bytes())
 }
 
 fn piece_name(series: &str, step: usize, rank: usize) -> String {

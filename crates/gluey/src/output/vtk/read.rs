@@ -8,7 +8,7 @@ use thiserror::Error;
 use vtkio::Vtk;
 use vtkio::model::{Attribute, DataSet, Piece, UnstructuredGridPiece};
 
-use super::{HEXAHEDRON_ORDER, QUAD_ORDER};
+use super::grid::{HEXAHEDRON_ORDER, QUAD_ORDER};
 
 /// A file could not be read back.
 #[derive(Debug, Error)]

@@ -5,6 +5,7 @@
 //! they are compressed.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use base64::engine::{Engine, general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
@@ -17,6 +18,7 @@ use vtkio::model::{
 use vtkio::xml::Compressor;
 
 use crate::case::Precision;
+use crate::output::{OutputError, write_atomically};
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
@@ -60,10 +62,17 @@ pub(super) struct Piece {
     pub of_cells: Vec<Array>,
 }
 
-/// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in
+/// Writes the file that holds `piece`, whole or not at all.
+pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), OutputError> {
+    let text = document(piece, encoding);
+    let text = text.map_err(|error| OutputError::new(path, "encode the file", error))?;
+    write_atomically(path, text.as_bytes())
+}
+
+/// The text of that file. vtkio writes it, without compression; the arrays are compressed afterwards in
 /// blocks, since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears
 /// 32 kB. What is empty stays as it is: vtkio does not read arrays of no block.
-pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
     let compression = if piece.points.is_empty() { 0 } else { encoding.compression };
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
