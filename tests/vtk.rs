@@ -158,6 +158,8 @@ fn fields_in_pieces() {
     assert_eq!(files(), [&pieces[..], &["fields-000040.pvtu", "fields.pvd"]].concat());
     assert!(listed().contains("timestep=\"1\" part=\"0\" file=\"fields-000040.pvtu\""), "{}", listed());
 
+    let empty = fs::read_to_string(folder.path().join(pieces[2])).expect("a file");
+    assert!(empty.contains("<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">"), "VTK wants both: {empty}");
     let joined = read_fields::<2>(&folder.path().join("fields-000040.pvtu")).expect("what was written");
     assert_eq!(joined.cells, (0..18).collect::<Vec<_>>());
     assert_eq!(joined.points, [&one.points[..], &other.points].concat());

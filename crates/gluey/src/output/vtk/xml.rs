@@ -91,9 +91,10 @@ fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
         })
         .map_err(|error| io::Error::other(error.to_string()))?;
     let text = String::from_utf8(bytes).map_err(io::Error::other)?;
+    let text = counted(&signed_indices(&text));
     match compression {
-        0 => Ok(signed_indices(&text)),
-        level => compressed_arrays(&signed_indices(&text), level.min(9)),
+        0 => Ok(text),
+        level => compressed_arrays(&text, level.min(9)),
     }
 }
 
@@ -127,6 +128,11 @@ fn reals(values: Vec<f64>, precision: Precision) -> IOBuffer {
 /// `<`.
 fn signed_indices(text: &str) -> String {
     text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
+}
+
+/// vtkio leaves out numbers of points and cells that are zero, and VTK breaks off without them.
+fn counted(text: &str) -> String {
+    text.replace("<Piece>", "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">")
 }
 
 /// The same file with its arrays compressed: base64 of the size in 8 bytes and the data, as vtkio wrote it,
