@@ -192,10 +192,12 @@ impl Case {
     }
 
     fn command(&self, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
-        self.command_into(&self.folder(), ranks, key)
+        let mut command = self.command_into(&self.folder(), ranks, key)?;
+        command.arg("--force");
+        Ok(command)
     }
 
-    /// The same with another folder for the results.
+    /// The same with another folder for the results, where there are none.
     fn command_into(&self, out: &Path, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
         let (program, folder) = (self.root.join("target/release/gluey"), self.folder());
         let file = folder.join("near.toml");
@@ -203,7 +205,7 @@ impl Case {
             .and_then(|()| std::fs::write(&file, CASE))
             .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })?;
         let (file, out) = (file.display(), out.display());
-        let words = format!("run {file} --quiet --force --threads 1 --out {out} --set {key}");
+        let words = format!("run {file} --quiet --threads 1 --out {out} --set {key}");
         Ok(self.launcher.command(ranks, &program, &words))
     }
 
