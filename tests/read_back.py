@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Reads the files that `gluey run CASE.toml --vtk N` writes with meshio, as a second opinion on their format.
+"""Reads the files that `gluey run CASE.toml --vtk N` writes with meshio and VTK, as second opinions on their format.
 
-    pip install meshio
+    pip install meshio vtk
     python3 tests/read_back.py out/pair-2d-gluey-vtk
 
-Prints what each file holds; exits non-zero at the first thing that is not as it should be.
+Fields in pieces, which runs on several ranks write, are read by VTK through the file that names them, and one by one
+by meshio. Prints what each file holds; exits non-zero at the first thing that is not as it should be.
 """
 
 import sys
@@ -13,6 +14,8 @@ from pathlib import Path
 
 import meshio
 import numpy
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOXML import vtkXMLPUnstructuredGridReader, vtkXMLUnstructuredGridReader
 
 FIELDS = {"velocity": 3, "pressure": 1, "viscosity": 1, "level_set": 1, "lambda": 3}
 PARTICLES = {"radius": 1, "velocity": 3, "spin": 3, "particle": 1, "image": 1, "unwrapped": 3}
@@ -59,15 +62,66 @@ def check_contacts(mesh):
 CHECKS = {"fields": check_fields, "particles": check_particles, "contacts": check_contacts}
 
 
+def read_by_vtk(file):
+    """Points, nodes cell by cell and arrays of points as VTK finds them."""
+    reader = vtkXMLPUnstructuredGridReader() if file.suffix == ".pvtu" else vtkXMLUnstructuredGridReader()
+    complaints = []
+    reader.AddObserver("ErrorEvent", lambda *_: complaints.append(file))
+    reader.AddObserver("WarningEvent", lambda *_: complaints.append(file))
+    reader.SetFileName(str(file))
+    reader.Update()
+    assert not complaints, f"VTK does not like {file}"
+    grid = reader.GetOutput()
+    nodes = vtk_to_numpy(grid.GetCells().GetConnectivityArray())
+    points = vtk_to_numpy(grid.GetPoints().GetData()) if grid.GetNumberOfPoints() else numpy.zeros((0, 3))
+    data = grid.GetPointData()
+    arrays = {data.GetArrayName(k): vtk_to_numpy(data.GetArray(k)) for k in range(data.GetNumberOfArrays())}
+    return points, nodes, grid.GetNumberOfCells(), arrays
+
+
+def check_pieces(index):
+    """Pieces hold what VTK finds through their index, and their cells fill the box once. Returns what to print."""
+    names = [piece.get("Source") for piece in xml.parse(index).iter("Piece")]
+    written = sorted(file.name for file in index.parent.glob(f"{index.stem}-*.vtu"))
+    assert names == written, f"{index} names {names} of {written}"
+    points, nodes, cell_count, arrays = read_by_vtk(index)
+    check_arrays(arrays, FIELDS, len(points))
+    read, pieces = [read_by_vtk(index.with_name(name)) for name in names], []
+    for name, (_, _, count, _) in zip(names, read):
+        if count > 0:
+            pieces.append(meshio.read(index.with_name(name)))
+            check_fields(pieces[-1])
+    assert sum(piece[2] for piece in read) == cell_count, "cells of the pieces"
+    assert numpy.array_equal(numpy.concatenate([piece.points for piece in pieces]), points), "places by meshio"
+    for array, values in arrays.items():
+        by_meshio = numpy.concatenate([piece.point_data[array] for piece in pieces])
+        assert numpy.array_equal(by_meshio.reshape(len(points), -1), values.reshape(len(points), -1)), array
+    corners = points[nodes.reshape(cell_count, -1)]
+    sizes = corners.max(axis=1) - corners.min(axis=1)
+    box = points.max(axis=0) - points.min(axis=0)
+    used = box > 0
+    filled = sizes[:, used].prod(axis=1).sum() / box[used].prod()
+    assert abs(filled - 1.0) < 1e-6, f"cells fill the box {filled} times"
+    middles = 0.5 * (corners.max(axis=1) + corners.min(axis=1))
+    assert len(numpy.unique(numpy.round(middles, 9), axis=0)) == cell_count, "a cell is there twice"
+    return f"{len(names)} pieces, {len(points)} points, {cell_count} cells"
+
+
 def main(folder):
     collections = sorted(folder.glob("*.pvd"))
     assert collections, f"no .pvd file in {folder}"
     for collection in collections:
         for entry in xml.parse(collection).iter("DataSet"):
-            mesh = meshio.read(folder / entry.get("file"))
-            CHECKS[collection.stem](mesh)
-            cells = ", ".join(f"{len(block.data)} {block.type}" for block in mesh.cells)
-            print(f"t = {float(entry.get('timestep')):<8g} {entry.get('file')}: {len(mesh.points)} points, {cells}")
+            file = folder / entry.get("file")
+            if file.suffix == ".pvtu":
+                text = check_pieces(file)
+            else:
+                mesh = meshio.read(file)
+                CHECKS[collection.stem](mesh)
+                points, *_ = read_by_vtk(file)
+                assert numpy.array_equal(points, mesh.points), f"{file} by VTK"
+                text = f"{len(mesh.points)} points, " + ", ".join(f"{len(b.data)} {b.type}" for b in mesh.cells)
+            print(f"t = {float(entry.get('timestep')):<8g} {file.name}: {text}")
 
 
 if __name__ == "__main__":

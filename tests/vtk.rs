@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use gluey::output::vtk::{Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles};
+use gluey::output::vtk::{
+    Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles, write_piece,
+};
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
@@ -117,6 +119,66 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     let three = |v: &Vector<D>| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)];
     assert_eq!(numbers(data, "velocity"), fields.velocity.iter().flat_map(three).collect::<Vec<_>>());
     assert_eq!(numbers(data, "lambda"), fields.multiplier.iter().flat_map(three).collect::<Vec<_>>());
+}
+
+/// Pieces are read back one after the other, empty ones too. A step that was written in the other way before
+/// is replaced.
+#[test]
+fn fields_in_pieces() {
+    let folder = TempDir::new().expect("a folder");
+    let (one, mut other) = (one_cell::<2>(), one_cell::<2>());
+    other.points.iter_mut().for_each(|x| x[0] += 1.0);
+    let frame = Frame {
+        step: 40,
+        time: 1.0,
+        particles: &[],
+        twists: &[],
+        contacts: &[],
+        domain: &Domain::default(),
+        in_box: None,
+        fields: Some(&one),
+    };
+    let files = || {
+        let files =
+            fs::read_dir(folder.path()).expect("a folder").map(|file| file.expect("a file").file_name());
+        let names =
+            files.filter_map(|name| name.into_string().ok()).filter(|name| name.starts_with("fields"));
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    };
+    let listed = || fs::read_to_string(folder.path().join("fields.pvd")).expect("a collection");
+    let create = |done| VtkWriter::create(folder.path(), done).expect("a folder");
+    create(&[]).write(&frame).expect("files");
+    assert_eq!(files(), ["fields-000040.vtu", "fields.pvd"]);
+    write_piece(folder.path(), (40, 1), &other, VtkEncoding::default()).expect("a piece");
+    write_piece(folder.path(), (40, 2), &Fields::<2>::default(), VtkEncoding::default()).expect("no cells");
+    create(&[]).in_pieces(3).write(&frame).expect("files");
+    let pieces = ["fields-000040-0000.vtu", "fields-000040-0001.vtu", "fields-000040-0002.vtu"];
+    assert_eq!(files(), [&pieces[..], &["fields-000040.pvtu", "fields.pvd"]].concat());
+    assert!(listed().contains("timestep=\"1\" part=\"0\" file=\"fields-000040.pvtu\""), "{}", listed());
+
+    let empty = fs::read_to_string(folder.path().join(pieces[2])).expect("a file");
+    assert!(empty.contains("<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">"), "VTK wants both: {empty}");
+    let joined = read_fields::<2>(&folder.path().join("fields-000040.pvtu")).expect("what was written");
+    assert_eq!(joined.cells, (0..18).collect::<Vec<_>>());
+    assert_eq!(joined.points, [&one.points[..], &other.points].concat());
+    assert_eq!(joined.velocity, [&one.velocity[..], &other.velocity].concat());
+    assert_eq!(joined.pressure, [&one.pressure[..], &other.pressure].concat());
+    fs::remove_file(folder.path().join(pieces[1])).expect("a file");
+    let error = read_fields::<2>(&folder.path().join("fields-000040.pvtu")).expect_err("a piece is missing");
+    assert!(error.to_string().contains(pieces[1]), "{error}");
+
+    // A run that goes on finds the steps before, whoever wrote them.
+    create(&[(40, 1.0)]).write(&Frame { step: 41, time: 1.5, ..frame }).expect("files");
+    assert!(
+        listed().contains("fields-000040.pvtu") && listed().contains("fields-000041.vtu"),
+        "{}",
+        listed()
+    );
+    create(&[]).write(&frame).expect("files");
+    assert!(files().contains(&"fields-000040.vtu".to_owned()));
+    assert!(!files().contains(&"fields-000040.pvtu".to_owned()));
 }
 
 /// What is read back does not depend on the compression, and on the precision as far as it must.

@@ -50,6 +50,8 @@ const STEPS: &[Step] = &[
     // Two crates that are never published need one without a version.
     Step::new("package --workspace --exclude gluey-verify --exclude xtask --no-verify --allow-dirty"),
     Step::new("test --release --workspace"),
+    // What the feature of MPI builds on, with threads as ranks.
+    Step::new("test --release --workspace --features gluey/ranks --test pieces"),
 ];
 
 /// The last steps, which take longest. The verification fails where a number is beyond its limit, the

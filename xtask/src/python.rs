@@ -41,19 +41,50 @@ pub enum PythonError {
 pub fn run(root: &Path, python: Option<&Path>) -> Result<(), PythonError> {
     let python = find(python)?;
     let environment = root.join(ENVIRONMENT);
-    eprintln!("a fresh environment of {} in {}", python.display(), environment.display());
-    let mut make = Command::new(&python);
-    make.args(["-m", "venv", "--clear"]).arg(&environment);
-    if !outcome(&python, make.output())?.status.success() {
-        let text = format!("{} makes no environments: install its module venv", python.display());
-        return Err(PythonError::Missing(text));
-    }
-    let python = program_of(&environment);
+    let python = make(&python, &environment)?;
     check_index(root, &python)?;
     let package = format!("./{PACKAGE}[test]");
     step(root, &python, &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package])?;
     let cache = format!("cache_dir={}", environment.join("pytest").display());
     step(&root.join(PACKAGE), &python, &["-B", "-m", "pytest", "-o", &cache])
+}
+
+/// The interpreter of an environment in a folder of the workspace that has these packages; makes it if it is
+/// not there.
+///
+/// # Errors
+/// [`PythonError::Missing`] without Python or the packages.
+pub fn with_packages(root: &Path, folder: &str, packages: &[&str]) -> Result<PathBuf, PythonError> {
+    let environment = root.join(folder);
+    let python = program_of(&environment);
+    let import = format!("import {}", packages.join(", "));
+    let has_all = |python: &Path| {
+        let output = Command::new(python).args(["-c", &import]).output();
+        output.is_ok_and(|output| output.status.success())
+    };
+    if has_all(&python) {
+        return Ok(python);
+    }
+    let python = make(&find(None)?, &environment)?;
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(packages);
+    outcome(&python, install.output())?;
+    match has_all(&python) {
+        true => Ok(python),
+        false => Err(PythonError::Missing(format!("{} cannot be fetched", packages.join(" and ")))),
+    }
+}
+
+/// Makes a fresh environment; returns its interpreter.
+fn make(python: &Path, environment: &Path) -> Result<PathBuf, PythonError> {
+    eprintln!("a fresh environment of {} in {}", python.display(), environment.display());
+    let mut make = Command::new(python);
+    make.args(["-m", "venv", "--clear"]).arg(environment);
+    if !outcome(python, make.output())?.status.success() {
+        let text = format!("{} makes no environments: install its module venv", python.display());
+        return Err(PythonError::Missing(text));
+    }
+    Ok(program_of(environment))
 }
 
 /// The interpreter of an environment.

@@ -1,6 +1,8 @@
 //! `cargo xtask test-mpi`: what is there under MPI, as processes on this machine: the same bits as by
-//! threads, for several numbers of ranks; cases of `gluey run` as one process computes them, through contact;
-//! and an end for all when one rank fails or is killed.
+//! threads, for several numbers of ranks; cases of `gluey run` as one process computes them, through contact,
+//! and their frames; and an end for all when one rank fails or is killed.
+
+mod frames;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -142,6 +144,7 @@ pub fn run(root: &Path) -> Result<(), MpiError> {
     println!("a rank that fails ends all of 3 ranks, and says why");
     let case = Case { launcher, root: root.to_owned() };
     case.compare()?;
+    case.write_frames()?;
     case.refuse()?;
     case.share_memory()?;
     case.lose_a_rank()
@@ -189,13 +192,20 @@ impl Case {
     }
 
     fn command(&self, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
+        let mut command = self.command_into(&self.folder(), ranks, key)?;
+        command.arg("--force");
+        Ok(command)
+    }
+
+    /// The same with another folder for the results, where there are none.
+    fn command_into(&self, out: &Path, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
         let (program, folder) = (self.root.join("target/release/gluey"), self.folder());
         let file = folder.join("near.toml");
         std::fs::create_dir_all(&folder)
             .and_then(|()| std::fs::write(&file, CASE))
             .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })?;
-        let (file, folder) = (file.display(), folder.display());
-        let words = format!("run {file} --quiet --force --threads 1 --out {folder} --set {key}");
+        let (file, out) = (file.display(), out.display());
+        let words = format!("run {file} --quiet --threads 1 --out {out} --set {key}");
         Ok(self.launcher.command(ranks, &program, &words))
     }
 

@@ -7,13 +7,15 @@ use gluey_linalg::{
     BadDiagonal, BlockError, DirectError, Gcr, GcrParams, KrylovError, KrylovReport, LinOp, Reference,
     SparseError,
 };
+use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Traffic};
 use gluey_stokes::StokesError;
 
 use crate::bodies::{Shared, rigid};
+use crate::cells::MyCells;
 use crate::cycle::VCycle;
 use crate::operator::StokesOperator;
-use crate::precondition::{BlockTriangular, lumped_mass};
+use crate::precondition::BlockTriangular;
 use crate::pressures::SharedPressures;
 use crate::schur::SchurInverse;
 use crate::space::{LevelSpace, Plans};
@@ -136,7 +138,8 @@ where
     pub points: Vec<Vector<D>>,
     /// Velocities at them.
     pub velocity: Vec<Vector<D>>,
-    /// Pressures at the pressure nodes, without their mean; zero at hanging nodes and in bodies.
+    /// Pressures at the pressure nodes, without the mean of the unknown ones; zero where bodies are all
+    /// around.
     pub pressure: Vec<f64>,
     /// Velocity and spin of each body, the same on all ranks.
     pub twists: Vec<Twist<D>>,
@@ -154,6 +157,19 @@ where
     pub setup_traffic: Traffic,
     /// What it sent in the solve.
     pub solve_traffic: Traffic,
+    cells: MyCells<D>,
+}
+
+impl<const D: usize> MyFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The fields in the cells of the rank, around the bodies of the flow: cells of all ranks, in their
+    /// order, are those of the serial solver, each once. Points on borders are points of every rank that has
+    /// a cell there.
+    pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
+        self.cells.fields(balls)
+    }
 }
 
 impl BoxFlow {
@@ -202,7 +218,6 @@ impl BoxFlow {
         let pressures = SharedPressures::new(tree, &shared, &space);
         let levels = cycle.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plans));
         let levels = levels.collect();
-        let mass = lumped_mass(&space, &pressures, ranks);
         let schur = SchurInverse::new(tree, &shared, &space, &top.plans.nodes, &pressures, self.viscosity)?;
         let mut operator = StokesOperator::new(ranks, space, &top.plans, pressures.clone(), self.viscosity);
         let mut preconditioner = BlockTriangular::new(cycle, pressures, schur);
@@ -213,14 +228,15 @@ impl BoxFlow {
         let mut x = vec![0.0; b.len()];
         let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x)?;
         let solve_traffic = ranks.traffic().since(start).since(setup_traffic);
-        remove_mean(ranks, &mass, &mut x[operator.velocity_dim()..]);
+        let velocity_dim = operator.velocity_dim();
+        operator.pressures.remove_mean(ranks, &mut x[velocity_dim..]);
         let [velocity, twists, pressure] = operator.nodal_values(&lift, &x);
         let counts = counts_of_all(&operator.space, ranks);
         let reference = if report.reference_norm > 0.0 { report.reference_norm } else { 1.0 };
         Ok(MyFlow {
             points: points.owned.clone().map(|node| points.map.point(node)).collect(),
-            velocity: velocity.as_chunks::<D>().0.iter().map(|&u| u.into()).collect(),
-            pressure,
+            velocity: velocity.as_chunks::<D>().0[points.owned.clone()].iter().map(|&u| u.into()).collect(),
+            pressure: pressure[operator.space.pressure.owned.clone()].to_vec(),
             twists: twists_of_all(bodies.balls, &operator.space, ranks, &twists),
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
@@ -229,6 +245,7 @@ impl BoxFlow {
             levels,
             setup_traffic,
             solve_traffic,
+            cells: MyCells::new(&operator.space, self.viscosity, velocity, pressure),
         })
     }
 
@@ -370,11 +387,4 @@ where
         twist
     };
     balls.iter().zip(all.chunks_exact(n)).map(twist).collect()
-}
-
-/// Subtracts the mean from pressures that are zero where they are no unknowns.
-fn remove_mean(ranks: &dyn Communicator, mass: &[f64], p: &mut [f64]) {
-    let mut sums = [p.iter().zip(mass).map(|(p, mass)| p * mass).sum(), mass.iter().sum()];
-    ranks.sum(&mut sums);
-    p.iter_mut().zip(mass).filter(|(_, mass)| **mass > 0.0).for_each(|(p, _)| *p -= sums[0] / sums[1]);
 }

@@ -29,6 +29,7 @@
 //! cells, viscosities that vary, or boxes without a wall.
 
 mod bodies;
+mod cells;
 mod coarse;
 mod cuts;
 mod cycle;
@@ -45,7 +46,7 @@ mod transfer;
 
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
-pub use moving::{SharedHydrodynamics, Suspension, SuspensionError};
+pub use moving::{FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -7,7 +7,7 @@
 use gluey_fem::{ImplicitTree, MeshError};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_motion::{FlowStatistics, Hydrodynamics, NoForces};
+use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, NoForces};
 use gluey_parallel::Communicator;
 use gluey_stokes::Refinement;
 
@@ -51,11 +51,45 @@ pub enum SuspensionError {
     Flow(#[from] FlowError),
 }
 
+/// A frame with the fields of the last flow that rank zero wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameName {
+    /// Which of several streams of frames it belongs to.
+    pub stream: u32,
+    /// Its step.
+    pub step: u32,
+}
+
 /// What rank zero wants of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     End,
     Predict,
+    Show(FrameName),
+}
+
+impl Order {
+    /// What rank zero wants, on all ranks.
+    fn share(self, ranks: &dyn Communicator) -> Self {
+        let mut numbers = match self {
+            Self::End => [0.0; 3],
+            Self::Predict => [1.0, 0.0, 0.0],
+            Self::Show(FrameName { stream, step }) => [2.0, f64::from(stream), f64::from(step)],
+        };
+        ranks.share(&mut numbers);
+        let [order, stream, step] = numbers.map(|number| number as u32);
+        match order {
+            0 => Self::End,
+            1 => Self::Predict,
+            _ => Self::Show(FrameName { stream, step }),
+        }
+    }
+}
+
+/// For rank zero between two flows: has the others, who [`Suspension::follow_and_show`], show the fields of
+/// the last one.
+pub fn ask_for_fields(ranks: &dyn Communicator, frame: FrameName) {
+    Order::Show(frame).share(ranks);
 }
 
 impl<const D: usize> Suspension<D>
@@ -74,8 +108,7 @@ where
         wrenches: &[Wrench<D>],
         shear_factor: f64,
     ) -> Result<MyFlow<D>, SuspensionError> {
-        let ball = |(&place, &radius): (&Vector<D>, &f64)| Ball::periodic(place, radius, self.periods);
-        let balls: Vec<Ball<D>> = positions.iter().zip(&self.radii).map(ball).collect();
+        let balls = self.balls(positions);
         let tree_of_balls = BallTree::new(&balls);
         let wants =
             |lower: &Vector<D>, h: f64, level: u8| self.refinement.wants(lower, h, level, &tree_of_balls);
@@ -96,13 +129,39 @@ where
         Ok(self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?)
     }
 
+    fn balls(&self, positions: &[Vector<D>]) -> Vec<Ball<D>> {
+        let ball = |(&place, &radius): (&Vector<D>, &f64)| Ball::periodic(place, radius, self.periods);
+        positions.iter().zip(&self.radii).map(ball).collect()
+    }
+
     /// Does what rank zero asks for with its [`SharedHydrodynamics::leading`], until that ends. All other
     /// ranks call this.
     pub fn follow(&self, ranks: &dyn Communicator) {
-        let mut told = Told::new(self);
-        while told.share(ranks, Order::End) == Order::Predict {
-            // An error is one on all ranks: rank zero says what it is.
-            let _ = self.solve(ranks, &told.positions, &told.wrenches, told.shear_factor);
+        self.follow_and_show(ranks, &mut |_, _| {});
+    }
+
+    /// The same, and hands `show` the fields in the cells of this rank when rank zero [asks](ask_for_fields)
+    /// for them: none if there is no flow.
+    pub fn follow_and_show(
+        &self,
+        ranks: &dyn Communicator,
+        show: &mut dyn FnMut(FrameName, Option<Fields<D>>),
+    ) {
+        let (mut told, mut last) = (Told::new(self), None::<MyFlow<D>>);
+        loop {
+            match Order::End.share(ranks) {
+                Order::End => return,
+                Order::Predict => {
+                    told.share(ranks);
+                    // Its memory is free for the next.
+                    drop(last.take());
+                    // An error is one on all ranks: rank zero says what it is.
+                    last = self.solve(ranks, &told.positions, &told.wrenches, told.shear_factor).ok();
+                }
+                Order::Show(frame) => {
+                    show(frame, last.as_ref().map(|flow| flow.fields(&self.balls(&told.positions))));
+                }
+            }
         }
     }
 }
@@ -143,9 +202,9 @@ where
         Self { positions: vec![Vector::zeros(); count], wrenches, shear_factor: 1.0 }
     }
 
-    /// Replaces all by what rank zero says, and returns its order.
-    fn share(&mut self, ranks: &dyn Communicator, order: Order) -> Order {
-        let mut numbers = vec![f64::from(u8::from(order == Order::Predict)), self.shear_factor];
+    /// Replaces all by what rank zero says.
+    fn share(&mut self, ranks: &dyn Communicator) {
+        let mut numbers = vec![self.shear_factor];
         numbers.extend(self.positions.iter().flatten());
         for wrench in &self.wrenches {
             numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
@@ -153,7 +212,6 @@ where
         ranks.share(&mut numbers);
         let mut told = numbers.into_iter();
         let mut next = || told.next().unwrap_or_default();
-        let order = if next() > 0.0 { Order::Predict } else { Order::End };
         self.shear_factor = next();
         for position in &mut self.positions {
             position.iter_mut().for_each(|x| *x = next());
@@ -162,7 +220,6 @@ where
             wrench.force.iter_mut().for_each(|f| *f = next());
             (0..Dim::<D>::ROT).for_each(|k| wrench.torque[k] = next());
         }
-        order
     }
 }
 
@@ -178,6 +235,8 @@ where
     leads: bool,
     /// Whether a prediction has begun and not ended.
     is_predicting: bool,
+    /// Of the last prediction, if it succeeded.
+    last: Option<MyFlow<D>>,
     statistics: FlowStatistics,
 }
 
@@ -188,7 +247,7 @@ where
     /// For ranks that all make the same predictions.
     pub fn beside(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
         let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
-        Self { suspension, ranks, told, leads: false, is_predicting: false, statistics }
+        Self { suspension, ranks, told, leads: false, is_predicting: false, last: None, statistics }
     }
 
     /// For rank zero, while the others [`Suspension::follow`].
@@ -210,7 +269,7 @@ where
         }
         assert!(!self.is_predicting, "a flow that other ranks share was broken off");
         if self.leads {
-            self.told.share(self.ranks, Order::End);
+            Order::End.share(self.ranks);
         }
     }
 }
@@ -231,7 +290,9 @@ where
         let places = particles.iter().map(|particle| particle.pose.position);
         told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
         self.is_predicting = true;
-        told.share(*ranks, Order::Predict);
+        Order::Predict.share(*ranks);
+        told.share(*ranks);
+        self.last = None;
         let start = std::time::Instant::now();
         let flow = suspension.solve(*ranks, &told.positions, &told.wrenches, told.shear_factor);
         self.is_predicting = false;
@@ -245,6 +306,7 @@ where
             residual: flow.relative_residual,
             phases: vec![("shared flow", start.elapsed().as_secs_f64())],
         };
+        self.last = Some(flow);
         Ok(())
     }
 
@@ -263,5 +325,10 @@ where
 
     fn statistics(&self) -> FlowStatistics {
         self.statistics.clone()
+    }
+
+    /// Those in the cells of this rank.
+    fn fields(&self) -> Option<Fields<D>> {
+        self.last.as_ref().map(|flow| flow.fields(&self.suspension.balls(&self.told.positions)))
     }
 }

@@ -88,7 +88,8 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
         b.iter_mut().zip(y).for_each(|(b, y)| *b -= y);
     }
 
-    /// Values of `lift + T x` at the owned nodes and of all own twists, and the pressures.
+    /// Values of `lift + T x` at all nodes of the part, right at those of own cells, all own twists, and the
+    /// pressures, as the velocities.
     pub fn nodal_values(&mut self, lift: &[f64], x: &[f64]) -> [Vec<f64>; 3] {
         let Self { ranks, space, pressures, wide, .. } = self;
         wide.fill(*ranks, space, pressures, x);
@@ -97,12 +98,11 @@ impl<'a, const D: usize> StokesOperator<'a, D> {
         space.bodies.expand(nodal, twists);
         space.velocity.map.distribute(D, |w| w, nodal);
         velocity.iter_mut().zip(lift).for_each(|(u, lift)| *u += lift);
-        let mut owned = vec![0.0; space.owned_dim()];
-        space.copy_owned(velocity, &mut owned);
-        let twists = owned.split_off(space.owned_nodal_dim());
-        let pressure = p[space.pressure.owned.clone()].to_vec();
+        let (nodal, twists) = velocity.split_at(space.nodal_dim());
+        let twists = twists[..space.bodies.owned_dim()].to_vec();
+        let values = [nodal.to_vec(), twists, p[..space.pressure.map.node_count()].to_vec()];
         wide.x.fill(0.0);
-        [owned, twists, pressure]
+        values
     }
 
     fn owned_nodes(&self) -> std::ops::Range<usize> {

@@ -6,7 +6,6 @@ use gluey_linalg::{Preconditioner, Scalar, vector};
 use crate::cycle::VCycle;
 use crate::pressures::SharedPressures;
 use crate::schur::SchurInverse;
-use crate::space::LevelSpace;
 
 pub struct BlockTriangular<'a, const D: usize> {
     cycle: VCycle<'a, D>,
@@ -25,24 +24,6 @@ impl<'a, const D: usize> BlockTriangular<'a, D> {
         let [r, z] = [0, 1].map(|_| vec![0.0; pressures.is_free.len()]);
         Self { cycle, pressures, schur, r, z, p }
     }
-}
-
-/// The lumped mass at the owned pressure nodes.
-pub fn lumped_mass<const D: usize>(
-    space: &LevelSpace<D>,
-    pressures: &SharedPressures,
-    ranks: &dyn gluey_parallel::Communicator,
-) -> Vec<f64> {
-    let (mesh, map) = (&space.part.mesh, &space.pressure.map);
-    let mut mass = vec![0.0; pressures.dim()];
-    for cell in space.own_cells() {
-        let corner = (0.5 * mesh.size(mesh.cells()[cell].level)).powi(D as i32);
-        map.cell(cell).iter().for_each(|&node| mass[node as usize] += corner);
-    }
-    map.condense(1, |w| w, &mut mass);
-    pressures.reduce(&mut mass);
-    pressures.plan.clone().accumulate::<f64, 1>(ranks, &mut mass);
-    mass[space.pressure.owned.clone()].to_vec()
 }
 
 impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D>

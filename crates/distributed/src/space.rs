@@ -21,6 +21,7 @@ pub struct LevelSpace<const D: usize> {
 }
 
 /// Nodes of one degree.
+#[derive(Debug)]
 pub struct Nodes<const D: usize> {
     pub map: NodeMap<D>,
     /// First touched by a cell of the rank.

@@ -40,7 +40,7 @@ mod space;
 pub use cells::{CHUNK_CELLS, Chunks};
 pub use element::{ReferenceMatrices, add_viscous};
 pub use mesh::{Cell, Cuts, ImplicitTree, MeshError, Part, TreeMesh, half_diagonal};
-pub use space::{Constraint, Evaluator, Interpolation, NodeMap};
+pub use space::{CellPoint, Constraint, Evaluator, Interpolation, NodeMap, points_of_cells};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -17,7 +17,7 @@ pub enum HydrodynamicsError {
     #[error(transparent)]
     Flow(#[from] FlowError),
     /// By the finite-element solver on several ranks.
-    #[cfg(feature = "mpi")]
+    #[cfg(feature = "ranks")]
     #[error(transparent)]
     Shared(#[from] gluey_distributed::SuspensionError),
     /// The model does not exist in this dimension.

@@ -53,7 +53,7 @@ pub use output::{ClaimError, OutputError, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
-#[cfg(feature = "mpi")]
+#[cfg(feature = "ranks")]
 pub use run::run_shared;
 pub use run::{
     FolderError, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths,

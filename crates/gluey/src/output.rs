@@ -138,6 +138,16 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputEr
     write().map_err(|error| OutputError::new(path, "write the file", error))
 }
 
+/// Removes a file that another one takes the place of, if it is there.
+pub(crate) fn remove_stale(path: &Path) -> Result<(), OutputError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(OutputError::new(path, "remove what an earlier run left", error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Puts a file of an earlier run out of the way, as the first `<path>.earlier-K` that is not there yet;
 /// `None` if there is no such file.
 pub(crate) fn set_aside(path: &Path) -> Result<Option<PathBuf>, OutputError> {

@@ -11,11 +11,13 @@ mod log;
 mod occupied;
 mod options;
 mod paths;
+#[cfg(feature = "ranks")]
+mod pieces;
 mod record;
 mod recorded;
 mod recorder;
 mod resumption;
-#[cfg(feature = "mpi")]
+#[cfg(feature = "ranks")]
 mod shared;
 mod stress;
 mod tables;
@@ -37,7 +39,7 @@ pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 pub(crate) use recorded::TABLE_OF_STUDY;
 pub use recorded::{FolderError, recorded_runs};
 pub use resumption::{ResumeError, Resumption};
-#[cfg(feature = "mpi")]
+#[cfg(feature = "ranks")]
 pub use shared::run_shared;
 
 use crate::case::{Case, Hydrodynamics};
@@ -53,7 +55,7 @@ use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
 use contacts::Contacts;
-use frames::{Frames, StreamOptions};
+use frames::{Frames, Others, StreamOptions};
 use log::Log;
 use recorder::Recorder;
 use tables::{TableMarks, Tables};
@@ -89,15 +91,17 @@ fn logged(
 
 fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<2>(case)?)?.finish(),
+        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<2>(case)?, None)?.finish(),
         Hydrodynamics::PairMobility => Err(HydrodynamicsError::unfit(case).into()),
     }
 }
 
 fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::PairMobility => Run::start(case, options, progress, pair_mobility(case))?.finish(),
-        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<3>(case)?)?.finish(),
+        Hydrodynamics::PairMobility => {
+            Run::start(case, options, progress, pair_mobility(case), None)?.finish()
+        }
+        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<3>(case)?, None)?.finish(),
     }
 }
 
@@ -126,7 +130,7 @@ where
     csv: CsvWriter<D>,
     tables: Tables,
     solver: SolverLog,
-    frames: Frames<D>,
+    frames: Frames<'a, D>,
     checkpoints: Option<CheckpointFile>,
     recorder: Option<Recorder>,
     /// The run before the step that is being done, where checkpoints are written.
@@ -144,12 +148,13 @@ where
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    /// At time 0, or at the checkpoint to resume.
+    /// At time 0, or at the checkpoint to resume; `others` share the flow.
     fn start(
         case: &'a Case,
         options: &'a RunOptions,
         progress: &'a dyn Progress,
         hydrodynamics: H,
+        others: Option<&'a dyn Others>,
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
@@ -176,7 +181,7 @@ where
             }
         };
         let first_step = simulation.step_index();
-        let frames = Frames::create(case, options, first_step)?;
+        let frames = Frames::create(case, options, first_step, others)?;
         let recorder = Recorder::begin(case, options, first_step)?;
         let (started, last_good) = (Instant::now(), None);
         Ok(Self {

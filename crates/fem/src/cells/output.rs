@@ -93,6 +93,9 @@ pub(super) fn add_ghost_contributions<X: Scalar, const C: usize>(
     ghosts: &[X],
     part_count: usize,
 ) {
+    if chunks.is_empty() {
+        return;
+    }
     let first = partition.first_of(chunks.start);
     if part_count > 1 && chunks.len() > 1 {
         let middle = chunks.start + chunks.len() / 2;

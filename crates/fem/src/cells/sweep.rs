@@ -315,7 +315,8 @@ impl<T: CellScalar, X: Scalar> Workspace<T, X> {
     /// is allocated.
     fn fit<const D: usize>(&mut self, operator: &CellOperator<T, D>, divergence: bool) {
         let chunks = &operator.chunks;
-        let threads = rayon::current_num_threads().clamp(1, chunks.count());
+        // A rank may have no cells.
+        let threads = rayon::current_num_threads().min(chunks.count()).max(1);
         T::pool().lend(threads, operator.rule.workspace_len(GROUP), &mut self.buffers);
         self.velocity.resize(chunks.velocity.ghosts.items().len() * D, X::ZERO);
         if divergence {

@@ -3,7 +3,9 @@
 mod evaluator;
 mod interpolation;
 mod nodes;
+mod points;
 
 pub use evaluator::Evaluator;
 pub use interpolation::Interpolation;
 pub use nodes::{Constraint, NodeMap};
+pub use points::{CellPoint, points_of_cells};

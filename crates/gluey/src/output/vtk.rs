@@ -8,10 +8,15 @@
 //! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
 //! nothing touches).
 //!
+//! Where ranks share the flow, each has its cells in a file of its own, and `.pvtu` files name those of a
+//! step.
+//!
 //! In periodic boxes particles are where the fields are, in the box, and images that reach into it follow
 //! them, so that pictures are whole.
 
 mod background;
+mod grid;
+mod pieces;
 mod read;
 mod shown;
 mod xml;
@@ -22,23 +27,18 @@ use gluey_contact::{Contact, Domain, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
 
-use super::{OutputError, prepare_folder_of, pvd, write_atomically};
+use super::{OutputError, prepare_folder_of, pvd, remove_stale};
 
 pub use crate::case::Precision;
 pub(crate) use background::FrameWriter;
+use grid::{FIELDS, fields_piece, in_space, scalars, vectors};
+pub use pieces::write_piece;
 pub use read::{VtkReadError, read_fields, read_particles};
 pub use shown::ShownBox;
 use shown::{Shown, shown};
 use vtkio::model::CellType;
 pub use xml::VtkEncoding;
 use xml::{Array, Piece};
-
-/// Lattice positions (x fastest) of the nodes of a biquadratic quadrilateral (VTK cell type 28), in VTK's
-/// order: corners, edges, centre.
-const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
-/// The same for a triquadratic hexahedron (type 29): corners, edges, faces -x +x -y +y -z +z, centre.
-const HEXAHEDRON_ORDER: [usize; 27] =
-    [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
 
 /// What rounding may do to a place, relative to the distance of centres.
 const ROUNDING: f64 = 1e-6;
@@ -79,6 +79,8 @@ pub struct VtkWriter {
 #[derive(Debug)]
 struct Series {
     name: &'static str,
+    /// How many files a step has, of which this writer writes the first; none for one file.
+    pieces: Option<usize>,
     entries: Vec<(f64, String)>,
 }
 
@@ -87,9 +89,11 @@ impl VtkWriter {
     /// time)`, those with a file in the folder stay in the collections.
     pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, OutputError> {
         prepare_folder_of(&folder.join("fields.pvd"))?;
-        let series = ["fields", "particles", "contacts"].map(|name| {
-            let entries = done.iter().map(|&(step, time)| (time, file_name(name, step)));
-            Series { name, entries: entries.filter(|(_, file)| folder.join(file).is_file()).collect() }
+        let series = [FIELDS, "particles", "contacts"].map(|name| {
+            let files = |step| [file_name(name, step), pieces::index_name(name, step)];
+            let there = |step| files(step).into_iter().find(|file| folder.join(file).is_file());
+            let entries = done.iter().filter_map(|&(step, time)| Some((time, there(step)?)));
+            Series { name, pieces: None, entries: entries.collect() }
         });
         Ok(Self { folder: folder.to_owned(), encoding: VtkEncoding::default(), series })
     }
@@ -97,6 +101,14 @@ impl VtkWriter {
     /// The same with other numbers in the files.
     pub fn encoded(mut self, encoding: VtkEncoding) -> Self {
         self.encoding = encoding;
+        self
+    }
+
+    /// The same where fields come in so many pieces, of which frames have the first. The others have to be
+    /// there ([`write_piece`]) when a frame is written.
+    pub fn in_pieces(mut self, count: usize) -> Self {
+        let fields = self.series.iter_mut().filter(|series| series.name == FIELDS);
+        fields.for_each(|series| series.pieces = Some(count));
         self
     }
 
@@ -129,11 +141,19 @@ impl Series {
         piece: Piece,
         encoding: VtkEncoding,
     ) -> Result<(), OutputError> {
-        let file = file_name(self.name, step);
-        let path = folder.join(&file);
-        let text = xml::document(piece, encoding);
-        let text = text.map_err(|error| OutputError::new(&path, "encode the file", error))?;
-        write_atomically(&path, text.as_bytes())?;
+        let (whole, index) = (file_name(self.name, step), pieces::index_name(self.name, step));
+        // A run that was resumed may have written the step in the other way before.
+        let (file, other) = match self.pieces {
+            None => {
+                xml::write(&folder.join(&whole), piece, encoding)?;
+                (whole, index)
+            }
+            Some(count) => {
+                pieces::write_first(folder, (self.name, step, count), piece, encoding)?;
+                (index, whole)
+            }
+        };
+        remove_stale(&folder.join(other))?;
         self.entries.push((time, file));
         pvd::write(&folder.join(format!("{}.pvd", self.name)), &self.entries)
     }
@@ -141,29 +161,6 @@ impl Series {
 
 fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
-}
-
-fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
-    let (order, cell_type): (&[usize], _) = match D {
-        2 => (&QUAD_ORDER, CellType::BiquadraticQuad),
-        _ => (&HEXAHEDRON_ORDER, CellType::TriquadraticHexahedron),
-    };
-    let cells = fields.cells.chunks_exact(order.len());
-    let count = cells.len();
-    Piece {
-        points: in_space(&fields.points),
-        connectivity: cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect(),
-        offsets: (1..=count).map(|cell| (cell * order.len()) as u64).collect(),
-        types: vec![cell_type; count],
-        of_points: vec![
-            vectors("velocity", &fields.velocity),
-            scalars("pressure", fields.pressure.clone()),
-            scalars("viscosity", fields.viscosity.clone()),
-            scalars("level_set", fields.level_set.clone()),
-            vectors("lambda", &fields.multiplier),
-        ],
-        of_cells: Vec::new(),
-    }
 }
 
 fn particles_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
@@ -238,19 +235,6 @@ where
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
     Piece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
-}
-
-fn scalars(name: &'static str, values: Vec<f64>) -> Array {
-    Array { name, components: 1, values }
-}
-
-fn vectors<const D: usize>(name: &'static str, values: &[Vector<D>]) -> Array {
-    Array { name, components: 3, values: in_space(values) }
-}
-
-/// VTK's vectors have three components.
-fn in_space<const D: usize>(vectors: &[Vector<D>]) -> Vec<f64> {
-    vectors.iter().flat_map(|v| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)]).collect()
 }
 
 /// A plane spin turns about z.

@@ -16,6 +16,16 @@ use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::simulation::{Simulation, StepError};
 
+/// The other ranks that share the flow of a run.
+pub(super) trait Others {
+    /// Number of ranks, this one among them.
+    fn rank_count(&self) -> usize;
+
+    /// Has them write the fields in their cells at a step, as one of the streams of the run. All are on disk
+    /// then.
+    fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError>;
+}
+
 /// A stream of frames that a run is to write.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StreamOptions {
@@ -51,6 +61,15 @@ impl StreamOptions {
         others.chain(asked.iter().cloned()).collect()
     }
 
+    /// How numbers are stored in the files for ParaView, if it has such.
+    #[cfg(feature = "ranks")]
+    pub fn encoding(&self) -> Option<VtkEncoding> {
+        match self.format {
+            Format::Vtk { encoding, .. } => Some(encoding),
+            Format::Xyz { .. } => None,
+        }
+    }
+
     fn vtk(options: &VtkOptions) -> Self {
         let format = Format::Vtk { encoding: options.encoding, with_fields: true };
         Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
@@ -63,11 +82,12 @@ impl StreamOptions {
 }
 
 /// The streams of a run that is going on.
-pub(super) struct Frames<const D: usize>
+pub(super) struct Frames<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
     streams: Vec<(Interval, Stream<D>)>,
+    others: Option<&'a dyn Others>,
 }
 
 enum Stream<const D: usize>
@@ -78,26 +98,35 @@ where
     Xyz(XyzWriter),
 }
 
-impl<const D: usize> Frames<D>
+impl<'a, const D: usize> Frames<'a, D>
 where
     Dim<D>: Space<D>,
     Contacts<D>: ContactModel<D>,
 {
     /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
-    pub fn create(case: &Case, options: &RunOptions, step: usize) -> Result<Self, OutputError> {
+    pub fn create(
+        case: &Case,
+        options: &RunOptions,
+        step: usize,
+        others: Option<&'a dyn Others>,
+    ) -> Result<Self, OutputError> {
         let stream = |stream: StreamOptions| {
             let StreamOptions { folder, interval, format } = stream;
             let opened = match format {
                 Format::Xyz { gzip } => Stream::Xyz(XyzWriter::create(&folder, gzip)?),
                 Format::Vtk { encoding, with_fields } => {
                     let writer = vtk_writer(case, &folder, interval, step)?.encoded(encoding);
+                    let writer = match others {
+                        Some(others) => writer.in_pieces(others.rank_count()),
+                        None => writer,
+                    };
                     Stream::Vtk { writer: FrameWriter::new(writer)?, with_fields }
                 }
             };
             Ok((interval, opened))
         };
         let streams = StreamOptions::of_run(case, options).into_iter().map(stream);
-        Ok(Self { streams: streams.collect::<Result<_, _>>()? })
+        Ok(Self { streams: streams.collect::<Result<_, _>>()?, others })
     }
 
     /// Writes what is due of the simulation as it is.
@@ -113,7 +142,7 @@ where
         let (particles, twists) = (simulation.particles(), simulation.twists());
         let due =
             |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step, case.time.step);
-        for (_, stream) in self.streams.iter_mut().filter(|(interval, _)| due(interval)) {
+        for (index, (_, stream)) in self.streams.iter_mut().enumerate().filter(|(_, (every, _))| due(every)) {
             match stream {
                 Stream::Vtk { writer, with_fields } => {
                     let (contacts, domain) = (simulation.contacts(), simulation.contact().domain());
@@ -122,6 +151,9 @@ where
                         domain.is_periodic().then_some(ShownBox { container, slide: simulation.slide() });
                     let frame =
                         Frame { step, time, particles, twists, contacts, domain, in_box, fields: None };
+                    if let (true, Some(others)) = (*with_fields, self.others) {
+                        others.write_fields(index, step)?;
+                    }
                     writer.write(&frame, with_fields.then(|| simulation.fields()).flatten())?;
                 }
                 Stream::Xyz(writer) => {

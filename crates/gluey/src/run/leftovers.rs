@@ -46,16 +46,16 @@ fn remove_frames(folder: &Path, whole: bool) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Whether a run gives such names to frames (`fields-000100.vtu`, `particles-000100.xyz.gz`) or to their
-/// collections (`fields.pvd`).
+/// Whether a run gives such names to frames (`fields-000100.vtu`, `particles-000100.xyz.gz`), to pieces of
+/// them (`fields-000100-0003.vtu`, `fields-000100.pvtu`) or to their collections (`fields.pvd`).
 fn is_frame(name: &str) -> bool {
     let Some((stem, extension)) = name.split_once('.') else { return false };
-    let is_number = |step: &str| step.len() >= 6 && step.bytes().all(|byte| byte.is_ascii_digit());
-    match extension {
-        "pvd" => SERIES.contains(&stem),
-        "vtu" | "xyz" | "xyz.gz" => {
-            stem.split_once('-').is_some_and(|(series, step)| SERIES.contains(&series) && is_number(step))
-        }
+    let is_number = |text: &str, digits| text.len() >= digits && text.bytes().all(|b| b.is_ascii_digit());
+    let words: Vec<&str> = stem.split('-').collect();
+    match (&words[..], extension) {
+        ([series], "pvd") => SERIES.contains(series),
+        ([series, step], "vtu" | "pvtu" | "xyz" | "xyz.gz") => SERIES.contains(series) && is_number(step, 6),
+        ([series, step, rank], "vtu") => SERIES.contains(series) && is_number(step, 6) && is_number(rank, 4),
         _ => false,
     }
 }
@@ -70,13 +70,24 @@ mod tests {
 
     #[test]
     fn frames_are_told_from_other_files() {
-        for frame in ["fields-000000.vtu", "contacts.pvd", "particles-1234567.xyz", "particles-000020.xyz.gz"]
-        {
+        for frame in [
+            "fields-000000.vtu",
+            "fields-000000-0012.vtu",
+            "fields-000000.pvtu",
+            "contacts.pvd",
+            "particles-1234567.xyz",
+            "particles-000020.xyz.gz",
+        ] {
             assert!(is_frame(frame), "{frame}");
         }
-        for other in
-            ["notes.pvd", "fields-final.vtu", "particles-1.xyz", "state.pvsm", "fields", "x-000000.vtu"]
-        {
+        for other in [
+            "notes.pvd",
+            "fields-final.vtu",
+            "fields-000000-a.vtu",
+            "particles-1.xyz",
+            "fields",
+            "x-000000.vtu",
+        ] {
             assert!(!is_frame(other), "{other}");
         }
     }

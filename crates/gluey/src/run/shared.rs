@@ -1,12 +1,14 @@
-//! Cases whose flow is shared by ranks, with the feature `mpi`: which can be, and what becomes of them.
+//! Cases whose flow is shared by ranks: which can be, and what becomes of them.
 
 use gluey_contact::{ContactModel, PairContact};
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::Communicator;
 
+use super::frames::StreamOptions;
+use super::pieces::{OtherRanks, write_piece};
 use super::{Run, RunError, RunOptions, claim_outputs, leftovers, logged, occupied};
-use crate::case::{Case, Formulation, Hydrodynamics, OutputKind, Solver};
+use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 use crate::flow::{FlowError, refinement, tree};
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::{Sharing, available};
@@ -25,7 +27,7 @@ pub fn run_shared(
     ranks: &dyn Communicator,
 ) -> Result<Option<RunReport>, RunError> {
     case.check()?;
-    check(case, options)?;
+    check(case)?;
     crate::memory::check_shared(case, options.memory_limit, sharing(ranks))?;
     match case.dimension {
         2 => run_beside::<2>(case, options, progress, ranks),
@@ -45,15 +47,20 @@ where
 {
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
     if ranks.rank() > 0 {
-        suspension.follow(ranks);
+        let streams = StreamOptions::of_run(case, options);
+        suspension.follow_and_show(ranks, &mut |frame, fields| write_piece(ranks, &streams, frame, fields));
         return Ok(None);
     }
     // However this ends, the others learn of it when the leader is dropped.
     let leader = SharedHydrodynamics::leading(&suspension, ranks);
+    let others = OtherRanks(ranks);
     let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
-    logged(case, options, progress, |log| Run::start(case, options, log, leader)?.finish()).map(Some)
+    let report = logged(case, options, progress, |log| {
+        Run::start(case, options, log, leader, Some(&others))?.finish()
+    })?;
+    Ok(Some(report))
 }
 
 /// How many ranks there are, and what memory there is for each: those on one machine, by its name, share what
@@ -69,18 +76,12 @@ fn sharing(ranks: &dyn Communicator) -> Sharing {
 }
 
 /// Refuses what ranks cannot share.
-fn check(case: &Case, options: &RunOptions) -> Result<(), RunError> {
-    let has_fields = |kind: OutputKind, fields: bool| kind == OutputKind::Vtk && fields;
+fn check(case: &Case) -> Result<(), RunError> {
     let refused = [
         (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
         (case.flow.formulation != Formulation::RigidDofs, "a formulation other than rigid-dofs"),
         (case.is_sheared(), "a box that is sheared for ever"),
         (case.flow.solver == Solver::Direct, "the direct solver"),
-        (options.vtk.is_some(), "frames with the fields of the flow (--vtk)"),
-        (
-            case.output.iter().any(|output| has_fields(output.kind, output.fields)),
-            "frames with the fields of the flow (output.fields)",
-        ),
     ];
     match refused.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, what)) => Err(RunError::NotShared { what }),

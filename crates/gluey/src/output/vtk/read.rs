@@ -6,9 +6,9 @@ use gluey_geom::{Dim, Particle, Space, Vector};
 use gluey_motion::Fields;
 use thiserror::Error;
 use vtkio::Vtk;
-use vtkio::model::{Attribute, DataSet, UnstructuredGridPiece};
+use vtkio::model::{Attribute, DataSet, Piece, UnstructuredGridPiece};
 
-use super::{HEXAHEDRON_ORDER, QUAD_ORDER};
+use super::grid::{HEXAHEDRON_ORDER, QUAD_ORDER};
 
 /// A file could not be read back.
 #[derive(Debug, Error)]
@@ -31,12 +31,31 @@ pub enum VtkReadError {
     },
 }
 
-/// The fields of a file `fields-<step>.vtu` as they were written, but for their precision.
+/// The fields of a file `fields-<step>.vtu` as they were written, but for their precision; of a `.pvtu` file
+/// those of all pieces that it names, one after the other.
 ///
 /// # Errors
 /// If the file cannot be read, or is not of this dimension.
 pub fn read_fields<const D: usize>(path: &Path) -> Result<Fields<D>, VtkReadError> {
-    let grid = Grid::read(path)?;
+    let mut all = Fields::default();
+    for grid in Grid::all(path)? {
+        append(&mut all, fields_of(&grid)?);
+    }
+    Ok(all)
+}
+
+fn append<const D: usize>(all: &mut Fields<D>, more: Fields<D>) {
+    let first = all.points.len() as u32;
+    all.cells.extend(more.cells.iter().map(|node| first + node));
+    all.points.extend(more.points);
+    all.velocity.extend(more.velocity);
+    all.pressure.extend(more.pressure);
+    all.viscosity.extend(more.viscosity);
+    all.level_set.extend(more.level_set);
+    all.multiplier.extend(more.multiplier);
+}
+
+fn fields_of<const D: usize>(grid: &Grid) -> Result<Fields<D>, VtkReadError> {
     let order: &[usize] = if D == 2 { &QUAD_ORDER } else { &HEXAHEDRON_ORDER };
     let (nodes, ends) = grid.piece.cells.cell_verts.clone().into_xml();
     if ends.iter().enumerate().any(|(cell, &end)| end != ((cell + 1) * order.len()) as u64) {
@@ -87,27 +106,40 @@ where
 }
 
 /// A file and the grid in it.
-struct Grid<'a> {
-    path: &'a Path,
+struct Grid {
+    path: PathBuf,
     piece: UnstructuredGridPiece,
 }
 
-impl<'a> Grid<'a> {
-    fn read(path: &'a Path) -> Result<Self, VtkReadError> {
-        let unreadable = |problem: String| VtkReadError::Unreadable { path: path.to_owned(), problem };
-        let vtk = Vtk::import(path).map_err(|error| unreadable(error.to_string()))?;
-        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
-            return Err(unreadable("no unstructured grid".to_owned()));
+impl Grid {
+    /// The grid of a file, or those of the files that it names.
+    fn all(path: &Path) -> Result<Vec<Self>, VtkReadError> {
+        let names = |piece: &Piece<UnstructuredGridPiece>| match piece {
+            Piece::Source(name, _) => Some(path.with_file_name(name)),
+            _ => None,
         };
-        let [piece] = &pieces[..] else {
-            return Err(unreadable(format!("{} pieces instead of one", pieces.len())));
+        let pieces = pieces_of(path)?;
+        let named: Vec<PathBuf> = pieces.iter().filter_map(names).collect();
+        match named.is_empty() {
+            true => Ok(vec![Self::of_one(path, &pieces)?]),
+            false => named.iter().map(|path| Self::read(path)).collect(),
+        }
+    }
+
+    fn read(path: &Path) -> Result<Self, VtkReadError> {
+        Self::of_one(path, &pieces_of(path)?)
+    }
+
+    fn of_one(path: &Path, pieces: &[Piece<UnstructuredGridPiece>]) -> Result<Self, VtkReadError> {
+        let [piece] = pieces else {
+            return Err(unreadable(path, format!("{} pieces instead of one", pieces.len())));
         };
-        let piece = piece.load_piece_data(None).map_err(|error| unreadable(error.to_string()))?;
-        Ok(Self { path, piece })
+        let piece = piece.load_piece_data(None).map_err(|error| unreadable(path, error.to_string()))?;
+        Ok(Self { path: path.to_owned(), piece })
     }
 
     fn foreign(&self, what: String) -> VtkReadError {
-        VtkReadError::Foreign { path: self.path.to_owned(), what }
+        VtkReadError::Foreign { path: self.path.clone(), what }
     }
 
     fn numbers(&self, name: &str) -> Option<Vec<f64>> {
@@ -130,4 +162,16 @@ impl<'a> Grid<'a> {
         let numbers = numbers.ok_or_else(|| self.foreign(format!("no array `{name}`")))?;
         Ok(numbers.chunks_exact(3).map(|three| Vector::from_fn(|d, _| three[d])).collect())
     }
+}
+
+fn pieces_of(path: &Path) -> Result<Vec<Piece<UnstructuredGridPiece>>, VtkReadError> {
+    let vtk = Vtk::import(path).map_err(|error| unreadable(path, error.to_string()))?;
+    match vtk.data {
+        DataSet::UnstructuredGrid { pieces, .. } => Ok(pieces),
+        _ => Err(unreadable(path, "no unstructured grid".to_owned())),
+    }
+}
+
+fn unreadable(path: &Path, problem: String) -> VtkReadError {
+    VtkReadError::Unreadable { path: path.to_owned(), problem }
 }

@@ -5,6 +5,7 @@
 //! they are compressed.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use base64::engine::{Engine, general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
@@ -17,6 +18,7 @@ use vtkio::model::{
 use vtkio::xml::Compressor;
 
 use crate::case::Precision;
+use crate::output::{OutputError, write_atomically};
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
@@ -60,10 +62,18 @@ pub(super) struct Piece {
     pub of_cells: Vec<Array>,
 }
 
-/// The file that holds `piece`. vtkio writes it, without compression; the arrays are compressed afterwards in
+/// Writes the file that holds `piece`, whole or not at all.
+pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), OutputError> {
+    let text = document(piece, encoding);
+    let text = text.map_err(|error| OutputError::new(path, "encode the file", error))?;
+    write_atomically(path, text.as_bytes())
+}
+
+/// The text of that file. vtkio writes it, without compression; the arrays are compressed afterwards in
 /// blocks, since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears
-/// 32 kB.
-pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+/// 32 kB. What is empty stays as it is: vtkio does not read arrays of no block.
+fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+    let compression = if piece.points.is_empty() { 0 } else { encoding.compression };
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
         title: String::new(),
@@ -74,16 +84,17 @@ pub(super) fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String
     let mut bytes = Vec::new();
     vtk.try_into_xml_format(Compressor::None, 0)
         .and_then(|mut file| {
-            if encoding.compression > 0 {
+            if compression > 0 {
                 file.compressor = Compressor::ZLib;
             }
             file.write(&mut bytes)
         })
         .map_err(|error| io::Error::other(error.to_string()))?;
     let text = String::from_utf8(bytes).map_err(io::Error::other)?;
-    match encoding.compression {
-        0 => Ok(signed_indices(&text)),
-        level => compressed_arrays(&signed_indices(&text), level.min(9)),
+    let text = counted(&signed_indices(&text));
+    match compression {
+        0 => Ok(text),
+        level => compressed_arrays(&text, level.min(9)),
     }
 }
 
@@ -117,6 +128,11 @@ fn reals(values: Vec<f64>, precision: Precision) -> IOBuffer {
 /// `<`.
 fn signed_indices(text: &str) -> String {
     text.replace("<DataArray type=\"UInt64\"", "<DataArray type=\"Int64\"")
+}
+
+/// vtkio leaves out numbers of points and cells that are zero, and VTK breaks off without them.
+fn counted(text: &str) -> String {
+    text.replace("<Piece>", "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">")
 }
 
 /// The same file with its arrays compressed: base64 of the size in 8 bytes and the data, as vtkio wrote it,

@@ -68,7 +68,8 @@ fn frames(folder: &Path) -> Result<Vec<(usize, PathBuf)>, PlotError> {
 fn own_frames(folder: &Path) -> Result<Vec<(usize, PathBuf)>, PlotError> {
     let step = |path: &Path| {
         let name = path.file_name()?.to_str()?;
-        name.strip_prefix("fields-")?.strip_suffix(".vtu")?.parse().ok()
+        let name = name.strip_prefix("fields-")?;
+        name.strip_suffix(".vtu").or_else(|| name.strip_suffix(".pvtu"))?.parse().ok()
     };
     let files = entries(folder)?.into_iter().filter_map(|path| Some((step(&path)?, path)));
     let mut frames: Vec<(usize, PathBuf)> = files.collect();

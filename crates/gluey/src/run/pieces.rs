@@ -1,0 +1,89 @@
+//! Frames whose fields ranks write in pieces, each those in its own cells.
+//!
+//! Rank zero asks for a frame, the others write and say whether they could. Then it writes its own piece and
+//! the file that names all of them.
+
+use std::io;
+use std::path::PathBuf;
+
+use gluey_distributed::{FrameName, ask_for_fields};
+use gluey_motion::Fields;
+use gluey_parallel::{Communicator, Message};
+
+use super::frames::{Others, StreamOptions};
+use crate::output::{OutputError, vtk};
+
+/// All ranks but zero, as rank zero sees them.
+pub(super) struct OtherRanks<'a>(pub &'a dyn Communicator);
+
+impl Others for OtherRanks<'_> {
+    fn rank_count(&self) -> usize {
+        self.0.size()
+    }
+
+    fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError> {
+        ask_for_fields(self.0, FrameName { stream: stream as u32, step: step as u32 });
+        first_failure(self.0, None)
+    }
+}
+
+/// Writes the fields in the cells of a rank other than zero, which it tells what came of it.
+pub(super) fn write_piece<const D: usize>(
+    ranks: &dyn Communicator,
+    streams: &[StreamOptions],
+    frame: FrameName,
+    fields: Option<Fields<D>>,
+) {
+    let FrameName { stream, step } = frame;
+    let stream = streams.get(stream as usize);
+    let asked = fields.zip(stream).and_then(|(fields, stream)| Some((fields, stream, stream.encoding()?)));
+    let written = match asked {
+        Some((fields, stream, encoding)) => {
+            vtk::write_piece(&stream.folder, (step as usize, ranks.rank()), &fields, encoding)
+        }
+        None => {
+            let path = stream.map_or_else(PathBuf::new, |stream| stream.folder.clone());
+            Err(OutputError::new(&path, "write fields to", io::Error::other("there are none")))
+        }
+    };
+    // What went wrong is told by rank zero.
+    let _ = first_failure(ranks, written.err());
+}
+
+/// The failure of the first rank that has one, on rank zero, which has none of its own.
+fn first_failure(ranks: &dyn Communicator, own: Option<OutputError>) -> Result<(), OutputError> {
+    let told = own.map_or(Vec::new(), |error| encoded(&error));
+    let lengths = ranks.all_gather(&[told.len() as u64]);
+    let Some(failed) = lengths.iter().position(|&length| length > 0) else { return Ok(()) };
+    let (mut told_here, mut heard) = (Vec::new(), Vec::new());
+    if ranks.rank() == failed {
+        told_here.push(Message { rank: 0, bytes: told });
+    } else if ranks.rank() == 0 {
+        heard.push(Message { rank: failed, bytes: vec![0; lengths[failed] as usize] });
+    }
+    ranks.exchange(&told_here, &mut heard);
+    match heard.pop() {
+        Some(message) => Err(decoded(&message)),
+        None => Ok(()),
+    }
+}
+
+/// The file, the number of the system's error, 0 for another one, and what it says: parted by zeros, which no
+/// path has.
+fn encoded(error: &OutputError) -> Vec<u8> {
+    let number = error.source.raw_os_error().unwrap_or(0);
+    format!("{}\0{number}\0{}", error.path.display(), error.source).into_bytes()
+}
+
+fn decoded(message: &Message) -> OutputError {
+    let text = String::from_utf8_lossy(&message.bytes);
+    let mut words = text.splitn(3, '\0');
+    let mut next = || words.next().unwrap_or_default();
+    let (path, number, reason) = (PathBuf::from(next()), next(), next());
+    let kind = match number.parse() {
+        Ok(number) if number > 0 => io::Error::from_raw_os_error(number).kind(),
+        _ => io::ErrorKind::Other,
+    };
+    let source = io::Error::new(kind, format!("{reason}, on rank {}", message.rank));
+    OutputError::new(&path, "write the file", source)
+}
