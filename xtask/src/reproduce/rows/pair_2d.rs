@@ -154,8 +154,9 @@ pub fn orbits(evidence: &Evidence<'_>) -> Vec<Claim> {
             measured(last, last_turn(Approach::Inelastic)),
             Wanted::AtLeast(1.01),
         ),
-        // The gap alone makes 1.00004 of it. The rest is the middle of the pair, whose place in the middle of
-        // the box is unstable: what velocities lack in symmetry, some 5e-9, grows like exp(0.17 t), to 5e-5 a.
+        // The gap alone makes 1.00004 of it. The rest is the middle of the pair, whose place in the middle
+        // of the box is unstable: what velocities lack in symmetry, some 5e-9, grows like exp(0.17 t), to
+        // 5e-5 a.
         exact(
             "fig6-circle-unfitted",
             "pair-2d-unfitted",
