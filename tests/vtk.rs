@@ -68,6 +68,23 @@ fn one_cell<const D: usize>() -> Fields<D> {
     }
 }
 
+/// A frame of fields without particles.
+fn frame_of<'a, const D: usize>(domain: &'a Domain<D>, fields: &'a Fields<D>) -> Frame<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    Frame {
+        step: 40,
+        time: 1.0,
+        particles: &[],
+        twists: &[],
+        contacts: &[],
+        domain,
+        in_box: None,
+        fields: Some(fields),
+    }
+}
+
 fn cells_have_vtks_order_of_nodes<const D: usize>(
     cell_type: CellType,
     edges: &[[usize; 2]],
@@ -78,16 +95,8 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     let folder = TempDir::new().expect("a folder");
     let fields = one_cell::<D>();
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let frame = Frame {
-        step: 40,
-        time: 1.0,
-        particles: &[],
-        twists: &[],
-        contacts: &[],
-        domain: &Domain::default(),
-        in_box: None,
-        fields: Some(&fields),
-    };
+    let domain = Domain::default();
+    let frame = frame_of(&domain, &fields);
     writer.write(&frame).expect("files");
     let path = folder.path().join("fields-000040.vtu");
     assert_eq!(read_fields::<D>(&path).expect("what was written"), fields);
@@ -128,16 +137,8 @@ fn fields_in_pieces() {
     let folder = TempDir::new().expect("a folder");
     let (one, mut other) = (one_cell::<2>(), one_cell::<2>());
     other.points.iter_mut().for_each(|x| x[0] += 1.0);
-    let frame = Frame {
-        step: 40,
-        time: 1.0,
-        particles: &[],
-        twists: &[],
-        contacts: &[],
-        domain: &Domain::default(),
-        in_box: None,
-        fields: Some(&one),
-    };
+    let domain = Domain::default();
+    let frame = frame_of(&domain, &one);
     let files = || {
         let files =
             fs::read_dir(folder.path()).expect("a folder").map(|file| file.expect("a file").file_name());
