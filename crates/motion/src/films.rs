@@ -25,7 +25,8 @@ use serde::{Deserialize, Serialize};
 pub struct Film<const D: usize> {
     /// Index of the particle.
     pub first: usize,
-    /// Index of its partner; `None` for a wall.
+    /// Index of its partner; `None` for a wall, through which nothing flows: where the flow comes in or goes
+    /// out a gap changes without a force, and the impulse says nothing.
     pub second: Option<usize>,
     /// From the centre of the first to that of its partner (the image that is meant), or to the wall.
     pub branch: Vector<D>,
