@@ -28,6 +28,12 @@ impl BlockDiagonal {
         blocks.filter(|(body, _)| is_held(*body)).for_each(|(_, block)| block.fill(0.0));
     }
 
+    /// Multiplies the inverses at some positions and those of all twists by a factor.
+    pub fn scale(&mut self, positions: &[u32], factor: f32) {
+        positions.iter().for_each(|&k| self.nodal[k as usize] *= factor);
+        self.twists.iter_mut().for_each(|value| *value *= factor);
+    }
+
     /// The nodal entries.
     pub fn into_nodal(self) -> Vec<f32> {
         self.nodal

@@ -1,18 +1,21 @@
-//! The velocity block of a system in single precision, with the cells that surfaces cut.
+//! The velocity block of a system in single precision, with the cells that surfaces cut, all of it or around
+//! some of the nodes.
 
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::LinOp;
 
-use super::restricted::CountedOperator;
+use super::restricted::{CountedOperator, acting};
 use super::system::StokesSystem;
 use crate::surface::{SurfaceCoupling, SurfaceWorkspace};
 
-/// `A` on reduced velocities, which counts its applications.
+/// `A` on reduced velocities, right at some of the nodes, which counts its applications.
 #[derive(Clone, Debug)]
 pub struct ViscousOperator<const D: usize> {
     fluid: CountedOperator<f32, D>,
+    /// The cells that act on fewer nodes.
+    near: CountedOperator<f32, D>,
     surfaces: Option<Arc<SurfaceCoupling<D>>>,
     work: SurfaceWorkspace<f32>,
 }
@@ -21,19 +24,36 @@ impl<const D: usize> ViscousOperator<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The velocity block of `system`.
-    pub fn new(system: &StokesSystem<D>) -> Self {
-        let cells = &system.cells;
+    /// The velocity block of `system`: its loads on marked nodes, and all loads of velocities that vanish but
+    /// at the nodes `near`.
+    pub fn new(system: &StokesSystem<D>, marked: &[bool], near: &[bool]) -> Self {
+        let fluid = |marked: &[bool]| {
+            let cells = acting(system.discretisation(), &system.cells, marked);
+            CountedOperator::new(&system.space, &cells, system.cells.len(), system.penalty.as_ref())
+        };
         Self {
-            fluid: CountedOperator::new(&system.space, cells, cells.len(), system.penalty.as_ref()),
+            fluid: fluid(marked),
+            near: fluid(near),
             surfaces: system.surfaces.clone(),
             work: SurfaceWorkspace::default(),
         }
     }
 
+    /// `y = A x` for velocities that vanish but near the surfaces.
+    pub fn apply_near(&mut self, x: &[f32], y: &mut [f32]) {
+        self.near.apply(x, y);
+        self.add_surfaces(x, y);
+    }
+
     /// Applications since the last call.
     pub fn take_applications(&mut self) -> f64 {
-        self.fluid.take_applications()
+        self.fluid.take_applications() + self.near.take_applications()
+    }
+
+    fn add_surfaces(&mut self, x: &[f32], y: &mut [f32]) {
+        if let Some(surfaces) = &self.surfaces {
+            surfaces.add_narrow([x, &[]], [y, &mut []], &mut self.work);
+        }
     }
 }
 
@@ -47,8 +67,6 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.fluid.apply(x, y);
-        if let Some(surfaces) = &self.surfaces {
-            surfaces.add_narrow([x, &[]], [y, &mut []], &mut self.work);
-        }
+        self.add_surfaces(x, y);
     }
 }

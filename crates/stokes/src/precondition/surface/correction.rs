@@ -27,13 +27,14 @@ where
     /// Whether a node is free.
     is_free: Vec<bool>,
     /// On the reduced velocities.
-    b: Vec<f32>,
     x: Vec<f32>,
     r: Vec<f32>,
     /// Load and velocity on the finest rigid level.
     load: Vec<f64>,
     spread: Vec<f64>,
     velocity: Vec<f32>,
+    /// What the levels correct, on the reduced velocities.
+    correction: Vec<f32>,
 }
 
 impl<const D: usize> SurfaceCorrection<D>
@@ -48,21 +49,21 @@ where
     ) -> Result<Self, StokesError> {
         let space = &elements.system().space;
         let dim = space.dim();
-        let [b, x, r, velocity] = [(); 4].map(|()| vec![0.0; dim]);
+        let [x, r, velocity] = [(); 3].map(|()| vec![0.0; dim]);
         Ok(Self {
             smoother: SurfaceSmoother::new(elements, surfaces)?,
             rigid: rigid.clone(),
             is_free: (0..space.nodes().node_count()).map(|node| space.is_free(node)).collect(),
-            b,
             x,
             r,
             load: vec![0.0; dim],
             spread: vec![0.0; dim],
+            correction: velocity.clone(),
             velocity,
         })
     }
 
-    /// `x += V r` for the residual in the workspace.
+    /// `z = V r`, `x += z`, `r -= A z` for the residual in the workspace.
     fn correct(&mut self, levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
         let nodal = self.rigid.full_dim();
         vector::convert(1.0, &self.r, &mut self.load);
@@ -74,12 +75,14 @@ where
             *load += spread;
         }
         levels(&mut self.load, &mut self.velocity);
-        vector::axpy(1.0, &self.velocity[nodal..], &mut self.x[nodal..]);
+        self.correction[nodal..].copy_from_slice(&self.velocity[nodal..]);
         self.rigid.expand(&mut self.velocity);
-        let fields = self.x.chunks_exact_mut(D).zip(self.velocity.chunks_exact(D));
-        for ((x, u), _) in fields.zip(&self.is_free).filter(|(_, is_free)| **is_free) {
-            x.iter_mut().zip(u).for_each(|(x, u)| *x += u);
+        let fields = self.correction.chunks_exact_mut(D).zip(self.velocity.chunks_exact(D));
+        for ((z, u), _) in fields.zip(&self.is_free).filter(|(_, is_free)| **is_free) {
+            z.copy_from_slice(u);
         }
+        vector::axpy(1.0, &self.correction, &mut self.x);
+        self.smoother.subtract(&self.correction, &mut self.r);
     }
 }
 
@@ -92,18 +95,16 @@ where
         if norm == 0.0 {
             return z.fill(0.0);
         }
-        vector::convert(1.0 / norm, r, &mut self.b);
+        vector::convert(1.0 / norm, r, &mut self.r);
         self.x.fill(0.0);
-        self.smoother.add_blocks(&self.b, &mut self.x);
-        self.smoother.residual(&self.b, &self.x, &mut self.r);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
         self.correct(levels);
-        self.smoother.residual(&self.b, &self.x, &mut self.r);
-        self.smoother.add_blocks(&self.r, &mut self.x);
-        self.smoother.sweep(&self.b, &mut self.x);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
+        self.smoother.sweep(&self.r, &mut self.x);
         vector::convert(norm, &self.x, z);
     }
 
     fn take_applications(&mut self) -> f64 {
-        self.smoother.operator.take_applications()
+        self.smoother.take_applications()
     }
 }

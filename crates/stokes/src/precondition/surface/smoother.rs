@@ -6,6 +6,7 @@
 //! node belongs to, needs no damping. In 3D, where an inverse has 3321 numbers, only the few modes of a block
 //! that its diagonal does not tell apart are kept. Elsewhere Chebyshev's method with the diagonal is enough.
 
+use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
@@ -32,12 +33,15 @@ const SAFETY: f64 = 1.1;
 
 /// The smoothers of the finest mesh.
 pub struct SurfaceSmoother<const D: usize> {
-    /// The viscous operator.
-    pub operator: ViscousOperator<D>,
+    /// The viscous operator at the nodes that the sweep smooths, and of velocities at those of the blocks.
+    operator: ViscousOperator<D>,
     diagonal: BlockDiagonal,
     /// The sweep with the diagonal.
-    pub chebyshev: Chebyshev<f32>,
+    chebyshev: Chebyshev<f32>,
     blocks: Blocks<D>,
+    /// Reduced velocities and their loads.
+    velocity: Vec<f32>,
+    load: Vec<f32>,
 }
 
 /// Restricted additive Schwarz on the free nodes of the roots.
@@ -66,39 +70,70 @@ where
         let system = elements.system();
         let near = near_surfaces(elements, surfaces);
         let nodes = NumberedNodes::new(system.discretisation(), |n| near[n] && system.space.is_free(n));
+        let mut smoothed = around_finest_cells(system.discretisation());
         let (blocks, near_surfaces) = Blocks::new(&nodes, elements, surfaces)?;
-        let mut diagonal = diagonal(elements, surfaces, &blocks.positions, &near_surfaces)?;
-        let mut operator = ViscousOperator::new(system);
-        let largest = SAFETY * estimate_lambda_max(&mut operator, &mut diagonal, LANCZOS_STEPS)?;
-        let in_fluid = cell_lambda_max::<D>(&system.discretisation().reference());
-        let interval = SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: largest.max(in_fluid) };
-        let chebyshev = Chebyshev::new(operator.dim(), DEGREES[D - 2], interval);
+        let mut diagonal = diagonal(elements, surfaces, &smoothed, (&blocks.positions, &near_surfaces))?;
+        smoothed.iter_mut().zip(&near).for_each(|(smoothed, near)| *smoothed |= near);
+        let mut operator = ViscousOperator::new(system, &smoothed, &near);
+        let interval =
+            interval(&mut operator, &mut diagonal, &blocks.positions, &system.discretisation().reference())?;
         operator.take_applications();
-        Ok(Self { operator, diagonal, chebyshev, blocks })
+        let dim = operator.dim();
+        Ok(Self {
+            operator,
+            chebyshev: Chebyshev::new(dim, DEGREES[D - 2], interval),
+            diagonal,
+            blocks,
+            velocity: vec![0.0; dim],
+            load: vec![0.0; dim],
+        })
     }
 
-    /// `z += G r` by the blocks.
-    pub fn add_blocks(&mut self, r: &[f32], z: &mut [f32]) {
-        let Blocks { inverses, positions, r: local, z: correction } = &mut self.blocks;
-        gather(positions, r, local);
-        match inverses {
-            Inverses::Whole(patches) => patches.apply(local, correction),
-            Inverses::WeakModes(modes) => modes.apply(local, correction),
-        }
-        add_at(positions, correction, z);
+    /// `x += G r`, `r -= A G r` by the blocks `G`.
+    pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32]) {
+        self.velocity.fill(0.0);
+        self.blocks.add(r, &mut self.velocity);
+        vector::axpy(1.0, &self.velocity, x);
+        self.operator.apply_near(&self.velocity, &mut self.load);
+        vector::axpy(-1.0, &self.load, r);
     }
 
-    /// Chebyshev's sweep on `A x = b` from the present `x`.
-    pub fn sweep(&mut self, b: &[f32], x: &mut [f32]) {
-        let Self { operator, diagonal, chebyshev, .. } = self;
-        chebyshev.smooth(operator, diagonal, b, x, Guess::Given);
+    /// Chebyshev's sweep on `A x = b` from an `x` with the residual `r`.
+    pub fn sweep(&mut self, r: &[f32], x: &mut [f32]) {
+        let Self { operator, diagonal, chebyshev, velocity, .. } = self;
+        chebyshev.smooth(operator, diagonal, r, velocity, Guess::Zero);
+        vector::axpy(1.0, velocity, x);
     }
 
-    /// `r = b - A x`.
-    pub fn residual(&mut self, b: &[f32], x: &[f32], r: &mut [f32]) {
-        self.operator.apply(x, r);
-        vector::residual_from_product(b, r);
+    /// `r -= A z` at the nodes that are smoothed.
+    pub fn subtract(&mut self, z: &[f32], r: &mut [f32]) {
+        self.operator.apply(z, &mut self.load);
+        vector::axpy(-1.0, &self.load, r);
     }
+
+    /// Applications of the operator since the last call.
+    pub fn take_applications(&mut self) -> f64 {
+        self.operator.take_applications()
+    }
+}
+
+/// What the sweep damps: eigenvalues in the fluid. The cuts decide the largest near surfaces, at `near` and of
+/// the twists, which may be several times that in the fluid: the diagonal is made larger there by as much.
+fn interval<const D: usize>(
+    operator: &mut ViscousOperator<D>,
+    diagonal: &mut BlockDiagonal,
+    near: &[u32],
+    reference: &ReferenceMatrices<D>,
+) -> Result<SpectralInterval, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let in_fluid = cell_lambda_max(reference);
+    let largest = SAFETY * estimate_lambda_max(operator, diagonal, LANCZOS_STEPS)?;
+    if largest > in_fluid {
+        diagonal.scale(near, (in_fluid / largest) as f32);
+    }
+    Ok(SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: in_fluid })
 }
 
 /// The nodes of cut cells and of roots.
@@ -119,6 +154,17 @@ impl<const D: usize> Blocks<D>
 where
     Dim<D>: Space<D>,
 {
+    /// `z += G r`.
+    fn add(&mut self, r: &[f32], z: &mut [f32]) {
+        let Self { inverses, positions, r: local, z: correction } = self;
+        gather(positions, r, local);
+        match inverses {
+            Inverses::Whole(patches) => patches.apply(local, correction),
+            Inverses::WeakModes(modes) => modes.apply(local, correction),
+        }
+        add_at(positions, correction, z);
+    }
+
     /// The blocks, and the diagonal at their nodes.
     fn new(
         nodes: &NumberedNodes<'_, D>,
@@ -166,15 +212,14 @@ where
 fn diagonal<const D: usize>(
     elements: &Elements<'_, D>,
     surfaces: &SurfaceCoupling<D>,
-    positions: &[u32],
-    near_surfaces: &[f64],
+    smoothed: &[bool],
+    (positions, near_surfaces): (&[u32], &[f64]),
 ) -> Result<BlockDiagonal, StokesError>
 where
     Dim<D>: Space<D>,
 {
     let system = elements.system();
-    let smoothed = around_finest_cells(system.discretisation());
-    let mut smoothed_in_fluid = smoothed;
+    let mut smoothed_in_fluid = smoothed.to_vec();
     positions.iter().for_each(|&k| smoothed_in_fluid[k as usize / D] = false);
     let fluid = nodal_diagonal(&system.space, &system.cells, &smoothed_in_fluid);
     let mut nodal = fluid.map_err(StokesError::AtSurface)?;
