@@ -9,12 +9,18 @@
 //! Since `-div(2 eta E) = 0` there is no other load than this, which Nitsche's terms put on the fluid, on the
 //! pressures and, by its reaction, on the bodies.
 
+use gluey_fem::element::node_count;
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
+use gluey_linalg::vectorised;
+use rayon::prelude::*;
 
 use super::coupling::SurfaceCoupling;
 use super::cut_cells::in_space;
 use super::shapes::Shapes;
 use crate::space::Discretisation;
+
+/// Velocity nodes of a cell, at most.
+const MOST_NODES: usize = 27;
 
 /// Loads on the nodal velocities and on the pressures at all nodes, and on the bodies.
 pub struct StrainLoad<const D: usize>
@@ -40,44 +46,120 @@ pub fn load_of_strain<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let shear = discretisation.mesh.shear();
-    let shapes = Shapes::<D>::new(shear);
     let mut load = StrainLoad {
         velocity: vec![0.0; discretisation.velocity.node_count() * D],
         pressure: vec![0.0; discretisation.pressure.node_count()],
         wrenches: vec![Wrench::default(); body_count],
     };
-    for (place, cut) in surfaces.cut.cells.iter().enumerate() {
+    let rule = Rule::<D>::new(discretisation.mesh.shear());
+    let of_cell = |place: usize| {
+        vectorised(
+            #[inline(always)]
+            || rule.of_cell(discretisation, surfaces, place, strain),
+        )
+    };
+    let loads: Vec<CellLoad<D>> =
+        (0..surfaces.cut.cells.len()).into_par_iter().with_min_len(16).map(of_cell).collect();
+    for (cut, own) in surfaces.cut.cells.iter().zip(loads) {
         let cell = cut.cell as usize;
-        let h = discretisation.cell_size(cell);
-        let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
-        let nodes = discretisation.velocity.cell(cell);
-        let mut forces = vec![Vector::<D>::zeros(); nodes.len()];
-        for ((&body, ball), surface) in cut.bodies.iter().zip(&cut.balls).zip(&cut.moments.surfaces) {
-            for (q, at) in shapes.points.iter().enumerate() {
+        for (i, &node) in discretisation.velocity.cell(cell).iter().enumerate() {
+            (0..D).for_each(|c| load.velocity[node as usize * D + c] += viscosity * own.forces[c][i]);
+        }
+        for (&node, own) in discretisation.pressure.cell(cell).iter().zip(own.pressures) {
+            load.pressure[node as usize] += own;
+        }
+        for (&body, own) in cut.bodies.iter().zip(own.wrenches) {
+            let wrench = &mut load.wrenches[body as usize];
+            wrench.force += own.force * viscosity;
+            wrench.torque += own.torque * viscosity;
+        }
+    }
+    load
+}
+
+/// The loads of a cut cell, those of a viscosity of one.
+struct CellLoad<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// By component and node.
+    forces: [[f64; MOST_NODES]; D],
+    pressures: Vec<f64>,
+    /// On each body that cuts it.
+    wrenches: Vec<Wrench<D>>,
+}
+
+/// The points of a cell and the functions there.
+struct Rule<const D: usize> {
+    shear: f64,
+    shapes: Shapes<D>,
+    /// Values and components of the slopes of the velocity functions, point by point.
+    values: Vec<[f64; MOST_NODES]>,
+    slopes: Vec<[[f64; MOST_NODES]; D]>,
+}
+
+impl<const D: usize> Rule<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(shear: f64) -> Self {
+        let shapes = Shapes::<D>::new(shear);
+        let mut values = vec![[0.0; MOST_NODES]; shapes.points.len()];
+        let mut slopes = vec![[[0.0; MOST_NODES]; D]; shapes.points.len()];
+        for (q, functions) in shapes.velocity.iter().enumerate() {
+            for (i, (value, slope)) in functions.iter().enumerate() {
+                values[q][i] = *value;
+                (0..D).for_each(|d| slopes[q][d][i] = slope[d]);
+            }
+        }
+        Self { shear, shapes, values, slopes }
+    }
+
+    #[inline(always)]
+    fn of_cell(
+        &self,
+        discretisation: &Discretisation<D>,
+        surfaces: &SurfaceCoupling<D>,
+        place: usize,
+        strain: &Matrix<D>,
+    ) -> CellLoad<D> {
+        let cut = &surfaces.cut.cells[place];
+        let h = discretisation.cell_size(cut.cell as usize);
+        let (stress, area) = (h.powi(D as i32 - 2), h.powi(D as i32 - 1));
+        let mut load = CellLoad {
+            forces: [[0.0; MOST_NODES]; D],
+            pressures: vec![0.0; node_count::<D>(1)],
+            wrenches: vec![Wrench::default(); cut.bodies.len()],
+        };
+        for ((wrench, ball), surface) in load.wrenches.iter_mut().zip(&cut.balls).zip(&cut.moments.surfaces) {
+            for (q, at) in self.shapes.points.iter().enumerate() {
                 let from_center: [f64; D] = std::array::from_fn(|d| at[d] - ball.center[d]);
-                let arm = in_space(shear, &from_center) * h;
+                let arm = in_space(self.shear, &from_center) * h;
                 let motion = strain * arm;
                 let normal = Vector::<D>::from_column_slice(&surface.normal[q]);
                 // The fluid has to follow -E r.
                 let penalty = motion * (surfaces.penalty(place) * surface.area[q] * stress);
-                let flux = (motion * normal.transpose() + normal * motion.transpose()) * stress;
-                for (force, (shape, slope)) in forces.iter_mut().zip(&shapes.velocity[q]) {
-                    *force += flux * slope - penalty * *shape;
+                for (c, forces) in load.forces.iter_mut().enumerate() {
+                    add_multiple(-penalty[c], &self.values[q], forces);
+                    for (d, slopes) in self.slopes[q].iter().enumerate() {
+                        let flux = (motion[c] * normal[d] + normal[c] * motion[d]) * stress;
+                        add_multiple(flux, slopes, forces);
+                    }
                 }
                 let through = area * motion.dot(&normal);
-                let nodes = discretisation.pressure.cell(cell);
-                for (&node, shape) in nodes.iter().zip(&shapes.pressure[q]) {
-                    load.pressure[node as usize] -= shape * through;
+                for (sum, shape) in load.pressures.iter_mut().zip(&self.shapes.pressure[q]) {
+                    *sum -= shape * through;
                 }
-                let wrench = &mut load.wrenches[body as usize];
                 wrench.force += penalty;
                 wrench.torque += Dim::<D>::moment(&arm, &penalty);
             }
         }
-        for (&node, force) in nodes.iter().zip(&forces) {
-            (0..D).for_each(|c| load.velocity[node as usize * D + c] += force[c]);
-        }
+        load
     }
-    load
+}
+
+/// `to += factor x`.
+#[inline(always)]
+fn add_multiple(factor: f64, x: &[f64; MOST_NODES], to: &mut [f64; MOST_NODES]) {
+    to.iter_mut().zip(x).for_each(|(to, x)| *to += factor * x);
 }
