@@ -117,8 +117,9 @@ where
     }
 }
 
-/// What the sweep damps: eigenvalues in the fluid. The cuts decide the largest near surfaces, at `near` and of
-/// the twists, which may be several times that in the fluid: the diagonal is made larger there by as much.
+/// What the sweep damps. The cuts decide the largest eigenvalue near surfaces, at `near` and of the twists,
+/// which may be several times that in the fluid: half of the excess, in powers, goes into the diagonal there,
+/// half into the interval.
 fn interval<const D: usize>(
     operator: &mut ViscousOperator<D>,
     diagonal: &mut BlockDiagonal,
@@ -130,10 +131,9 @@ where
 {
     let in_fluid = cell_lambda_max(reference);
     let largest = SAFETY * estimate_lambda_max(operator, diagonal, LANCZOS_STEPS)?;
-    if largest > in_fluid {
-        diagonal.scale(near, (in_fluid / largest) as f32);
-    }
-    Ok(SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: in_fluid })
+    let excess = (largest / in_fluid).max(1.0).sqrt();
+    diagonal.scale(near, (1.0 / excess) as f32);
+    Ok(SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: in_fluid * excess })
 }
 
 /// The nodes of cut cells and of roots.
