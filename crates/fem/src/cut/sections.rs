@@ -60,8 +60,7 @@ impl<const D: usize> Sections<D> {
         }
     }
 
-    /// The integrals over a ball cut flat. Each flat is seen by the rays along its largest component, the
-    /// part in the cell by those that see the first flat.
+    /// The integrals over a ball cut flat. Each flat is seen by the rays along its largest component.
     pub fn of_body(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>]) -> Body<D> {
         let zeros = || vec![0.0; POINTS.pow(D as u32)];
         let mut parts = Parts::default();
@@ -72,13 +71,12 @@ impl<const D: usize> Sections<D> {
             }),
             flats: flats.iter().map(|_| zeros()).collect(),
         };
-        let of_volume = flats.first().map_or(0, FlatInCell::main_axis);
         for direction in 0..D {
-            if direction != of_volume && flats.iter().all(|flat| flat.main_axis() != direction) {
+            if direction > 0 && flats.iter().all(|flat| flat.main_axis() != direction) {
                 continue;
             }
             let sums = self.sums(ball, flats, direction, &mut parts);
-            if direction == of_volume {
+            if direction == 0 {
                 self.set(direction, &sums.volume, &mut body.volume);
             }
             for (k, sum) in sums.flats.iter().enumerate().filter(|(k, _)| flats[*k].main_axis() == direction)
