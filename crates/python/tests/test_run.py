@@ -217,9 +217,9 @@ def test_what_a_run_came_upon_is_a_warning(tmp_path: Path) -> None:
         raise LookupError
 
     with pytest.raises(LookupError):
-        gluey.run(pair(end=20.0), out, progress=stop)
+        gluey.run(pair(end=8.0), out, progress=stop)
     with pytest.warns(gluey.GlueyWarning, match="left by earlier runs") as warned:
-        gluey.run(pair(end=20.0), out, progress=False, overrides={"time.end": 20.0}, force=True)
+        gluey.run(pair(end=8.0), out, progress=False, overrides={"time.end": 8.0}, force=True)
     assert warned[0].filename == __file__
 
 
