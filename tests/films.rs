@@ -130,14 +130,14 @@ fn smallest_gap<const D: usize>(seed: u64) -> f64 {
 
 #[test]
 fn clusters_of_discs() {
-    let gaps = (0..24).map(|seed| smallest_gap::<2>(seed));
+    let gaps = (0..24).map(smallest_gap::<2>);
     let smallest = gaps.fold(f64::INFINITY, f64::min);
     assert!(smallest < 1e-3, "no thin film was tried: {smallest}");
 }
 
 #[test]
 fn clusters_of_spheres() {
-    let gaps = (100..108).map(|seed| smallest_gap::<3>(seed));
+    let gaps = (100..108).map(smallest_gap::<3>);
     let smallest = gaps.fold(f64::INFINITY, f64::min);
     assert!(smallest < 1e-2, "no thin film was tried: {smallest}");
 }
