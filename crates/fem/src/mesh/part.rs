@@ -6,6 +6,9 @@
 //! order of the whole mesh: the ranges of all ranks, one after the other, number the whole mesh.
 
 use std::ops::Range;
+use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
 
 use super::implicit::ImplicitTree;
 use super::tree::{Cell, TreeMesh};
@@ -65,7 +68,7 @@ impl Cuts {
 pub struct Part<const D: usize> {
     /// The leaves, as a mesh. Its nodes are numbered like those of the whole, and hanging nodes of the inner
     /// cells have their constraints; at its rim it knows nothing of what lies outside.
-    pub mesh: TreeMesh<D>,
+    pub mesh: Arc<TreeMesh<D>>,
     own: Range<usize>,
     inner: Range<usize>,
 }
@@ -74,21 +77,34 @@ impl<const D: usize> Part<D> {
     /// The leaves that begin in the keys `own` of the tree cut at `depth`, and around those that overlap the
     /// keys `inner` whatever touches them.
     pub fn new(tree: &mut ImplicitTree<'_, D>, depth: u8, own: &Range<u64>, inner: &Range<u64>) -> Self {
+        Self::widened(tree, depth, [own, inner], 1, &|_| false)
+    }
+
+    /// The same with more of what is around: `rings` times the leaves that touch a leaf that is there
+    /// already, but for the first time only those that touch one that `spreads`.
+    pub fn widened(
+        tree: &mut ImplicitTree<'_, D>,
+        depth: u8,
+        [own, inner]: [&Range<u64>; 2],
+        rings: usize,
+        spreads: &dyn Fn(&Cell<D>) -> bool,
+    ) -> Self {
         let mut leaves = Vec::new();
         tree.for_each_leaf(depth, inner, |cell| leaves.push(cell));
         let Some(first) = leaves.first().map(|cell| tree.key(cell)) else {
             let mesh = tree.frame().clone().with_leaves(depth, Vec::new());
-            return Self { mesh, own: 0..0, inner: 0..0 };
+            return Self { mesh: Arc::new(mesh), own: 0..0, inner: 0..0 };
         };
         let (inner_count, owned) = (leaves.len(), |cell: &Cell<D>| own.contains(&tree.key(cell)));
         let before_own = leaves.iter().take_while(|cell| tree.key(cell) < own.start).count();
         let own_count = leaves.iter().filter(|cell| owned(cell)).count();
-        let around = tree.surroundings(depth, &leaves);
+        let mut around = tree.surroundings(depth, &leaves);
+        spread(tree, depth, (&leaves, &mut around), rings, spreads);
         let before = around.iter().filter(|cell| tree.key(cell) < first).count();
         leaves.extend(around);
         let own = before + before_own..before + before_own + own_count;
         let mesh = tree.frame().clone().with_leaves(depth, leaves);
-        Self { mesh, own, inner: before..before + inner_count }
+        Self { mesh: Arc::new(mesh), own, inner: before..before + inner_count }
     }
 
     /// Leaves of the rank, of those of the mesh.
@@ -100,5 +116,23 @@ impl<const D: usize> Part<D> {
     /// that its run begins in.
     pub fn inner(&self) -> Range<usize> {
         self.inner.clone()
+    }
+}
+
+/// Adds rings of leaves to those around some.
+fn spread<const D: usize>(
+    tree: &mut ImplicitTree<'_, D>,
+    depth: u8,
+    (leaves, around): (&[Cell<D>], &mut Vec<Cell<D>>),
+    rings: usize,
+    spreads: &dyn Fn(&Cell<D>) -> bool,
+) {
+    let mut known: FxHashSet<Cell<D>> = leaves.iter().chain(&*around).copied().collect();
+    let mut rim: Vec<Cell<D>> = around.clone();
+    for _ in 1..rings {
+        rim.retain(spreads);
+        rim = tree.surroundings(depth, &rim);
+        rim.retain(|cell| known.insert(*cell));
+        around.extend_from_slice(&rim);
     }
 }
