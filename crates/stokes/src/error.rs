@@ -183,6 +183,25 @@ pub enum StokesError {
     NotPrepared,
 }
 
+impl StokesError {
+    /// The same with other numbers of the bodies, where some of them were numbered by themselves.
+    #[must_use]
+    pub fn with_bodies(mut self, number: impl Fn(usize) -> usize) -> Self {
+        match &mut self {
+            Self::Unresolved { body, .. }
+            | Self::NoSolid { body, .. }
+            | Self::NoRoot { body, .. }
+            | Self::NoPenalty { body, .. }
+            | Self::WeakSurface { body, .. }
+            | Self::CoarseSurface { body }
+            | Self::AtSurface(DiagonalError::Body { body, .. })
+            | Self::SurfaceBlock { body, .. } => *body = number(*body),
+            _ => {}
+        }
+        self
+    }
+}
+
 /// A part of the diagonal of an operator that has no inverse.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DiagonalError {

@@ -32,6 +32,7 @@ mod film;
 mod flow;
 mod formulation;
 mod operator;
+pub mod part;
 mod precondition;
 mod solid;
 mod solver;

@@ -107,6 +107,12 @@ impl<const D: usize> Film<D> {
         }
     }
 
+    /// Whether it lies at a side of the box through which a shear flow along x goes. The fluid there moves
+    /// along the normal and a body with it, whatever the resistance: such a gap is no measure of a force.
+    pub fn is_across_flow(&self) -> bool {
+        matches!(self.partner, Partner::Wall { axis: 0, .. })
+    }
+
     /// How much slip rolls: half the difference of the curvatures.
     pub fn roll_of_slip(&self) -> f64 {
         0.5 * (1.0 / self.radii[1] - 1.0 / self.radii[0])

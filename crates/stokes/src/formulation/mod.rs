@@ -23,6 +23,7 @@ use crate::space::{CutCellPressures, Discretisation};
 pub use paper::{PaperParams, ParticleVelocity};
 pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
 pub use rigid_dofs::default_offset;
+pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -24,7 +24,7 @@ use crate::surface::{
 };
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
-const OFFSET: f64 = -0.1;
+pub const OFFSET: f64 = -0.1;
 
 /// Multiple of the largest local ratio in Nitsche's penalty, and what it may be doubled to where that is too
 /// little: the ratio of each root does not see bad cells next to each other whose ghosts have other roots.
@@ -45,6 +45,38 @@ impl Unfitted {
     pub fn new(lubrication: Lubrication) -> Self {
         Self { lubrication, penalty: PenaltyFactor::new(PENALTY) }
     }
+
+    /// The same with penalties twice as large, if they may grow.
+    pub fn with_stiffer_penalties(&self) -> Option<Self> {
+        let penalty = self.penalty.doubled(LARGEST_PENALTY)?;
+        Some(Self { penalty, ..*self })
+    }
+
+    /// The same with the penalty in each of these cells of the mesh multiplied by a factor.
+    #[must_use]
+    pub fn with_raised_penalties(&self, cells: impl Iterator<Item = (u32, f64)>) -> Self {
+        Self { penalty: self.penalty.clone().raised(cells), ..*self }
+    }
+
+    /// The system around these bodies, with the forces of the films that are `wanted`.
+    pub fn system<const D: usize>(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        wanted: &dyn Fn(&Film<D>) -> bool,
+    ) -> Result<StokesSystem<D>, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
+        let mut films = thin_films(bodies, discretisation.mesh.domain(), &heights);
+        let flats = flats(&films, bodies.len(), &heights);
+        let system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
+        films.retain(wanted);
+        let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
+        Ok(if lubricates { system.with_films(bodies, films, &heights) } else { system })
+    }
 }
 
 impl<const D: usize> Method<D> for Unfitted
@@ -57,23 +89,17 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
-        let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
-        let films = thin_films(bodies, discretisation.mesh.domain(), &heights);
-        let flats = flats(&films, bodies.len(), &heights);
-        let system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
-        let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
-        let system = if lubricates { system.with_films(bodies, films, &heights) } else { system };
+        let system = self.system(discretisation, bodies, viscosity, &|_| true)?;
         Ok((system, Arc::new(self.clone())))
     }
 
     fn stiffened(&self) -> Option<Arc<dyn Method<D>>> {
-        let penalty = self.penalty.doubled(LARGEST_PENALTY)?;
-        Some(Arc::new(Self { penalty, ..*self }))
+        self.with_stiffer_penalties().map(|stiffer| Arc::new(stiffer) as Arc<dyn Method<D>>)
     }
 
     fn raised(&self, cells: &[WeakCell]) -> Option<Arc<dyn Method<D>>> {
         let factors = cells.iter().map(|weak| (weak.cell, weak.factor()));
-        Some(Arc::new(Self { penalty: self.penalty.clone().raised(factors), ..*self }))
+        Some(Arc::new(self.with_raised_penalties(factors)))
     }
 }
 

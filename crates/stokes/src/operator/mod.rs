@@ -4,6 +4,7 @@ mod assembly;
 mod cells;
 mod diagonal;
 mod element;
+mod pressure_forces;
 mod restricted;
 mod system;
 mod viscous;
@@ -12,6 +13,7 @@ pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, facto
 pub use cells::viscous_diagonal;
 pub use diagonal::{BlockDiagonal, block_diagonal, nodal_diagonal};
 pub use element::{Elements, Source};
+pub use pressure_forces::PressureForces;
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
 pub use system::{StokesSystem, SystemOperator};
 pub use viscous::ViscousOperator;

@@ -17,6 +17,7 @@ use crate::film::{Film, FilmCoupling, Heights};
 use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
+    own_cells,
 };
 use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace, flows_through_films};
 
@@ -65,7 +66,7 @@ where
         cells.retain(is_fluid);
         Self {
             pressure,
-            operator: cell_operator(&space, &cells, None),
+            operator: cell_operator(&space, &own_cells(space.discretisation(), &cells), None),
             space,
             cells,
             penalty: None,
@@ -196,12 +197,15 @@ where
 
     /// The operator of the fluid alone in single precision.
     pub fn in_single_precision(&self) -> CellOperator<f32, D> {
-        cell_operator(&self.space, &self.cells, None)
+        cell_operator(&self.space, &own_cells(self.discretisation(), &self.cells), None)
     }
 
+    /// In a part the mean is one over all parts, and not known here.
     fn reduce_pressures<T: Scalar>(&self, q: &mut [T]) {
         self.pressure.reduce(q);
-        self.pressure.remove_mean(q);
+        if !self.discretisation().is_part() {
+            self.pressure.remove_mean(q);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use gluey_linalg::LinOp;
 
 use super::restricted::{CountedOperator, acting};
 use super::system::StokesSystem;
+use crate::space::own_cells;
 use crate::surface::{SurfaceCoupling, SurfaceWorkspace};
 
 /// `A` on reduced velocities, right at some of the nodes, which counts its applications.
@@ -28,7 +29,8 @@ where
     /// at the nodes `near`.
     pub fn new(system: &StokesSystem<D>, marked: &[bool], near: &[bool]) -> Self {
         let fluid = |marked: &[bool]| {
-            let cells = acting(system.discretisation(), &system.cells, marked);
+            let own = own_cells(system.discretisation(), &system.cells);
+            let cells = acting(system.discretisation(), &own, marked);
             CountedOperator::new(&system.space, &cells, system.cells.len(), system.penalty.as_ref())
         };
         Self {

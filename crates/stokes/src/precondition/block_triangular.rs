@@ -1,13 +1,11 @@
 //! The block triangular preconditioner.
 
-use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
 
-use crate::operator::StokesSystem;
+use crate::operator::{PressureForces, StokesSystem};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
-use crate::surface::SurfaceWorkspace;
 
 /// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures.
 pub struct BlockTriangular<'a, const D: usize>
@@ -15,15 +13,13 @@ where
     Dim<D>: Space<D>,
 {
     system: &'a StokesSystem<D>,
-    fluid: &'a CellOperator<f32, D>,
+    forces: &'a mut PressureForces<D>,
     cycle: &'a mut VCycle<D>,
     schur: &'a mut SchurInverse<D>,
     /// `r_p`, then `z_p` at all nodes.
     pressure: Vec<f32>,
     /// `z_p`.
     answer: Vec<f32>,
-    work: Workspace<f32>,
-    surfaces: SurfaceWorkspace<f32>,
 }
 
 impl<'a, const D: usize> BlockTriangular<'a, D>
@@ -32,13 +28,12 @@ where
 {
     pub fn new(
         system: &'a StokesSystem<D>,
-        fluid: &'a CellOperator<f32, D>,
+        forces: &'a mut PressureForces<D>,
         cycle: &'a mut VCycle<D>,
         schur: &'a mut SchurInverse<D>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];
-        let (work, surfaces) = (Workspace::default(), SurfaceWorkspace::default());
-        Self { system, fluid, cycle, schur, pressure: zeros(), answer: zeros(), work, surfaces }
+        Self { system, forces, cycle, schur, pressure: zeros(), answer: zeros() }
     }
 }
 
@@ -47,7 +42,7 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
-        let Self { system, fluid, cycle, schur, pressure, answer, work, surfaces } = self;
+        let Self { system, forces, cycle, schur, pressure, answer } = self;
         let [ru, rp, rf] = system.parts(r);
         let [zu, zp, zf] = system.parts_mut(z);
         if let Some(films) = &system.films {
@@ -62,16 +57,7 @@ where
         vector::convert(1.0, answer, zp);
         vector::copy(answer, pressure);
         system.pressure.expand(pressure);
-        let gradient = |load: &mut [f32]| {
-            fluid.gradient(pressure, load, work);
-            if let Some(cut) = &system.surfaces {
-                cut.add_narrow([&[], pressure], [&mut *load, &mut []], surfaces);
-            }
-            if let Some(films) = &system.films {
-                films.add_loads(zf, load);
-            }
-        };
-        cycle.answer(ru, gradient, zu);
+        cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu);
         system.space.clear_held(zu);
     }
 }

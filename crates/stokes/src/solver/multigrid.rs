@@ -10,14 +10,13 @@
 //! correction, [`crate::precondition::solid::PenalisedCorrection`].
 
 use gluey_fem::ReferenceMatrices;
-use gluey_fem::cells::CellOperator;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Gcr, GcrParams, LinOp, Preconditioner, Reference, Scalar};
 
 use super::{SaddleSolver, SolveReport};
 use crate::error::StokesError;
 use crate::formulation::Problem;
-use crate::operator::{Elements, StokesSystem, SystemOperator};
+use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle};
 use crate::precondition::{BlockTriangular, CycleLevels};
@@ -41,8 +40,7 @@ where
     noise: f64,
     cycle: Option<VCycle<D>>,
     schur: Option<SchurInverse<D>>,
-    /// The operator of the fluid.
-    fluid: Option<CellOperator<f32, D>>,
+    forces: Option<PressureForces<D>>,
 }
 
 impl<const D: usize> Default for MultigridSolver<D>
@@ -57,7 +55,7 @@ where
             noise: 0.0,
             cycle: None,
             schur: None,
-            fluid: None,
+            forces: None,
         }
     }
 }
@@ -89,7 +87,7 @@ where
         let before = self.schur.take();
         self.schur = Some(SchurInverse::new(&hierarchy.meshes, &elements, before)?);
         self.cycle = Some(velocity_cycle(problem, &elements, hierarchy)?);
-        self.fluid = Some(system.in_single_precision());
+        self.forces = Some(PressureForces::new(system));
         // Penalties and extrapolated nodes in thin films leave large numbers that nearly cancel.
         self.noise = if system.surfaces.is_some() { f64::INFINITY } else { rounding_noise(system) };
         Ok(())
@@ -102,12 +100,13 @@ where
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<SolveReport, StokesError> {
-        let (Some(cycle), Some(schur), Some(fluid)) = (&mut self.cycle, &mut self.schur, &self.fluid) else {
+        let (Some(cycle), Some(schur), Some(forces)) = (&mut self.cycle, &mut self.schur, &mut self.forces)
+        else {
             return Err(StokesError::NotPrepared);
         };
         cycle.take_fine_applications();
         let operator = &mut SystemOperator::new(system);
-        let preconditioner = &mut BlockTriangular::new(system, fluid, cycle, schur);
+        let preconditioner = &mut BlockTriangular::new(system, forces, cycle, schur);
         let residuals = if self.noise <= MOST_NOISE {
             run(&mut self.single, operator, preconditioner, b, x, tolerance)?
         } else {

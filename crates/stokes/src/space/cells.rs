@@ -46,3 +46,11 @@ pub fn all_cells<const D: usize>(discretisation: &Discretisation<D>, viscosity: 
     };
     (0..discretisation.mesh.cell_count()).map(active).collect()
 }
+
+/// Those that are added up here.
+pub fn own_cells<const D: usize>(
+    discretisation: &Discretisation<D>,
+    cells: &[ActiveCell],
+) -> Vec<ActiveCell> {
+    cells.iter().filter(|cell| discretisation.is_own(cell.cell as usize)).copied().collect()
+}

@@ -1,5 +1,6 @@
 //! A mesh with its velocity and pressure nodes.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::{Chunks, NodeMap, ReferenceMatrices, TreeMesh};
@@ -15,6 +16,8 @@ pub struct Discretisation<const D: usize> {
     pub pressure: Arc<NodeMap<D>>,
     /// How operators cut the mesh.
     pub chunks: Arc<Chunks<D>>,
+    /// The cells that are added up here, where the mesh is a part of a larger one.
+    own: Option<Range<usize>>,
 }
 
 impl<const D: usize> Discretisation<D> {
@@ -23,7 +26,28 @@ impl<const D: usize> Discretisation<D> {
         let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
         let (velocity, pressure) = (nodes(2), nodes(1));
         let chunks = Arc::new(Chunks::new(&velocity, &pressure));
-        Self { mesh: Arc::new(mesh), velocity, pressure, chunks }
+        Self { mesh: Arc::new(mesh), velocity, pressure, chunks, own: None }
+    }
+
+    /// A part of a larger mesh, of which the cells `own` are added up here: operators are sums over these
+    /// cells, sums over all cells those of all parts.
+    pub fn of_part(
+        mesh: Arc<TreeMesh<D>>,
+        [velocity, pressure]: [Arc<NodeMap<D>>; 2],
+        chunks: Arc<Chunks<D>>,
+        own: Range<usize>,
+    ) -> Self {
+        Self { mesh, velocity, pressure, chunks, own: Some(own) }
+    }
+
+    /// Whether the mesh is a part of a larger one.
+    pub fn is_part(&self) -> bool {
+        self.own.is_some()
+    }
+
+    /// Whether a cell is added up here: all are, but in a part.
+    pub fn is_own(&self, cell: usize) -> bool {
+        self.own.as_ref().is_none_or(|own| own.contains(&cell))
     }
 
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.

@@ -8,7 +8,7 @@ mod marking;
 mod pressure;
 mod velocity;
 
-pub use cells::{ActiveCell, active_cells, all_cells};
+pub use cells::{ActiveCell, active_cells, all_cells, own_cells};
 pub use discretisation::Discretisation;
 pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{

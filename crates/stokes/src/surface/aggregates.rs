@@ -33,12 +33,15 @@ impl Aggregates {
     /// # Errors
     /// [`StokesError::NoRoot`] for a cell without any good one around it, [`StokesError::CoarseSurface`]
     /// where hanging nodes meet cut cells.
+    ///
+    /// At the rim of a part, where its root may be outside, a bad cell is its own.
     pub fn new<const D: usize>(
         discretisation: &Discretisation<D>,
         cut: &CutCells<D>,
     ) -> Result<Self, StokesError> {
         let root = |of: &CutCell<D>| match cut.states[of.cell as usize] {
             CellState::Bad => root(discretisation, cut, of)
+                .or_else(|| (!discretisation.is_own(of.cell as usize)).then_some(of.cell))
                 .ok_or(StokesError::NoRoot { body: of.bodies[0] as usize, share: of.moments.fraction() }),
             _ => Ok(of.cell),
         };

@@ -35,12 +35,12 @@ pub struct SurfaceCoupling<const D: usize> {
     penalties: Vec<f64>,
     /// Cut cell and body of each piece.
     pieces: Vec<(u32, u32)>,
-    /// The velocity nodes of cut cells in the nodes of the mesh: themselves, or what they take their values
+    /// The velocity nodes of own cut cells in the nodes of the mesh: themselves, or what they take their values
     /// from.
     velocity: AffineConstraints,
     /// Nodes among these with given values.
     boundary: Vec<u32>,
-    /// The velocity nodes and the pressure nodes of cut cells.
+    /// The velocity nodes and the pressure nodes of own cut cells.
     nodes: Subset,
     pressures: Subset,
     /// The Gauss points of a cell, and the pressure functions there.
@@ -80,7 +80,8 @@ where
         let (velocity, pressure) = (&discretisation.velocity, &discretisation.pressure);
         let touched = |nodes: &gluey_fem::NodeMap<D>| {
             let mut touched = vec![false; nodes.node_count()];
-            let all = cut.cells.iter().flat_map(|cell| nodes.cell(cell.cell as usize));
+            let own = cut.cells.iter().filter(|cell| discretisation.is_own(cell.cell as usize));
+            let all = own.flat_map(|cell| nodes.cell(cell.cell as usize));
             all.for_each(|&node| touched[node as usize] = true);
             Subset::new(touched.len(), |node| touched[node])
         };
@@ -96,12 +97,14 @@ where
         let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
         let shear = discretisation.mesh.shear();
-        let of_pieces = || pieces.iter().map(|&piece| data.piece(piece));
+        let is_own = |piece: &&(u32, u32)| discretisation.is_own(cut.cells[piece.0 as usize].cell as usize);
+        let own: Vec<&(u32, u32)> = pieces.iter().filter(is_own).collect();
+        let of_pieces = || own.iter().map(|&&piece| data.piece(piece));
         let (wide, narrow) = rayon::join(
             || CutOperator::new(of_pieces(), counts).sheared(shear),
             || CutOperator::new(of_pieces(), counts).sheared(shear),
         );
-        drop(data);
+        drop((data, own));
         let discretisation = discretisation.clone();
         let (roots, bodies_at_roots) = roots_and_bodies(&cut, aggregates);
         let corners = node_count::<D>(1);

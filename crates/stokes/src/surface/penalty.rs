@@ -99,6 +99,9 @@ pub fn penalties<const D: usize>(
     let values: Vec<Result<f64, BlockError>> = clusters.par_iter().map(of_cluster).collect();
     let mut penalties = vec![0.0; cut.cells.len()];
     for (cluster, value) in clusters.iter().zip(values) {
+        let is_own = |&(_, k): &(u32, u32)| discretisation.is_own(cut.cells[k as usize].cell as usize);
+        // At the rim of a part aggregates are not whole; nobody asks for their penalties.
+        let value = value.or_else(|error| if cluster.iter().any(is_own) { Err(error) } else { Ok(1.0) });
         let value = value.map_err(|_| {
             let first = &cut.cells[cluster[0].1 as usize];
             StokesError::NoPenalty { body: first.bodies[0] as usize, cell: first.cell as usize }

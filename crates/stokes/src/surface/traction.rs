@@ -41,7 +41,7 @@ impl<const D: usize> Shapes<D> {
 
 /// `int_G t r` for the traction `t = sigma n` on each body, `n` out of it, and the arm `r` from its centre,
 /// of a nodal field with all constraints fulfilled and the pressures at all nodes, relative to a linear flow
-/// with this strain. The traction is the one that balances the forces: with the penalty in it.
+/// with this strain, from the own cells. The traction is the one that balances the forces: with the penalty in it.
 pub fn first_moments<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
     space: &VelocitySpace<D>,
@@ -58,6 +58,9 @@ where
     let of_cell = |(index, cut): (usize, &CutCell<D>)| -> Vec<Matrix<D>> {
         let mut moments = vec![Matrix::<D>::zeros(); cut.bodies.len()];
         let cell = cut.cell as usize;
+        if !discretisation.is_own(cell) {
+            return moments;
+        }
         let h = discretisation.cell_size(cell);
         let (stress, area) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
         for (q, at) in shapes.points.iter().enumerate() {

@@ -55,6 +55,7 @@ where
     let (discretisation, cut) = (surfaces.discretisation(), &surfaces.cut);
     let energy = StrainEnergy::new(discretisation, cut);
     let mesh = &discretisation.mesh;
+    // The part holds all cells around its own.
     let around = |cell: u32| -> f64 {
         let here = &mesh.cells()[cell as usize];
         let offset = |k: usize| std::array::from_fn(|d| (k / 3usize.pow(d as u32) % 3) as i32 - 1);
@@ -72,6 +73,9 @@ where
         let share = taken / around(cell);
         (share > MOST).then(|| WeakCell { cell, body: cut.cells[place].bodies[0], share })
     };
-    let is_bad = |place: &usize| cut.states[cut.cells[*place].cell as usize] == CellState::Bad;
+    let is_bad = |place: &usize| {
+        let cell = cut.cells[*place].cell as usize;
+        cut.states[cell] == CellState::Bad && discretisation.is_own(cell)
+    };
     (0..cut.cells.len()).into_par_iter().with_min_len(64).filter(is_bad).filter_map(weak).collect()
 }

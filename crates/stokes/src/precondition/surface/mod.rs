@@ -2,6 +2,9 @@
 
 mod correction;
 mod roots;
+mod shared;
 mod smoother;
 
 pub use correction::SurfaceCorrection;
+pub use shared::SharedVelocities;
+pub use smoother::{AssembledSmoother, SurfaceSmoother};

@@ -10,7 +10,7 @@ use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
-    estimate_lambda_max, invert_spd, vector,
+    estimate_lambda_max_from, invert_spd, vector,
 };
 
 use crate::error::{DiagonalError, StokesError};
@@ -18,10 +18,11 @@ use crate::operator::{BlockDiagonal, Elements, ViscousOperator, add_at, gather, 
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::velocity::cell_lambda_max;
-use crate::space::around_finest_cells;
+use crate::space::{Discretisation, around_finest_cells};
 use crate::surface::SurfaceCoupling;
 
 use super::roots::{ModesError, modes_and_diagonal};
+use super::shared::SharedVelocities;
 
 /// Steps of the sweep with the diagonal in 2D and in 3D, and what it damps eigenvalues down to: the largest
 /// in the fluid over this.
@@ -44,11 +45,13 @@ pub struct SurfaceSmoother<const D: usize> {
     load: Vec<f32>,
 }
 
-/// Restricted additive Schwarz on the free nodes of the roots.
+/// Restricted additive Schwarz on the free nodes of the own roots.
 struct Blocks<const D: usize> {
     inverses: Inverses<D>,
     /// The components of the nodes among the reduced velocities.
     positions: Vec<u32>,
+    /// In a part, which share of its blocks a component has here.
+    shares: Option<Vec<f32>>,
     r: Vec<f32>,
     z: Vec<f32>,
 }
@@ -65,21 +68,85 @@ impl<const D: usize> SurfaceSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoothers of a system with cut cells.
-    pub fn new(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Result<Self, StokesError> {
+    /// The smoothers of a system with cut cells, a part of which may be here. Vectors that it is applied to
+    /// then hold the same at copies as at their owners.
+    ///
+    /// # Errors
+    /// If a block or an entry of the diagonal is not positive. Where the mesh is shared, what comes before
+    /// the first message ([`SurfaceSmoother::assembled`]) may fail on one part alone.
+    pub fn new(
+        elements: &Elements<'_, D>,
+        surfaces: &SurfaceCoupling<D>,
+        shared: &mut dyn SharedVelocities,
+    ) -> Result<Self, StokesError> {
+        Self::assembled(elements, surfaces)?.completed(elements, surfaces, shared)
+    }
+
+    /// What of it needs no other part.
+    ///
+    /// # Errors
+    /// If a block or an entry of the diagonal is not positive.
+    pub fn assembled(
+        elements: &Elements<'_, D>,
+        surfaces: &SurfaceCoupling<D>,
+    ) -> Result<AssembledSmoother<D>, StokesError> {
         let system = elements.system();
         let near = near_surfaces(elements, surfaces);
-        let nodes = NumberedNodes::new(system.discretisation(), |n| near[n] && system.space.is_free(n));
+        let here = nodes_of_own_cells(system.discretisation());
+        let is_in = |n: usize| near[n] && system.space.is_free(n) && here.as_ref().is_none_or(|here| here[n]);
+        let nodes = NumberedNodes::new(system.discretisation(), is_in);
         let mut smoothed = around_finest_cells(system.discretisation());
+        if let Some(here) = &here {
+            smoothed.iter_mut().zip(here).for_each(|(smoothed, here)| *smoothed &= here);
+        }
         let (blocks, near_surfaces) = Blocks::new(&nodes, elements, surfaces)?;
-        let mut diagonal = diagonal(elements, surfaces, &smoothed, (&blocks.positions, &near_surfaces))?;
+        let nodal = nodal(elements, &smoothed, (&blocks.positions, &near_surfaces))?;
         smoothed.iter_mut().zip(&near).for_each(|(smoothed, near)| *smoothed |= near);
-        let mut operator = ViscousOperator::new(system, &smoothed, &near);
-        let interval =
-            interval(&mut operator, &mut diagonal, &blocks.positions, &system.discretisation().reference())?;
+        let operator = ViscousOperator::new(system, &smoothed, &near);
+        Ok(AssembledSmoother { operator, blocks, nodal, near })
+    }
+}
+
+/// A smoother whose parts do not know of each other yet.
+pub struct AssembledSmoother<const D: usize> {
+    operator: ViscousOperator<D>,
+    blocks: Blocks<D>,
+    /// The inverse diagonal at the nodes of own cells.
+    nodal: Vec<f32>,
+    /// Nodes of cut cells and roots.
+    near: Vec<bool>,
+}
+
+impl<const D: usize> AssembledSmoother<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The smoother. All parts call this.
+    ///
+    /// # Errors
+    /// If the block of a twist is not positive.
+    pub fn completed(
+        self,
+        elements: &Elements<'_, D>,
+        surfaces: &SurfaceCoupling<D>,
+        shared: &mut dyn SharedVelocities,
+    ) -> Result<SurfaceSmoother<D>, StokesError> {
+        let Self { mut operator, blocks, nodal, near } = self;
+        let system = elements.system();
+        // Parts that fail send all messages first, which others wait for.
+        let (mut diagonal, failure) = diagonal(elements, surfaces, nodal, shared);
+        let near: Vec<u32> = if system.discretisation().is_part() {
+            let near = (0..near.len()).filter(|&node| near[node] && system.space.is_free(node));
+            near.flat_map(|node| (node * D) as u32..((node + 1) * D) as u32).collect()
+        } else {
+            blocks.positions.clone()
+        };
+        let reference = system.discretisation().reference();
+        let interval = interval(&mut operator, &mut diagonal, &near, &reference, shared)?;
         operator.take_applications();
+        failure.map_or(Ok(()), Err)?;
         let dim = operator.dim();
-        Ok(Self {
+        Ok(SurfaceSmoother {
             operator,
             chebyshev: Chebyshev::new(dim, DEGREES[D - 2], interval),
             diagonal,
@@ -88,32 +155,87 @@ where
             load: vec![0.0; dim],
         })
     }
+}
 
+impl<const D: usize> SurfaceSmoother<D>
+where
+    Dim<D>: Space<D>,
+{
     /// `x += G r`, `r -= A G r` by the blocks `G`.
-    pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32]) {
+    pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32], shared: &mut dyn SharedVelocities) {
         self.velocity.fill(0.0);
         self.blocks.add(r, &mut self.velocity);
+        shared.sum(&mut self.velocity);
         vector::axpy(1.0, &self.velocity, x);
         self.operator.apply_near(&self.velocity, &mut self.load);
+        shared.sum(&mut self.load);
         vector::axpy(-1.0, &self.load, r);
     }
 
     /// Chebyshev's sweep on `A x = b` from an `x` with the residual `r`.
-    pub fn sweep(&mut self, r: &[f32], x: &mut [f32]) {
+    pub fn sweep(&mut self, r: &[f32], x: &mut [f32], shared: &mut dyn SharedVelocities) {
         let Self { operator, diagonal, chebyshev, velocity, .. } = self;
-        chebyshev.smooth(operator, diagonal, r, velocity, Guess::Zero);
+        let mut operator = Summed { operator, shared };
+        chebyshev.smooth(&mut operator, diagonal, r, velocity, Guess::Zero);
         vector::axpy(1.0, velocity, x);
     }
 
     /// `r -= A z` at the nodes that are smoothed.
-    pub fn subtract(&mut self, z: &[f32], r: &mut [f32]) {
-        self.operator.apply(z, &mut self.load);
+    pub fn subtract(&mut self, z: &[f32], r: &mut [f32], shared: &mut dyn SharedVelocities) {
+        Summed { operator: &mut self.operator, shared }.apply(z, &mut self.load);
         vector::axpy(-1.0, &self.load, r);
     }
 
     /// Applications of the operator since the last call.
     pub fn take_applications(&mut self) -> f64 {
         self.operator.take_applications()
+    }
+}
+
+/// The operator on vectors that hold the same at copies as at their owners.
+struct Summed<'a, const D: usize> {
+    operator: &'a mut ViscousOperator<D>,
+    shared: &'a mut dyn SharedVelocities,
+}
+
+impl<const D: usize> LinOp<f32> for Summed<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.operator.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.operator.apply(x, y);
+        self.shared.sum(y);
+    }
+}
+
+/// The operator on vectors that are zero at copies, whose scalar products are sums over parts.
+struct OnOwned<'a, const D: usize> {
+    operator: &'a mut ViscousOperator<D>,
+    shared: &'a mut dyn SharedVelocities,
+    x: Vec<f32>,
+}
+
+impl<const D: usize> LinOp<f32> for OnOwned<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn dim(&self) -> usize {
+        self.operator.dim()
+    }
+
+    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
+        self.x.copy_from_slice(x);
+        self.shared.update(&mut self.x);
+        self.operator.apply(&self.x, y);
+        self.shared.accumulate(y);
+    }
+
+    fn complete(&self, sums: &mut [f64]) {
+        self.shared.complete(sums);
     }
 }
 
@@ -125,15 +247,31 @@ fn interval<const D: usize>(
     diagonal: &mut BlockDiagonal,
     near: &[u32],
     reference: &ReferenceMatrices<D>,
+    shared: &mut dyn SharedVelocities,
 ) -> Result<SpectralInterval, StokesError>
 where
     Dim<D>: Space<D>,
 {
     let in_fluid = cell_lambda_max(reference);
-    let largest = SAFETY * estimate_lambda_max(operator, diagonal, LANCZOS_STEPS)?;
+    let mut start = vec![0.0; operator.dim()];
+    vector::fill_pseudo_random(1, &mut start);
+    shared.clear(&mut start);
+    let mut on_owned = OnOwned { x: start.clone(), operator, shared };
+    let largest = SAFETY * estimate_lambda_max_from(start, &mut on_owned, diagonal, LANCZOS_STEPS)?;
     let excess = (largest / in_fluid).max(1.0).sqrt();
     diagonal.scale(near, (1.0 / excess) as f32);
     Ok(SpectralInterval { lower: in_fluid / RATIOS[D - 2], upper: in_fluid * excess })
+}
+
+/// The nodes of the own cells of a part.
+fn nodes_of_own_cells<const D: usize>(discretisation: &Discretisation<D>) -> Option<Vec<bool>> {
+    let nodes = &discretisation.velocity;
+    discretisation.is_part().then(|| {
+        let mut here = vec![false; nodes.node_count()];
+        let own = (0..nodes.cell_count()).filter(|&cell| discretisation.is_own(cell));
+        own.flat_map(|cell| nodes.cell(cell)).for_each(|&node| here[node as usize] = true);
+        here
+    })
 }
 
 /// The nodes of cut cells and of roots.
@@ -156,11 +294,14 @@ where
 {
     /// `z += G r`.
     fn add(&mut self, r: &[f32], z: &mut [f32]) {
-        let Self { inverses, positions, r: local, z: correction } = self;
+        let Self { inverses, positions, shares, r: local, z: correction } = self;
         gather(positions, r, local);
         match inverses {
             Inverses::Whole(patches) => patches.apply(local, correction),
             Inverses::WeakModes(modes) => modes.apply(local, correction),
+        }
+        if let Some(shares) = shares {
+            correction.iter_mut().zip(shares).for_each(|(z, share)| *z *= *share);
         }
         add_at(positions, correction, z);
     }
@@ -178,7 +319,9 @@ where
             block.sort_unstable();
             block
         };
-        let blocks = surfaces.roots().iter().map(block);
+        let is_own = |root: &&u32| nodes.mesh.is_own(**root as usize);
+        let blocks = surfaces.roots().iter().filter(is_own).map(block);
+        let shares = nodes.mesh.is_part().then(|| shares::<D>(nodes, surfaces.roots(), block));
         let zeros = vec![0.0; nodes.nodes.len() * D];
         let (inverses, diagonal) = if D == 2 {
             let matrix = assemble_on_nodes(nodes, elements)?;
@@ -192,8 +335,27 @@ where
             })?;
             (Inverses::WeakModes(modes), diagonal)
         };
-        Ok((Self { inverses, positions: nodes.positions(), r: zeros.clone(), z: zeros }, diagonal))
+        let positions = nodes.positions();
+        Ok((Self { inverses, positions, shares, r: zeros.clone(), z: zeros }, diagonal))
     }
+}
+
+/// Which share of the blocks of each component belongs to own roots, of the blocks of all.
+fn shares<const D: usize>(
+    nodes: &NumberedNodes<'_, D>,
+    roots: &[u32],
+    block: impl Fn(&u32) -> Vec<u32>,
+) -> Vec<f32> {
+    let [mut own, mut all] = [0, 1].map(|_| vec![0u32; nodes.nodes.len()]);
+    for root in roots {
+        let is_own = u32::from(nodes.mesh.is_own(*root as usize));
+        for node in block(root) {
+            own[node as usize] += is_own;
+            all[node as usize] += 1;
+        }
+    }
+    let share = |(&own, &all): (&u32, &u32)| own as f32 / all.max(1) as f32;
+    own.iter().zip(&all).map(share).flat_map(|share| [share; D]).collect()
 }
 
 /// The error of the block of a root.
@@ -202,19 +364,21 @@ where
     Dim<D>: Space<D>,
 {
     let PatchError { patch, source } = error;
-    let (discretisation, root) = (surfaces.discretisation(), surfaces.roots()[patch] as usize);
+    let (discretisation, roots) = (surfaces.discretisation(), surfaces.roots());
+    let mut own = (0..roots.len()).filter(|&place| discretisation.is_own(roots[place] as usize));
+    let place = own.nth(patch).unwrap_or_default();
+    let root = roots[place] as usize;
     let (mesh, half) = (&discretisation.mesh, 0.5 * discretisation.cell_size(root));
     let center = mesh.lower_corner(&mesh.cells()[root]).iter().map(|x| x + half).collect();
-    StokesError::SurfaceBlock { center, body: surfaces.body_at_root(patch), source }
+    StokesError::SurfaceBlock { center, body: surfaces.body_at_root(place), source }
 }
 
-/// The inverse diagonal, with blocks for the twists.
-fn diagonal<const D: usize>(
+/// The inverse diagonal at nodes: in the fluid, and at the given ones near surfaces.
+fn nodal<const D: usize>(
     elements: &Elements<'_, D>,
-    surfaces: &SurfaceCoupling<D>,
     smoothed: &[bool],
     (positions, near_surfaces): (&[u32], &[f64]),
-) -> Result<BlockDiagonal, StokesError>
+) -> Result<Vec<f32>, StokesError>
 where
     Dim<D>: Space<D>,
 {
@@ -230,14 +394,39 @@ where
         }
         nodal[k as usize] = (1.0 / value) as f32;
     }
+    Ok(nodal)
+}
+
+/// The inverse diagonal, with blocks for the twists, and the first of these that is not positive.
+fn diagonal<const D: usize>(
+    elements: &Elements<'_, D>,
+    surfaces: &SurfaceCoupling<D>,
+    mut nodal: Vec<f32>,
+    shared: &mut dyn SharedVelocities,
+) -> (BlockDiagonal, Option<StokesError>)
+where
+    Dim<D>: Space<D>,
+{
+    let system = elements.system();
     let rigid = Dim::<D>::RIGID;
     let mut blocks = vec![0.0; system.space.body_count() * rigid * rigid];
-    for (piece, (_, body)) in surfaces.pieces().enumerate() {
+    let own = surfaces.pieces().enumerate().filter(|(_, (cell, _))| system.discretisation().is_own(*cell));
+    for (piece, (_, body)) in own {
         surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
     }
-    for (body, block) in blocks.chunks_exact_mut(rigid * rigid).enumerate() {
-        let inverted = invert_spd(rigid, block);
-        inverted.map_err(|source| StokesError::AtSurface(DiagonalError::Body { body, source }))?;
+    let nodal_dim = nodal.len();
+    nodal.resize(system.space.dim(), 0.0);
+    shared.update(&mut nodal);
+    nodal.truncate(nodal_dim);
+    shared.sum_blocks(&mut blocks);
+    // A body that is near a part and nowhere in it has none there.
+    let is_here = |block: &[f64]| !system.discretisation().is_part() || block.iter().any(|&b| b != 0.0);
+    let mut failure = None;
+    for (body, block) in blocks.chunks_exact_mut(rigid * rigid).enumerate().filter(|b| is_here(b.1)) {
+        if let Err(source) = invert_spd(rigid, block) {
+            failure = failure.or(Some(StokesError::AtSurface(DiagonalError::Body { body, source })));
+        }
     }
-    Ok(BlockDiagonal::new(nodal, blocks.into_iter().map(|value| value as f32).collect(), rigid))
+    let blocks = blocks.into_iter().map(|value| value as f32).collect();
+    (BlockDiagonal::new(nodal, blocks, rigid), failure)
 }

@@ -1,0 +1,208 @@
+//! `unfitted` on a part of a mesh, for solvers whose ranks hold one part each.
+//!
+//! A part is a [`Discretisation::of_part`]: own cells, which are added up here, and others around them. What
+//! follows from places alone is found without a message: which cells are cut, aggregates, penalties, the
+//! blocks of the smoother. For that the part has to reach as far around its own surfaces as
+//! [`rings_around_surfaces`] says. Vectors are those of [`StokesSystem`] at all nodes of the part; products of
+//! its operator are the sums over the own cells, and sums of these over all parts are right at every node.
+
+use gluey_fem::ReferenceMatrices;
+use gluey_geom::{Dim, Matrix, Space};
+use gluey_levelset::Ball;
+
+use crate::error::StokesError;
+use crate::film::{Film, Lubrication};
+use crate::formulation::{Problem, Unfitted};
+use crate::operator::{Elements, StokesSystem};
+use crate::precondition::surface;
+use crate::space::Discretisation;
+
+pub use crate::operator::PressureForces;
+pub use crate::precondition::surface::{SharedVelocities, SurfaceSmoother};
+pub use crate::surface::WeakCell;
+
+/// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two
+/// cells away, and what else that root carries.
+const RINGS: usize = 4;
+
+/// `unfitted` with penalties as the flows so far want them.
+#[derive(Clone, Debug)]
+pub struct PartMethod(Unfitted);
+
+impl PartMethod {
+    /// With this treatment of films that are too thin for the mesh.
+    pub fn new(lubrication: Lubrication) -> Self {
+        Self(Unfitted::new(lubrication))
+    }
+
+    /// The same with penalties twice as large, if they may grow.
+    #[must_use]
+    pub fn stiffened(&self) -> Option<Self> {
+        self.0.with_stiffer_penalties().map(Self)
+    }
+
+    /// The same with the penalty in each of these cells, by their places in the part, multiplied by a factor.
+    #[must_use]
+    pub fn raised(&self, cells: impl Iterator<Item = (u32, f64)>) -> Self {
+        Self(self.0.with_raised_penalties(cells))
+    }
+
+    /// The problem around the bodies near a part, in the order of all bodies, with the forces of the films
+    /// that are `wanted`: each film of some part.
+    ///
+    /// # Errors
+    /// Those of [`Problem::new`].
+    pub fn problem<const D: usize>(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        viscosity: f64,
+        wanted: &dyn Fn(&Film<D>) -> bool,
+    ) -> Result<Problem<D>, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let system = self.0.system(discretisation, bodies, viscosity, wanted)?;
+        Ok(Problem { system, bodies: bodies.to_vec(), rigidity: std::sync::Arc::new(self.0.clone()) })
+    }
+}
+
+/// How many rings of cells around its own a part needs near surfaces: for the roots of bad cells, and for the
+/// flow through the films between bodies of up to this radius.
+pub fn rings_around_surfaces<const D: usize>(
+    lubrication: Lubrication,
+    largest_radius: f64,
+    cell_size: f64,
+) -> usize {
+    let heights = lubrication.heights::<D>(cell_size);
+    let edge = (largest_radius * heights.largest.max(2.0 * heights.at_walls)).sqrt();
+    RINGS + (edge / cell_size).ceil() as usize
+}
+
+/// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
+pub fn coarse_offset() -> f64 {
+    crate::formulation::OFFSET_OF_LEVELS
+}
+
+/// The smoother of a part, before parts know of each other.
+pub struct AssembledSmoother<'p, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    elements: Elements<'p, D>,
+    smoother: surface::AssembledSmoother<D>,
+}
+
+impl<'p, const D: usize> AssembledSmoother<'p, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// For a problem that [`PartMethod::problem`] gave.
+    ///
+    /// # Errors
+    /// [`StokesError::SurfaceBlock`] or [`StokesError::AtSurface`] where penalties are too small.
+    pub fn new(problem: &'p Problem<D>) -> Result<Self, StokesError> {
+        let elements = Elements::new(&problem.system, ReferenceMatrices::<D>::VELOCITY);
+        let surfaces = problem.system.surfaces.as_ref().ok_or(StokesError::NotPrepared)?;
+        let smoother = SurfaceSmoother::assembled(&elements, surfaces)?;
+        Ok(Self { elements, smoother })
+    }
+
+    /// The smoother. All parts call this.
+    ///
+    /// # Errors
+    /// [`StokesError::AtSurface`] where penalties are too small, on all parts that have the body.
+    pub fn completed(self, shared: &mut dyn SharedVelocities) -> Result<SurfaceSmoother<D>, StokesError> {
+        let surfaces = self.elements.system().surfaces.as_ref().ok_or(StokesError::NotPrepared)?;
+        self.smoother.completed(&self.elements, surfaces, shared)
+    }
+}
+
+impl<const D: usize> StokesSystem<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The own cells that no surface cuts.
+    pub fn own_fluid_cells(&self) -> impl Iterator<Item = usize> + '_ {
+        let cells = self.cells.iter().map(|cell| cell.cell as usize);
+        cells.filter(|&cell| self.discretisation().is_own(cell))
+    }
+
+    /// All cells that no surface cuts.
+    pub fn fluid_cells(&self) -> impl Iterator<Item = usize> + '_ {
+        self.cells.iter().map(|cell| cell.cell as usize)
+    }
+
+    /// The own cells in which something flows.
+    pub fn own_flowing_cells(&self) -> Vec<usize> {
+        let cut = self.surfaces.iter().flat_map(|surfaces| &surfaces.cut.cells);
+        let cut = cut.map(|cell| cell.cell as usize).filter(|&cell| self.discretisation().is_own(cell));
+        let mut cells: Vec<usize> = self.own_fluid_cells().chain(cut).collect();
+        cells.sort_unstable();
+        cells
+    }
+
+    /// Calls `visit` with each own cell in which something flows and `int p_q p_r / eta` over its fluid, row
+    /// by row.
+    pub fn for_each_pressure_mass(&self, mut visit: impl FnMut(usize, &[f64])) {
+        let corners = ReferenceMatrices::<D>::PRESSURE;
+        let unit = self.discretisation().reference().pressure_mass;
+        let mut matrix = vec![0.0; corners * corners];
+        for cell in self.own_flowing_cells() {
+            let surfaces = self.surfaces.as_ref().map(|s| (s, s.cut.place[cell] as usize));
+            if let Some((surfaces, place)) = surfaces.filter(|(s, place)| *place < s.cut.cells.len()) {
+                let viscosity = self.viscosity();
+                surfaces.for_each_mass(place, |q, r, mass| matrix[q * corners + r] = mass / viscosity);
+            } else {
+                let scale = self.discretisation().cell_size(cell).powi(D as i32) / self.viscosity();
+                matrix.iter_mut().zip(unit.iter()).for_each(|(value, unit)| *value = scale * unit);
+            }
+            visit(cell, &matrix);
+        }
+    }
+
+    /// The bodies that own cells or own films depend on.
+    pub fn bodies_here(&self) -> Vec<bool> {
+        let mut here = vec![false; self.space.body_count()];
+        for (cell, body) in self.surfaces.iter().flat_map(|surfaces| surfaces.pieces()) {
+            here[body] |= self.discretisation().is_own(cell);
+        }
+        let nodal = self.space.full_dim();
+        for (k, _) in self.film_rows().flatten() {
+            if let Some(twist) = (*k as usize).checked_sub(nodal) {
+                here[twist / Dim::<D>::RIGID] = true;
+            }
+        }
+        here
+    }
+
+    /// Entries of the films' rows in reduced velocities.
+    pub fn film_rows(&self) -> impl Iterator<Item = &[(u32, f64)]> {
+        self.films.iter().flat_map(|films| (0..films.dim()).map(|row| films.row(row)))
+    }
+
+    /// The inverses of about the Schur complement of the films' forces.
+    pub fn film_inverses(&self) -> &[f64] {
+        self.films.as_ref().map_or(&[], |films| films.schur_inverses())
+    }
+}
+
+impl<const D: usize> Problem<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The own cells whose penalty is too small for a velocity that [`Problem::velocity`] gave, right at all
+    /// cells around own ones, relative to a linear flow with this strain.
+    pub fn weak_cells(&self, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {
+        self.rigidity.weak_cells(self, velocity, strain)
+    }
+
+    /// The share of the own cells in the first moments `int (sigma.n) r dA` of the tractions on the bodies,
+    /// from nodal velocities with twists, and pressures.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] where the formulation has no such tractions.
+    pub fn first_moments(&self, fields: [&[f64]; 2]) -> Result<Vec<Matrix<D>>, StokesError> {
+        self.rigidity.first_moments(self, fields, &Matrix::zeros())
+    }
+}
