@@ -8,19 +8,20 @@
 //!
 //! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
 //! only), `--bodies` (three rigid bodies, and fine cells around these only), `--pair` (the two bodies of
-//! S2 and S3 in the shear of `bench-stokes`, all cells as fine), `--tolerance T`, `--ranks N,M,...` (threads;
+//! S2 and S3 in the shear of `bench-stokes`, all cells as fine), `--unfitted` (bodies whose surfaces cut cells,
+//! with films; without it, bodies whose nodes move with them), `--tolerance T`, `--ranks N,M,...` (threads;
 //! without it, the processes of `mpirun`), `--fail-rank R` (this rank fails before the solve, to see that all
 //! end). Times, and the most memory that a process held, go to the standard error, so that equal runs print
 //! equal lines.
 
 use std::time::Instant;
 
-use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, RigidBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, RigidBodies, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Threads, Traffic};
-use gluey_stokes::Refinement;
+use gluey_stokes::{Lubrication, Refinement};
 use serde::Serialize;
 
 /// Latency of a message and bytes a second of a rank, of the model.
@@ -34,6 +35,7 @@ struct Options {
     adaptive: bool,
     bodies: bool,
     pair: bool,
+    unfitted: bool,
     tolerance: f64,
     fail_rank: Option<usize>,
 }
@@ -45,6 +47,7 @@ fn main() {
         adaptive: false,
         bodies: false,
         pair: false,
+        unfitted: false,
         tolerance: 1e-8,
         fail_rank: None,
     };
@@ -55,6 +58,7 @@ fn main() {
             "--adaptive" => Some(&mut options.adaptive),
             "--bodies" => Some(&mut options.bodies),
             "--pair" => Some(&mut options.pair),
+            "--unfitted" => Some(&mut options.unfitted),
             _ => None,
         };
         if let Some(switch) = switch {
@@ -69,7 +73,7 @@ fn main() {
             "--fail-rank" => options.fail_rank = Some(number(&name, &value)),
             "--ranks" => ranks = Some(value.split(',').map(|n| number(&name, n)).collect()),
             _ => fail(&format!(
-                "{name} is no option: --dimension, --level, --adaptive, --bodies, --pair, --tolerance, --ranks, --fail-rank"
+                "{name} is no option: --dimension, --level, --adaptive, --bodies, --pair, --unfitted, --tolerance, --ranks, --fail-rank"
             )),
         }
     }
@@ -157,9 +161,14 @@ where
     assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
     let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
     let wrenches = if options.pair { Vec::new() } else { wrenches(balls.len()) };
-    let offset = if options.pair { gluey_stokes::default_offset(D) } else { -0.1 };
-    let bodies = RigidBodies { balls: &balls, offset, wrenches: &wrenches };
-    let mine = flow.solve_around(&bodies, &mut tree, &cuts, ranks, &walls);
+    let (balls, wrenches) = (&balls[..], &wrenches[..]);
+    let mine = if options.unfitted {
+        let bodies = SurfaceBodies { balls, lubrication: Lubrication::Deficit, wrenches };
+        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &walls)
+    } else {
+        let offset = if options.pair { gluey_stokes::default_offset(D) } else { -0.1 };
+        flow.solve_around(&RigidBodies { balls, offset, wrenches }, &mut tree, &cuts, ranks, &walls)
+    };
     let mine = mine.unwrap_or_else(|error| fail(&error.to_string()));
     let seconds = start.elapsed().as_secs_f64();
     let peaks = ranks.all_gather(&[peak_kibibytes()]);
@@ -237,6 +246,7 @@ struct Record {
     adaptive: bool,
     bodies: bool,
     pair: bool,
+    unfitted: bool,
     tolerance: f64,
     ranks: usize,
     iterations: usize,
@@ -262,7 +272,7 @@ impl Record {
             .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
         let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
-        let &Options { dimension, level, adaptive, bodies, pair, tolerance, .. } = options;
+        let &Options { dimension, level, adaptive, bodies, pair, unfitted, tolerance, .. } = options;
         let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
         let hops = 2.0 * (ranks.size() as f64).log2().ceil() * solve.reductions as f64;
         let modelled_communication_seconds =
@@ -273,6 +283,7 @@ impl Record {
             adaptive,
             bodies,
             pair,
+            unfitted,
             tolerance,
             ranks: ranks.size(),
             iterations: mine.iterations,

@@ -39,8 +39,13 @@ pub struct Shared<'a, 'b, const D: usize> {
 impl<const D: usize> Shared<'_, '_, D> {
     /// The rank whose run holds the centre of a body.
     pub fn owner(&self, tree: &ImplicitTree<'_, D>, body: &Ball<D>) -> usize {
+        self.owner_of_point(tree, body.center())
+    }
+
+    /// The rank whose run holds a point, or what is nearest to it in the box.
+    pub fn owner_of_point(&self, tree: &ImplicitTree<'_, D>, point: &Vector<D>) -> usize {
         let (frame, level) = (tree.frame(), tree.max_level());
-        let (arm, h) = (body.center() - frame.domain().lower, frame.size(level));
+        let (arm, h) = (point - frame.domain().lower, frame.size(level));
         let coords = std::array::from_fn(|d| {
             let count = i64::from(frame.roots()[d]) << level;
             let cell = (arm[d] / h).floor() as i64;

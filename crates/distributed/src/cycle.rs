@@ -7,7 +7,7 @@ use crate::bodies::Shared;
 use crate::coarse::CoarseFactor;
 use crate::flow::FlowError;
 use crate::level::{Level, LevelOperator};
-use crate::space::{LevelSpace, ghost_plan};
+use crate::space::{Around, LevelSpace, ghost_plan};
 use crate::transfer::Transfer;
 
 /// Cells of the coarsest mesh along the shortest edge of the box, at most, unless it has more roots.
@@ -20,13 +20,27 @@ pub struct VCycle<'a, const D: usize> {
     transfers: Vec<Transfer<D>>,
     /// On rank zero.
     coarse: Option<CoarseFactor>,
+    /// Whether the finest level smooths.
+    smooths: bool,
 }
 
 impl<'a, const D: usize> VCycle<'a, D> {
+    /// All ranks call this.
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'a, '_, D>,
         viscosity: f64,
+    ) -> Result<Self, FlowError> {
+        Self::under(tree, shared, viscosity, None)
+    }
+
+    /// The same under a smoother of the finest level elsewhere, for which its part is to hold more. All ranks
+    /// call this.
+    pub fn under(
+        tree: &mut ImplicitTree<'_, D>,
+        shared: &Shared<'a, '_, D>,
+        viscosity: f64,
+        around: Option<&Around<'_, D>>,
     ) -> Result<Self, FlowError> {
         let ranks = shared.ranks;
         let finest = tree.max_level();
@@ -35,10 +49,11 @@ impl<'a, const D: usize> VCycle<'a, D> {
         for depth in coarsest..=finest {
             // Rank zero holds all of the coarsest level: what it lacks are ghosts.
             let all = (depth == coarsest && ranks.rank() == 0).then(|| 0..tree.end());
-            let space = LevelSpace::new(tree, depth, shared, all);
+            let around = around.filter(|_| depth == finest);
+            let space = LevelSpace::widened(tree, depth, shared, all, around);
             let plans = ghost_plan(tree, shared, &space);
             let mut level = Level::new(ranks, space, plans, viscosity, depth == finest)?;
-            if depth > coarsest {
+            if depth > coarsest && around.is_none() {
                 level.relax_near_bodies(tree, shared, viscosity)?;
             }
             levels.push(level);
@@ -52,7 +67,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
         ranks.sum(&mut failures);
         match coarse.transpose() {
             Ok(_) if failures[0] > 0.0 => Err(FlowError::CoarseElsewhere),
-            coarse => Ok(Self { levels, transfers, coarse: coarse? }),
+            coarse => Ok(Self { levels, transfers, coarse: coarse?, smooths: around.is_none() }),
         }
     }
 
@@ -79,7 +94,9 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let nodal = operator.space.owned_nodal_dim();
             self.transfers[fine - 1].prolong(space, &x[..space.nodal_dim()], &mut z[..nodal]);
             operator.project(z);
-            fine_level.smooth();
+            if self.smooths || fine + 1 < self.levels.len() {
+                self.levels[fine].smooth();
+            }
         }
     }
 

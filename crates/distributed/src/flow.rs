@@ -77,24 +77,31 @@ pub enum FlowError {
         /// Its rows.
         source: BlockError,
     },
-    /// A body that the mesh does not resolve.
-    #[error(
-        "body {body} with radius {radius} has no rigid motion on cells of size {cell_size}: refine the mesh"
-    )]
-    Unresolved {
-        /// Which, the first of them.
-        body: usize,
-        /// Its radius.
-        radius: f64,
-        /// Edge length of the smallest cells.
-        cell_size: f64,
-    },
-    /// Small matrices of pressures, in a gap or of the box.
+    /// What the serial solver says: of small matrices of pressures, in a gap or of the box, and of surfaces.
     #[error(transparent)]
-    Pressures(#[from] StokesError),
-    /// The same, on a rank that has none of them.
-    #[error("matrices of pressures: not positive definite on another rank")]
-    PressuresElsewhere,
+    Part(#[from] StokesError),
+    /// The same, of the part of another rank.
+    #[error("{message} (on rank {rank})")]
+    Elsewhere {
+        /// Which rank, the first of them.
+        rank: usize,
+        /// What it says.
+        message: String,
+    },
+    /// The velocity block lacks positivity at a body, whatever the penalty there.
+    #[error(
+        "penalties at body {} were raised {rounds} times, and the surface of a cell still takes {share:.2} of the strain \
+         energy around it: refine the mesh",
+        body + 1
+    )]
+    WeakSurface {
+        /// Index of the body, from 0; messages count from 1.
+        body: usize,
+        /// What the tractions on the surface take, over the strain energy around the cell.
+        share: f64,
+        /// How often penalties were raised.
+        rounds: usize,
+    },
     /// A matrix of pressures is too large.
     #[error(transparent)]
     Sparse(#[from] SparseError),
@@ -157,7 +164,7 @@ where
     pub setup_traffic: Traffic,
     /// What it sent in the solve.
     pub solve_traffic: Traffic,
-    cells: MyCells<D>,
+    pub(crate) cells: MyCells<D>,
 }
 
 impl<const D: usize> MyFlow<D>
@@ -307,13 +314,14 @@ fn check_resolved<const D: usize>(
     let first = ranks.all_gather(&[lost]).into_iter().min().unwrap_or(u64::MAX);
     match balls.get(first as usize) {
         Some(ball) => {
-            Err(FlowError::Unresolved { body: first as usize, radius: ball.bounding_radius(), cell_size })
+            let (body, radius) = (first as usize, ball.bounding_radius());
+            Err(StokesError::Unresolved { body, radius, cell_size }.into())
         }
         None => Ok(()),
     }
 }
 
-fn sizes<const D: usize>(space: &LevelSpace<D>, plans: &Plans) -> LevelSizes {
+pub fn sizes<const D: usize>(space: &LevelSpace<D>, plans: &Plans) -> LevelSizes {
     let cells = space.part.own().len();
     LevelSizes {
         cells,
@@ -354,7 +362,7 @@ where
 }
 
 /// Cells and unknowns of all ranks.
-fn counts_of_all<const D: usize>(space: &LevelSpace<D>, ranks: &dyn Communicator) -> [f64; 2] {
+pub fn counts_of_all<const D: usize>(space: &LevelSpace<D>, ranks: &dyn Communicator) -> [f64; 2] {
     let unknowns = space.owned_nodal_dim() + space.pressure.owned.len();
     let mut counts = [space.part.own().len() as f64, unknowns as f64];
     ranks.sum(&mut counts);

@@ -28,6 +28,7 @@
 //! `docs/decisions/0030-ranks.md` says what separates it from the serial solver. Not for surfaces that cut
 //! cells, viscosities that vary, or boxes without a wall.
 
+mod agreement;
 mod bodies;
 mod cells;
 mod coarse;
@@ -42,11 +43,13 @@ mod precondition;
 mod pressures;
 mod schur;
 mod space;
+mod surface;
 mod transfer;
 
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
 pub use moving::{FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields};
+pub use surface::SurfaceBodies;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -7,12 +7,13 @@
 use gluey_fem::{ImplicitTree, MeshError};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_motion::{Fields, FlowStatistics, Hydrodynamics, NoForces};
+use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, NoForces};
 use gluey_parallel::Communicator;
-use gluey_stokes::Refinement;
+use gluey_stokes::{CutCellPressures, Formulation, Lubrication, Refinement};
 
 use crate::cuts::cuts_of_work;
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
+use crate::surface::SurfaceBodies;
 
 /// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls.
 #[derive(Clone, Debug)]
@@ -30,8 +31,8 @@ where
     pub periods: [Option<f64>; D],
     /// How the mesh follows the particles.
     pub refinement: Refinement,
-    /// Nodes with a level set of at least this many cells are rigid.
-    pub offset: f64,
+    /// How rigidity is imposed: `rigid-dofs` with aggregated pressures, or `unfitted`.
+    pub formulation: Formulation,
     /// Radii of the particles.
     pub radii: Vec<f64>,
     /// Forces and torques on them, or no entries for none on any.
@@ -49,6 +50,9 @@ pub enum SuspensionError {
     /// The flow failed, on all ranks.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// Ranks have it not.
+    #[error("ranks share flows of `unfitted`, and of `rigid-dofs` with aggregated pressures, only")]
+    Formulation,
 }
 
 /// A frame with the fields of the last flow that rank zero wants.
@@ -125,8 +129,18 @@ where
         }
         let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 });
-        let bodies = RigidBodies { balls: &balls, offset: self.offset, wrenches };
-        Ok(self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?)
+        let balls = &balls;
+        Ok(match self.formulation {
+            Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate } => {
+                let bodies = RigidBodies { balls, offset, wrenches };
+                self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?
+            }
+            Formulation::Unfitted { lubrication } => {
+                let bodies = SurfaceBodies { balls, lubrication, wrenches };
+                self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, &shear)?
+            }
+            _ => return Err(SuspensionError::Formulation),
+        })
     }
 
     fn balls(&self, positions: &[Vector<D>]) -> Vec<Ball<D>> {
@@ -321,6 +335,26 @@ where
             acting.torque += more.torque;
         }
         Ok(())
+    }
+
+    fn films(&self, reach: f64) -> Vec<Film<D>> {
+        let lubrication = Lubrication::Deficit;
+        if self.last.is_none() || self.suspension.formulation != (Formulation::Unfitted { lubrication }) {
+            return Vec::new();
+        }
+        let (balls, domain) = (self.suspension.balls(&self.told.positions), &self.suspension.domain);
+        let mut films = gluey_stokes::films(&balls, domain, reach);
+        films.retain(|film| !film.is_across_flow());
+        let film = |film: gluey_stokes::Film<D>| Film {
+            first: film.body as usize,
+            second: film.side(1),
+            branch: film.branch(),
+            slide: Vector::zeros(),
+            is_held: [false; 2],
+            gap: film.gap,
+            curvature_radius: film.curvature_radius(),
+        };
+        films.into_iter().map(film).collect()
     }
 
     fn statistics(&self) -> FlowStatistics {

@@ -6,8 +6,10 @@
 //! cells that the others do not hold.
 
 use gluey_fem::{Constraint, ImplicitTree};
+use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
 use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_stokes::PressureSpace;
 use rustc_hash::FxHashMap;
 
 use crate::bodies::Shared;
@@ -81,6 +83,42 @@ impl SharedPressures {
         let [free_count, bridge_count, poor_count] = sums;
         let has_bridges = bridge_count > 0.0;
         Self { plan, is_free, free_count, has_bridges, is_poor, poor_count, ghosts, keeps: free, rows }
+    }
+
+    /// Around surfaces that cut cells: those of the space of the part, which knows the aggregates of its own
+    /// cells. Constants are in the kernel but for rounding of the moments, so means are removed. All ranks
+    /// call this.
+    pub fn around_surfaces<const D: usize>(
+        tree: &mut ImplicitTree<'_, D>,
+        shared: &Shared<'_, '_, D>,
+        space: &LevelSpace<D>,
+        pressure: &PressureSpace<D>,
+    ) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let (ranks, nodes) = (shared.ranks, &*space.pressure);
+        let count = nodes.map.node_count();
+        let is_ghost = |row: &&Constraint| !nodes.map.is_hanging(row.node as usize);
+        let mut rows: Vec<Constraint> = pressure.constraints().iter().filter(is_ghost).cloned().collect();
+        rows.sort_unstable_by_key(|row| row.node);
+        let mut needed = vec![false; count];
+        for &node in nodes.map.cells(space.part.own()) {
+            nodes.regular(node).for_each(|(node, _)| needed[node as usize] = true);
+        }
+        rows.retain(|row| needed[row.node as usize]);
+        let masters = rows.iter().flat_map(|row| &row.masters);
+        masters.for_each(|&(master, _)| needed[master as usize] = true);
+        let keeps: Vec<bool> = (0..count).map(|node| pressure.is_free(node)).collect();
+        let mut ghosts = wanted_nodes(tree, shared, &space.part, nodes, |node| needed[node] && keeps[node]);
+        ghosts.sort_unstable_by_key(|ghost| ghost.place);
+        let plan = GhostPlan::new(ranks, ghosts.clone(), nodes.finder());
+        let is_free = keeps[nodes.owned.clone()].to_vec();
+        let mut free_count = [is_free.iter().filter(|is_free| **is_free).count() as f64];
+        ranks.sum(&mut free_count);
+        let is_poor = vec![false; is_free.len()];
+        let (free_count, poor_count) = (free_count[0], 0.0);
+        Self { plan, is_free, free_count, has_bridges: true, is_poor, poor_count, ghosts, keeps, rows }
     }
 
     /// Length of a vector at the nodes of the part and elsewhere.

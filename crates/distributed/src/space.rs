@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, CellScalar};
-use gluey_fem::{Chunks, ImplicitTree, NodeMap, Part};
+use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part};
 use gluey_parallel::{GhostPlan, Wanted};
 
 use crate::bodies::{LevelBodies, Shared, rigid};
@@ -20,10 +20,18 @@ pub struct LevelSpace<const D: usize> {
     pub bodies: Arc<LevelBodies<D>>,
 }
 
+/// What else a part of the finest level holds.
+pub struct Around<'a, const D: usize> {
+    /// How many rings of cells around its own.
+    pub rings: usize,
+    /// By which cells all but the first of them spread.
+    pub spreads: &'a dyn Fn(&Cell<D>) -> bool,
+}
+
 /// Nodes of one degree.
 #[derive(Debug)]
 pub struct Nodes<const D: usize> {
-    pub map: NodeMap<D>,
+    pub map: Arc<NodeMap<D>>,
     /// First touched by a cell of the rank.
     pub owned: Range<usize>,
     /// The constraint of each hanging node, or none.
@@ -32,7 +40,7 @@ pub struct Nodes<const D: usize> {
 
 impl<const D: usize> Nodes<D> {
     fn new(part: &Part<D>, degree: usize) -> Self {
-        let map = NodeMap::new(&part.mesh, degree);
+        let map = Arc::new(NodeMap::new(&part.mesh, degree));
         let touched = |cells| map.cells(cells).iter().max().map_or(0, |&node| node as usize + 1);
         let first = touched(0..part.own().start);
         let owned = first..touched(0..part.own().end).max(first);
@@ -81,8 +89,23 @@ impl<const D: usize> LevelSpace<D> {
         shared: &Shared<'_, '_, D>,
         inner: Option<Range<u64>>,
     ) -> Self {
+        Self::widened(tree, depth, shared, inner, None)
+    }
+
+    /// The same with more of what is around. All ranks call this.
+    pub fn widened(
+        tree: &mut ImplicitTree<'_, D>,
+        depth: u8,
+        shared: &Shared<'_, '_, D>,
+        inner: Option<Range<u64>>,
+        around: Option<&Around<'_, D>>,
+    ) -> Self {
         let own = shared.cuts.of(shared.ranks.rank());
-        let part = Part::new(tree, depth, &own, &inner.unwrap_or(own.clone()));
+        let inner = inner.unwrap_or(own.clone());
+        let part = match around {
+            None => Part::new(tree, depth, &own, &inner),
+            Some(around) => Part::widened(tree, depth, [&own, &inner], around.rings, around.spreads),
+        };
         let (velocity, pressure) = (Nodes::new(&part, 2), Nodes::new(&part, 1));
         let chunks = Arc::new(Chunks::new(&velocity.map, &pressure.map));
         let bodies = LevelBodies::new(tree, shared, &part, &velocity).into();

@@ -13,7 +13,8 @@ use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Fields, Hydrodynamics};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
-    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, Formulation, Refinement, SolverKind,
+    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement,
+    SolverKind,
 };
 
 /// Places and radii; the third lies across the border of the box in the first direction.
@@ -21,7 +22,11 @@ const BODIES: [([f64; 3], f64); 3] =
     [([0.4, 0.35, 0.52], 0.14), ([0.5, 0.76, 0.7], 0.1), ([0.98, 0.6, 0.4], 0.16)];
 const FRAME: FrameName = FrameName { stream: 3, step: 70 };
 
-fn suspension<const D: usize>() -> Suspension<D>
+const RIGID_DOFS: Formulation =
+    Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
+const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
+
+fn suspension<const D: usize>(formulation: Formulation) -> Suspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -34,11 +39,11 @@ where
         refinement: Refinement {
             coarsest: surface - 2,
             surface,
-            band: 1.0,
+            band: 2.0,
             gap_fraction: 0.0,
             gap_levels: 0,
         },
-        offset: -0.1,
+        formulation,
         radii: BODIES.map(|body| body.1).to_vec(),
         wrenches: Vec::new(),
         shear_rate: 1.0,
@@ -66,11 +71,9 @@ fn serial<const D: usize>(suspension: &Suspension<D>) -> Flow<D>
 where
     Dim<D>: Space<D>,
 {
-    let Suspension { domain, roots, periods, refinement, offset, .. } = suspension;
+    let &Suspension { domain, roots, periods, ref refinement, formulation, .. } = suspension;
     let balls = balls(suspension);
-    let mesh = refinement.mesh(*domain, *roots, periods.map(|p| p.is_some()), &balls).unwrap();
-    let formulation =
-        Formulation::RigidDofs { offset: *offset, cut_cell_pressures: CutCellPressures::Aggregate };
+    let mesh = refinement.mesh(domain, roots, periods.map(|p| p.is_some()), &balls).unwrap();
     let viscosity = suspension.flow.viscosity;
     let params = FlowParams { viscosity, formulation, solver: SolverKind::Multigrid, tolerance: 1e-12 };
     let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
@@ -146,11 +149,11 @@ where
     found
 }
 
-fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(limits: [f64; 2])
+fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(formulation: Formulation, limits: [f64; 2])
 where
     Dim<D>: Space<D>,
 {
-    let suspension = suspension::<D>();
+    let suspension = suspension::<D>(formulation);
     let flow = serial(&suspension);
     for size in [1, 2, 3, 8] {
         let pieces = shown(&suspension, size);
@@ -166,29 +169,33 @@ where
 
 #[test]
 fn pieces_are_the_fields_of_the_serial_solver_in_2d() {
-    pieces_are_the_fields_of_the_serial_solver::<2>([1e-9, 1e-8]);
+    pieces_are_the_fields_of_the_serial_solver::<2>(RIGID_DOFS, [1e-9, 1e-8]);
+    pieces_are_the_fields_of_the_serial_solver::<2>(UNFITTED, [2.2e-8, 2.5e-7]);
 }
 
 #[test]
 fn pieces_are_the_fields_of_the_serial_solver_in_3d() {
-    pieces_are_the_fields_of_the_serial_solver::<3>([1e-9, 1e-8]);
+    pieces_are_the_fields_of_the_serial_solver::<3>(RIGID_DOFS, [1e-9, 1e-8]);
+    pieces_are_the_fields_of_the_serial_solver::<3>(UNFITTED, [1.2e-8, 2.1e-8]);
 }
 
 /// More ranks than cells: some have none.
 #[test]
 fn a_rank_without_cells_has_an_empty_piece() {
-    let mut suspension = suspension::<2>();
-    suspension.refinement = Refinement { coarsest: 2, surface: 2, ..suspension.refinement };
-    suspension.radii = vec![0.3, 0.26, 0.28];
-    let pieces = shown(&suspension, 20);
-    assert_eq!(pieces.iter().map(|piece| piece.cells.len() / 9).sum::<usize>(), 16);
-    assert!(pieces.iter().any(|piece| piece.points.is_empty()));
+    for formulation in [RIGID_DOFS, UNFITTED] {
+        let mut suspension = suspension::<2>(formulation);
+        suspension.refinement = Refinement { coarsest: 2, surface: 2, ..suspension.refinement };
+        suspension.radii = vec![0.3, 0.26, 0.28];
+        let pieces = shown(&suspension, 20);
+        assert_eq!(pieces.iter().map(|piece| piece.cells.len() / 9).sum::<usize>(), 16);
+        assert!(pieces.iter().any(|piece| piece.points.is_empty()));
+    }
 }
 
 /// There is nothing to show of a flow that failed.
 #[test]
 fn a_flow_that_failed_has_no_fields() {
-    let suspension = Suspension { radii: vec![0.001; 3], ..suspension::<2>() };
+    let suspension = Suspension { radii: vec![0.001; 3], ..suspension::<2>(UNFITTED) };
     let found = Threads::run(2, |ranks| {
         if ranks.rank() > 0 {
             let mut seen = Vec::new();

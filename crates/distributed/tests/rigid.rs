@@ -9,7 +9,7 @@ use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Alone, Communicator, Threads};
 use gluey_stokes::{
-    Conditions, CutCellPressures, FlowParams, FlowSolver, Formulation, Refinement, SolverKind,
+    Conditions, CutCellPressures, FlowParams, FlowSolver, Formulation, Refinement, SolverKind, StokesError,
 };
 
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 };
@@ -214,7 +214,8 @@ fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
 fn all_ranks_refuse_what_cannot_be_computed() {
     let tiny = Example { bodies: &[([0.4, 0.5, 0.5], 0.2), ([0.81, 0.3, 0.5], 0.05)], ..PAIR };
     let (radius, cell_size) = (0.05, 0.125);
-    assert_eq!(errors(tiny, &[]), vec![FlowError::Unresolved { body: 1, radius, cell_size }; 3]);
+    let refused = FlowError::Part(StokesError::Unresolved { body: 1, radius, cell_size });
+    assert_eq!(errors(tiny, &[]), vec![refused; 3]);
     let one = [Wrench::default()];
     assert_eq!(errors(PAIR, &one), vec![FlowError::Count { found: 1, bodies: 2 }; 3]);
 }

@@ -39,7 +39,10 @@ where
             roots: [1; D],
             periods: std::array::from_fn(|d| (self.is_periodic && d == 0).then_some(1.0)),
             refinement: Refinement { coarsest, surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 },
-            offset: default_offset(D),
+            formulation: Formulation::RigidDofs {
+                offset: default_offset(D),
+                cut_cell_pressures: CutCellPressures::Aggregate,
+            },
             radii: vec![self.radius; self.centers.len()],
             wrenches: Vec::new(),
             shear_rate: 1.0,
@@ -51,12 +54,10 @@ where
     }
 
     fn serial(&self, tolerance: f64) -> Flow<D> {
-        let Suspension { domain, roots, periods, refinement, offset, .. } = self.suspension();
+        let Suspension { domain, roots, periods, refinement, formulation, .. } = self.suspension();
         let ball = |&center: &Vector<D>| Ball::periodic(center, self.radius, periods);
         let balls: Vec<Ball<D>> = self.centers.iter().map(ball).collect();
         let mesh = refinement.mesh(domain, roots, periods.map(|p| p.is_some()), &balls).unwrap();
-        let cut_cell_pressures = CutCellPressures::Aggregate;
-        let formulation = Formulation::RigidDofs { offset, cut_cell_pressures };
         let solver = SolverKind::Multigrid;
         let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance };
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });

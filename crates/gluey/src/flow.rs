@@ -19,15 +19,14 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, Partner, PhaseTimes, Refinement};
+use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Lubrication};
 
-use params::flow_params;
 use stress_control::StressControl;
 
-pub(crate) use params::{refinement, tree};
+pub(crate) use params::{flow_params, refinement, tree};
 
 pub use error::FlowError;
 pub use estimate::{MeshEstimate, MeshSize};
@@ -253,13 +252,6 @@ where
     }
 }
 
-/// Whether a film lies at a side through which the undisturbed flow goes, which is along x. The fluid there
-/// moves along the normal and a particle with it, whatever the resistance: such a gap is no measure of a
-/// force.
-fn is_at_open_side<const D: usize>(film: &gluey_stokes::Film<D>) -> bool {
-    matches!(film.partner, Partner::Wall { axis: 0, .. })
-}
-
 impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
 where
     Dim<D>: Space<D>,
@@ -354,7 +346,7 @@ where
             return Vec::new();
         }
         let mut films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
-        films.retain(|film| !is_at_open_side(film));
+        films.retain(|film| !film.is_across_flow());
         let film = |film: gluey_stokes::Film<D>| Film {
             first: film.body as usize,
             second: film.side(1),

@@ -5,13 +5,16 @@
 
 use std::sync::Arc;
 
-use gluey_fem::ReferenceMatrices;
 use gluey_linalg::{LinOp, Pattern, SellMatrix, SparseError, SparseMatrix};
 use gluey_parallel::{Communicator, GhostPlan, Wanted, route};
 use rustc_hash::FxHashMap;
 
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
+
+/// Calls what it is given with each own cell in which something flows and `int p_q p_r / eta` over its fluid,
+/// row by row.
+pub type Masses<'a> = dyn Fn(&mut dyn FnMut(usize, &[f64])) + 'a;
 
 /// `T` on the owned pressures.
 pub struct SharedMass<'a> {
@@ -79,30 +82,29 @@ impl<'a> SharedMass<'a> {
         ranks: &'a dyn Communicator,
         space: &LevelSpace<D>,
         pressures: &SharedPressures,
-        viscosity: f64,
+        (viscosity, masses): (f64, &Masses<'_>),
         weights: &[f64],
     ) -> Result<Self, SparseError> {
         let mut columns = Columns::new(space, pressures);
-        let cells = Cells { space, pressures, viscosity, unit: &ReferenceMatrices::<D>::new().pressure_mass };
+        let cells = Cells { space, pressures, masses };
         let received = cells.rows_of_others(ranks, &columns);
         let received = columns.placed(ranks, space, &received);
         let find = space.pressure.finder();
         let first = space.pressure.owned.start as u32;
         columns.plan = GhostPlan::new(ranks, columns.ghosts.clone(), |key| find(key).map(|q| q - first));
 
-        let mut groups: Vec<Vec<usize>> = space.own_cells().map(|cell| cells.group(cell, &columns)).collect();
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        masses(&mut |cell, _| groups.push(cells.group(cell, &columns)));
         groups.extend(received.iter().map(|entry| vec![entry.0, entry.1]));
         let mut matrix = SparseMatrix::zeros(Arc::new(Pattern::from_groups(columns.len(), &groups)?));
         drop(groups);
         let owned = columns.owned;
         let mut failed = Ok(());
-        for cell in space.own_cells() {
-            cells.for_each_entry(cell, &columns, |row, column, value| {
-                if row < owned {
-                    failed = failed.and(matrix.add(row, column, value));
-                }
-            });
-        }
+        cells.for_each_entry(&columns, |row, column, value| {
+            if row < owned {
+                failed = failed.and(matrix.add(row, column, value));
+            }
+        });
         failed?;
         received.iter().try_for_each(|&(row, column, value)| matrix.add(row, column, value))?;
         for q in (0..owned).filter(|&q| !pressures.is_free[q]) {
@@ -179,8 +181,7 @@ impl Columns {
 struct Cells<'a, const D: usize> {
     space: &'a LevelSpace<D>,
     pressures: &'a SharedPressures,
-    viscosity: f64,
-    unit: &'a [f64],
+    masses: &'a Masses<'a>,
 }
 
 impl<const D: usize> Cells<'_, D> {
@@ -202,31 +203,29 @@ impl<const D: usize> Cells<'_, D> {
         group
     }
 
-    fn for_each_entry(&self, cell: usize, columns: &Columns, mut visit: impl FnMut(usize, usize, f64)) {
-        let mesh = &self.space.part.mesh;
-        let scale = mesh.size(mesh.cells()[cell].level).powi(D as i32) / self.viscosity;
-        let terms = self.terms(cell, columns);
-        for (i, rows) in terms.iter().enumerate() {
-            for (j, others) in terms.iter().enumerate() {
-                let value = scale * self.unit[i * terms.len() + j];
-                for &(row, wr) in rows {
-                    others.iter().for_each(|&(column, wc)| visit(row, column, wr * wc * value));
+    fn for_each_entry(&self, columns: &Columns, mut visit: impl FnMut(usize, usize, f64)) {
+        (self.masses)(&mut |cell, matrix| {
+            let terms = self.terms(cell, columns);
+            for (i, rows) in terms.iter().enumerate() {
+                for (j, others) in terms.iter().enumerate() {
+                    let value = matrix[i * terms.len() + j];
+                    for &(row, wr) in rows {
+                        others.iter().for_each(|&(column, wc)| visit(row, column, wr * wc * value));
+                    }
                 }
             }
-        }
+        });
     }
 
     /// Sends what own cells add to rows of others, and returns what others add to own ones: keys of row and
     /// column, who owns the column, and the value.
     fn rows_of_others(&self, ranks: &dyn Communicator, columns: &Columns) -> Vec<[u64; 4]> {
         let mut entries = Vec::new();
-        for cell in self.space.own_cells() {
-            self.for_each_entry(cell, columns, |row, column, value| {
-                if row >= columns.owned {
-                    entries.push((row, column, value));
-                }
-            });
-        }
+        self.for_each_entry(columns, |row, column, value| {
+            if row >= columns.owned {
+                entries.push((row, column, value));
+            }
+        });
         entries.sort_by_key(|entry| (entry.0, entry.1));
         let named = entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).map(|same| {
             let (owner, row) = columns.name(ranks.rank(), self.space, same[0].0);

@@ -8,18 +8,20 @@ mod mass;
 mod weights;
 mod whole_box;
 
-use gluey_fem::ImplicitTree;
+use gluey_fem::{ImplicitTree, ReferenceMatrices};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, SpectralInterval, estimate_lambda_max_from};
 use gluey_parallel::GhostPlan;
-use gluey_stokes::StokesError;
 
+use crate::agreement::agreed;
 use crate::bodies::Shared;
 use crate::flow::FlowError;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
 use gap::Gaps;
+pub use mass::Masses;
 use mass::SharedMass;
+pub use weights::Flowing;
 use whole_box::WholeBox;
 
 /// As in the serial solver: bound of the relative error of the inverse mass, most steps for it, Lanczos steps
@@ -42,7 +44,7 @@ impl<'a, const D: usize> SchurInverse<'a, D>
 where
     Dim<D>: Space<D>,
 {
-    /// All ranks call this.
+    /// Around bodies whose nodes move with them. All ranks call this.
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'a, '_, D>,
@@ -51,9 +53,31 @@ where
         pressures: &SharedPressures,
         viscosity: f64,
     ) -> Result<Self, FlowError> {
+        let unit = ReferenceMatrices::<D>::new().pressure_mass;
+        let masses = |visit: &mut dyn FnMut(usize, &[f64])| {
+            let (mesh, mut matrix) = (&space.part.mesh, unit.to_vec());
+            for cell in space.own_cells() {
+                let scale = mesh.size(mesh.cells()[cell].level).powi(D as i32) / viscosity;
+                matrix.iter_mut().zip(unit.iter()).for_each(|(value, unit)| *value = scale * unit);
+                visit(cell, &matrix);
+            }
+        };
+        let flowing = Flowing::around_rigid_nodes(space);
+        Self::of_cells(tree, shared, (space, nodes), pressures, viscosity, (&flowing, &masses))
+    }
+
+    /// For cells of these masses. All ranks call this.
+    pub fn of_cells(
+        tree: &mut ImplicitTree<'_, D>,
+        shared: &Shared<'a, '_, D>,
+        (space, nodes): (&LevelSpace<D>, &GhostPlan),
+        pressures: &SharedPressures,
+        viscosity: f64,
+        (flowing, masses): (&Flowing, &Masses<'_>),
+    ) -> Result<Self, FlowError> {
         let ranks = shared.ranks;
-        let weights = weights::weights(ranks, space, pressures, viscosity);
-        let mut mass = SharedMass::new(ranks, space, pressures, viscosity, &weights)?;
+        let weights = weights::weights(ranks, space, pressures, flowing, viscosity);
+        let mut mass = SharedMass::new(ranks, space, pressures, (viscosity, masses), &weights)?;
         let gaps = Gaps::new(tree, shared, space, nodes, pressures, &mass);
         let gaps = agreed(ranks, gaps)?;
         let whole_box = agreed(ranks, WholeBox::new(tree, ranks, space, pressures, viscosity))?;
@@ -76,19 +100,6 @@ where
         if let Some(whole_box) = whole_box {
             whole_box.add(mass.ranks, r, z);
         }
-    }
-}
-
-/// A failure of one rank is one of all; only the first says more.
-fn agreed<T>(
-    ranks: &dyn gluey_parallel::Communicator,
-    outcome: Result<T, StokesError>,
-) -> Result<T, FlowError> {
-    let mut failures = [f64::from(u8::from(outcome.is_err()))];
-    ranks.sum(&mut failures);
-    match outcome {
-        Ok(_) if failures[0] > 0.0 => Err(FlowError::PressuresElsewhere),
-        outcome => Ok(outcome?),
     }
 }
 

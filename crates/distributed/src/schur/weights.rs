@@ -19,15 +19,43 @@ use crate::space::LevelSpace;
 /// The least weight, for pressures that act on hardly any velocity.
 const LEAST: f64 = 0.05;
 
+/// Where something flows that nothing cuts, and which velocities are fixed there.
+pub struct Flowing {
+    /// Own cells in which something flows.
+    pub own: Vec<usize>,
+    /// All cells of the part in which something flows.
+    pub all: Vec<usize>,
+    /// Velocity nodes on walls and in bodies.
+    pub is_fixed: Vec<bool>,
+}
+
+impl Flowing {
+    /// Around bodies whose nodes move with them.
+    pub fn around_rigid_nodes<const D: usize>(space: &LevelSpace<D>) -> Self {
+        let map = &space.velocity.map;
+        let is_fixed = |node: usize| space.bodies.body_of(node).is_some() || map.is_on_boundary(node);
+        Self {
+            own: space.own_cells().collect(),
+            all: (0..map.cell_count()).filter(|&cell| !space.bodies.is_rigid(map.cell(cell))).collect(),
+            is_fixed: (0..map.node_count()).map(is_fixed).collect(),
+        }
+    }
+
+    fn is_fixed(&self, node: u32) -> bool {
+        self.is_fixed[node as usize]
+    }
+}
+
 /// Weights of the owned pressures, one for those that are not unknowns. All ranks call this.
 pub fn weights<const D: usize>(
     ranks: &dyn Communicator,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
+    flowing: &Flowing,
     viscosity: f64,
 ) -> Vec<f64> {
     let inside = ratio_inside::<D>();
-    let ratios = ratios(ranks, space, pressures, viscosity);
+    let ratios = ratios(ranks, space, pressures, flowing, viscosity);
     let weight = |ratio: Option<f64>| ratio.map_or(1.0, |ratio| (ratio / inside).clamp(LEAST, 1.0));
     ratios.into_iter().map(weight).collect()
 }
@@ -44,7 +72,8 @@ fn ratio_inside<const D: usize>() -> f64 {
     let centre = Vector::<D>::repeat(0.5);
     let is_centre = |q: &usize| space.pressure.map.point(*q) == centre;
     let centre = space.pressure.owned.clone().find(is_centre).expect("a uniform mesh has a centre node");
-    let rows = Rows::new(&space, &pressures, 1.0, |q| q == centre);
+    let flowing = Flowing::around_rigid_nodes(&space);
+    let rows = Rows::new(&space, &pressures, &flowing, 1.0, |q| q == centre);
     let [stiffness, mass] = rows.sums(centre, &[]);
     stiffness / mass
 }
@@ -54,10 +83,11 @@ fn ratios<const D: usize>(
     ranks: &dyn Communicator,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
+    flowing: &Flowing,
     viscosity: f64,
 ) -> Vec<Option<f64>> {
-    let special = next_to_fixed(ranks, space, pressures);
-    let rows = Rows::new(space, pressures, viscosity, |q| special[q]);
+    let special = next_to_fixed(ranks, space, pressures, flowing);
+    let rows = Rows::new(space, pressures, flowing, viscosity, |q| special[q]);
     let mut sent = Vec::new();
     for ghost in &pressures.ghosts {
         for (node, [b, a]) in rows.row(ghost.place as usize) {
@@ -93,10 +123,11 @@ fn next_to_fixed<const D: usize>(
     ranks: &dyn Communicator,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
+    flowing: &Flowing,
 ) -> Vec<bool> {
-    let is_fixed = |&node: &u32| is_fixed(space, node);
+    let is_fixed = |&node: &u32| flowing.is_fixed(node);
     let mut special = vec![0.0; pressures.dim()];
-    for cell in space.own_cells().filter(|&cell| space.velocity.map.cell(cell).iter().any(is_fixed)) {
+    for &cell in flowing.own.iter().filter(|&&cell| space.velocity.map.cell(cell).iter().any(is_fixed)) {
         for &node in space.pressure.map.cell(cell) {
             pressures.for_each_term(&space.pressure, node, |q, _| special[q as usize] = 1.0);
         }
@@ -107,17 +138,13 @@ fn next_to_fixed<const D: usize>(
     special.into_iter().map(|special| special > 0.0).collect()
 }
 
-fn is_fixed<const D: usize>(space: &LevelSpace<D>, node: u32) -> bool {
-    let node = node as usize;
-    space.bodies.body_of(node).is_some() || space.velocity.map.is_on_boundary(node)
-}
-
 /// A row of `B` at the velocity nodes, by their keys, with the diagonal of `A` there.
 type RowOf<const D: usize> = BTreeMap<u64, [[f64; D]; 2]>;
 
 /// Rows of `B` as far as own cells add to them. Hanging nodes count as nodes of their own.
 struct Rows<'a, const D: usize> {
     space: &'a LevelSpace<D>,
+    flowing: &'a Flowing,
     reference: ReferenceMatrices<D>,
     viscosity: f64,
     /// Of `A`, at the velocity nodes of own cells.
@@ -132,11 +159,12 @@ impl<'a, const D: usize> Rows<'a, D> {
     fn new(
         space: &'a LevelSpace<D>,
         pressures: &SharedPressures,
+        flowing: &'a Flowing,
         viscosity: f64,
         special: impl Fn(usize) -> bool,
     ) -> Self {
         let mut of_pressure: Vec<(u32, (u32, u8, f64))> = Vec::new();
-        for cell in space.own_cells() {
+        for &cell in &flowing.own {
             for (corner, &node) in space.pressure.map.cell(cell).iter().enumerate() {
                 pressures.for_each_term(&space.pressure, node, |q, weight| {
                     if special(q as usize) {
@@ -150,8 +178,8 @@ impl<'a, const D: usize> Rows<'a, D> {
         let firsts = (0..=pressures.dim()).map(first).collect();
         let corners = of_pressure.into_iter().map(|of| of.1).collect();
         let reference = ReferenceMatrices::<D>::new();
-        let diagonal = diagonal(space, &reference, viscosity);
-        Self { space, reference, viscosity, diagonal, firsts, corners }
+        let diagonal = diagonal(space, flowing, &reference, viscosity);
+        Self { space, flowing, reference, viscosity, diagonal, firsts, corners }
     }
 
     fn corners_of(&self, q: usize) -> &[(u32, u8, f64)] {
@@ -179,7 +207,7 @@ impl<'a, const D: usize> Rows<'a, D> {
             let divergence = self.reference.divergence[usize::from(corner) * n..][..n].as_chunks::<D>().0;
             let scale = weight * self.size(cell).powi(D as i32 - 1);
             let nodes = map.cell(cell as usize).iter().zip(divergence);
-            for (&node, divergence) in nodes.filter(|term| !is_fixed(self.space, *term.0)) {
+            for (&node, divergence) in nodes.filter(|term| !self.flowing.is_fixed(*term.0)) {
                 let new = || [[0.0; D], self.diagonal[node as usize]];
                 let entry = row.entry(map.key(node as usize)).or_insert_with(new);
                 entry[0].iter_mut().zip(divergence).for_each(|(b, d)| *b += scale * d);
@@ -209,12 +237,13 @@ impl<'a, const D: usize> Rows<'a, D> {
 /// around them are there.
 fn diagonal<const D: usize>(
     space: &LevelSpace<D>,
+    flowing: &Flowing,
     reference: &ReferenceMatrices<D>,
     viscosity: f64,
 ) -> Vec<[f64; D]> {
     let (n, mesh, map) = (ReferenceMatrices::<D>::VELOCITY, &space.part.mesh, &space.velocity.map);
     let mut diagonal = vec![[0.0; D]; map.node_count()];
-    for cell in (0..mesh.cell_count()).filter(|&cell| !space.bodies.is_rigid(map.cell(cell))) {
+    for &cell in &flowing.all {
         let scale = viscosity * mesh.size(mesh.cells()[cell].level).powi(D as i32 - 2);
         for (i, &node) in map.cell(cell).iter().enumerate() {
             let entries = diagonal[node as usize].iter_mut().enumerate();

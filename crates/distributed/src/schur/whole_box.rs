@@ -105,7 +105,7 @@ fn small_mesh<const D: usize>(tree: &ImplicitTree<'_, D>) -> Option<(TreeMesh<D>
         if roots(tree) << (usize::from(depth.saturating_sub(1)) * D) > MOST_PRESSURES {
             return None;
         }
-        let mesh = Part::new(&mut asked, depth, &all, &all).mesh;
+        let mesh = (*Part::new(&mut asked, depth, &all, &all).mesh).clone();
         let map = NodeMap::new(&mesh, 1);
         (map.node_count() <= MOST_PRESSURES).then_some((mesh, map))
     })

@@ -29,7 +29,7 @@ pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
 }
 
 /// Parameters of the flow of a checked case.
-pub(super) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
+pub(crate) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let flow = &case.flow;
     let formulation = match flow.formulation {
         Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {

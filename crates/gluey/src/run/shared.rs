@@ -9,7 +9,7 @@ use super::frames::StreamOptions;
 use super::pieces::{OtherRanks, write_piece};
 use super::{Run, RunError, RunOptions, claim_outputs, leftovers, logged, occupied};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
-use crate::flow::{FlowError, refinement, tree};
+use crate::flow::{FlowError, flow_params, refinement, tree};
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::{Sharing, available};
 use crate::progress::Progress;
@@ -79,9 +79,11 @@ fn sharing(ranks: &dyn Communicator) -> Sharing {
 fn check(case: &Case) -> Result<(), RunError> {
     let refused = [
         (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
-        (case.flow.formulation != Formulation::RigidDofs, "a formulation other than rigid-dofs"),
+        (case.flow.formulation == Formulation::Paper, "the formulation paper"),
         (case.is_sheared(), "a box that is sheared for ever"),
         (case.flow.solver == Solver::Direct, "the direct solver"),
+        (case.gives_motions(), "particles that are held or driven"),
+        (case.body_force.is_some(), "a force on the fluid"),
     ];
     match refused.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, what)) => Err(RunError::NotShared { what }),
@@ -104,7 +106,7 @@ where
         roots,
         periods: std::array::from_fn(|axis| case.period(axis)),
         refinement: refinement(case, level),
-        offset: case.rigid_offset(),
+        formulation: flow_params::<D>(case).formulation,
         radii: case.particles.iter().map(|particle| particle.radius).collect(),
         wrenches: case.wrenches(),
         shear_rate: case.shear_rate,

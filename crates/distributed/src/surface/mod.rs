@@ -1,0 +1,393 @@
+//! Flows around the true surfaces of bodies, the formulation `unfitted` of the serial solver, on cells that
+//! ranks share.
+//!
+//! A rank sets the serial solver's problem up on its part of the finest mesh, which reaches far enough around
+//! surfaces for all that follows from places alone: cut cells, aggregates, penalties, films, blocks of the
+//! smoother. Only sums over cells go between ranks. Coarser levels are those of bodies whose nodes move with
+//! them.
+
+mod operator;
+mod precondition;
+mod space;
+
+use gluey_fem::{Cell, Cuts, ImplicitTree};
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree, Body};
+use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
+use gluey_parallel::{Communicator, GhostPlan, Traffic};
+use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
+use gluey_stokes::{Discretisation, Film, Lubrication, Problem, StokesError, StokesSystem};
+use rustc_hash::FxHashMap;
+
+use crate::agreement::{agreed, gathered};
+use crate::bodies::{Shared, rigid};
+use crate::cells::MyCells;
+use crate::cycle::VCycle;
+use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
+use crate::schur::{Flowing, Masses, SchurInverse};
+use crate::space::{Around, LevelSpace};
+use operator::SurfaceOperator;
+use precondition::{SurfaceCycle, SurfaceTriangular};
+use space::{NearBodies, SurfaceSpace, is_near_surface, largest_radius, owner_of_film};
+
+/// Iterations between restarts.
+const RESTART: usize = 60;
+/// How often penalties of single cells are raised for one flow, at most, as in the serial solver.
+const MOST_ROUNDS: usize = 6;
+
+/// Bodies whose surfaces cut the mesh where they are, all of which every rank knows.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceBodies<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The bodies.
+    pub balls: &'a [Ball<D>],
+    /// Treatment of films that are too thin for the mesh.
+    pub lubrication: Lubrication,
+    /// Force and torque on each body, or no entries for none on any.
+    pub wrenches: &'a [Wrench<D>],
+}
+
+/// What a flow is computed with.
+struct Setting<'f, 'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    flow: &'f BoxFlow,
+    shared: Shared<'a, 'f, D>,
+    bodies: NearBodies<D>,
+    discretisation: Discretisation<D>,
+    level: LevelSpace<D>,
+    wrenches: &'f [Wrench<D>],
+    walls: &'f dyn Fn(&Vector<D>) -> Vector<D>,
+    /// What was sent before.
+    start: Traffic,
+}
+
+impl BoxFlow {
+    /// The flow around bodies whose surfaces cut the mesh, with the velocity `walls` on the walls of the box.
+    /// All ranks call this with the same arguments. The function is also taken for the undisturbed flow
+    /// inside.
+    ///
+    /// # Errors
+    /// [`FlowError`], on all ranks.
+    pub fn solve_around_surfaces<const D: usize>(
+        &self,
+        around: &SurfaceBodies<'_, D>,
+        tree: &mut ImplicitTree<'_, D>,
+        cuts: &Cuts,
+        ranks: &dyn Communicator,
+        walls: &dyn Fn(&Vector<D>) -> Vector<D>,
+    ) -> Result<MyFlow<D>, FlowError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let (found, count) = (around.wrenches.len(), around.balls.len());
+        if found != 0 && found != count {
+            return Err(FlowError::Count { found, bodies: count });
+        }
+        let cell_size = tree.frame().size(tree.max_level());
+        let is_small = |ball: &Ball<D>| ball.bounding_radius() < cell_size;
+        if let Some(body) = around.balls.iter().position(is_small) {
+            let radius = around.balls[body].bounding_radius();
+            return Err(StokesError::Unresolved { body, radius, cell_size }.into());
+        }
+        let start = ranks.traffic();
+        let bodies = BallTree::new(around.balls);
+        let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset() };
+        let frame = tree.frame().clone();
+        let spreads = |cell: &Cell<D>| is_near_surface(&frame, &bodies, cell);
+        let rings = rings_around_surfaces::<D>(around.lubrication, largest_radius(&bodies), cell_size);
+        let levels =
+            VCycle::under(tree, &shared, self.viscosity, Some(&Around { rings, spreads: &spreads }))?;
+        let level = levels.levels[levels.levels.len() - 1].operator.space.clone();
+        let setting = Setting {
+            flow: self,
+            bodies: NearBodies::new(tree, &shared, &level.part),
+            shared,
+            discretisation: part_of(&level),
+            level,
+            wrenches: around.wrenches,
+            walls,
+            start,
+        };
+        setting.trusted(tree, levels, PartMethod::new(around.lubrication))
+    }
+}
+
+fn part_of<const D: usize>(level: &LevelSpace<D>) -> Discretisation<D> {
+    let nodes = [level.velocity.map.clone(), level.pressure.map.clone()];
+    Discretisation::of_part(level.part.mesh.clone(), nodes, level.chunks.clone(), level.part.own())
+}
+
+/// A cell whose penalty is too small, as ranks tell each other: its key, the factor, a body and the share of
+/// energy that it takes.
+type Named = [u64; 4];
+
+/// A flow with the penalties that were tried.
+struct Attempt<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    levels: VCycle<'a, D>,
+    space: SurfaceSpace<'a, D>,
+    /// Values at all nodes of the part, those of the velocity followed by the twists near it.
+    velocity: Vec<f64>,
+    pressure: Vec<f64>,
+    sizes: Vec<LevelSizes>,
+    report: Result<KrylovReport, KrylovError>,
+    setup_traffic: Traffic,
+    solve_traffic: Traffic,
+}
+
+impl<'a, const D: usize> Setting<'_, 'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow with penalties that are large enough, as in the serial solver.
+    fn trusted(
+        &self,
+        tree: &mut ImplicitTree<'_, D>,
+        mut levels: VCycle<'a, D>,
+        mut method: PartMethod,
+    ) -> Result<MyFlow<D>, FlowError> {
+        let (ranks, mut rounds, mut wasted) = (self.shared.ranks, 0, 0);
+        loop {
+            let problem = agreed(ranks, self.problem(tree, &method))?;
+            let smoother = self.named(AssembledSmoother::new(&problem));
+            if let Some(stiffer) = self.stiffened(&method, &smoother) {
+                method = stiffer;
+                continue;
+            }
+            let smoother = agreed(ranks, smoother)?;
+            let attempt = self.attempt(tree, levels, (&problem, smoother))?;
+            let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
+            let Some(&[_, _, body, share]) = weak.first() else {
+                return self.finished(&problem, attempt, wasted);
+            };
+            if rounds == MOST_ROUNDS {
+                attempt.report?;
+                let (body, share) = (body as usize, f64::from_bits(share));
+                return Err(FlowError::WeakSurface { body, share, rounds });
+            }
+            rounds += 1;
+            wasted += attempt.report.as_ref().map_or(0, |report| report.iterations);
+            method = method.raised(self.found(tree, &weak).into_iter());
+            levels = attempt.levels;
+        }
+    }
+
+    /// With penalties twice as large, if blocks of any rank show that they are too small.
+    fn stiffened<T>(&self, method: &PartMethod, smoother: &Result<T, StokesError>) -> Option<PartMethod> {
+        let is_weak = matches!(smoother, Err(StokesError::SurfaceBlock { .. } | StokesError::AtSurface(_)));
+        let weak = self.shared.ranks.all_gather(&[u64::from(is_weak)]);
+        if weak.contains(&1) { method.stiffened() } else { None }
+    }
+
+    fn problem(&self, tree: &ImplicitTree<'_, D>, method: &PartMethod) -> Result<Problem<D>, StokesError> {
+        let rank = self.shared.ranks.rank();
+        let wanted = |film: &Film<D>| owner_of_film(tree, &self.shared, film) == rank;
+        self.named(method.problem(&self.discretisation, &self.bodies.balls, self.flow.viscosity, &wanted))
+    }
+
+    /// With the numbers of bodies among all.
+    fn named<T>(&self, outcome: Result<T, StokesError>) -> Result<T, StokesError> {
+        outcome.map_err(|error| error.with_bodies(|place| self.bodies.ids[place] as usize))
+    }
+
+    /// The flow with the penalties of a problem. All ranks call this.
+    fn attempt(
+        &self,
+        tree: &mut ImplicitTree<'_, D>,
+        levels: VCycle<'a, D>,
+        (problem, smoother): (&Problem<D>, AssembledSmoother<'_, D>),
+    ) -> Result<Attempt<'a, D>, FlowError> {
+        let (ranks, system) = (self.shared.ranks, &problem.system);
+        let space = SurfaceSpace::new(tree, &self.shared, &self.level, (problem, &self.bodies));
+        let mut sizes = level_sizes(&levels);
+        if let Some(finest) = sizes.last_mut() {
+            [finest.neighbours, finest.ghost_nodes] = space.neighbours();
+        }
+        let mut reduced = space.shared_velocities();
+        let smoother = agreed(ranks, self.named(smoother.completed(&mut reduced)))?;
+        let cycle = SurfaceCycle::new(levels, smoother, reduced, system);
+        let schur = self.schur(tree, system, &space)?;
+        let mut operator = SurfaceOperator::new(system, space.clone());
+        let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur);
+        let lift = problem.lift(self.walls);
+        let b = self.right_hand_side(problem, &mut operator, &lift)?;
+        let before = ranks.traffic();
+        let mut x = vec![0.0; b.len()];
+        let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x);
+        let solve_traffic = ranks.traffic().since(before);
+        let mut space = operator.into_space();
+        let [_, p, _] = space.parts_mut(&mut x);
+        let mut pressure = p.to_vec();
+        space.pressures.remove_mean(ranks, &mut pressure);
+        space.parts_mut(&mut x)[1].copy_from_slice(&pressure);
+        let mut whole = vec![0.0; system.dim()];
+        space.spread(&x, &mut whole);
+        space.update_around(&mut whole);
+        Ok(Attempt {
+            levels: preconditioner.into_levels(),
+            space,
+            velocity: problem.velocity(&lift, &whole),
+            pressure: problem.pressure(&whole),
+            sizes,
+            report,
+            setup_traffic: before.since(self.start),
+            solve_traffic,
+        })
+    }
+
+    fn schur(
+        &self,
+        tree: &mut ImplicitTree<'_, D>,
+        system: &StokesSystem<D>,
+        space: &SurfaceSpace<'a, D>,
+    ) -> Result<SchurInverse<'a, D>, FlowError> {
+        let map = &self.level.velocity.map;
+        let is_fixed = |node: usize| map.is_on_boundary(node) || system.space.body_of(node).is_some();
+        let flowing = Flowing {
+            own: system.own_fluid_cells().collect(),
+            all: system.fluid_cells().collect(),
+            is_fixed: (0..map.node_count()).map(is_fixed).collect(),
+        };
+        let masses = |visit: &mut dyn FnMut(usize, &[f64])| system.for_each_pressure_mass(visit);
+        let level = (&self.level, &GhostPlan::default());
+        let cells = (&flowing, &masses as &Masses<'_>);
+        SchurInverse::of_cells(tree, &self.shared, level, &space.pressures, self.flow.viscosity, cells)
+    }
+
+    /// Forces and torques on the bodies, less what the lift gives.
+    fn right_hand_side(
+        &self,
+        problem: &Problem<D>,
+        operator: &mut SurfaceOperator<'_, 'a, D>,
+        lift: &[f64],
+    ) -> Result<Vec<f64>, FlowError> {
+        let mut whole = problem.right_hand_side(lift, None);
+        if !self.wrenches.is_empty() {
+            // Owners alone add them.
+            let mut wrenches = vec![Wrench::default(); self.bodies.ids.len()];
+            for &body in &operator.space.own_bodies {
+                wrenches[body as usize] = self.wrenches[self.bodies.ids[body as usize] as usize];
+            }
+            problem.add_wrenches(&wrenches, &mut whole)?;
+        }
+        let mut b = vec![0.0; operator.space.dim()];
+        operator.space.gather(&mut whole, &mut b);
+        Ok(b)
+    }
+
+    /// Steps in double precision, as in the serial solver: in films penalties and extrapolated nodes leave
+    /// large numbers that nearly cancel.
+    fn krylov(
+        &self,
+        operator: &mut SurfaceOperator<'_, 'a, D>,
+        preconditioner: &mut SurfaceTriangular<'_, 'a, D>,
+        b: &[f64],
+        x: &mut [f64],
+    ) -> Result<KrylovReport, KrylovError> {
+        let params = GcrParams {
+            relative_tolerance: self.flow.tolerance,
+            max_iterations: self.flow.max_iterations,
+            restart: RESTART,
+            ..GcrParams::default()
+        };
+        let mut gcr = Gcr::<f64, f64, f32>::with_directions(params);
+        gcr.solve(operator, preconditioner, b, x, Reference::RightHandSide)
+    }
+
+    /// Own cells whose penalty is too small for what was found, as in the serial solver also for a flow that
+    /// did not converge.
+    fn weak_cells(
+        &self,
+        tree: &ImplicitTree<'_, D>,
+        problem: &Problem<D>,
+        attempt: &Attempt<'a, D>,
+    ) -> Vec<Named> {
+        if !matches!(attempt.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
+            return Vec::new();
+        }
+        let weak = problem.weak_cells(&attempt.velocity, &Matrix::zeros());
+        let cells = self.level.part.mesh.cells();
+        let named = |weak: &WeakCell| {
+            let body = u64::from(self.bodies.ids[weak.body as usize]);
+            let key = tree.key(&cells[weak.cell as usize]);
+            [key, weak.factor().to_bits(), body, weak.share.to_bits()]
+        };
+        weak.iter().map(named).collect()
+    }
+
+    /// Those of named cells that the part holds, with their factors.
+    fn found(&self, tree: &ImplicitTree<'_, D>, named: &[Named]) -> Vec<(u32, f64)> {
+        let cells = self.level.part.mesh.cells().iter().zip(0..);
+        let places: FxHashMap<u64, u32> = cells.map(|(cell, place)| (tree.key(cell), place)).collect();
+        let found = named.iter().map(|&[key, factor, ..]| (places.get(&key), f64::from_bits(factor)));
+        found.filter_map(|(place, factor)| Some((*place?, factor))).collect()
+    }
+
+    fn finished(
+        &self,
+        problem: &Problem<D>,
+        attempt: Attempt<'a, D>,
+        wasted: usize,
+    ) -> Result<MyFlow<D>, FlowError> {
+        let Attempt { space, velocity, pressure, sizes, report, setup_traffic, solve_traffic, .. } = attempt;
+        let (report, level) = (report?, &self.level);
+        let (points, nodal) = (&level.velocity, level.nodal_dim());
+        let counts = counts_of_all(level, space.ranks);
+        let reference = if report.reference_norm > 0.0 { report.reference_norm } else { 1.0 };
+        Ok(MyFlow {
+            points: points.owned.clone().map(|node| points.map.point(node)).collect(),
+            velocity: velocity[..nodal].as_chunks::<D>().0[points.owned.clone()]
+                .iter()
+                .map(|&u| u.into())
+                .collect(),
+            pressure: pressure[level.pressure.owned.clone()].to_vec(),
+            twists: self.twists_of_all(problem, &space, &velocity),
+            cell_count: counts[0] as usize,
+            dof_count: counts[1] as usize,
+            iterations: wasted + report.iterations,
+            relative_residual: report.residual_norm / reference,
+            levels: sizes,
+            setup_traffic,
+            solve_traffic,
+            cells: MyCells::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
+        })
+    }
+
+    /// The twists of all bodies, of which each rank has its own.
+    fn twists_of_all(
+        &self,
+        problem: &Problem<D>,
+        space: &SurfaceSpace<'a, D>,
+        velocity: &[f64],
+    ) -> Vec<Twist<D>> {
+        let (all, n) = (self.shared.bodies.balls().len(), rigid::<D>());
+        if all == 0 {
+            return Vec::new();
+        }
+        let mut numbers = vec![0.0; all * n];
+        for &body in &space.own_bodies {
+            let twist = problem.system.space.twist(velocity, body as usize);
+            let own = &mut numbers[self.bodies.ids[body as usize] as usize * n..][..n];
+            own[..D].copy_from_slice(twist.velocity.as_slice());
+            own[D..].copy_from_slice(Dim::<D>::spin_slice(&twist.spin));
+        }
+        space.ranks.sum(&mut numbers);
+        let twist = |numbers: &[f64]| {
+            let mut twist = Twist::default();
+            twist.velocity.copy_from_slice(&numbers[..D]);
+            (D..n).for_each(|k| twist.spin[k - D] = numbers[k]);
+            twist
+        };
+        numbers.chunks_exact(n).map(twist).collect()
+    }
+}
+
+fn level_sizes<const D: usize>(levels: &VCycle<'_, D>) -> Vec<LevelSizes> {
+    levels.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plans)).collect()
+}

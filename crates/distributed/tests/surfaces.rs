@@ -1,0 +1,175 @@
+//! Bodies whose surfaces cut the mesh: flows on ranks beside those of the serial solver of `unfitted`, at its
+//! tolerance and in as many iterations.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use gluey_distributed::{BoxFlow, MyFlow, SurfaceBodies, equal_cuts};
+use gluey_fem::ImplicitTree;
+use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree, LevelSet};
+use gluey_parallel::{Communicator, Threads};
+use gluey_stokes::{
+    Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
+};
+
+const TOLERANCE: f64 = 1e-11;
+
+/// Bodies in a shear flow.
+struct Example<const D: usize> {
+    bodies: Vec<(Vector<D>, f64)>,
+    /// Levels of the cells away from bodies and at them.
+    levels: [u8; 2],
+    /// In the first direction.
+    is_periodic: bool,
+    lubrication: Lubrication,
+}
+
+impl<const D: usize> Example<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn refinement(&self) -> Refinement {
+        let [coarsest, surface] = self.levels;
+        Refinement { coarsest, surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
+    }
+
+    fn balls(&self) -> Vec<Ball<D>> {
+        let period = std::array::from_fn(|d| (self.is_periodic && d == 0).then_some(1.0));
+        self.bodies.iter().map(|&(center, radius)| Ball::periodic(center, radius, period)).collect()
+    }
+
+    fn periodic(&self) -> [bool; D] {
+        std::array::from_fn(|d| self.is_periodic && d == 0)
+    }
+
+    fn wrenches(&self) -> Vec<Wrench<D>> {
+        let wrench = |k: usize| {
+            let mut wrench = Wrench::default();
+            wrench.force[k % D] = 0.1;
+            wrench.torque[0] = 0.004 * (1.0 + k as f64);
+            wrench
+        };
+        (0..self.bodies.len()).map(wrench).collect()
+    }
+
+    fn solve(&self, ranks: &dyn Communicator) -> MyFlow<D> {
+        let (balls, wrenches, refinement) = (self.balls(), self.wrenches(), self.refinement());
+        let tree_of_balls = BallTree::new(&balls);
+        let wants = |lower: &Vector<D>, h: f64, level: u8| refinement.wants(lower, h, level, &tree_of_balls);
+        let deepest = refinement.deepest();
+        let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), deepest, &wants).unwrap();
+        let cuts = equal_cuts(&tree, ranks);
+        let bodies = SurfaceBodies { balls: &balls, lubrication: self.lubrication, wrenches: &wrenches };
+        let flow = BoxFlow { viscosity: 1.7, tolerance: TOLERANCE, max_iterations: 300 };
+        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &shear).unwrap()
+    }
+
+    fn serial(&self) -> Flow<D> {
+        let (balls, wrenches) = (self.balls(), self.wrenches());
+        let mesh = self.refinement().mesh(Aabb::unit(), [1; D], self.periodic(), &balls).unwrap();
+        let formulation = Formulation::Unfitted { lubrication: self.lubrication };
+        let params =
+            FlowParams { viscosity: 1.7, formulation, solver: SolverKind::Multigrid, tolerance: TOLERANCE };
+        let conditions = Conditions::boundary(&shear).with_wrenches(&wrenches);
+        FlowSolver::<D>::new(params).unwrap().solve_under(mesh, &balls, &conditions).unwrap()
+    }
+
+    /// Velocities of the fluid and twists are those of the serial solver on these numbers of ranks but for a
+    /// limit, in as many iterations, within one, and the same bits run after run. In bodies velocities are
+    /// polynomials that nothing holds but the tolerance.
+    fn check(&self, sizes: &[usize], limit: f64) {
+        let (serial, balls) = (self.serial(), self.balls());
+        let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
+        let scale = serial.velocity.iter().copied().map(f64::abs).fold(0.0, largest);
+        for &size in sizes {
+            let run = || Threads::run(size, |ranks| self.solve(ranks)).unwrap();
+            let parts = run();
+            let velocity = velocities(&parts);
+            assert_eq!(velocity.len() * D, serial.velocity.len());
+            let pairs = velocity.iter().zip(serial.velocity.as_chunks::<D>().0);
+            let points = parts.iter().flat_map(|part| &part.points);
+            let is_fluid = |x: &Vector<D>| balls.iter().all(|ball| ball.value(x) < 0.0);
+            let in_fluid = pairs.zip(points).filter(|pair| is_fluid(pair.1));
+            let differences = in_fluid.map(|((a, &b), _)| (a - Vector::from(b)).norm() / scale);
+            let difference = differences.fold(0.0, largest);
+            let twists = parts[0].twists.iter().zip(&serial.twists);
+            let of_twists = twists.map(|(a, b)| distance(a, b)).fold(0.0, largest);
+            let iterations = [parts[0].iterations, serial.iteration_count];
+            println!("{size} ranks: {difference:.1e}, twists {of_twists:.1e}, iterations {iterations:?}");
+            assert!(difference < limit && of_twists < limit, "{size} ranks: {difference:e} {of_twists:e}");
+            assert!(iterations[0].abs_diff(iterations[1]) <= 1, "{size} ranks: {iterations:?}");
+            let again = run();
+            assert_eq!((velocities(&again), &again[0].twists), (velocity, &parts[0].twists), "the same bits");
+        }
+    }
+}
+
+fn shear<const D: usize>(x: &Vector<D>) -> Vector<D> {
+    Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 })
+}
+
+fn distance<const D: usize>(a: &Twist<D>, b: &Twist<D>) -> f64
+where
+    Dim<D>: Space<D>,
+{
+    let spins = Dim::<D>::spin_slice(&a.spin).iter().zip(Dim::<D>::spin_slice(&b.spin));
+    let spins = spins.map(|(a, b)| (a - b).abs());
+    spins.chain([(a.velocity - b.velocity).norm()]).fold(0.0, f64::max)
+}
+
+fn velocities<const D: usize>(parts: &[MyFlow<D>]) -> Vec<Vector<D>>
+where
+    Dim<D>: Space<D>,
+{
+    parts.iter().flat_map(|part| part.velocity.iter().copied()).collect()
+}
+
+/// Two bodies of different radii with this gap over the first one's, and a third across the border.
+fn three<const D: usize>(gap: f64, levels: [u8; 2], lubrication: Lubrication) -> Example<D>
+where
+    Dim<D>: Space<D>,
+{
+    let [a, b] = [0.13, 0.1];
+    let first = Vector::<D>::from_fn(|d, _| [0.37, 0.46, 0.52][d]);
+    let normal = Vector::<D>::from_fn(|d, _| [0.8, 0.55, 0.24][d]).normalize();
+    let second = first + normal * (a + b + gap * a);
+    let third = Vector::<D>::from_fn(|d, _| [0.98, 0.25, 0.4][d]);
+    Example { bodies: vec![(first, a), (second, b), (third, 0.12)], levels, is_periodic: true, lubrication }
+}
+
+/// Fifty spheres at random, some of which nearly touch, in a box with walls.
+fn fifty(levels: [u8; 2], lubrication: Lubrication) -> Example<3> {
+    let radius = 0.08;
+    let mut state = 7u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1u32 << 31)
+    };
+    let mut bodies: Vec<(Vector<3>, f64)> = Vec::new();
+    while bodies.len() < 50 {
+        let center = Vector::<3>::from_fn(|_, _| 1.02 * radius + (1.0 - 2.04 * radius) * next());
+        if bodies.iter().all(|(other, _)| (other - center).norm() > 2.005 * radius) {
+            bodies.push((center, radius));
+        }
+    }
+    Example { bodies, levels, is_periodic: false, lubrication }
+}
+
+#[test]
+fn bodies_apart_move_as_in_the_serial_solver() {
+    three::<2>(0.5, [4, 5], Lubrication::None).check(&[1, 2, 3, 4, 8], 1.2e-10);
+    three::<3>(0.5, [3, 4], Lubrication::None).check(&[1, 2, 3, 8], 3.6e-12);
+}
+
+#[test]
+fn films_are_those_of_the_serial_solver() {
+    for (gap, limits) in [(0.3, [1.4e-10, 5e-12]), (0.02, [1.2e-10, 5e-12]), (1e-4, [2.1e-9, 1.4e-10])] {
+        three::<2>(gap, [4, 5], Lubrication::Deficit).check(&[1, 2, 3, 4, 8], limits[0]);
+        three::<3>(gap, [3, 4], Lubrication::Deficit).check(&[1, 2, 3, 8], limits[1]);
+    }
+}
+
+#[test]
+fn fifty_spheres_move_as_in_the_serial_solver() {
+    fifty([3, 4], Lubrication::Deficit).check(&[3], 2.2e-10);
+}
