@@ -21,7 +21,7 @@ use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Threads, Traffic};
-use gluey_stokes::{Lubrication, Refinement};
+use gluey_stokes::{Conditions, Lubrication, Refinement};
 use serde::Serialize;
 
 /// Latency of a message and bytes a second of a rank, of the model.
@@ -163,8 +163,9 @@ where
     let wrenches = if options.pair { Vec::new() } else { wrenches(balls.len()) };
     let (balls, wrenches) = (&balls[..], &wrenches[..]);
     let mine = if options.unfitted {
-        let bodies = SurfaceBodies { balls, lubrication: Lubrication::Deficit, wrenches };
-        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &walls)
+        let bodies = SurfaceBodies { balls, lubrication: Lubrication::Deficit };
+        let conditions = Conditions::boundary(&walls).with_wrenches(wrenches);
+        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &conditions)
     } else {
         let offset = if options.pair { gluey_stokes::default_offset(D) } else { -0.1 };
         flow.solve_around(&RigidBodies { balls, offset, wrenches }, &mut tree, &cuts, ranks, &walls)

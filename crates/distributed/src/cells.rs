@@ -34,6 +34,11 @@ impl<const D: usize> MyCells<D> {
         }
     }
 
+    /// Of the box.
+    pub fn shear(&self) -> f64 {
+        self.part.mesh.shear()
+    }
+
     /// The same numbers as the serial solver gives at the same places.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         let balls = BallTree::new(balls);

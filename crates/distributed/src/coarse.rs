@@ -20,10 +20,13 @@ pub struct CoarseFactor {
 
 impl CoarseFactor {
     pub fn new<const D: usize>(space: &LevelSpace<D>, viscosity: f64) -> Result<Self, DirectError> {
-        let nodal = space.nodal_dim();
+        let (nodal, nodes) = (space.nodal_dim(), space.velocity.map.node_count());
+        let has_walls = (0..nodes).any(|node| space.velocity.map.is_on_boundary(node));
+        // Where nothing fixes a constant velocity, one node is left out, as in the serial solver.
+        let loose = if has_walls { None } else { (0..nodes).find(|&node| space.is_free(node)) };
         let unknowns = Subset::new(space.dim(), |k| match k.checked_sub(nodal) {
             Some(twist) => space.bodies.is_active(twist / rigid::<D>()),
-            None => space.is_free(k / D),
+            None => space.is_free(k / D) && Some(k / D) != loose,
         });
         let dim = unknowns.len();
         let matrix = SparseMatrix::from_triplets(dim, dim, &triplets(space, &unknowns, viscosity))?;
@@ -73,7 +76,7 @@ fn triplets<const D: usize>(
     unknowns: &Subset,
     viscosity: f64,
 ) -> Vec<(usize, usize, f64)> {
-    let (n, viscous) = (ReferenceMatrices::<D>::VELOCITY, ReferenceMatrices::<D>::new().viscous);
+    let (n, viscous) = (ReferenceMatrices::<D>::VELOCITY, space.reference().viscous);
     let (mesh, map) = (&space.part.mesh, &space.velocity.map);
     let number = |k: u32| unknowns.number(k as usize);
     let mut triplets = Vec::new();

@@ -9,7 +9,7 @@ use gluey_linalg::{
 };
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Traffic};
-use gluey_stokes::StokesError;
+use gluey_stokes::{StokesError, Stress};
 
 use crate::bodies::{Shared, rigid};
 use crate::cells::MyCells;
@@ -105,6 +105,9 @@ pub enum FlowError {
     /// A matrix of pressures is too large.
     #[error(transparent)]
     Sparse(#[from] SparseError),
+    /// Ranks do not share flows around bodies that are held.
+    #[error("ranks share flows around bodies that are free only")]
+    Conditions,
     /// As many wrenches as bodies are needed, or none.
     #[error("{found} wrenches for {bodies} bodies")]
     Count {
@@ -150,6 +153,8 @@ where
     pub pressure: Vec<f64>,
     /// Velocity and spin of each body, the same on all ranks.
     pub twists: Vec<Twist<D>>,
+    /// The stress, where it was wanted, the same on all ranks.
+    pub stress: Option<Stress<D>>,
     /// Cells of all ranks.
     pub cell_count: usize,
     /// Velocity and pressure unknowns of all ranks, as if there were no bodies and no hanging nodes.
@@ -176,6 +181,11 @@ where
     /// a cell there.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         self.cells.fields(balls)
+    }
+
+    /// Shear of the box: what stands at `x` in it is at `x + shear (y - y_lower) e_1` in space.
+    pub fn shear(&self) -> f64 {
+        self.cells.shear()
     }
 }
 
@@ -245,6 +255,7 @@ impl BoxFlow {
             velocity: velocity.as_chunks::<D>().0[points.owned.clone()].iter().map(|&u| u.into()).collect(),
             pressure: pressure[operator.space.pressure.owned.clone()].to_vec(),
             twists: twists_of_all(bodies.balls, &operator.space, ranks, &twists),
+            stress: None,
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
             iterations: report.iterations,

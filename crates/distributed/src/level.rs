@@ -182,7 +182,8 @@ impl<'a, const D: usize> Level<'a, D> {
         let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
         let degree = if is_finest { SWEEP.degree } else { DEGREE_BELOW };
-        let chebyshev = Chebyshev::below(cell_lambda_max::<D>()?, dim, &ChebyshevParams { degree, ..SWEEP });
+        let largest = cell_lambda_max(&operator.space.reference())?;
+        let chebyshev = Chebyshev::below(largest, dim, &ChebyshevParams { degree, ..SWEEP });
         let nodal = vec![0.0; operator.space.owned_nodal_dim()];
         let [b, z] = [0, 1].map(|_| vec![0.0; dim]);
         Ok(Self { operator, diagonal, chebyshev, near_bodies: None, b, z, nodal })
@@ -195,7 +196,8 @@ impl<'a, const D: usize> Level<'a, D> {
         shared: &Shared<'a, '_, D>,
         viscosity: f64,
     ) -> Result<(), FlowError> {
-        self.near_bodies = NearBodies::new(tree, shared, self, viscosity, cell_lambda_max::<D>()?);
+        let largest = cell_lambda_max(&self.operator.space.reference())?;
+        self.near_bodies = NearBodies::new(tree, shared, self, viscosity, largest);
         Ok(())
     }
 
@@ -230,7 +232,7 @@ impl<const D: usize> LevelOperator<'_, D> {
     fn blocks(&self, viscosity: f64) -> Result<Vec<f32>, FlowError> {
         let (bodies, map) = (&self.space.bodies, &self.space.velocity.map);
         let (n, size) = (rigid::<D>(), rigid::<D>() * rigid::<D>());
-        let viscous = ReferenceMatrices::<D>::new().viscous;
+        let viscous = self.space.reference().viscous;
         let velocities = ReferenceMatrices::<D>::VELOCITY;
         let viscous = nalgebra::DMatrix::from_row_slice(velocities, velocities, &viscous);
         let mut blocks = vec![0.0; bodies.ids.len() * size];
@@ -272,7 +274,7 @@ impl<const D: usize> LevelOperator<'_, D> {
         let Self { space, y, .. } = self;
         let nodes = &space.velocity;
         let n = ReferenceMatrices::<D>::VELOCITY;
-        let viscous = ReferenceMatrices::<D>::new().viscous;
+        let viscous = space.reference().viscous;
         y.fill(0.0);
         for cell in space.cells(viscosity) {
             let local = nodes.map.cell(cell.cell);
@@ -301,9 +303,9 @@ impl<const D: usize> LevelOperator<'_, D> {
 
 /// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
 /// that of sums over cells.
-fn cell_lambda_max<const D: usize>() -> Result<f64, KrylovError> {
+fn cell_lambda_max<const D: usize>(reference: &ReferenceMatrices<D>) -> Result<f64, KrylovError> {
     let n = ReferenceMatrices::<D>::VELOCITY;
-    let viscous = ReferenceMatrices::<D>::new().viscous;
+    let viscous = &reference.viscous;
     let scale = |i: usize| viscous[i * (n + 1)].sqrt();
     let mut scaled = FnOp::new(n, |x: &[f64], y: &mut [f64]| {
         for (i, y) in y.iter_mut().enumerate() {

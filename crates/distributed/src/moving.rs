@@ -5,17 +5,18 @@
 //! others follow, or do the same work on their particles beside it; what rank zero says holds.
 
 use gluey_fem::{ImplicitTree, MeshError};
-use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, NoForces};
+use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, NoForces};
 use gluey_parallel::Communicator;
-use gluey_stokes::{CutCellPressures, Formulation, Lubrication, Refinement};
+use gluey_stokes::{Conditions, CutCellPressures, Formulation, Lubrication, Refinement};
 
 use crate::cuts::cuts_of_work;
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
 use crate::surface::SurfaceBodies;
 
-/// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls.
+/// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls, or far away where it has
+/// none: then its images in `y` slide along each other.
 #[derive(Clone, Debug)]
 pub struct Suspension<const D: usize>
 where
@@ -27,7 +28,7 @@ where
     pub domain: Aabb<D>,
     /// Cells along its edges before any is refined.
     pub roots: [u32; D],
-    /// Periods along its axes, where it has some; at least one has none.
+    /// Periods along its axes, where it has some. Without walls it is sheared for ever, by `unfitted` only.
     pub periods: [Option<f64>; D],
     /// How the mesh follows the particles.
     pub refinement: Refinement,
@@ -51,7 +52,9 @@ pub enum SuspensionError {
     #[error(transparent)]
     Flow(#[from] FlowError),
     /// Ranks have it not.
-    #[error("ranks share flows of `unfitted`, and of `rigid-dofs` with aggregated pressures, only")]
+    #[error(
+        "ranks share flows of `unfitted`, and between walls of `rigid-dofs` with aggregated pressures, only"
+    )]
     Formulation,
 }
 
@@ -112,12 +115,26 @@ where
         wrenches: &[Wrench<D>],
         shear_factor: f64,
     ) -> Result<MyFlow<D>, SuspensionError> {
-        let balls = self.balls(positions);
+        let told = Told { positions: positions.to_vec(), wrenches: wrenches.to_vec(), ..Told::new(self) };
+        self.solve_as_told(ranks, &Told { shear_factor, ..told })
+    }
+
+    /// Whether the box has no walls.
+    fn is_sheared(&self) -> bool {
+        self.periods.iter().all(Option::is_some)
+    }
+
+    fn solve_as_told(&self, ranks: &dyn Communicator, told: &Told<D>) -> Result<MyFlow<D>, SuspensionError> {
+        let balls = self.balls(told);
+        let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
         let tree_of_balls = BallTree::new(&balls);
         let wants =
             |lower: &Vector<D>, h: f64, level: u8| self.refinement.wants(lower, h, level, &tree_of_balls);
         let periodic = self.periods.map(|period| period.is_some());
-        let tree = |depth: u8| ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants);
+        let tree = |depth: u8| {
+            let tree = ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants)?;
+            Ok::<_, MeshError>(tree.sheared(shear))
+        };
         let deepest = self.refinement.deepest();
         let mut whole = tree(deepest)?;
         let mut cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
@@ -127,25 +144,72 @@ where
             whole = tree(used)?;
             cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
         }
-        let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
-        let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 });
-        let balls = &balls;
+        let shear = self.undisturbed(told.shear_factor);
+        let (balls, wrenches) = (&balls, &told.wrenches[..]);
         Ok(match self.formulation {
-            Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate } => {
+            Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate }
+                if !self.is_sheared() =>
+            {
                 let bodies = RigidBodies { balls, offset, wrenches };
                 self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?
             }
             Formulation::Unfitted { lubrication } => {
-                let bodies = SurfaceBodies { balls, lubrication, wrenches };
-                self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, &shear)?
+                let bodies = SurfaceBodies { balls, lubrication };
+                let mut solve = |conditions: &Conditions<'_, D>| {
+                    self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, conditions)
+                };
+                if !self.is_sheared() {
+                    return Ok(solve(&Conditions::boundary(&shear).with_wrenches(wrenches))?);
+                }
+                let mut gradient = Matrix::<D>::zeros();
+                gradient[(0, 1)] = self.shear_rate * told.shear_factor;
+                // What acts on the particles is balanced by a uniform force on all of the box; forces between
+                // them have no sum.
+                let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
+                let back = -total / self.domain.extent().product();
+                let uniform = move |_: &Vector<D>| back;
+                let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(wrenches);
+                let conditions =
+                    if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+                let mut flow =
+                    if told.with_stress { solve(&conditions.with_stress())? } else { solve(&conditions)? };
+                for (twist, place) in flow.twists.iter_mut().zip(&told.positions) {
+                    twist.velocity += shear(place);
+                    // About z, the only axis in 2D and the last one in 3D.
+                    twist.spin[Dim::<D>::ROT - 1] -= 0.5 * gradient[(0, 1)];
+                }
+                flow
             }
             _ => return Err(SuspensionError::Formulation),
         })
     }
 
-    fn balls(&self, positions: &[Vector<D>]) -> Vec<Ball<D>> {
-        let ball = |(&place, &radius): (&Vector<D>, &f64)| Ball::periodic(place, radius, self.periods);
-        positions.iter().zip(&self.radii).map(ball).collect()
+    /// The undisturbed velocity.
+    fn undisturbed(&self, shear_factor: f64) -> impl Fn(&Vector<D>) -> Vector<D> + use<D> {
+        let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
+        move |x| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 })
+    }
+
+    fn balls(&self, told: &Told<D>) -> Vec<Ball<D>> {
+        let height = self.periods[1].unwrap_or(0.0);
+        let lattice = Lattice::new(self.periods).tilted(told.strain * height);
+        let origin = self.domain.lower[1];
+        let ball = |(place, &radius): (&Vector<D>, &f64)| Ball::in_space(place, radius, &lattice, origin);
+        told.positions.iter().zip(&self.radii).map(ball).collect()
+    }
+
+    /// The fields of a flow in the cells of a rank, in space.
+    fn fields(&self, flow: &MyFlow<D>, told: &Told<D>) -> Fields<D> {
+        let mut fields = flow.fields(&self.balls(told));
+        if self.is_sheared() {
+            let shear = flow.shear();
+            let undisturbed = self.undisturbed(told.shear_factor);
+            for (point, velocity) in fields.points.iter_mut().zip(&mut fields.velocity) {
+                point[0] += shear * (point[1] - self.domain.lower[1]);
+                *velocity += undisturbed(point);
+            }
+        }
+        fields
     }
 
     /// Does what rank zero asks for with its [`SharedHydrodynamics::leading`], until that ends. All other
@@ -170,10 +234,10 @@ where
                     // Its memory is free for the next.
                     drop(last.take());
                     // An error is one on all ranks: rank zero says what it is.
-                    last = self.solve(ranks, &told.positions, &told.wrenches, told.shear_factor).ok();
+                    last = self.solve_as_told(ranks, &told).ok();
                 }
                 Order::Show(frame) => {
-                    show(frame, last.as_ref().map(|flow| flow.fields(&self.balls(&told.positions))));
+                    show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));
                 }
             }
         }
@@ -201,6 +265,9 @@ where
     positions: Vec<Vector<D>>,
     wrenches: Vec<Wrench<D>>,
     shear_factor: f64,
+    /// Of the images in a box without walls.
+    strain: f64,
+    with_stress: bool,
 }
 
 impl<const D: usize> Told<D>
@@ -213,12 +280,13 @@ where
             0 => vec![Wrench::default(); count],
             _ => suspension.wrenches.clone(),
         };
-        Self { positions: vec![Vector::zeros(); count], wrenches, shear_factor: 1.0 }
+        let positions = vec![Vector::zeros(); count];
+        Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress: false }
     }
 
     /// Replaces all by what rank zero says.
     fn share(&mut self, ranks: &dyn Communicator) {
-        let mut numbers = vec![self.shear_factor];
+        let mut numbers = vec![self.shear_factor, self.strain, f64::from(u8::from(self.with_stress))];
         numbers.extend(self.positions.iter().flatten());
         for wrench in &self.wrenches {
             numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
@@ -226,7 +294,8 @@ where
         ranks.share(&mut numbers);
         let mut told = numbers.into_iter();
         let mut next = || told.next().unwrap_or_default();
-        self.shear_factor = next();
+        [self.shear_factor, self.strain] = [next(), next()];
+        self.with_stress = next() > 0.0;
         for position in &mut self.positions {
             position.iter_mut().for_each(|x| *x = next());
         }
@@ -272,6 +341,22 @@ where
     }
 }
 
+impl<const D: usize> SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity of the image at a film beyond that of its particle.
+    fn slide(&self, film: &gluey_stokes::Film<D>) -> Vector<D> {
+        let mut slide = Vector::zeros();
+        if let (true, Some(second)) = (self.suspension.is_sheared(), film.side(1)) {
+            let places = &self.told.positions;
+            let direct = places[second][1] - places[film.body as usize][1];
+            slide[0] = self.suspension.shear_rate * self.told.shear_factor * (film.branch()[1] - direct);
+        }
+        slide
+    }
+}
+
 impl<const D: usize> Drop for SharedHydrodynamics<'_, D>
 where
     Dim<D>: Space<D>,
@@ -308,7 +393,7 @@ where
         told.share(*ranks);
         self.last = None;
         let start = std::time::Instant::now();
-        let flow = suspension.solve(*ranks, &told.positions, &told.wrenches, told.shear_factor);
+        let flow = suspension.solve_as_told(*ranks, told);
         self.is_predicting = false;
         let flow = flow?;
         twists.copy_from_slice(&flow.twists);
@@ -328,6 +413,26 @@ where
         self.told.shear_factor = factor;
     }
 
+    fn set_strain(&mut self, strain: f64, with_stress: bool) {
+        if self.suspension.is_sheared() {
+            (self.told.strain, self.told.with_stress) = (strain, with_stress);
+        }
+    }
+
+    fn stress(&self) -> Option<MeanStress<D>> {
+        let stress = self.last.as_ref()?.stress.as_ref()?;
+        let volume = self.suspension.domain.extent().product();
+        Some(MeanStress {
+            rate: self.suspension.shear_rate * self.told.shear_factor,
+            viscosity: self.suspension.flow.viscosity,
+            of_bodies: stress.of_bodies(volume),
+            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            of_contacts: None,
+            of_repulsion: Matrix::zeros(),
+            dissipation: stress.dissipation / volume,
+        })
+    }
+
     fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
         self.told.wrenches = Told::new(self.suspension).wrenches;
         for (acting, more) in self.told.wrenches.iter_mut().zip(wrenches) {
@@ -342,14 +447,14 @@ where
         if self.last.is_none() || self.suspension.formulation != (Formulation::Unfitted { lubrication }) {
             return Vec::new();
         }
-        let (balls, domain) = (self.suspension.balls(&self.told.positions), &self.suspension.domain);
+        let (balls, domain) = (self.suspension.balls(&self.told), &self.suspension.domain);
         let mut films = gluey_stokes::films(&balls, domain, reach);
         films.retain(|film| !film.is_across_flow());
         let film = |film: gluey_stokes::Film<D>| Film {
             first: film.body as usize,
             second: film.side(1),
             branch: film.branch(),
-            slide: Vector::zeros(),
+            slide: self.slide(&film),
             is_held: [false; 2],
             gap: film.gap,
             curvature_radius: film.curvature_radius(),
@@ -363,6 +468,6 @@ where
 
     /// Those in the cells of this rank.
     fn fields(&self) -> Option<Fields<D>> {
-        self.last.as_ref().map(|flow| flow.fields(&self.suspension.balls(&self.told.positions)))
+        self.last.as_ref().map(|flow| self.suspension.fields(flow, &self.told))
     }
 }

@@ -2,7 +2,7 @@
 //! error on the nodes within three cells of a body and on the twists is smoothed, all else at rest.
 
 use gluey_fem::ImplicitTree;
-use gluey_fem::cells::{CellOperator, Workspace};
+use gluey_fem::cells::Workspace;
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp, vector};
 use gluey_parallel::GhostPlan;
 
@@ -52,8 +52,7 @@ impl<'a, const D: usize> NearBodies<'a, D> {
         let map = &space.velocity.map;
         let is_near = |&node: &u32| space.velocity.regular(node).any(|(node, _)| near[node as usize]);
         let cells = space.cells(viscosity).filter(|cell| map.cell(cell.cell).iter().any(is_near));
-        let cells =
-            CellOperator::new(&space.chunks, map, cells, 1, &space.bodies.nodes, space.bodies.ids.len());
+        let cells = space.operator_of(cells);
         let nodes = plans.nodes.restricted(shared.ranks, |node| near[node as usize]);
         let bodies = (&space.bodies.plan, rigid::<D>(), space.nodal_dim());
         let all = GhostPlan::joined(&[(&nodes, D, 0), bodies]);

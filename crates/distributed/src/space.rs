@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, CellScalar};
-use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part};
+use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part, ReferenceMatrices};
 use gluey_parallel::{GhostPlan, Wanted};
 
 use crate::bodies::{LevelBodies, Shared, rigid};
@@ -134,8 +134,22 @@ impl<const D: usize> LevelSpace<D> {
 
     /// The operator of these cells.
     pub fn operator<T: CellScalar>(&self, viscosity: f64) -> CellOperator<T, D> {
+        self.operator_of(self.cells(viscosity))
+    }
+
+    /// The operator of some of them.
+    pub fn operator_of<T: CellScalar>(
+        &self,
+        cells: impl Iterator<Item = CellData<'static>>,
+    ) -> CellOperator<T, D> {
         let (map, bodies) = (&self.velocity.map, &self.bodies);
-        CellOperator::new(&self.chunks, map, self.cells(viscosity), 1, &bodies.nodes, bodies.ids.len())
+        CellOperator::new(&self.chunks, map, cells, 1, &bodies.nodes, bodies.ids.len())
+            .sheared(self.part.mesh.shear())
+    }
+
+    /// The element matrices of its cells, which are sheared like the box.
+    pub fn reference(&self) -> ReferenceMatrices<D> {
+        ReferenceMatrices::sheared(self.part.mesh.shear())
     }
 
     /// Length of the velocities and twists in a vector at all nodes of the part.

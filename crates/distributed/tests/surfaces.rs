@@ -59,9 +59,10 @@ where
         let deepest = refinement.deepest();
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), deepest, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
-        let bodies = SurfaceBodies { balls: &balls, lubrication: self.lubrication, wrenches: &wrenches };
+        let bodies = SurfaceBodies { balls: &balls, lubrication: self.lubrication };
+        let conditions = Conditions::boundary(&shear).with_wrenches(&wrenches);
         let flow = BoxFlow { viscosity: 1.7, tolerance: TOLERANCE, max_iterations: 300 };
-        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &shear).unwrap()
+        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &conditions).unwrap()
     }
 
     fn serial(&self) -> Flow<D> {

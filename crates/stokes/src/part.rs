@@ -7,11 +7,12 @@
 //! its operator are the sums over the own cells, and sums of these over all parts are right at every node.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
 use crate::film::{Film, Lubrication};
+use crate::flow::{Conditions, Stress, fluid_weights, own_stress, subtract_uniform};
 use crate::formulation::{Problem, Unfitted};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface;
@@ -197,12 +198,58 @@ where
         self.rigidity.weak_cells(self, velocity, strain)
     }
 
-    /// The share of the own cells in the first moments `int (sigma.n) r dA` of the tractions on the bodies,
-    /// from nodal velocities with twists, and pressures.
+    /// The field that carries the data of some conditions, and the sums over own cells of its residual with the
+    /// loads. Wrenches are for those to give who own the body.
     ///
     /// # Errors
-    /// [`StokesError::Unsupported`] where the formulation has no such tractions.
-    pub fn first_moments(&self, fields: [&[f64]; 2]) -> Result<Vec<Matrix<D>>, StokesError> {
-        self.rigidity.first_moments(self, fields, &Matrix::zeros())
+    /// Those of [`Problem::add_wrenches`] and [`Problem::set_twists`].
+    pub fn data_under(&self, conditions: &Conditions<'_, D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+        conditions.data(self)
     }
+
+    /// Integrals over the fluid of the own cells of a velocity that [`Problem::velocity`] gave, and of
+    /// pressures at all nodes.
+    pub fn fluid_integrals(&self, [velocity, pressure]: [&[f64]; 2]) -> FluidIntegrals<D> {
+        let mut sums = FluidIntegrals { volume: 0.0, velocity: Vector::zeros(), pressure: 0.0 };
+        let Some(surfaces) = &self.system.surfaces else { return sums };
+        let (discretisation, cut) = (self.discretisation(), &surfaces.cut);
+        let weights = fluid_weights(discretisation, &discretisation.velocity, cut);
+        for (weight, u) in weights.iter().zip(velocity.chunks_exact(D)) {
+            sums.volume += weight;
+            sums.velocity += Vector::<D>::from_column_slice(u) * *weight;
+        }
+        let weights = fluid_weights(discretisation, &discretisation.pressure, cut);
+        sums.pressure = weights.iter().zip(pressure).map(|(weight, p)| weight * p).sum();
+        sums
+    }
+
+    /// Takes a uniform velocity from a velocity that [`Problem::velocity`] gave.
+    pub fn subtract_uniform(&self, by: &Vector<D>, velocity: &mut [f64]) {
+        subtract_uniform(&self.system.space, velocity, by, |_| true);
+    }
+
+    /// What the own cells and films add to the stress in a linear flow of this strain, for pressures whose mean
+    /// over the fluid vanishes, and a vector with the forces of films; for the bodies near the part.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] where the formulation has no tractions.
+    pub fn own_stress(
+        &self,
+        strain: &Matrix<D>,
+        fields: [&[f64]; 2],
+        x: &[f64],
+    ) -> Result<Stress<D>, StokesError> {
+        own_stress(self, strain, fields, x)
+    }
+}
+
+/// Integrals over the fluid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluidIntegrals<const D: usize> {
+    /// Its volume.
+    pub volume: f64,
+    /// Of its velocity.
+    pub velocity: Vector<D>,
+    /// Of its pressure.
+    pub pressure: f64,
 }

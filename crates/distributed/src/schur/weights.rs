@@ -177,7 +177,7 @@ impl<'a, const D: usize> Rows<'a, D> {
         let first = |q: usize| of_pressure.partition_point(|of| (of.0 as usize) < q) as u32;
         let firsts = (0..=pressures.dim()).map(first).collect();
         let corners = of_pressure.into_iter().map(|of| of.1).collect();
-        let reference = ReferenceMatrices::<D>::new();
+        let reference = space.reference();
         let diagonal = diagonal(space, flowing, &reference, viscosity);
         Self { space, flowing, reference, viscosity, diagonal, firsts, corners }
     }

@@ -15,8 +15,12 @@ use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
-use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
-use gluey_stokes::{Discretisation, Film, Lubrication, Problem, StokesError, StokesSystem};
+use gluey_stokes::part::{
+    AssembledSmoother, FluidIntegrals, PartMethod, WeakCell, coarse_offset, rings_around_surfaces,
+};
+use gluey_stokes::{
+    Conditions, Discretisation, Film, Given, Lubrication, Problem, StokesError, StokesSystem, Stress,
+};
 use rustc_hash::FxHashMap;
 
 use crate::agreement::{agreed, gathered};
@@ -37,16 +41,11 @@ const MOST_ROUNDS: usize = 6;
 
 /// Bodies whose surfaces cut the mesh where they are, all of which every rank knows.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceBodies<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SurfaceBodies<'a, const D: usize> {
     /// The bodies.
     pub balls: &'a [Ball<D>],
     /// Treatment of films that are too thin for the mesh.
     pub lubrication: Lubrication,
-    /// Force and torque on each body, or no entries for none on any.
-    pub wrenches: &'a [Wrench<D>],
 }
 
 /// What a flow is computed with.
@@ -59,34 +58,29 @@ where
     bodies: NearBodies<D>,
     discretisation: Discretisation<D>,
     level: LevelSpace<D>,
-    wrenches: &'f [Wrench<D>],
-    walls: &'f dyn Fn(&Vector<D>) -> Vector<D>,
+    conditions: &'f Conditions<'f, D>,
     /// What was sent before.
     start: Traffic,
 }
 
 impl BoxFlow {
-    /// The flow around bodies whose surfaces cut the mesh, with the velocity `walls` on the walls of the box.
-    /// All ranks call this with the same arguments. The function is also taken for the undisturbed flow
-    /// inside.
+    /// The flow around bodies whose surfaces cut the mesh, under conditions on all of them. All ranks call this
+    /// with the same arguments. A box without walls is sheared like the tree, and the flow has no mean.
     ///
     /// # Errors
-    /// [`FlowError`], on all ranks.
+    /// [`FlowError`], on all ranks. [`FlowError::Conditions`] for bodies that are held.
     pub fn solve_around_surfaces<const D: usize>(
         &self,
         around: &SurfaceBodies<'_, D>,
         tree: &mut ImplicitTree<'_, D>,
         cuts: &Cuts,
         ranks: &dyn Communicator,
-        walls: &dyn Fn(&Vector<D>) -> Vector<D>,
+        conditions: &Conditions<'_, D>,
     ) -> Result<MyFlow<D>, FlowError>
     where
         Dim<D>: Space<D>,
     {
-        let (found, count) = (around.wrenches.len(), around.balls.len());
-        if found != 0 && found != count {
-            return Err(FlowError::Count { found, bodies: count });
-        }
+        check_conditions(conditions, around.balls.len())?;
         let cell_size = tree.frame().size(tree.max_level());
         let is_small = |ball: &Ball<D>| ball.bounding_radius() < cell_size;
         if let Some(body) = around.balls.iter().position(is_small) {
@@ -108,12 +102,28 @@ impl BoxFlow {
             shared,
             discretisation: part_of(&level),
             level,
-            wrenches: around.wrenches,
-            walls,
+            conditions,
             start,
         };
         setting.trusted(tree, levels, PartMethod::new(around.lubrication))
     }
+}
+
+/// # Errors
+/// [`FlowError::Count`], [`FlowError::Conditions`].
+fn check_conditions<const D: usize>(conditions: &Conditions<'_, D>, bodies: usize) -> Result<(), FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let found = match conditions.bodies {
+        Given::Wrenches([]) => bodies,
+        Given::Wrenches(wrenches) => wrenches.len(),
+        Given::Twists(_) | Given::Each(_) => return Err(FlowError::Conditions),
+    };
+    if conditions.without_mean {
+        return Err(FlowError::Conditions);
+    }
+    if found == bodies { Ok(()) } else { Err(FlowError::Count { found, bodies }) }
 }
 
 fn part_of<const D: usize>(level: &LevelSpace<D>) -> Discretisation<D> {
@@ -135,6 +145,7 @@ where
     /// Values at all nodes of the part, those of the velocity followed by the twists near it.
     velocity: Vec<f64>,
     pressure: Vec<f64>,
+    stress: Option<Stress<D>>,
     sizes: Vec<LevelSizes>,
     report: Result<KrylovReport, KrylovError>,
     setup_traffic: Traffic,
@@ -215,8 +226,7 @@ where
         let schur = self.schur(tree, system, &space)?;
         let mut operator = SurfaceOperator::new(system, space.clone());
         let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur);
-        let lift = problem.lift(self.walls);
-        let b = self.right_hand_side(problem, &mut operator, &lift)?;
+        let (lift, b) = self.data(problem, &mut operator)?;
         let before = ranks.traffic();
         let mut x = vec![0.0; b.len()];
         let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x);
@@ -229,11 +239,25 @@ where
         let mut whole = vec![0.0; system.dim()];
         space.spread(&x, &mut whole);
         space.update_around(&mut whole);
+        let (mut velocity, pressure) = (problem.velocity(&lift, &whole), problem.pressure(&whole));
+        let integrals = self.integrals(problem, [&velocity, &pressure]);
+        if !self.level.part.mesh.periodic().contains(&false) {
+            let mean = self.mean_velocity(problem, &space, &velocity, &integrals);
+            problem.subtract_uniform(&mean, &mut velocity);
+        }
+        let wants_stress = self.conditions.stress;
+        let stress = wants_stress.then(|| {
+            let mean = integrals.pressure / integrals.volume;
+            let pressure: Vec<f64> = pressure.iter().map(|p| p - mean).collect();
+            self.stress(problem, [&velocity, &pressure], &whole)
+        });
+        let stress = stress.transpose()?;
         Ok(Attempt {
             levels: preconditioner.into_levels(),
             space,
-            velocity: problem.velocity(&lift, &whole),
-            pressure: problem.pressure(&whole),
+            velocity,
+            pressure,
+            stress,
             sizes,
             report,
             setup_traffic: before.since(self.start),
@@ -260,25 +284,76 @@ where
         SchurInverse::of_cells(tree, &self.shared, level, &space.pressures, self.flow.viscosity, cells)
     }
 
-    /// Forces and torques on the bodies, less what the lift gives.
-    fn right_hand_side(
+    /// The field that carries the data, and the right-hand side.
+    fn data(
         &self,
         problem: &Problem<D>,
         operator: &mut SurfaceOperator<'_, 'a, D>,
-        lift: &[f64],
-    ) -> Result<Vec<f64>, FlowError> {
-        let mut whole = problem.right_hand_side(lift, None);
-        if !self.wrenches.is_empty() {
-            // Owners alone add them.
-            let mut wrenches = vec![Wrench::default(); self.bodies.ids.len()];
-            for &body in &operator.space.own_bodies {
-                wrenches[body as usize] = self.wrenches[self.bodies.ids[body as usize] as usize];
-            }
-            problem.add_wrenches(&wrenches, &mut whole)?;
+    ) -> Result<(Vec<f64>, Vec<f64>), FlowError> {
+        let Given::Wrenches(all) = self.conditions.bodies else { return Err(FlowError::Conditions) };
+        let mut wrenches = vec![Wrench::default(); if all.is_empty() { 0 } else { self.bodies.ids.len() }];
+        for &body in operator.space.own_bodies.iter().filter(|_| !all.is_empty()) {
+            wrenches[body as usize] = all[self.bodies.ids[body as usize] as usize];
         }
+        let bodies = Given::Wrenches(&wrenches);
+        let (lift, mut whole) = problem.data_under(&Conditions { bodies, ..*self.conditions })?;
         let mut b = vec![0.0; operator.space.dim()];
         operator.space.gather(&mut whole, &mut b);
-        Ok(b)
+        Ok((lift, b))
+    }
+
+    /// Integrals over the fluid of all ranks.
+    fn integrals(&self, problem: &Problem<D>, fields: [&[f64]; 2]) -> FluidIntegrals<D> {
+        let own = problem.fluid_integrals(fields);
+        let mut sums = vec![own.volume, own.pressure];
+        sums.extend(own.velocity.iter());
+        self.shared.ranks.sum(&mut sums);
+        let velocity = Vector::from_column_slice(&sums[2..]);
+        FluidIntegrals { volume: sums[0], pressure: sums[1], velocity }
+    }
+
+    /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid leaves
+    /// of the box, in proportion to their volumes.
+    fn mean_velocity(
+        &self,
+        problem: &Problem<D>,
+        space: &SurfaceSpace<'a, D>,
+        velocity: &[f64],
+        integrals: &FluidIntegrals<D>,
+    ) -> Vector<D> {
+        let whole_box: f64 = self.level.part.mesh.domain().extent().product();
+        let balls = self.shared.bodies.balls();
+        let volume = |ball: &Ball<D>| ball.bounding_radius().powi(D as i32);
+        let all: f64 = balls.iter().map(volume).sum();
+        let twists = self.twists_of_all(problem, space, velocity);
+        let share = |ball: &Ball<D>| (whole_box - integrals.volume) * volume(ball) / all;
+        let of_bodies = balls.iter().zip(&twists).map(|(ball, twist)| twist.velocity * share(ball));
+        (integrals.velocity + of_bodies.sum::<Vector<D>>()) / whole_box
+    }
+
+    /// The stress of a flow.
+    fn stress(
+        &self,
+        problem: &Problem<D>,
+        fields: [&[f64]; 2],
+        whole: &[f64],
+    ) -> Result<Stress<D>, FlowError> {
+        let own = problem.own_stress(&self.conditions.strain, fields, whole)?;
+        let (all, n) = (self.shared.bodies.balls().len(), D * D);
+        let mut numbers = vec![0.0; 2 * all * n];
+        for (half, moments) in [&own.moments, &own.of_films].into_iter().enumerate() {
+            for (&id, moment) in self.bodies.ids.iter().zip(moments) {
+                numbers[(half * all + id as usize) * n..][..n].copy_from_slice(moment.as_slice());
+            }
+        }
+        numbers.extend([own.dissipation, own.dissipation_of_films]);
+        self.shared.ranks.sum(&mut numbers);
+        let moments = |half: usize| {
+            let entries = numbers[half * all * n..][..all * n].chunks_exact(n);
+            entries.map(Matrix::<D>::from_column_slice).collect()
+        };
+        let [dissipation, dissipation_of_films] = [0, 1].map(|k| numbers[2 * all * n + k]);
+        Ok(Stress { moments: moments(0), of_films: moments(1), dissipation, dissipation_of_films })
     }
 
     /// Steps in double precision, as in the serial solver: in films penalties and extrapolated nodes leave
@@ -311,7 +386,7 @@ where
         if !matches!(attempt.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
             return Vec::new();
         }
-        let weak = problem.weak_cells(&attempt.velocity, &Matrix::zeros());
+        let weak = problem.weak_cells(&attempt.velocity, &self.conditions.strain);
         let cells = self.level.part.mesh.cells();
         let named = |weak: &WeakCell| {
             let body = u64::from(self.bodies.ids[weak.body as usize]);
@@ -335,7 +410,7 @@ where
         attempt: Attempt<'a, D>,
         wasted: usize,
     ) -> Result<MyFlow<D>, FlowError> {
-        let Attempt { space, velocity, pressure, sizes, report, setup_traffic, solve_traffic, .. } = attempt;
+        let Attempt { space, velocity, pressure, sizes, report, .. } = attempt;
         let (report, level) = (report?, &self.level);
         let (points, nodal) = (&level.velocity, level.nodal_dim());
         let counts = counts_of_all(level, space.ranks);
@@ -352,9 +427,10 @@ where
             dof_count: counts[1] as usize,
             iterations: wasted + report.iterations,
             relative_residual: report.residual_norm / reference,
+            stress: attempt.stress,
             levels: sizes,
-            setup_traffic,
-            solve_traffic,
+            setup_traffic: attempt.setup_traffic,
+            solve_traffic: attempt.solve_traffic,
             cells: MyCells::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
         })
     }

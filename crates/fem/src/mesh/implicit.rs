@@ -45,6 +45,12 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
         Ok(Self { frame, wants, roots, wanted: FxHashMap::default(), refined: FxHashMap::default() })
     }
 
+    /// The same tree in a box with this shear.
+    #[must_use]
+    pub fn sheared(self, shear: f64) -> Self {
+        Self { frame: self.frame.sheared(shear), ..self }
+    }
+
     /// The same tree with nothing known of it yet.
     #[must_use]
     pub fn forgotten(&self) -> Self {

@@ -80,7 +80,11 @@ fn check(case: &Case) -> Result<(), RunError> {
     let refused = [
         (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
         (case.flow.formulation == Formulation::Paper, "the formulation paper"),
-        (case.is_sheared(), "a box that is sheared for ever"),
+        (case.shear_stress.is_some(), "a shear stress that is given"),
+        (
+            case.is_sheared() && case.flow.formulation != Formulation::Unfitted,
+            "a box that is sheared for ever, but by unfitted",
+        ),
         (case.flow.solver == Solver::Direct, "the direct solver"),
         (case.gives_motions(), "particles that are held or driven"),
         (case.body_force.is_some(), "a force on the fluid"),

@@ -197,7 +197,7 @@ where
     }
 
     /// The field that carries the data, and its residual with the loads.
-    pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+    pub(crate) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
         let mut lift = problem.lift(self.boundary);
         if let Some(twists) = self.twists() {
             problem.set_twists(&twists, &mut lift)?;

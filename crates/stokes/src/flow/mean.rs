@@ -63,7 +63,7 @@ pub fn mean_of(weights: &[f64], values: &[f64]) -> f64 {
         / weights.iter().sum::<f64>()
 }
 
-/// Integrals over the fluid of the functions of degree 1 or 2.
+/// Integrals over the fluid of the own cells of the functions of degree 1 or 2.
 pub fn fluid_weights<const D: usize>(
     discretisation: &Discretisation<D>,
     nodes: &NodeMap<D>,
@@ -80,7 +80,7 @@ pub fn fluid_weights<const D: usize>(
         .iter()
         .map(|(x, _)| (0..count).map(|i| value::<D>(degree, i, x)).collect())
         .collect();
-    for cell in 0..nodes.cell_count() {
+    for cell in (0..nodes.cell_count()).filter(|&cell| discretisation.is_own(cell)) {
         let volume = discretisation.cell_size(cell).powi(D as i32);
         let of_cell = nodes.cell(cell).iter();
         if let Some(cut) = cut.cut(cell) {

@@ -25,6 +25,7 @@ use crate::space::{Discretisation, solid_nodes};
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given, GivenOf};
+pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use stress::Stress;
@@ -406,10 +407,22 @@ where
     let mut pressure = pressure[..problem.system.pressure.dim()].to_vec();
     let mean = stress::mean_pressure(problem, &pressure);
     pressure.iter_mut().for_each(|p| *p -= mean);
-    let fields = [velocity, &pressure[..]];
-    let moments = problem.rigidity.first_moments(problem, fields, &conditions.strain)?;
+    own_stress(problem, &conditions.strain, [velocity, &pressure], x)
+}
+
+/// What the own cells and films add to the stress, with pressures whose mean over the fluid vanishes.
+pub(crate) fn own_stress<const D: usize>(
+    problem: &Problem<D>,
+    strain: &Matrix<D>,
+    [velocity, pressure]: [&[f64]; 2],
+    x: &[f64],
+) -> Result<Stress<D>, StokesError>
+where
+    Dim<D>: Space<D>,
+{
+    let moments = problem.rigidity.first_moments(problem, [velocity, pressure], strain)?;
     let of_films = problem.system.parts(x)[2].iter().map(|g| g * g).sum::<f64>();
-    let dissipation = stress::dissipation(problem, velocity, &conditions.strain);
+    let dissipation = stress::dissipation(problem, velocity, strain);
     Ok(Stress {
         moments: moments.iter().map(symmetric).collect(),
         of_films: film_moments(&problem.film_forces(x), problem.bodies.len()).iter().map(symmetric).collect(),

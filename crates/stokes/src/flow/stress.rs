@@ -36,7 +36,7 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// Power that the fluid dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative to a linear flow
+/// Power that the fluid of the own cells dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative to a linear flow
 /// with this strain.
 pub fn dissipation<const D: usize>(problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> f64
 where
@@ -45,7 +45,10 @@ where
     let Some(surfaces) = &problem.system.surfaces else { return 0.0 };
     let cut = &surfaces.cut;
     let energy = StrainEnergy::new(problem.discretisation(), cut);
-    let of_cell = |cell: usize| energy.in_cell(cell, velocity, strain);
+    let of_cell = |cell: usize| match problem.discretisation().is_own(cell) {
+        true => energy.in_cell(cell, velocity, strain),
+        false => 0.0,
+    };
     let cells: Vec<f64> = (0..cut.states.len()).into_par_iter().with_min_len(256).map(of_cell).collect();
     problem.system.viscosity() * cells.iter().sum::<f64>()
 }

@@ -248,7 +248,8 @@ where
         b: &mut [f64],
     ) {
         let discretisation = self.discretisation();
-        add_load(discretisation, |cell| cut.states[cell] == CellState::Fluid, force, b);
+        let is_whole = |cell: usize| cut.states[cell] == CellState::Fluid && discretisation.is_own(cell);
+        add_load(discretisation, is_whole, force, b);
         add_load_of_cut_cells(discretisation, cut, force, b);
         self.system.reduce(b);
         let forces = forces_on_bodies(discretisation, cut, force, self.bodies.len());

@@ -15,7 +15,7 @@ const RAY_POINTS: usize = 4;
 
 type Force<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 
-/// `b += int f . v` over the fluid of the cut cells for the nodal velocities `v`.
+/// `b += int f . v` over the fluid of the own cut cells for the nodal velocities `v`.
 pub fn add_load_of_cut_cells<const D: usize>(
     discretisation: &Discretisation<D>,
     cut: &CutCells<D>,
@@ -25,7 +25,7 @@ pub fn add_load_of_cut_cells<const D: usize>(
     let points = gauss_cube::<D>(POINTS);
     let shapes_at = |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| value::<D>(2, i, x)).collect();
     let shapes: Vec<Vec<f64>> = points.iter().map(|point| shapes_at(&point.0)).collect();
-    for of in &cut.cells {
+    for of in cut.cells.iter().filter(|of| discretisation.is_own(of.cell as usize)) {
         let cell = of.cell as usize;
         let (lower, h) = place(discretisation, of);
         for (((at, _), weight), shapes) in points.iter().zip(&of.moments.volume).zip(&shapes) {
@@ -37,7 +37,8 @@ pub fn add_load_of_cut_cells<const D: usize>(
     }
 }
 
-/// Force and torque of `f` on each body as the mesh sees it, a body in a widened film without its caps.
+/// Force and torque of `f` on each body as the mesh sees it, a body in a widened film without its caps; the
+/// share of own cells.
 pub fn forces_on_bodies<const D: usize>(
     discretisation: &Discretisation<D>,
     cut: &CutCells<D>,
@@ -50,7 +51,7 @@ where
     let (points, ray) = (gauss_cube::<D>(POINTS), gauss(RAY_POINTS));
     let in_box = |x: Vector<D>| force(&wrapped(discretisation, x));
     let mut wrenches = vec![Wrench::default(); body_count];
-    for of in &cut.cells {
+    for of in cut.cells.iter().filter(|of| discretisation.is_own(of.cell as usize)) {
         let (lower, h) = place(discretisation, of);
         for ((&body, ball), surface) in of.bodies.iter().zip(&of.balls).zip(&of.moments.surfaces) {
             let center = lower + Vector::from(ball.center) * h;

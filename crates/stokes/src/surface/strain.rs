@@ -35,7 +35,7 @@ where
     pub wrenches: Vec<Wrench<D>>,
 }
 
-/// The load of a strain `E`, a symmetric matrix without trace, on `body_count` bodies.
+/// The load of a strain `E`, a symmetric matrix without trace, on `body_count` bodies, from the own cells.
 pub fn load_of_strain<const D: usize>(
     discretisation: &Discretisation<D>,
     surfaces: &SurfaceCoupling<D>,
@@ -58,9 +58,11 @@ where
             || rule.of_cell(discretisation, surfaces, place, strain),
         )
     };
-    let loads: Vec<CellLoad<D>> =
-        (0..surfaces.cut.cells.len()).into_par_iter().with_min_len(16).map(of_cell).collect();
-    for (cut, own) in surfaces.cut.cells.iter().zip(loads) {
+    let cells = &surfaces.cut.cells;
+    let own: Vec<usize> =
+        (0..cells.len()).filter(|&place| discretisation.is_own(cells[place].cell as usize)).collect();
+    let loads: Vec<CellLoad<D>> = own.par_iter().with_min_len(16).map(|&place| of_cell(place)).collect();
+    for (cut, own) in own.iter().map(|&place| &cells[place]).zip(loads) {
         let cell = cut.cell as usize;
         for (i, &node) in discretisation.velocity.cell(cell).iter().enumerate() {
             (0..D).for_each(|c| load.velocity[node as usize * D + c] += viscosity * own.forces[c][i]);
