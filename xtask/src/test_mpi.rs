@@ -11,13 +11,15 @@ use std::time::{Duration, Instant};
 /// Numbers of ranks.
 const RANKS: [&str; 5] = ["1", "2", "3", "4", "8"];
 /// Flows that are computed.
-const FLOWS: [&str; 6] = [
+const FLOWS: [&str; 8] = [
     "--dimension 2 --level 5",
     "--dimension 2 --level 6 --adaptive --tolerance 1e-11",
     "--dimension 3 --level 3",
     "--dimension 3 --level 4 --adaptive --tolerance 1e-11",
     "--dimension 2 --level 5 --bodies",
     "--dimension 3 --level 4 --bodies",
+    "--dimension 2 --level 5 --bodies --unfitted",
+    "--dimension 3 --level 4 --bodies --unfitted",
 ];
 /// Two spheres that the shear drives at each other.
 const CASE: &str = r#"name = "near"
@@ -46,8 +48,40 @@ band = 1
 "#;
 /// Its trajectory.
 const TRAJECTORY: &str = "near-gluey-rigid-dofs.csv";
+/// Spheres in a box that is sheared for ever, by the default formulation.
+const SHEARED: &str = r#"name = "sheared"
+dimension = 3
+
+[domain]
+boundary = "sheared"
+
+[suspension]
+volume_fraction = 0.2
+count = 6
+
+[time]
+step = 0.1
+end = 0.3
+
+[contact]
+strategy = "none"
+
+[flow]
+tolerance = 1e-11
+solver = "multigrid"
+
+[flow.mesh]
+cells_per_radius = 1.6
+
+[rheology]
+every = 1
+"#;
+/// Its tables.
+const TABLES: [&str; 2] = ["sheared-none-unfitted.csv", "sheared-none-unfitted-rheology.csv"];
 /// Largest difference of the numbers in it from those of one process.
 const LIMIT: f64 = 1e-11;
+/// The same in the sheared box, whose stresses one process finds from the flow of the step before.
+const LIMIT_OF_SHEARED: f64 = 5e-10;
 /// Its checkpoint.
 const CHECKPOINT: &str = "near-gluey-rigid-dofs.checkpoint";
 /// A key that makes the run longer.
@@ -55,7 +89,7 @@ const LONG: &str = "time.end=2";
 /// Ranks of a run that loses one.
 const LOSING: &str = "3";
 /// What is said of a case that ranks cannot share.
-const REFUSAL: &str = "several ranks cannot share a formulation other than rigid-dofs";
+const REFUSAL: &str = "several ranks cannot share the formulation paper";
 /// A limit of memory in gigabytes that one process refuses the case under, and eight do not.
 const LIMIT_OF_MEMORY: &str = "0.043";
 /// What is said of a case that needs more.
@@ -157,32 +191,25 @@ struct Case {
 }
 
 impl Case {
-    /// The places of the particles are those of one process, and the same bits run after run.
+    /// The places of the particles are those of one process, and the same bits run after run; the stress too
+    /// where there is one.
     fn compare(&self) -> Result<(), MpiError> {
-        let alone = self.rows("1")?;
-        for ranks in RANKS.into_iter().skip(1) {
-            let rows = self.rows(ranks)?;
-            if self.rows(ranks)? != rows {
-                return Err(MpiError::Case { ranks, what: "two runs have other bits".into() });
-            }
-            let difference = largest_difference(&alone, &rows);
-            if difference.is_none_or(|difference| difference > LIMIT) {
-                let what = format!("rows differ from those of one process by {difference:?}, not {LIMIT}");
-                return Err(MpiError::Case { ranks, what });
-            }
-            println!("{ranks} ranks, a case: {:e} from one process", difference.unwrap_or(0.0));
-        }
-        Ok(())
+        compare("between walls", LIMIT, |ranks| {
+            line(&mut self.command(ranks, "time.end=0.4")?)?;
+            self.read(ranks, TRAJECTORY)
+        })?;
+        compare("sheared for ever", LIMIT_OF_SHEARED, |ranks| {
+            line(&mut self.command_of("sheared.toml", SHEARED, ranks)?)?;
+            Ok(TABLES
+                .map(|table| self.read(ranks, table))
+                .into_iter()
+                .collect::<Result<Vec<_>, _>>()?
+                .concat())
+        })
     }
 
-    /// The table of the trajectory.
-    fn rows(&self, ranks: &'static str) -> Result<String, MpiError> {
-        line(&mut self.command(ranks, "time.end=0.4")?)?;
-        self.read(ranks)
-    }
-
-    fn read(&self, ranks: &'static str) -> Result<String, MpiError> {
-        let file = self.folder().join(TRAJECTORY);
+    fn read(&self, ranks: &'static str, table: &str) -> Result<String, MpiError> {
+        let file = self.folder().join(table);
         std::fs::read_to_string(&file)
             .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })
     }
@@ -197,15 +224,28 @@ impl Case {
         Ok(command)
     }
 
+    /// The run of another case, in the place of what a run before left.
+    fn command_of(&self, name: &str, case: &str, ranks: &'static str) -> Result<Command, MpiError> {
+        let mut command = self.run(name, case, &self.folder(), ranks)?;
+        command.arg("--force");
+        Ok(command)
+    }
+
     /// The same with another folder for the results, where there are none.
     fn command_into(&self, out: &Path, ranks: &'static str, key: &str) -> Result<Command, MpiError> {
+        let mut command = self.run("near.toml", CASE, out, ranks)?;
+        command.args(["--set", key]);
+        Ok(command)
+    }
+
+    fn run(&self, name: &str, case: &str, out: &Path, ranks: &'static str) -> Result<Command, MpiError> {
         let (program, folder) = (self.root.join("target/release/gluey"), self.folder());
-        let file = folder.join("near.toml");
+        let file = folder.join(name);
         std::fs::create_dir_all(&folder)
-            .and_then(|()| std::fs::write(&file, CASE))
+            .and_then(|()| std::fs::write(&file, case))
             .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })?;
         let (file, out) = (file.display(), out.display());
-        let words = format!("run {file} --quiet --threads 1 --out {out} --set {key}");
+        let words = format!("run {file} --quiet --threads 1 --out {out}");
         Ok(self.launcher.command(ranks, &program, &words))
     }
 
@@ -283,9 +323,9 @@ impl Case {
         let mut command = self.command(ranks, LONG)?;
         command.arg("--resume").arg(checkpoint);
         line(&mut command)?;
-        let resumed = self.read(ranks)?;
+        let resumed = self.read(ranks, TRAJECTORY)?;
         line(&mut self.command(RANKS[0], LONG)?)?;
-        let alone = self.read(RANKS[0])?;
+        let alone = self.read(RANKS[0], TRAJECTORY)?;
         let difference = largest_difference(&alone, &resumed);
         if difference.is_none_or(|difference| difference > LIMIT) {
             let what = format!("a resumed run differs from one process by {difference:?}, not {LIMIT}");
@@ -297,6 +337,29 @@ impl Case {
         );
         Ok(())
     }
+}
+
+/// Tables of a case on several numbers of ranks beside those of one process.
+fn compare(
+    case: &str,
+    limit: f64,
+    tables: impl Fn(&'static str) -> Result<String, MpiError>,
+) -> Result<(), MpiError> {
+    let alone = tables(RANKS[0])?;
+    for ranks in RANKS.into_iter().skip(1) {
+        let found = tables(ranks)?;
+        if tables(ranks)? != found {
+            return Err(MpiError::Case { ranks, what: format!("{case}: two runs have other bits") });
+        }
+        let difference = largest_difference(&alone, &found);
+        if difference.is_none_or(|difference| difference > limit) {
+            let what =
+                format!("{case}: rows differ from those of one process by {difference:?}, not {limit}");
+            return Err(MpiError::Case { ranks, what });
+        }
+        println!("{ranks} ranks, a case {case}: {:e} from one process", difference.unwrap_or(0.0));
+    }
+    Ok(())
 }
 
 /// The processes that a process started.

@@ -10,9 +10,13 @@ use gluey_parallel::Communicator;
 /// Blocks of keys a rank counts, at least: a cut is searched in one of them.
 const BLOCKS_OF_A_RANK: usize = 16;
 
-/// Work on a cell that flows, and on one that moves as a body does (measured: `docs/ranks.md`).
+/// Work on a cell that flows, on one that moves as a body does, and on one that a surface cuts (measured:
+/// `docs/ranks.md`).
 const OF_CELL: u64 = 10;
 const OF_RIGID_CELL: u64 = 12;
+const OF_CUT_CELL: u64 = 82;
+/// Work on a cell without fluid, of which nothing but a coarser level knows.
+const OF_SOLID_CELL: u64 = 4;
 
 /// Cuts the whole tree into runs that differ by one leaf at most. Each rank counts its share of the tree; all
 /// know of the others are the numbers of leaves in some dozen blocks of each.
@@ -63,6 +67,26 @@ pub fn cuts_of_work<const D: usize>(
         let center: Vector<D> = frame.lower_corner(cell).add_scalar(0.5 * h);
         let is_rigid = bodies.nearest_within(&center, -frame.half_diagonal(h)).is_some();
         if is_rigid { OF_RIGID_CELL } else { OF_CELL }
+    };
+    weighted_cuts(tree, ranks, &weight)
+}
+
+/// Cuts it into runs of equal work around these bodies where their surfaces cut cells.
+pub fn cuts_of_work_at_surfaces<const D: usize>(
+    tree: &ImplicitTree<'_, D>,
+    bodies: &BallTree<'_, D>,
+    ranks: &dyn Communicator,
+) -> Cuts {
+    let frame = tree.frame();
+    let weight = |cell: &Cell<D>| {
+        let h = frame.size(cell.level);
+        let center: Vector<D> = frame.lower_corner(cell).add_scalar(0.5 * h);
+        // Half an edge on the way to a surface is what the middles of cut cells have on the mean.
+        match bodies.nearest_within(&center, 0.5 * h) {
+            None => OF_CELL,
+            Some((_, level_set)) if level_set <= 0.5 * h => OF_CUT_CELL,
+            Some(_) => OF_SOLID_CELL,
+        }
     };
     weighted_cuts(tree, ranks, &weight)
 }

@@ -54,7 +54,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let plans = ghost_plan(tree, shared, &space);
             let mut level = Level::new(ranks, space, plans, viscosity, depth == finest)?;
             if depth > coarsest && around.is_none() {
-                level.relax_near_bodies(tree, shared, viscosity)?;
+                level.relax_near_bodies(tree, shared, viscosity);
             }
             levels.push(level);
         }

@@ -4,10 +4,10 @@
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{ImplicitTree, ReferenceMatrices};
 use gluey_linalg::{
-    BadDiagonal, Chebyshev, ChebyshevParams, FnOp, Guess, Identity, KrylovError, LinOp, Preconditioner,
-    estimate_lambda_max, invert_spd, vector,
+    BadDiagonal, Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, invert_spd, vector,
 };
 use gluey_parallel::{Communicator, GhostPlan};
+use gluey_stokes::part::cell_lambda_max;
 
 use crate::bodies::{Shared, rigid, rows};
 use crate::flow::FlowError;
@@ -16,7 +16,7 @@ use crate::space::{LevelSpace, Plans};
 
 /// Applications in a sweep of the finest level, and the part of the spectrum that it damps, as in the serial
 /// solver. The largest eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.05, lanczos_steps: 60 };
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.05, lanczos_steps: 0 };
 /// Applications in a sweep of the others.
 const DEGREE_BELOW: usize = 5;
 
@@ -182,7 +182,7 @@ impl<'a, const D: usize> Level<'a, D> {
         let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
         let degree = if is_finest { SWEEP.degree } else { DEGREE_BELOW };
-        let largest = cell_lambda_max(&operator.space.reference())?;
+        let largest = cell_lambda_max(&operator.space.reference());
         let chebyshev = Chebyshev::below(largest, dim, &ChebyshevParams { degree, ..SWEEP });
         let nodal = vec![0.0; operator.space.owned_nodal_dim()];
         let [b, z] = [0, 1].map(|_| vec![0.0; dim]);
@@ -195,10 +195,9 @@ impl<'a, const D: usize> Level<'a, D> {
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'a, '_, D>,
         viscosity: f64,
-    ) -> Result<(), FlowError> {
-        let largest = cell_lambda_max(&self.operator.space.reference())?;
+    ) {
+        let largest = cell_lambda_max(&self.operator.space.reference());
         self.near_bodies = NearBodies::new(tree, shared, self, viscosity, largest);
-        Ok(())
     }
 
     /// Improves `z`, then once more around the bodies.
@@ -299,18 +298,4 @@ impl<const D: usize> LevelOperator<'_, D> {
             }
         }
     }
-}
-
-/// Largest eigenvalue of `D^-1 K` for the viscous matrix `K` of a cell and its diagonal `D`, which bounds
-/// that of sums over cells.
-fn cell_lambda_max<const D: usize>(reference: &ReferenceMatrices<D>) -> Result<f64, KrylovError> {
-    let n = ReferenceMatrices::<D>::VELOCITY;
-    let viscous = &reference.viscous;
-    let scale = |i: usize| viscous[i * (n + 1)].sqrt();
-    let mut scaled = FnOp::new(n, |x: &[f64], y: &mut [f64]| {
-        for (i, y) in y.iter_mut().enumerate() {
-            *y = (0..n).map(|j| viscous[i * n + j] * x[j] / (scale(i) * scale(j))).sum();
-        }
-    });
-    estimate_lambda_max(&mut scaled, &mut Identity, SWEEP.lanczos_steps)
 }

@@ -25,8 +25,9 @@
 //! # Ok::<(), gluey_parallel::RankFailure>(())
 //! ```
 //!
-//! `docs/decisions/0030-ranks.md` says what separates it from the serial solver. Not for surfaces that cut
-//! cells, viscosities that vary, or boxes without a wall.
+//! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
+//! (`docs/decisions/0036-surfaces-on-ranks.md`). Not for bodies that are held, or viscosities that vary; boxes
+//! without a wall for `unfitted` only.
 
 mod agreement;
 mod bodies;
@@ -46,7 +47,7 @@ mod space;
 mod surface;
 mod transfer;
 
-pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
+pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
 pub use moving::{FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields};
 pub use surface::SurfaceBodies;

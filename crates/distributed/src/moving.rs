@@ -11,7 +11,7 @@ use gluey_motion::{Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, NoFo
 use gluey_parallel::Communicator;
 use gluey_stokes::{Conditions, CutCellPressures, Formulation, Lubrication, Refinement};
 
-use crate::cuts::cuts_of_work;
+use crate::cuts::{cuts_of_work, cuts_of_work_at_surfaces};
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
 use crate::surface::SurfaceBodies;
 
@@ -137,12 +137,16 @@ where
         };
         let deepest = self.refinement.deepest();
         let mut whole = tree(deepest)?;
-        let mut cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
+        let cuts_of = |tree: &ImplicitTree<'_, D>| match self.formulation {
+            Formulation::Unfitted { .. } => cuts_of_work_at_surfaces(tree, &tree_of_balls, ranks),
+            _ => cuts_of_work(tree, &tree_of_balls, ranks),
+        };
+        let mut cuts = cuts_of(&whole);
         let used = finest_level(&mut whole, &cuts.of(ranks.rank()), ranks);
         if used < deepest {
             // Cells as deep as gaps might ask for are not there: the lattice is that of the finest there are.
             whole = tree(used)?;
-            cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
+            cuts = cuts_of(&whole);
         }
         let shear = self.undisturbed(told.shear_factor);
         let (balls, wrenches) = (&balls, &told.wrenches[..]);

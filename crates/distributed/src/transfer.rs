@@ -4,28 +4,27 @@
 //! touches it first. That is the first to touch it of all, so ranks agree with the serial solver.
 
 use gluey_fem::element::{multi_index, node_count, values_1d};
+use gluey_linalg::Jagged;
 
 use crate::space::LevelSpace;
 
 /// Points of the grid a direction.
 const POINTS: usize = 5;
-/// Place of a node without an unknown.
-const NOWHERE: u8 = u8::MAX;
-/// Most nodes of a cell.
-const MOST_NODES: usize = 27;
 
 /// Interpolation between the nodes of two levels, and its transpose.
 pub struct Transfer<const D: usize> {
     /// Coarse cell of each owned fine node, and place in its grid.
     places: Vec<(u32, u8)>,
-    /// Weights of the nodes of a cell at each point of its grid.
-    weights: Vec<[f32; MOST_NODES]>,
+    /// Nodes of a cell that count at each point of its grid, and their weights; none at the last, which stands
+    /// for nodes without an unknown.
+    weights: Jagged<(u8, f32)>,
 }
 
 impl<const D: usize> Transfer<D> {
     pub fn new(coarse: &LevelSpace<D>, fine: &LevelSpace<D>) -> Self {
         let owned = &fine.velocity.owned;
-        let mut places = vec![(0, NOWHERE); owned.len()];
+        let nowhere = POINTS.pow(D as u32) as u8;
+        let mut places = vec![(0, nowhere); owned.len()];
         let mut is_placed = vec![false; owned.len()];
         let fine_mesh = &fine.part.mesh;
         for cell in fine.part.own() {
@@ -52,16 +51,18 @@ impl<const D: usize> Transfer<D> {
                 }
             }
         }
-        Self { places, weights: (0..POINTS.pow(D as u32)).map(weights_at::<D>).collect() }
+        let points = (0..POINTS.pow(D as u32)).map(weights_at::<D>);
+        Self { places, weights: points.chain([Vec::new()]).collect() }
     }
 
     /// `fine = P coarse` on the owned nodes, of a field that is right at all nodes of the coarse part.
     pub fn prolong(&self, coarse: &LevelSpace<D>, field: &[f32], fine: &mut [f32]) {
         for (&(cell, place), value) in self.places.iter().zip(fine.as_chunks_mut::<D>().0) {
             *value = [0.0; D];
-            let Some(weights) = self.weights.get(usize::from(place)) else { continue };
-            for (&node, &weight) in coarse.velocity.map.cell(cell as usize).iter().zip(weights) {
-                (0..D).for_each(|c| value[c] += weight * field[node as usize * D + c]);
+            let nodes = coarse.velocity.map.cell(cell as usize);
+            for &(local, weight) in &self.weights[usize::from(place)] {
+                let from = &field[nodes[usize::from(local)] as usize * D..][..D];
+                (0..D).for_each(|c| value[c] += weight * from[c]);
             }
         }
     }
@@ -70,22 +71,22 @@ impl<const D: usize> Transfer<D> {
     pub fn restrict(&self, coarse: &LevelSpace<D>, fine: &[f32], field: &mut [f32]) {
         field.fill(0.0);
         for (&(cell, place), value) in self.places.iter().zip(fine.as_chunks::<D>().0) {
-            let Some(weights) = self.weights.get(usize::from(place)) else { continue };
-            for (&node, &weight) in coarse.velocity.map.cell(cell as usize).iter().zip(weights) {
-                (0..D).for_each(|c| field[node as usize * D + c] += weight * value[c]);
+            let nodes = coarse.velocity.map.cell(cell as usize);
+            for &(local, weight) in &self.weights[usize::from(place)] {
+                let to = &mut field[nodes[usize::from(local)] as usize * D..][..D];
+                (0..D).for_each(|c| to[c] += weight * value[c]);
             }
         }
     }
 }
 
-/// Weights of the nodes at a point of the grid.
-fn weights_at<const D: usize>(place: usize) -> [f32; MOST_NODES] {
+/// The nodes that count at a point of the grid, and their weights.
+fn weights_at<const D: usize>(place: usize) -> Vec<(u8, f32)> {
     let point = multi_index::<D>(place, POINTS);
     let along = point.map(|i| values_1d(2, i as f64 / (POINTS - 1) as f64));
-    let mut weights = [0.0; MOST_NODES];
-    for (i, weight) in weights.iter_mut().enumerate().take(node_count::<D>(2)) {
+    let weight = |i: usize| {
         let index = multi_index::<D>(i, 3);
-        *weight = (0..D).map(|d| along[d][index[d]]).product::<f64>() as f32;
-    }
-    weights
+        (i as u8, (0..D).map(|d| along[d][index[d]]).product::<f64>() as f32)
+    };
+    (0..node_count::<D>(2)).map(weight).filter(|(_, weight)| *weight != 0.0).collect()
 }

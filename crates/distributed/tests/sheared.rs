@@ -12,7 +12,7 @@ use gluey_stokes::{
 };
 
 const TOLERANCE: f64 = 1e-11;
-const STRAIN: f64 = 0.37;
+const STRAIN: f64 = 0.2;
 const RATE: f64 = 0.8;
 
 /// Particles that nearly touch, one across the seam.

@@ -20,6 +20,7 @@ use crate::space::Discretisation;
 
 pub use crate::operator::PressureForces;
 pub use crate::precondition::surface::{SharedVelocities, SurfaceSmoother};
+pub use crate::precondition::velocity::cell_lambda_max;
 pub use crate::surface::WeakCell;
 
 /// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two
@@ -134,11 +135,15 @@ where
         self.cells.iter().map(|cell| cell.cell as usize)
     }
 
-    /// The own cells in which something flows.
-    pub fn own_flowing_cells(&self) -> Vec<usize> {
+    /// The own cells that surfaces cut.
+    pub fn own_cut_cells(&self) -> impl Iterator<Item = usize> + '_ {
         let cut = self.surfaces.iter().flat_map(|surfaces| &surfaces.cut.cells);
-        let cut = cut.map(|cell| cell.cell as usize).filter(|&cell| self.discretisation().is_own(cell));
-        let mut cells: Vec<usize> = self.own_fluid_cells().chain(cut).collect();
+        cut.map(|cell| cell.cell as usize).filter(|&cell| self.discretisation().is_own(cell))
+    }
+
+    /// The own cells in which something flows.
+    fn own_flowing_cells(&self) -> Vec<usize> {
+        let mut cells: Vec<usize> = self.own_fluid_cells().chain(self.own_cut_cells()).collect();
         cells.sort_unstable();
         cells
     }

@@ -30,6 +30,8 @@ where
     x: Vec<f32>,
     r: Vec<f32>,
     correction: Vec<f32>,
+    /// What is owned of them.
+    own: Vec<f32>,
 }
 
 impl<'a, const D: usize> SurfaceCycle<'a, D>
@@ -45,7 +47,7 @@ where
         let [x, r, correction] = [(); 3].map(|()| vec![0.0; system.velocity_dim()]);
         let nodes = system.space.nodes().node_count();
         let is_free = (0..nodes).map(|node| system.space.is_free(node)).collect();
-        Self { levels, smoother, shared, is_free, x, r, correction }
+        Self { levels, smoother, shared, is_free, x, r, correction, own: Vec::new() }
     }
 
     /// `z = V r` on owned velocities and twists.
@@ -56,17 +58,17 @@ where
         if norm == 0.0 {
             return z.fill(0.0);
         }
-        let scaled: Vec<f32> = r.iter().map(|r| (r / norm) as f32).collect();
-        space.set_velocities(&scaled, &mut self.r);
+        self.own.resize(r.len(), 0.0);
+        vector::convert(1.0 / norm, r, &mut self.own);
+        space.set_velocities(&self.own, &mut self.r);
         self.shared.update(&mut self.r);
         self.x.fill(0.0);
         self.smoother.add_blocks(&mut self.r, &mut self.x, &mut self.shared);
         self.correct(space);
         self.smoother.add_blocks(&mut self.r, &mut self.x, &mut self.shared);
         self.smoother.sweep(&self.r, &mut self.x, &mut self.shared);
-        let mut answer = scaled;
-        space.copy_velocities(&self.x, &mut answer);
-        vector::convert(norm, &answer, z);
+        space.copy_velocities(&self.x, &mut self.own);
+        vector::convert(norm, &self.own, z);
     }
 
     /// `z = L r`, `x += z`, `r -= A z`.

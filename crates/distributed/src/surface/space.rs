@@ -79,7 +79,7 @@ pub struct SurfaceSpace<'a, const D: usize> {
     plan: GhostPlan,
     velocities: GhostPlan,
     twists: GhostPlan,
-    /// Of the velocities in all cells around own ones.
+    /// Of the velocities in all cells around own ones that are cut.
     around: GhostPlan,
 }
 
@@ -104,7 +104,7 @@ where
             GhostPlan::new(ranks, wanted, level.velocity.finder())
         };
         let nodes = plan_of(&needed);
-        let around = plan_of(&masters.around(level));
+        let around = plan_of(&masters.around(level, system));
         let twists = twist_plan(ranks, bodies, &bodies_here(level, problem));
         let pressures = SharedPressures::around_surfaces(tree, shared, level, &system.pressure);
         let nodal = system.space.full_dim();
@@ -220,7 +220,7 @@ where
         self.copy_velocities(whole, y);
     }
 
-    /// Brings the velocities of others in all cells around own ones to a nodal field.
+    /// Brings the velocities of others in all cells around own ones that are cut to a nodal field.
     pub fn update_around(&mut self, field: &mut [f64]) {
         let nodal = self.level.nodal_dim();
         self.around.update::<f64, D>(self.ranks, &mut field[..nodal]);
@@ -314,12 +314,12 @@ where
         needed
     }
 
-    /// The nodes that own cells and those around them depend on.
-    fn around(&self, level: &LevelSpace<D>) -> Vec<bool> {
+    /// The nodes that own cut cells and those around them depend on.
+    fn around(&self, level: &LevelSpace<D>, system: &StokesSystem<D>) -> Vec<bool> {
         let mesh = &level.part.mesh;
         let mut needed = vec![false; self.nodes.map.node_count()];
         let offset = |k: usize| std::array::from_fn(|d| (k / 3usize.pow(d as u32) % 3) as i32 - 1);
-        for own in level.part.own() {
+        for own in system.own_cut_cells() {
             let near = (0..3usize.pow(D as u32)).filter_map(|k| {
                 mesh.neighbour(&mesh.cells()[own], &offset(k)).and_then(|cell| mesh.find(&cell))
             });

@@ -10,7 +10,7 @@ use super::findings::Findings;
 use super::locate::Source;
 use super::overrides::Override;
 use super::validate::{check_mutual, check_surroundings};
-use super::{Case, VERSION, fill, form};
+use super::{Case, Formulation, VERSION, fill, form};
 
 impl Case {
     /// Reads and checks a case file.
@@ -123,9 +123,26 @@ fn version_problem(table: &toml::Table) -> Option<Problem> {
     (found != i64::from(VERSION)).then_some(Problem::Version { found })
 }
 
+/// Notes keys of a formulation in a case that names none: it would be solved with another.
+fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
+    let Some(flow) = table.get("flow").and_then(Value::as_table) else { return };
+    if flow.contains_key("formulation") {
+        return;
+    }
+    for formulation in [Formulation::Paper, Formulation::RigidDofs].map(|name| name.to_string()) {
+        if flow.contains_key(&formulation) {
+            let key = Key::default().name("flow").name(&formulation);
+            let needs = format!("flow.formulation = \"{formulation}\"");
+            let found = format!("no `flow.formulation`, which means \"{}\"", Formulation::default());
+            findings.add(key, Problem::Unfit { choice: format!("`[flow.{formulation}]`"), needs, found });
+        }
+    }
+}
+
 /// The case that `table` is, as far as its parts are right; what is wrong is noted.
 fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<Case> {
     let has_list = table.contains_key("particles");
+    check_choice_is_named(&table, findings);
     let whole = Value::Table(table);
     form::check(&whole, Case::schema(), &Key::default(), findings);
     let Value::Table(mut table) = whole else { return None };

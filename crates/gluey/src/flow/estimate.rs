@@ -26,6 +26,10 @@ const PROGRAM: f64 = 16e6;
 const PROGRAM_OF_RANK: f64 = 24e6;
 /// What an unknown takes there; unit: bytes.
 const OF_RANK: f64 = 500.0;
+/// The same with steps in double precision, in `unfitted`.
+const OF_RANK_AT_SURFACES: f64 = 800.0;
+/// Layers of cells around its own whose cuts a process of `unfitted` holds, as a cube of its cells would have.
+const LAYERS_AT_SURFACES: f64 = 6.0;
 /// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
 /// penalties; unit: bytes.
 const CUT_CELL: [f64; 2] = [40e3, 55e3];
@@ -60,7 +64,7 @@ impl MeshEstimate {
         let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
         let bytes = match ranks {
             0 | 1 => memory(case, &tree, (cell_count, unknown_count)),
-            _ => memory_of_rank(case.dimension, (cell_count, unknown_count), ranks as f64),
+            _ => memory_of_rank(case, &tree, (cell_count, unknown_count), ranks as f64),
         };
         Some(Self { cell_count, unknown_count, bytes })
     }
@@ -236,11 +240,16 @@ fn memory(case: &Case, tree: &Tree, counts: (f64, f64)) -> f64 {
 }
 
 /// Memory of one of the processes that share a case, in bytes (measured: see `docs/ranks.md`). Each holds
-/// its cells and those around them, as many as the surface of a cube of them has.
-fn memory_of_rank(dimension: usize, (cell_count, unknown_count): (f64, f64), ranks: f64) -> f64 {
-    let side = (cell_count / ranks).powf(1.0 / dimension as f64);
-    let with_ghosts = (1.0 + 2.0 / side).powi(dimension as i32);
-    PROGRAM_OF_RANK + OF_RANK * unknown_count / ranks * with_ghosts
+/// its cells and those around them, in layers like those of a cube of them: one, or as many as surfaces need.
+fn memory_of_rank(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64), ranks: f64) -> f64 {
+    let side = (cell_count / ranks).powf(1.0 / case.dimension as f64);
+    let with_layers = |count: f64| (1.0 + 2.0 * count / side).powi(case.dimension as i32).min(ranks);
+    let of_unknowns = |bytes: f64| PROGRAM_OF_RANK + bytes * unknown_count / ranks * with_layers(1.0);
+    if case.flow.formulation != Formulation::Unfitted {
+        return of_unknowns(OF_RANK);
+    }
+    let of_cuts = CUT_CELL[case.dimension - 2] * tree.cells_cut(case) / ranks;
+    of_unknowns(OF_RANK_AT_SURFACES) + of_cuts * with_layers(LAYERS_AT_SURFACES)
 }
 
 fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64)) -> f64 {
