@@ -7,11 +7,11 @@
 //! its operator are the sums over the own cells, and sums of these over all parts are right at every node.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::film::{Film, Lubrication};
+use crate::film::{Film, Lubrication, thin_films};
 use crate::flow::{Conditions, Stress, fluid_weights, own_stress, subtract_uniform};
 use crate::formulation::{Problem, Unfitted};
 use crate::operator::{Elements, StokesSystem};
@@ -69,16 +69,22 @@ impl PartMethod {
     }
 }
 
-/// How many rings of cells around its own a part needs near surfaces: for the roots of bad cells, and for the
-/// flow through the films between bodies of up to this radius.
+/// How many rings of cells around its own a part needs near surfaces, for cells of this size: for the roots of
+/// bad cells, and for what flows through the films between these bodies that are `wanted`.
 pub fn rings_around_surfaces<const D: usize>(
     lubrication: Lubrication,
-    largest_radius: f64,
+    (bodies, domain): (&[Ball<D>], &Aabb<D>),
     cell_size: f64,
+    wanted: &dyn Fn(&Film<D>) -> bool,
 ) -> usize {
+    if lubrication == Lubrication::None {
+        return RINGS;
+    }
     let heights = lubrication.heights::<D>(cell_size);
-    let edge = (largest_radius * heights.largest.max(2.0 * heights.at_walls)).sqrt();
-    RINGS + (edge / cell_size).ceil() as usize
+    let films = thin_films(bodies, domain, &heights);
+    let edge = |film: &Film<D>| film.shape(film.height(&heights)).edge();
+    let widest = films.iter().filter(|film| wanted(film)).map(edge).fold(0.0, f64::max);
+    RINGS + (widest / cell_size).ceil() as usize
 }
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.

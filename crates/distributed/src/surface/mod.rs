@@ -32,7 +32,7 @@ use crate::schur::{Flowing, Masses, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
-use space::{NearBodies, SurfaceSpace, is_near_surface, largest_radius, owner_of_film};
+use space::{NearBodies, SurfaceSpace, is_near_surface, owner_of_film};
 
 /// Iterations between restarts.
 const RESTART: usize = 60;
@@ -92,7 +92,9 @@ impl BoxFlow {
         let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset() };
         let frame = tree.frame().clone();
         let spreads = |cell: &Cell<D>| is_near_surface(&frame, &bodies, cell);
-        let rings = rings_around_surfaces::<D>(around.lubrication, largest_radius(&bodies), cell_size);
+        let is_own = |film: &Film<D>| owner_of_film(tree, &shared, film) == ranks.rank();
+        let all = (around.balls, frame.domain());
+        let rings = rings_around_surfaces(around.lubrication, all, cell_size, &is_own);
         let levels =
             VCycle::under(tree, &shared, self.viscosity, Some(&Around { rings, spreads: &spreads }))?;
         let level = levels.levels[levels.levels.len() - 1].operator.space.clone();

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use gluey_fem::{Cell, Constraint, ImplicitTree, Part, TreeMesh};
 use gluey_geom::{Dim, Space, Vector};
-use gluey_levelset::{Ball, BallTree, Body};
+use gluey_levelset::{Ball, BallTree};
 use gluey_linalg::Scalar;
 use gluey_parallel::{Communicator, GhostPlan, Number, Wanted};
 use gluey_stokes::part::SharedVelocities;
@@ -366,9 +366,4 @@ pub fn is_near_surface<const D: usize>(
     let center: Vector<D> = frame.lower_corner(cell) + Vector::repeat(0.5 * h);
     let reach = CELLS_AT_SURFACE * h;
     bodies.nearest_within(&center, reach).is_some_and(|nearest| nearest.1 <= reach)
-}
-
-/// The radius of the largest of all bodies.
-pub fn largest_radius<const D: usize>(bodies: &BallTree<'_, D>) -> f64 {
-    bodies.balls().iter().map(Body::bounding_radius).fold(0.0, f64::max)
 }
