@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
-//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--pair` (the two bodies of
-//! S2 and S3 in the shear of `bench-stokes`, all cells as fine), `--unfitted` (bodies whose surfaces cut cells,
+//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--pair` (the two bodies of S2
+//! and S3 in the shear of `bench-stokes`, all cells as fine), `--unfitted` (bodies whose surfaces cut cells,
 //! with films; without it, bodies whose nodes move with them), `--tolerance T`, `--ranks N,M,...` (threads;
 //! without it, the processes of `mpirun`), `--fail-rank R` (this rank fails before the solve, to see that all
 //! end). Times, and the most memory that a process held, go to the standard error, so that equal runs print

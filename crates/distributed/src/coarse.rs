@@ -19,11 +19,16 @@ pub struct CoarseFactor {
 }
 
 impl CoarseFactor {
-    pub fn new<const D: usize>(space: &LevelSpace<D>, viscosity: f64) -> Result<Self, DirectError> {
+    /// Where nothing fixes a constant velocity and it `may_float`, one node is left out, as in the serial
+    /// solver.
+    pub fn new<const D: usize>(
+        space: &LevelSpace<D>,
+        viscosity: f64,
+        may_float: bool,
+    ) -> Result<Self, DirectError> {
         let (nodal, nodes) = (space.nodal_dim(), space.velocity.map.node_count());
-        let has_walls = (0..nodes).any(|node| space.velocity.map.is_on_boundary(node));
-        // Where nothing fixes a constant velocity, one node is left out, as in the serial solver.
-        let loose = if has_walls { None } else { (0..nodes).find(|&node| space.is_free(node)) };
+        let is_fixed = !may_float || (0..nodes).any(|node| space.velocity.map.is_on_boundary(node));
+        let loose = if is_fixed { None } else { (0..nodes).find(|&node| space.is_free(node)) };
         let unknowns = Subset::new(space.dim(), |k| match k.checked_sub(nodal) {
             Some(twist) => space.bodies.is_active(twist / rigid::<D>()),
             None => space.is_free(k / D) && Some(k / D) != loose,

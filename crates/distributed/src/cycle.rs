@@ -61,7 +61,8 @@ impl<'a, const D: usize> VCycle<'a, D> {
         let pairs = levels.windows(2);
         let transfers =
             pairs.map(|pair| Transfer::new(&pair[0].operator.space, &pair[1].operator.space)).collect();
-        let coarse = (ranks.rank() == 0).then(|| CoarseFactor::new(&levels[0].operator.space, viscosity));
+        let coarse = (ranks.rank() == 0)
+            .then(|| CoarseFactor::new(&levels[0].operator.space, viscosity, around.is_some()));
         // All ranks learn of it.
         let mut failures = [f64::from(u8::from(matches!(coarse, Some(Err(_)))))];
         ranks.sum(&mut failures);

@@ -165,27 +165,34 @@ where
                 if !self.is_sheared() {
                     return Ok(solve(&Conditions::boundary(&shear).with_wrenches(wrenches))?);
                 }
-                let mut gradient = Matrix::<D>::zeros();
-                gradient[(0, 1)] = self.shear_rate * told.shear_factor;
-                // What acts on the particles is balanced by a uniform force on all of the box; forces between
-                // them have no sum.
-                let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
-                let back = -total / self.domain.extent().product();
-                let uniform = move |_: &Vector<D>| back;
-                let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(wrenches);
-                let conditions =
-                    if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
-                let mut flow =
-                    if told.with_stress { solve(&conditions.with_stress())? } else { solve(&conditions)? };
-                for (twist, place) in flow.twists.iter_mut().zip(&told.positions) {
-                    twist.velocity += shear(place);
-                    // About z, the only axis in 2D and the last one in 3D.
-                    twist.spin[Dim::<D>::ROT - 1] -= 0.5 * gradient[(0, 1)];
-                }
-                flow
+                self.sheared(told, &mut solve)?
             }
             _ => return Err(SuspensionError::Formulation),
         })
+    }
+
+    /// The flow in a box that is sheared for ever, with the motions in space.
+    fn sheared(
+        &self,
+        told: &Told<D>,
+        solve: &mut dyn FnMut(&Conditions<'_, D>) -> Result<MyFlow<D>, FlowError>,
+    ) -> Result<MyFlow<D>, FlowError> {
+        let (mut gradient, shear) = (Matrix::<D>::zeros(), self.undisturbed(told.shear_factor));
+        gradient[(0, 1)] = self.shear_rate * told.shear_factor;
+        // What acts on the particles is balanced by a uniform force on all of the box; forces between them
+        // have no sum.
+        let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
+        let back = -total / self.domain.extent().product();
+        let uniform = move |_: &Vector<D>| back;
+        let conditions = Conditions::in_linear_flow(&gradient).with_wrenches(&told.wrenches);
+        let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let mut flow = solve(&Conditions { stress: told.with_stress, ..conditions })?;
+        for (twist, place) in flow.twists.iter_mut().zip(&told.positions) {
+            twist.velocity += shear(place);
+            // About z, the only axis in 2D and the last one in 3D.
+            twist.spin[Dim::<D>::ROT - 1] -= 0.5 * gradient[(0, 1)];
+        }
+        Ok(flow)
     }
 
     /// The undisturbed velocity.

@@ -15,8 +15,8 @@ const POINTS: usize = 5;
 pub struct Transfer<const D: usize> {
     /// Coarse cell of each owned fine node, and place in its grid.
     places: Vec<(u32, u8)>,
-    /// Nodes of a cell that count at each point of its grid, and their weights; none at the last, which stands
-    /// for nodes without an unknown.
+    /// Nodes of a cell that count at each point of its grid, and their weights; none at the last, which
+    /// stands for nodes without an unknown.
     weights: Jagged<(u8, f32)>,
 }
 

@@ -3,8 +3,8 @@
 //! A part is a [`Discretisation::of_part`]: own cells, which are added up here, and others around them. What
 //! follows from places alone is found without a message: which cells are cut, aggregates, penalties, the
 //! blocks of the smoother. For that the part has to reach as far around its own surfaces as
-//! [`rings_around_surfaces`] says. Vectors are those of [`StokesSystem`] at all nodes of the part; products of
-//! its operator are the sums over the own cells, and sums of these over all parts are right at every node.
+//! [`rings_around_surfaces`] says. Vectors are those of [`StokesSystem`] at all nodes of the part; products
+//! of its operator are the sums over the own cells, and sums of these over all parts are right at every node.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
@@ -69,8 +69,8 @@ impl PartMethod {
     }
 }
 
-/// How many rings of cells around its own a part needs near surfaces, for cells of this size: for the roots of
-/// bad cells, and for what flows through the films between these bodies that are `wanted`.
+/// How many rings of cells around its own a part needs near surfaces, for cells of this size: for the roots
+/// of bad cells, and for what flows through the films between these bodies that are `wanted`.
 pub fn rings_around_surfaces<const D: usize>(
     lubrication: Lubrication,
     (bodies, domain): (&[Ball<D>], &Aabb<D>),
@@ -209,8 +209,8 @@ where
         self.rigidity.weak_cells(self, velocity, strain)
     }
 
-    /// The field that carries the data of some conditions, and the sums over own cells of its residual with the
-    /// loads. Wrenches are for those to give who own the body.
+    /// The field that carries the data of some conditions, and the sums over own cells of its residual with
+    /// the loads. Wrenches are for those to give who own the body.
     ///
     /// # Errors
     /// Those of [`Problem::add_wrenches`] and [`Problem::set_twists`].
@@ -239,8 +239,8 @@ where
         subtract_uniform(&self.system.space, velocity, by, |_| true);
     }
 
-    /// What the own cells and films add to the stress in a linear flow of this strain, for pressures whose mean
-    /// over the fluid vanishes, and a vector with the forces of films; for the bodies near the part.
+    /// What the own cells and films add to the stress in a linear flow of this strain, for pressures whose
+    /// mean over the fluid vanishes, and a vector with the forces of films; for the bodies near the part.
     ///
     /// # Errors
     /// [`StokesError::Unsupported`] where the formulation has no tractions.

@@ -19,7 +19,7 @@ use crate::flow::FlowError;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
 use gap::Gaps;
-pub use mass::Masses;
+use mass::Masses;
 use mass::SharedMass;
 pub use weights::Flowing;
 use whole_box::WholeBox;
@@ -30,6 +30,14 @@ const LARGEST_ERROR: f64 = 1.0 / 16.0;
 const MOST_STEPS: usize = 32;
 const LANCZOS_STEPS: usize = 15;
 const SAFETY: f64 = 1.1;
+
+/// The cells whose pressures there are.
+#[derive(Clone, Copy)]
+pub struct PressureCells<'a> {
+    pub viscosity: f64,
+    pub flowing: &'a Flowing,
+    pub masses: &'a Masses<'a>,
+}
 
 /// What a pressure is of a rank: its own ones first, then ghosts.
 pub struct SchurInverse<'a, const D: usize> {
@@ -62,20 +70,20 @@ where
                 visit(cell, &matrix);
             }
         };
-        let flowing = Flowing::around_rigid_nodes(space);
-        Self::of_cells(tree, shared, (space, nodes), pressures, viscosity, (&flowing, &masses))
+        let flowing = &Flowing::around_rigid_nodes(space);
+        let cells = PressureCells { viscosity, flowing, masses: &masses };
+        Self::of_cells(tree, shared, space, (nodes, pressures), &cells)
     }
 
     /// For cells of these masses. All ranks call this.
     pub fn of_cells(
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'a, '_, D>,
-        (space, nodes): (&LevelSpace<D>, &GhostPlan),
-        pressures: &SharedPressures,
-        viscosity: f64,
-        (flowing, masses): (&Flowing, &Masses<'_>),
+        space: &LevelSpace<D>,
+        (nodes, pressures): (&GhostPlan, &SharedPressures),
+        cells: &PressureCells<'_>,
     ) -> Result<Self, FlowError> {
-        let ranks = shared.ranks;
+        let (ranks, PressureCells { viscosity, flowing, masses }) = (shared.ranks, *cells);
         let weights = weights::weights(ranks, space, pressures, flowing, viscosity);
         let mut mass = SharedMass::new(ranks, space, pressures, (viscosity, masses), &weights)?;
         let gaps = Gaps::new(tree, shared, space, nodes, pressures, &mass);

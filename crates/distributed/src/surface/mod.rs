@@ -28,7 +28,7 @@ use crate::bodies::{Shared, rigid};
 use crate::cells::MyCells;
 use crate::cycle::VCycle;
 use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
-use crate::schur::{Flowing, Masses, SchurInverse};
+use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
@@ -64,8 +64,8 @@ where
 }
 
 impl BoxFlow {
-    /// The flow around bodies whose surfaces cut the mesh, under conditions on all of them. All ranks call this
-    /// with the same arguments. A box without walls is sheared like the tree, and the flow has no mean.
+    /// The flow around bodies whose surfaces cut the mesh, under conditions on all of them. All ranks call
+    /// this with the same arguments. A box without walls is sheared like the tree, and the flow has no mean.
     ///
     /// # Errors
     /// [`FlowError`], on all ranks. [`FlowError::Conditions`] for bodies that are held.
@@ -281,9 +281,10 @@ where
             is_fixed: (0..map.node_count()).map(is_fixed).collect(),
         };
         let masses = |visit: &mut dyn FnMut(usize, &[f64])| system.for_each_pressure_mass(visit);
-        let level = (&self.level, &GhostPlan::default());
-        let cells = (&flowing, &masses as &Masses<'_>);
-        SchurInverse::of_cells(tree, &self.shared, level, &space.pressures, self.flow.viscosity, cells)
+        // Aggregates leave no gaps, which alone ask for velocities of others.
+        let pressures = (&GhostPlan::default(), &space.pressures);
+        let cells = PressureCells { viscosity: self.flow.viscosity, flowing: &flowing, masses: &masses };
+        SchurInverse::of_cells(tree, &self.shared, &self.level, pressures, &cells)
     }
 
     /// The field that carries the data, and the right-hand side.
@@ -314,8 +315,8 @@ where
         FluidIntegrals { volume: sums[0], pressure: sums[1], velocity }
     }
 
-    /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid leaves
-    /// of the box, in proportion to their volumes.
+    /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid
+    /// leaves of the box, in proportion to their volumes.
     fn mean_velocity(
         &self,
         problem: &Problem<D>,

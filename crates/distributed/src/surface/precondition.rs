@@ -1,8 +1,8 @@
 //! The block triangular preconditioner around surfaces, as in the serial solver: `z_p = -S^-1 r_p`,
 //! `z_u = V (r_u + B^T z_p)`, the forces of films with the pressures.
 //!
-//! With the blocks `G` of the smoother, the levels `L` and the sweep `C` the cycle `V` is `z = G r`,
-//! `z += L (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`. Its vectors hold the same at copies as at their
+//! With the blocks `G` of the smoother, the levels `L` and the sweep `C` the cycle `V` is `z = G r`, `z += L
+//! (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`. Its vectors hold the same at copies as at their
 //! owners.
 
 use gluey_geom::{Dim, Space};

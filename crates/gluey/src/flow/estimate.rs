@@ -28,7 +28,8 @@ const PROGRAM_OF_RANK: f64 = 24e6;
 const OF_RANK: f64 = 500.0;
 /// The same with steps in double precision, in `unfitted`.
 const OF_RANK_AT_SURFACES: f64 = 800.0;
-/// Layers of cells around its own whose cuts a process of `unfitted` holds, as a cube of its cells would have.
+/// Layers of cells around its own whose cuts a process of `unfitted` holds, as a cube of its cells would
+/// have.
 const LAYERS_AT_SURFACES: f64 = 6.0;
 /// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
 /// penalties; unit: bytes.

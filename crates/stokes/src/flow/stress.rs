@@ -36,8 +36,8 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// Power that the fluid of the own cells dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative to a linear flow
-/// with this strain.
+/// Power that the fluid of the own cells dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative
+/// to a linear flow with this strain.
 pub fn dissipation<const D: usize>(problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> f64
 where
     Dim<D>: Space<D>,

@@ -35,8 +35,8 @@ pub struct SurfaceCoupling<const D: usize> {
     penalties: Vec<f64>,
     /// Cut cell and body of each piece.
     pieces: Vec<(u32, u32)>,
-    /// The velocity nodes of own cut cells in the nodes of the mesh: themselves, or what they take their values
-    /// from.
+    /// The velocity nodes of own cut cells in the nodes of the mesh: themselves, or what they take their
+    /// values from.
     velocity: AffineConstraints,
     /// Nodes among these with given values.
     boundary: Vec<u32>,

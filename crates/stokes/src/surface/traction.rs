@@ -41,7 +41,8 @@ impl<const D: usize> Shapes<D> {
 
 /// `int_G t r` for the traction `t = sigma n` on each body, `n` out of it, and the arm `r` from its centre,
 /// of a nodal field with all constraints fulfilled and the pressures at all nodes, relative to a linear flow
-/// with this strain, from the own cells. The traction is the one that balances the forces: with the penalty in it.
+/// with this strain, from the own cells. The traction is the one that balances the forces: with the penalty
+/// in it.
 pub fn first_moments<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
     space: &VelocitySpace<D>,
