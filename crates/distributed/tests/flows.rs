@@ -7,6 +7,8 @@ use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Alone, Communicator, Threads};
 
+/// Of velocities and pressures, over the largest.
+const LIMITS: [f64; 2] = [1.6e-11, 1.7e-10];
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 120 };
 
 #[derive(Clone, Copy)]
@@ -69,7 +71,8 @@ where
     (velocity, parts.iter().flat_map(|part| part.pressure.iter().copied()).collect())
 }
 
-fn ranks_find_the_flow_of_one<const D: usize>(example: Example)
+/// Velocities and pressures are those of one rank but for these limits.
+fn ranks_find_the_flow_of_one<const D: usize>(example: Example, limits: [f64; 2])
 where
     Dim<D>: Space<D>,
 {
@@ -80,13 +83,14 @@ where
         let parts = run();
         let (velocity, pressure) = joined(&parts);
         let difference = largest_difference(&alone.velocity, &velocity);
-        println!("{size} ranks: {difference:.1e}, iterations {}", alone.iterations);
-        assert!(difference < 1.8e-10, "{size} ranks: {difference:e}");
+        let iterations = [alone.iterations, parts[0].iterations];
+        println!("{size} ranks: {difference:.1e}, iterations {iterations:?}");
+        assert!(difference < limits[0], "{size} ranks: {difference:e}");
         let scale = alone.pressure.iter().fold(0.0f64, |m, p| m.max(p.abs()));
         let pressures = alone.pressure.iter().zip(&pressure);
         let difference = pressures.fold(0.0f64, |m, (a, b)| m.max((a - b).abs())) / scale;
         println!("{size} ranks: pressures {difference:.1e}");
-        assert!(difference < 1.8e-9, "{size} ranks: pressures {difference:e}");
+        assert!(difference < limits[1], "{size} ranks: pressures {difference:e}");
         let iterations: Vec<usize> = parts.iter().map(|part| part.iterations).collect();
         assert!(iterations.iter().all(|&n| n == iterations[0] && n.abs_diff(alone.iterations) <= 1));
         assert_eq!(joined(&run()), (velocity, pressure), "the same bits on every run");
@@ -95,14 +99,17 @@ where
 
 #[test]
 fn ranks_find_the_flow_of_one_in_2d() {
-    [UNIFORM, ADAPTIVE, PERIODIC].into_iter().for_each(ranks_find_the_flow_of_one::<2>);
+    ranks_find_the_flow_of_one::<2>(UNIFORM, LIMITS);
+    ranks_find_the_flow_of_one::<2>(ADAPTIVE, LIMITS);
+    // One rank ends an iteration apart from several, all of them at the tolerance.
+    ranks_find_the_flow_of_one::<2>(PERIODIC, [1.8e-10, 1.2e-9]);
 }
 
 #[test]
 fn ranks_find_the_flow_of_one_in_3d() {
     let [uniform, adaptive, periodic] =
         [UNIFORM, ADAPTIVE, PERIODIC].map(|e| Example { level: e.level - 1, ..e });
-    [uniform, adaptive, periodic].into_iter().for_each(ranks_find_the_flow_of_one::<3>);
+    [uniform, adaptive, periodic].into_iter().for_each(|e| ranks_find_the_flow_of_one::<3>(e, LIMITS));
 }
 
 #[test]
