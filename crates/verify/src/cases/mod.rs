@@ -14,6 +14,7 @@ mod integrator;
 mod lattices;
 mod linear_flow;
 mod manufactured;
+mod pair_stresslets;
 mod random_pairs;
 mod sheared;
 mod spheres;
@@ -32,6 +33,7 @@ pub const CASES: &[Case] = &[
     linear_flow::SPHERE,
     inclusion::CASE,
     spheres::CASE,
+    pair_stresslets::CASE,
     disc_wall::CASE,
     wall::CASE,
     lattices::CASE,

@@ -117,7 +117,7 @@ fn measure(
 
 /// Tolerance of the solver: the slower the pair, the smaller.
 fn tolerance(gap: f64) -> f64 {
-    if FILMS.contains(&gap) { 1e-8 } else { 1e-6 }
+    if gap > 0.2 { 1e-6 } else { 1e-8 }
 }
 
 fn numbers(tables: &Tables) -> Vec<Number> {

@@ -101,7 +101,7 @@ fn measure(method: &Method, cells: f64, place: &Place, position: usize) -> Resul
     center[1] = (1.0 + place.gap()) * RADIUS;
     let sphere = [Ball::new(center, RADIUS)];
     let mesh = mesh(&Refinement::to_level(level(RADIUS, cells)), &sphere)?;
-    let mut solver = FlowSolver::new(method.params::<3>(1e-8))?;
+    let mut solver = FlowSolver::new(method.params::<3>(1e-9))?;
     let mut prepared = solver.prepared(mesh, &sphere)?;
     let mut held = |twist: Twist<3>| -> Result<Wrench<3>, VerifyError> {
         Ok(prepared.solve(&Conditions::at_rest().with_twists(&[twist]))?.wrenches[0])
