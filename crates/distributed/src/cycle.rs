@@ -17,7 +17,7 @@ pub struct VCycle<'a, const D: usize> {
     /// Coarsest first.
     pub levels: Vec<Level<'a, D>>,
     /// `transfers[l]` joins level `l` to level `l + 1`.
-    transfers: Vec<Transfer<D>>,
+    transfers: Vec<Transfer>,
     /// On rank zero.
     coarse: Option<CoarseFactor>,
     /// Whether the finest level smooths.
