@@ -1,6 +1,9 @@
 //! Evaluation of a field of one mesh at the nodes of another over the same box, and of a velocity at a point.
 
+use std::ops::Range;
+
 use gluey_geom::{Dim, Space, Twist, Vector};
+use rayon::prelude::*;
 
 use super::nodes::NodeMap;
 use crate::element::{gradient, multi_index, value, values_1d};
@@ -8,6 +11,9 @@ use crate::mesh::{Cell, TreeMesh};
 
 /// A point this near to a face, in the smallest cells of the mesh, lies on it.
 const ON_FACE: f64 = 1e-9;
+
+/// Nodes to which one thread transfers at a time.
+const SHARE: usize = 4096;
 
 /// Finds the cells of a mesh that hold given points.
 pub struct Evaluator<'a, const D: usize> {
@@ -29,9 +35,30 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         to_nodes: &NodeMap<D>,
         fields: &mut [(&[f64], &mut [f64])],
     ) {
+        let mut parts: Vec<Vec<(&[f64], &mut [f64])>> =
+            (0..to_nodes.node_count().div_ceil(SHARE)).map(|_| Vec::new()).collect();
+        for (from, to) in fields {
+            let pieces = to.chunks_mut(SHARE * components);
+            parts.iter_mut().zip(pieces).for_each(|(part, piece)| part.push((from, piece)));
+        }
+        parts.par_iter_mut().enumerate().for_each(|(k, fields)| {
+            let nodes = k * SHARE..((k + 1) * SHARE).min(to_nodes.node_count());
+            self.transfer_to(nodes, from_nodes, components, to_nodes, fields);
+        });
+    }
+
+    /// The same at some nodes, whose values are all of what fields become.
+    fn transfer_to(
+        &self,
+        nodes: Range<usize>,
+        from_nodes: &NodeMap<D>,
+        components: usize,
+        to_nodes: &NodeMap<D>,
+        fields: &mut [(&[f64], &mut [f64])],
+    ) {
         let degree = from_nodes.degree();
-        for node in 0..to_nodes.node_count() {
-            let target = node * components..(node + 1) * components;
+        for (place, node) in nodes.enumerate() {
+            let target = place * components..(place + 1) * components;
             fields.iter_mut().for_each(|(_, to)| to[target.clone()].fill(0.0));
             let Some((cell, x)) = self.locate(to_nodes, node) else { continue };
             let line: [[f64; 3]; D] = std::array::from_fn(|d| values_1d(degree, x[d]));

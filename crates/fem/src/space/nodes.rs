@@ -48,7 +48,7 @@ impl<const D: usize> NodeMap<D> {
             constraints: Vec::new(),
             is_hanging: Vec::new(),
         };
-        let mut index = FxHashMap::default();
+        let mut index = PointIndex::new(map.lattice_extent, map.cell_nodes.capacity());
         for cell in mesh.cells() {
             map.touch(cell, finest, &mut index);
         }
@@ -160,11 +160,11 @@ impl<const D: usize> NodeMap<D> {
 
     /// Appends the nodes of a cell; `index` finds those that other cells have touched before by their lattice
     /// points.
-    fn touch(&mut self, cell: &Cell<D>, finest: u8, index: &mut FxHashMap<u64, u32>) {
+    fn touch(&mut self, cell: &Cell<D>, finest: u8, index: &mut PointIndex<D>) {
         for i in 0..self.nodes_per_cell {
             let point = self.wrap(lattice_point(cell, self.degree, i, finest));
             let next = self.lattice.len() as u32;
-            let node = *index.entry(pack(&point)).or_insert(next);
+            let node = index.find_or_insert(&point, next);
             if node == next {
                 self.lattice.push(point);
             }
@@ -266,6 +266,45 @@ impl<const D: usize> NodeMap<D> {
             }
             shift as f64 / width as f64
         })
+    }
+}
+
+/// The nodes at points of the lattice.
+enum PointIndex<const D: usize> {
+    /// By the place of a point in the box, [`NOWHERE`] where there is no node: in meshes that are nearly
+    /// uniform.
+    Dense { nodes: Vec<u32>, extent: [u32; D] },
+    /// By the key of a point.
+    Sparse(FxHashMap<u64, u32>),
+}
+
+/// Stands for no node.
+const NOWHERE: u32 = u32::MAX;
+
+impl<const D: usize> PointIndex<D> {
+    /// For points of a box with this lattice, dense where that takes no more memory than the nodes of all
+    /// cells.
+    fn new(extent: [u32; D], most: usize) -> Self {
+        let points = extent.iter().try_fold(1usize, |product, &n| product.checked_mul(n as usize + 1));
+        match points.filter(|&points| points <= most) {
+            Some(points) => Self::Dense { nodes: vec![NOWHERE; points], extent },
+            None => Self::Sparse(FxHashMap::default()),
+        }
+    }
+
+    /// The node at a point, which becomes `next` if there was none.
+    fn find_or_insert(&mut self, point: &[u32; D], next: u32) -> u32 {
+        match self {
+            Self::Dense { nodes, extent } => {
+                let along = |place: usize, d: usize| place * (extent[d] as usize + 1) + point[d] as usize;
+                let node = &mut nodes[(0..D).rev().fold(0, along)];
+                if *node == NOWHERE {
+                    *node = next;
+                }
+                *node
+            }
+            Self::Sparse(nodes) => *nodes.entry(pack(point)).or_insert(next),
+        }
     }
 }
 

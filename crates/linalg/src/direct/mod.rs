@@ -11,7 +11,7 @@ mod spd;
 
 pub use indefinite::{DirectIndefinite, FactorReport, IndefiniteParams, Regularise};
 pub use refinement::{RefinementParams, SolveReport};
-pub use spd::DirectSpd;
+pub use spd::{DirectSpd, Substitution};
 
 use std::sync::Arc;
 

@@ -88,6 +88,35 @@ impl DirectSpd {
     }
 }
 
+/// A factorisation of a [`DirectSpd`] with memory of its own: several threads solve with one factor.
+#[derive(Debug)]
+pub struct Substitution<'a> {
+    solver: &'a DirectSpd,
+    scratch: Scratch,
+}
+
+impl DirectSpd {
+    /// Substitution as by [`Preconditioner::apply`], beside others.
+    ///
+    /// # Errors
+    /// [`DirectError::OutOfMemory`].
+    pub fn substitution(&self) -> Result<Substitution<'_>, DirectError> {
+        let needed = self.symbolic.analysis.solve_in_place_scratch::<f64>(1, PAR);
+        Ok(Substitution { solver: self, scratch: Scratch::new(self.symbolic.dim(), needed)? })
+    }
+}
+
+impl Preconditioner<f64> for Substitution<'_> {
+    fn apply(&mut self, r: &[f64], z: &mut [f64]) {
+        if !self.solver.factorised {
+            z.fill(f64::NAN);
+            return;
+        }
+        z.copy_from_slice(r);
+        substitute(&self.solver.symbolic, &self.solver.factor, &mut self.scratch, z);
+    }
+}
+
 /// Substitution without a check of the residual, for use inside an iteration that checks its own. Without a
 /// factorisation the result is NaN, which every Krylov method here reports.
 impl Preconditioner<f64> for DirectSpd {

@@ -3,10 +3,15 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::pattern::{Pattern, SparseError};
 use crate::operator::LinOp;
 use crate::parallel;
 use crate::scalar::Scalar;
+
+/// Rows that are filled by one thread at a time.
+const ROWS: usize = 1024;
 
 /// A sparse matrix: a shared pattern and its own values.
 #[derive(Clone, Debug)]
@@ -81,6 +86,27 @@ impl<T: Scalar> SparseMatrix<T> {
         let position = self.pattern.position(row, column).ok_or(SparseError::NotInPattern { row, column })?;
         self.values[position] += value;
         Ok(())
+    }
+
+    /// Has `fill` change each row, given its columns and values, some rows side by side.
+    pub fn fill_rows(&mut self, fill: impl Fn(usize, &[u32], &mut [T]) + Sync) {
+        let Self { pattern, values } = self;
+        let (rows, mut rest) = (pattern.row_count(), values.as_mut_slice());
+        let mut parts = Vec::with_capacity(rows.div_ceil(ROWS));
+        for first in (0..rows).step_by(ROWS) {
+            let last = (first + ROWS).min(rows);
+            let own;
+            (own, rest) = rest.split_at_mut(pattern.range(last - 1).end - pattern.range(first).start);
+            parts.push((first..last, own));
+        }
+        parts.into_par_iter().for_each(|(rows, mut values)| {
+            for row in rows {
+                let columns = pattern.columns_of(row);
+                let own;
+                (own, values) = values.split_at_mut(columns.len());
+                fill(row, columns, own);
+            }
+        });
     }
 
     /// Adds a dense block, stored row by row, to the rows and columns `dofs`.

@@ -1,6 +1,11 @@
 //! Where the entries of a sparse matrix in compressed rows lie.
 
+use rayon::prelude::*;
+
 use crate::jagged::Jagged;
+
+/// Rows that are found by one thread at a time.
+const ROWS: usize = 4096;
 
 /// Positions of the entries of a sparse matrix, row by row, columns ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,19 +57,41 @@ pub enum SparseError {
 impl Pattern {
     /// Pattern of a square matrix of dimension `dim` that couples all unknowns of a group with each other; a
     /// group is typically the unknowns of a cell. The diagonal is always in it, and the pattern is symmetric.
-    pub fn from_groups<G: AsRef<[usize]>>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
+    pub fn from_groups<G: AsRef<[usize]> + Sync>(dim: usize, groups: &[G]) -> Result<Self, SparseError> {
         let touching = touching(dim, groups)?;
-        let mut builder = RowBuilder::new(dim, dim);
-        for row in 0..dim {
-            builder.insert(row);
-            for &group in &touching[row] {
-                for &column in groups[group as usize].as_ref() {
-                    builder.insert(column);
+        let parts = (0..dim.div_ceil(ROWS)).into_par_iter().map_init(
+            || RowBuilder::new(ROWS, dim),
+            |builder, part| {
+                builder.clear();
+                for row in part * ROWS..((part + 1) * ROWS).min(dim) {
+                    builder.insert(row);
+                    for &group in &touching[row] {
+                        groups[group as usize].as_ref().iter().for_each(|&column| builder.insert(column));
+                    }
+                    builder.end_ascending_row()?;
                 }
-            }
-            builder.end_row()?;
+                Ok((builder.row_start.clone(), builder.columns.clone()))
+            },
+        );
+        Self::of_parts(dim, parts.collect::<Result<Vec<_>, SparseError>>()?)
+    }
+
+    /// The rows of the parts, each with starts and columns, one after another.
+    fn of_parts(column_count: usize, parts: Vec<(Vec<u32>, Vec<u32>)>) -> Result<Self, SparseError> {
+        let entry_count = parts.iter().map(|(_, columns)| columns.len()).sum();
+        if u32::try_from(entry_count).is_err() {
+            return Err(SparseError::TooLarge { entry_count });
         }
-        Ok(builder.finish().into_ascending())
+        let row_count: usize = parts.iter().map(|(starts, _)| starts.len() - 1).sum();
+        let mut row_start = Vec::with_capacity(row_count + 1);
+        row_start.push(0);
+        let mut all = Vec::with_capacity(entry_count);
+        for (starts, columns) in parts {
+            let before = all.len() as u32;
+            row_start.extend(starts[1..].iter().map(|start| before + start));
+            all.extend_from_slice(&columns);
+        }
+        Ok(Self { column_count, rows: Jagged::from_starts(row_start, all) })
     }
 
     /// The pattern in which row and column `b` of this square one stand for `first[b] .. first[b + 1]`.
@@ -84,14 +111,6 @@ impl Pattern {
             }
         }
         Ok(Self { column_count: dim, rows })
-    }
-
-    /// This symmetric pattern, whose rows are not sorted, with rows sorted. Row `i` is column `i`, so handing
-    /// out rows in ascending order to their columns sorts them all, without a comparison.
-    fn into_ascending(self) -> Self {
-        let rows = self.rows.iter().zip(0u32..);
-        let transposed = rows.flat_map(|(columns, row)| columns.iter().map(move |&c| (c as usize, row)));
-        Self { rows: Jagged::grouped(self.rows.len(), transposed), ..self }
     }
 
     /// Pattern of the entries `(row, column)`, in any order, repetitions allowed.
@@ -219,6 +238,20 @@ impl RowBuilder {
             self.mark[column] = stamp;
             self.columns.push(column as u32);
         }
+    }
+
+    /// Drops all rows.
+    fn clear(&mut self) {
+        self.row_start.truncate(1);
+        self.columns.clear();
+    }
+
+    /// Ends a row and sorts its columns, whose marks go.
+    fn end_ascending_row(&mut self) -> Result<(), SparseError> {
+        let first = self.row_start.last().map_or(0, |&start| start as usize);
+        self.columns[first..].sort_unstable();
+        self.columns[first..].iter().for_each(|&column| self.mark[column as usize] = 0);
+        self.end_row()
     }
 
     /// Ends a row and leaves its columns in the order they came.

@@ -4,10 +4,11 @@ use gluey_fem::NodeMap;
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, multi_index, node_count, value};
 use gluey_geom::{Dim, Space, Vector};
+use rayon::prelude::*;
 
 use crate::formulation::Problem;
 use crate::space::{Discretisation, VelocitySpace};
-use crate::surface::{CellState, CutCells, SurfaceCoupling};
+use crate::surface::{CellState, CutCell, CutCells, SurfaceCoupling};
 
 /// The mean over fluid and bodies of a velocity (nodal values, then twists) around surfaces.
 pub fn mean_velocity<const D: usize>(
@@ -63,6 +64,18 @@ pub fn mean_of(weights: &[f64], values: &[f64]) -> f64 {
         / weights.iter().sum::<f64>()
 }
 
+/// Nodes of a cell in 3D.
+const MOST_NODES: usize = 27;
+
+/// Integrals over the fluid of a cut cell, of volume one, of the functions with these values at its points.
+fn integrals<const D: usize>(cut: &CutCell<D>, shapes: &[Vec<f64>]) -> [f64; MOST_NODES] {
+    let mut sums = [0.0; MOST_NODES];
+    for (weight, shapes) in cut.moments.volume.iter().zip(shapes) {
+        sums.iter_mut().zip(shapes).for_each(|(sum, shape)| *sum += weight * shape);
+    }
+    sums
+}
+
 /// Integrals over the fluid of the own cells of the functions of degree 1 or 2.
 pub fn fluid_weights<const D: usize>(
     discretisation: &Discretisation<D>,
@@ -80,14 +93,12 @@ pub fn fluid_weights<const D: usize>(
         .iter()
         .map(|(x, _)| (0..count).map(|i| value::<D>(degree, i, x)).collect())
         .collect();
+    let of_cut: Vec<[f64; MOST_NODES]> = cut.cells.par_iter().map(|cut| integrals(cut, &shapes)).collect();
     for cell in (0..nodes.cell_count()).filter(|&cell| discretisation.is_own(cell)) {
         let volume = discretisation.cell_size(cell).powi(D as i32);
         let of_cell = nodes.cell(cell).iter();
-        if let Some(cut) = cut.cut(cell) {
-            for (i, &node) in of_cell.enumerate() {
-                let terms = cut.moments.volume.iter().zip(&shapes).map(|(weight, shapes)| weight * shapes[i]);
-                weights[node as usize] += volume * terms.sum::<f64>();
-            }
+        if let Some(integrals) = of_cut.get(cut.place[cell] as usize) {
+            of_cell.zip(integrals).for_each(|(&node, weight)| weights[node as usize] += volume * weight);
         } else if cut.states[cell] == CellState::Fluid {
             of_cell.zip(&of_cube).for_each(|(&node, weight)| weights[node as usize] += volume * weight);
         }

@@ -94,16 +94,11 @@ where
         penalty: Option<Penalty<D>>,
     ) -> Self {
         let cells = active_cells(&space, viscosity);
-        Self {
-            pressure: PressureSpace::new(&space, &cells, cut),
-            operator: cell_operator(&space, &cells, penalty.as_ref()),
-            space,
-            cells,
-            penalty,
-            surfaces: None,
-            films: None,
-            viscosity,
-        }
+        let (pressure, operator) = rayon::join(
+            || PressureSpace::new(&space, &cells, cut),
+            || cell_operator(&space, &cells, penalty.as_ref()),
+        );
+        Self { pressure, operator, space, cells, penalty, surfaces: None, films: None, viscosity }
     }
 
     /// Mesh and nodes.

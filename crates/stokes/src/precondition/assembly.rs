@@ -6,7 +6,7 @@ use gluey_linalg::{BlockGroups, LocalTerm, Pattern, SparseError, SymmetricBlockM
 use rayon::prelude::*;
 
 use super::numbered::NumberedNodes;
-use crate::operator::Elements;
+use crate::operator::{Elements, Source};
 use crate::surface::SurfaceCoupling;
 
 /// Stands for the constraint of a node that has none.
@@ -34,8 +34,24 @@ where
     }
     let groups: Vec<&[usize]> = groups.iter().collect();
     let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(nodes.nodes.len(), &groups)?);
+    for_each_matrix(elements, &sources, |source, dense| {
+        forms.of_cell(source.cell(), &mut terms);
+        matrix.add_local(&terms, dense);
+    });
+    Ok(matrix)
+}
+
+/// Makes the matrices of these cells and pieces, some at a time side by side, and hands them on in their
+/// order.
+pub fn for_each_matrix<const D: usize>(
+    elements: &Elements<'_, D>,
+    sources: &[Source],
+    mut visit: impl FnMut(Source, &[f64]),
+) where
+    Dim<D>: Space<D>,
+{
     let len = elements.size().pow(2);
-    let mut dense = vec![0.0; BATCH * len];
+    let mut dense = vec![0.0; BATCH.min(sources.len()) * len];
     let surfaces = elements.system().surfaces.as_deref();
     let workspace = || surfaces.map(SurfaceCoupling::viscous_matrices);
     for batch in sources.chunks(BATCH) {
@@ -43,12 +59,8 @@ where
         pairs.with_min_len(LEAST_SHARE).for_each_init(workspace, |with, (&source, dense)| {
             elements.fill_velocities(source, with.as_mut(), dense);
         });
-        for (source, dense) in batch.iter().zip(dense.chunks_exact(len)) {
-            forms.of_cell(source.cell(), &mut terms);
-            matrix.add_local(&terms, dense);
-        }
+        batch.iter().zip(dense.chunks_exact(len)).for_each(|(&source, dense)| visit(source, dense));
     }
-    Ok(matrix)
 }
 
 /// The numbered nodes that nodes stand for: themselves, or the masters they hang on.

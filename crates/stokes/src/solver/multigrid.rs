@@ -84,9 +84,12 @@ where
         let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
         let before = self.cycle.take().map(|cycle| cycle.hierarchy).unwrap_or_default();
         let hierarchy = Hierarchy::new(problem.discretisation(), before);
-        let before = self.schur.take();
-        self.schur = Some(SchurInverse::new(&hierarchy.meshes, &elements, before)?);
-        self.cycle = Some(velocity_cycle(problem, &elements, hierarchy)?);
+        let (before, meshes) = (self.schur.take(), hierarchy.meshes.clone());
+        let (schur, cycle) = rayon::join(
+            || SchurInverse::new(&meshes, &elements, before),
+            || velocity_cycle(problem, &elements, hierarchy),
+        );
+        (self.schur, self.cycle) = (Some(schur?), Some(cycle?));
         self.forces = Some(PressureForces::new(system));
         // Penalties and extrapolated nodes in thin films leave large numbers that nearly cancel.
         self.noise = if system.surfaces.is_some() { f64::INFINITY } else { rounding_noise(system) };

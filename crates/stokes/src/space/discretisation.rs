@@ -24,7 +24,7 @@ impl<const D: usize> Discretisation<D> {
     /// Numbers the nodes of `mesh`.
     pub fn new(mesh: TreeMesh<D>) -> Self {
         let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
-        let (velocity, pressure) = (nodes(2), nodes(1));
+        let (velocity, pressure) = rayon::join(|| nodes(2), || nodes(1));
         let chunks = Arc::new(Chunks::new(&velocity, &pressure));
         Self { mesh: Arc::new(mesh), velocity, pressure, chunks, own: None }
     }

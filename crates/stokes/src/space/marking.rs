@@ -2,9 +2,13 @@
 
 use gluey_fem::{NodeMap, TreeMesh};
 use gluey_levelset::{Ball, BallTree};
+use rayon::prelude::*;
 
 use super::discretisation::Discretisation;
 use super::velocity::SolidNodes;
+
+/// Least number of nodes that are looked up by one thread.
+const LEAST_SHARE: usize = 1024;
 
 /// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size
 /// of the smallest cell at the node. A negative offset takes nodes slightly outside the surface.
@@ -25,7 +29,7 @@ pub fn solid_nodes<const D: usize>(
         let threshold = offset * mesh.size(finest[node]);
         bodies.nearest_within(&nodes.point(node), -threshold).map(|b| b.0 as u32)
     };
-    (0..nodes.node_count()).map(at).collect()
+    (0..nodes.node_count()).into_par_iter().with_min_len(LEAST_SHARE).map(at).collect()
 }
 
 /// How the cells of a mesh are made of free and rigid nodes.

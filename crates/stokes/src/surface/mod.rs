@@ -16,7 +16,7 @@ mod weak;
 
 pub use aggregates::Aggregates;
 pub use coupling::{SurfaceCoupling, SurfaceWorkspace};
-pub use cut_cells::{CellState, CutCells};
+pub use cut_cells::{CellState, CutCell, CutCells};
 pub use energy::StrainEnergy;
 pub use flats::{Flat, Flats};
 pub use load::{add_load_of_cut_cells, forces_on_bodies};

@@ -14,8 +14,9 @@ use std::sync::Arc;
 
 use gluey_fem::{Interpolation, TreeMesh};
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{LinOp, Ordering, Preconditioner, Subset, vector};
+use gluey_linalg::{DirectError, LinOp, Ordering, Preconditioner, Subset, vector};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::mass::pressure_matrix;
 use super::weights::without_bodies;
@@ -25,6 +26,8 @@ use crate::space::Discretisation;
 
 /// Largest dense matrix.
 const MOST_PRESSURES: usize = 1000;
+/// Least number of columns of `S_0` that one thread finds.
+const LEAST_COLUMNS: usize = 16;
 /// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
 const SHARE_OF_MASS: f64 = 1e-3;
 
@@ -199,25 +202,27 @@ where
     Dim<D>: Space<D>,
 {
     let assembled = assemble_viscous(system)?;
-    let mut factor = factorised(&assembled.matrix, Ordering::Amd)?;
-    let mut operator = SystemOperator::new(system);
+    let factor = factorised(&assembled.matrix, Ordering::Amd)?;
     let velocities = system.velocity_dim();
-    let zeros = || vec![0.0; assembled.unknowns.len()];
-    let (mut load, mut velocity) = (zeros(), zeros());
-    let (mut x, mut y) = (vec![0.0f64; system.dim()], vec![0.0; system.dim()]);
     let mut schur = DMatrix::zeros(unknowns.len(), unknowns.len());
-    for (column, &q) in unknowns.iter().enumerate() {
-        x.fill(0.0);
-        x[velocities + q as usize] = 1.0;
-        operator.apply(&x, &mut y);
-        assembled.unknowns.gather(&y, &mut load);
-        factor.apply(&load, &mut velocity);
-        assembled.unknowns.scatter(&velocity, &mut x);
-        operator.apply(&x, &mut y);
-        for (row, &p) in unknowns.iter().enumerate() {
-            schur[(row, column)] = y[velocities + p as usize];
-        }
-    }
+    let columns = schur.as_mut_slice().par_chunks_mut(unknowns.len().max(1)).zip(unknowns);
+    let failures = columns.with_min_len(LEAST_COLUMNS).map_init(
+        || (factor.substitution(), SystemOperator::new(system)),
+        |(factor, operator), (column, &q)| {
+            let factor = factor.as_mut().map_err(|error| error.clone())?;
+            let [mut load, mut velocity] = [(); 2].map(|()| vec![0.0; assembled.unknowns.len()]);
+            let (mut x, mut y) = (vec![0.0f64; system.dim()], vec![0.0; system.dim()]);
+            x[velocities + q as usize] = 1.0;
+            operator.apply(&x, &mut y);
+            assembled.unknowns.gather(&y, &mut load);
+            factor.apply(&load, &mut velocity);
+            assembled.unknowns.scatter(&velocity, &mut x);
+            operator.apply(&x, &mut y);
+            column.iter_mut().zip(unknowns).for_each(|(entry, &p)| *entry = y[velocities + p as usize]);
+            Ok(())
+        },
+    );
+    failures.collect::<Result<(), DirectError>>()?;
     Ok(schur)
 }
 

@@ -5,13 +5,15 @@ use std::sync::Arc;
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Pattern, SparseMatrix};
+use gluey_linalg::{Jagged, Pattern, SparseMatrix};
+use rayon::prelude::*;
 
 use super::cells::PressureMatrices;
 use super::weights::scale_by_weights;
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::space::pressure_expansion;
+use crate::surface::SurfaceCoupling;
 
 /// `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in its place, scaled by
 /// the weights of the pressures.
@@ -37,48 +39,99 @@ pub fn pressure_mass<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let discretisation = system.discretisation();
-    let m = ReferenceMatrices::<D>::PRESSURE;
-    let expansion = pressure_expansion(&system.pressure);
-    let unknowns = |cell: u32| {
-        let nodes = discretisation.pressure.cell(cell as usize).iter();
-        nodes.flat_map(|&q| expansion.terms(q as usize)).map(|term| term.0 as usize).collect::<Vec<_>>()
+    let (nodes, expansion) = (&system.discretisation().pressure, pressure_expansion(&system.pressure));
+    let sources = Sources::new(system, matrices);
+    let unknowns = |at: usize| {
+        let terms = nodes.cell(sources.cell(at)).iter().flat_map(|&q| expansion.terms(q as usize));
+        terms.map(|term| term.0 as usize).collect::<Vec<_>>()
     };
-    let cut = || system.surfaces.iter().flat_map(|surfaces| surfaces.cut.cells.iter());
-    let mesh_cells = system.cells.iter().map(|c| c.cell).chain(cut().map(|c| c.cell));
-    let groups: Vec<Vec<usize>> = mesh_cells.map(unknowns).collect();
-    let mut mass = SparseMatrix::zeros(Arc::new(Pattern::from_groups(system.pressure.dim(), &groups)?));
-    drop(groups);
-    for (index, c) in system.cells.iter().enumerate() {
-        let nodes = discretisation.pressure.cell(c.cell as usize);
-        let (scale, matrix) = matrices.of(index);
-        for (i, &row) in nodes.iter().enumerate() {
-            for (j, &column) in nodes.iter().enumerate() {
-                let value = scale * matrix[i * m + j];
-                for &(r, wr) in expansion.terms(row as usize) {
-                    for &(c, wc) in expansion.terms(column as usize) {
-                        mass.add(r as usize, c as usize, wr * wc * value)?;
+    let groups: Vec<Vec<usize>> = (0..sources.len()).into_par_iter().map(unknowns).collect();
+    let dim = system.pressure.dim();
+    let mut mass = SparseMatrix::zeros(Arc::new(Pattern::from_groups(dim, &groups)?));
+    let pairs = groups.iter().zip(0u32..).flat_map(|(group, at)| group.iter().map(move |&q| (q, at)));
+    let touching = Jagged::grouped(dim, pairs);
+    let add_to_row = |row: usize, columns: &[u32], values: &mut [f64]| {
+        if !system.pressure.is_free(row) {
+            columns
+                .iter()
+                .zip(&mut *values)
+                .filter(|(c, _)| **c as usize == row)
+                .for_each(|(_, v)| *v += 1.0);
+        }
+        let mut last = None;
+        for &at in touching[row].iter().filter(|&&at| last.replace(at) != Some(at)) {
+            let of_cell = nodes.cell(sources.cell(at as usize));
+            let (scale, matrix) = sources.matrix(at as usize);
+            for (i, &q) in of_cell.iter().enumerate() {
+                let weight: f64 = weight_of(row, expansion.terms(q as usize));
+                if weight == 0.0 {
+                    continue;
+                }
+                for (j, &r) in of_cell.iter().enumerate() {
+                    let value = weight * scale * matrix[i * of_cell.len() + j];
+                    for &(column, share) in expansion.terms(r as usize) {
+                        if let Ok(place) = columns.binary_search(&column) {
+                            values[place] += share * value;
+                        }
                     }
                 }
             }
         }
-    }
-    for (place, cell) in cut().enumerate() {
-        let nodes = discretisation.pressure.cell(cell.cell as usize);
-        let Some(surfaces) = &system.surfaces else { continue };
-        let mut added = Ok(());
-        surfaces.for_each_mass(place, |i, j, value| {
-            let value = value / system.viscosity();
-            for &(r, wr) in expansion.terms(nodes[i] as usize) {
-                for &(c, wc) in expansion.terms(nodes[j] as usize) {
-                    added = added.and(mass.add(r as usize, c as usize, wr * wc * value));
-                }
-            }
-        });
-        added?;
-    }
-    for q in (0..system.pressure.dim()).filter(|&q| !system.pressure.is_free(q)) {
-        mass.add(q, q, 1.0)?;
-    }
+    };
+    mass.fill_rows(add_to_row);
     Ok(mass)
+}
+
+/// What an unknown counts in a sum of unknowns.
+fn weight_of(unknown: usize, terms: &[(u32, f64)]) -> f64 {
+    terms.iter().filter(|term| term.0 as usize == unknown).map(|term| term.1).sum()
+}
+
+/// The cells whose matrices are added up: those of the fluid, then those that surfaces cut.
+struct Sources<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    system: &'a StokesSystem<D>,
+    matrices: &'a PressureMatrices,
+    /// Of cut cells, row by row.
+    of_cut: Vec<Vec<f64>>,
+}
+
+impl<'a, const D: usize> Sources<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(system: &'a StokesSystem<D>, matrices: &'a PressureMatrices) -> Self {
+        let m = ReferenceMatrices::<D>::PRESSURE;
+        let mass = |surfaces: &SurfaceCoupling<D>, place: usize| {
+            let mut matrix = vec![0.0; m * m];
+            surfaces.for_each_mass(place, |i, j, value| matrix[i * m + j] = value);
+            matrix
+        };
+        let of_cut = system.surfaces.as_deref().map_or_else(Vec::new, |surfaces| {
+            (0..surfaces.cut.cells.len()).into_par_iter().map(|place| mass(surfaces, place)).collect()
+        });
+        Self { system, matrices, of_cut }
+    }
+
+    fn len(&self) -> usize {
+        self.system.cells.len() + self.of_cut.len()
+    }
+
+    fn cell(&self, at: usize) -> usize {
+        let cells = &self.system.cells;
+        match (cells.get(at), &self.system.surfaces) {
+            (None, Some(surfaces)) => surfaces.cut.cells[at - cells.len()].cell as usize,
+            _ => cells[at].cell as usize,
+        }
+    }
+
+    /// The factor of a matrix, and the matrix.
+    fn matrix(&self, at: usize) -> (f64, &[f64]) {
+        match at.checked_sub(self.system.cells.len()) {
+            Some(place) => (1.0 / self.system.viscosity(), &self.of_cut[place]),
+            None => self.matrices.of(at),
+        }
+    }
 }

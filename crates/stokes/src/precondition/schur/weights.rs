@@ -41,13 +41,11 @@ pub fn scale_by_weights<const D: usize>(
 {
     let weights = weights(elements, matrices);
     let roots: Vec<f64> = weights.into_iter().map(f64::sqrt).collect();
-    let pattern = mass.pattern().clone();
-    for (row, root) in roots.iter().enumerate() {
-        let entries = &mut mass.values_mut()[pattern.range(row)];
-        for (value, &column) in entries.iter_mut().zip(pattern.columns_of(row)) {
-            *value *= root * roots[column as usize];
+    mass.fill_rows(|row, columns, values| {
+        for (value, &column) in values.iter_mut().zip(columns) {
+            *value *= roots[row] * roots[column as usize];
         }
-    }
+    });
 }
 
 /// The weights of all pressures, one for those that are not unknowns.

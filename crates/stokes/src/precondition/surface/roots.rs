@@ -10,11 +10,13 @@ use rayon::prelude::*;
 
 use crate::error::StokesError;
 use crate::operator::{Elements, Source};
-use crate::precondition::assembly::NodeForms;
+use crate::precondition::assembly::{NodeForms, for_each_matrix};
 use crate::precondition::numbered::NumberedNodes;
 
 /// Roots of a batch. Matrices of cells that two batches share are made twice.
 const ROOTS: usize = 512;
+/// Least number of roots of a batch whose modes are found by one thread.
+const LEAST_SHARE: usize = 16;
 /// Nodes in a batch of those that belong to no root.
 const NODES: usize = 4096;
 
@@ -56,10 +58,10 @@ where
 {
     let contributions = Contributions::new(nodes, elements);
     let batches = batches(&patches, nodes.nodes.len());
-    let workspace = || (vec![u32::MAX; nodes.nodes.len()], ModesWorkspace::default());
+    let workspace = || vec![u32::MAX; nodes.nodes.len()];
     let found: Vec<Result<_, ModesError>> = batches
         .par_iter()
-        .map_init(workspace, |work, batch| contributions.of_batch(batch, &patches, work))
+        .map_init(workspace, |place, batch| contributions.of_batch(batch, &patches, place))
         .collect();
     // The first error, whichever thread was the first to find one.
     let found: Vec<(Vec<Vec<f32>>, Vec<f64>)> = found.into_iter().collect::<Result<_, _>>()?;
@@ -113,7 +115,7 @@ where
         &self,
         batch: &Batch,
         patches: &Jagged<u32>,
-        (place, work): &mut (Vec<u32>, ModesWorkspace),
+        place: &mut [u32],
     ) -> Result<(Vec<Vec<f32>>, Vec<f64>), ModesError> {
         batch.nodes.iter().zip(0..).for_each(|(&node, k)| place[node as usize] = k);
         let matrix = self.matrix(batch, place);
@@ -125,12 +127,16 @@ where
         batch.nodes.iter().for_each(|&node| place[node as usize] = u32::MAX);
         let matrix = matrix.map_err(ModesError::Matrix)?;
         let diagonal = matrix.diagonal();
-        let modes = local.iter().zip(batch.roots.clone()).map(|(nodes, patch)| {
-            let modes = weak_modes(&matrix, &diagonal, nodes, work);
-            modes.map_err(|source| ModesError::Patch(PatchError { patch, source }))
-        });
-        let modes = modes.collect::<Result<_, _>>()?;
-        Ok((modes, diagonal))
+        let modes: Vec<Result<_, ModesError>> = local
+            .par_iter()
+            .zip(batch.roots.clone())
+            .with_min_len(LEAST_SHARE)
+            .map_init(ModesWorkspace::default, |work, (nodes, patch)| {
+                let modes = weak_modes(&matrix, &diagonal, nodes, work);
+                modes.map_err(|source| ModesError::Patch(PatchError { patch, source }))
+            })
+            .collect();
+        Ok((modes.into_iter().collect::<Result<_, _>>()?, diagonal))
     }
 
     /// The matrix on the nodes of a batch, which are numbered by `place`.
@@ -141,25 +147,22 @@ where
         touching.dedup();
         let (mut terms, mut groups) = (Vec::new(), BlockGroups::default());
         for &source in &touching {
-            self.terms(source, place, &mut terms);
+            self.terms(self.sources[source as usize], place, &mut terms);
             groups.push(terms.iter().map(|term: &LocalTerm| term.row as usize));
         }
         let groups: Vec<&[usize]> = groups.iter().collect();
         let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(batch.nodes.len(), &groups)?);
-        let mut dense = vec![0.0; self.elements.size().pow(2)];
-        let surfaces = self.elements.system().surfaces.as_deref();
-        let mut viscous = surfaces.map(|surfaces| surfaces.viscous_matrices());
-        for &source in &touching {
+        let sources: Vec<Source> = touching.iter().map(|&source| self.sources[source as usize]).collect();
+        for_each_matrix(self.elements, &sources, |source, dense| {
             self.terms(source, place, &mut terms);
-            self.elements.fill_velocities(self.sources[source as usize], viscous.as_mut(), &mut dense);
-            matrix.add_local(&terms, &dense);
-        }
+            matrix.add_local(&terms, dense);
+        });
         Ok(matrix)
     }
 
     /// The terms of a source in the rows of a batch.
-    fn terms(&self, source: u32, place: &[u32], terms: &mut Vec<LocalTerm>) {
-        self.forms.of_cell(self.sources[source as usize].cell(), terms);
+    fn terms(&self, source: Source, place: &[u32], terms: &mut Vec<LocalTerm>) {
+        self.forms.of_cell(source.cell(), terms);
         terms.retain_mut(|term| {
             term.row = place[term.row as usize];
             term.row != u32::MAX

@@ -87,12 +87,16 @@ where
         let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
-        let mut diagonal = block_diagonal(space, &cells, smoothed)?;
+        let (diagonal, operator) = rayon::join(
+            || block_diagonal(space, &cells, smoothed),
+            || CountedOperator::new(space, &cells, cell_count, None),
+        );
+        let mut diagonal = diagonal?;
         diagonal.hold(|body| !smooths_twists || space.is_held(body));
         let lambda_max = cell_lambda_max::<D>(&space.discretisation().reference());
         Ok(Self {
             near_bodies: NearBodies::new(space, &cells, &diagonal, lambda_max),
-            operator: CountedOperator::new(space, &cells, cell_count, None),
+            operator,
             chebyshev: Chebyshev::below(lambda_max, space.dim(), &smoothing.sweep),
             before: smoothing.before,
             diagonal,
