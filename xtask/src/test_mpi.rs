@@ -78,6 +78,35 @@ every = 1
 "#;
 /// Its tables.
 const TABLES: [&str; 2] = ["sheared-none-unfitted.csv", "sheared-none-unfitted-rheology.csv"];
+/// A sphere that is driven past one that is held and a free one, through fluid whose mean is at rest.
+const DRIVEN: &str = r#"name = "driven"
+dimension = 3
+shear_rate = 0.0
+particles = [
+    { position = [0.3, 0.5, 0.5], radius = 0.12, velocity = [0.5, 0.1, 0.0] },
+    { position = [0.62, 0.6, 0.45], radius = 0.1, held = true },
+    { position = [0.55, 0.2, 0.6], radius = 0.1 },
+]
+
+[domain]
+boundary = "sheared"
+
+[time]
+step = 0.05
+end = 0.1
+
+[contact]
+strategy = "none"
+
+[flow]
+tolerance = 1e-11
+solver = "multigrid"
+
+[flow.mesh]
+cells_per_radius = 1.6
+"#;
+/// Its tables.
+const TABLES_OF_DRIVEN: [&str; 2] = ["driven-none-unfitted.csv", "driven-none-unfitted-forces.csv"];
 /// Largest difference of the numbers in it from those of one process.
 const LIMIT: f64 = 1e-11;
 /// The same in the sheared box, whose stresses one process finds from the flow of the step before.
@@ -200,12 +229,17 @@ impl Case {
         })?;
         compare("sheared for ever", LIMIT_OF_SHEARED, |ranks| {
             line(&mut self.command_of("sheared.toml", SHEARED, ranks)?)?;
-            Ok(TABLES
-                .map(|table| self.read(ranks, table))
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()?
-                .concat())
+            self.read_all(ranks, TABLES)
+        })?;
+        compare("held and driven", LIMIT_OF_SHEARED, |ranks| {
+            line(&mut self.command_of("driven.toml", DRIVEN, ranks)?)?;
+            self.read_all(ranks, TABLES_OF_DRIVEN)
         })
+    }
+
+    fn read_all(&self, ranks: &'static str, tables: [&str; 2]) -> Result<String, MpiError> {
+        let tables = tables.map(|table| self.read(ranks, table));
+        Ok(tables.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     }
 
     fn read(&self, ranks: &'static str, table: &str) -> Result<String, MpiError> {

@@ -34,6 +34,8 @@ pub struct Shared<'a, 'b, const D: usize> {
     pub bodies: &'b BallTree<'b, D>,
     /// Nodes with a level set of at least this many cells are rigid.
     pub offset: f64,
+    /// Which bodies have motions that are given; no entries where all are free.
+    pub held: &'b [bool],
 }
 
 impl<const D: usize> Shared<'_, '_, D> {
@@ -71,6 +73,8 @@ pub struct LevelBodies<const D: usize> {
     fits: Vec<f64>,
     /// Of those in `nodes`.
     pub plan: GhostPlan,
+    /// Whether the motion of each is given: zero in vectors.
+    is_held: Vec<bool>,
 }
 
 impl<const D: usize> LevelBodies<D> {
@@ -102,12 +106,23 @@ impl<const D: usize> LevelBodies<D> {
         let mut has_nodes = vec![false; ids.len()];
         nodes.iter().for_each(|rigid| has_nodes[rigid.body as usize] = true);
         let plan = wide.restricted(shared.ranks, |body| has_nodes[body as usize]);
-        Self { ids, owned, nodes, body_of, fits, plan }
+        let is_held = ids.iter().map(|&id| shared.held.get(id as usize) == Some(&true)).collect();
+        Self { ids, owned, nodes, body_of, fits, plan, is_held }
     }
 
     /// The body a node moves with, by its place in `ids`.
     pub fn body_of(&self, node: usize) -> Option<u32> {
         Some(self.body_of[node]).filter(|&body| body != NO_BODY)
+    }
+
+    /// Whether the motion of a body is given.
+    pub fn is_held(&self, body: usize) -> bool {
+        self.is_held[body]
+    }
+
+    /// Whether a node here moves with a body whose motion is given.
+    pub fn holds_nodes(&self) -> bool {
+        self.nodes.iter().any(|rigid| self.is_held[rigid.body as usize])
     }
 
     /// Whether a body has enough nodes on this level to be rigid.
@@ -156,10 +171,16 @@ impl<const D: usize> LevelBodies<D> {
         }
     }
 
-    /// From the sums `R^T u` over the nodes of the owned bodies to the twists that are closest to `u`.
+    /// From the sums `R^T u` over the nodes of the owned bodies to the twists that are closest to `u`, or
+    /// zero where motions are given.
     pub fn fit<T: Scalar>(&self, owned: &mut [T]) {
         let n = rigid::<D>();
-        for (sums, inverse) in owned.chunks_exact_mut(n).zip(self.fits.chunks_exact(n * n)) {
+        let all = owned.chunks_exact_mut(n).zip(self.fits.chunks_exact(n * n)).zip(&self.is_held);
+        for ((sums, inverse), &is_held) in all {
+            if is_held {
+                sums.fill(T::ZERO);
+                continue;
+            }
             let before: [f64; MOST_RIGID] =
                 std::array::from_fn(|k| sums.get(k).map_or(0.0, |sum| sum.to_f64()));
             for (sum, row) in sums.iter_mut().zip(inverse.chunks_exact(n)) {

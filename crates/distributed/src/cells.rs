@@ -6,6 +6,7 @@ use gluey_fem::element::value;
 use gluey_fem::{Part, points_of_cells};
 use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree};
+use gluey_linalg::vector;
 use gluey_motion::Fields;
 
 use crate::space::{LevelSpace, Nodes};
@@ -32,6 +33,12 @@ impl<const D: usize> MyCells<D> {
             velocity,
             pressure,
         }
+    }
+
+    /// Adds a multiple of another flow in the same cells.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        vector::axpy(factor, &other.velocity, &mut self.velocity);
+        vector::axpy(factor, &other.pressure, &mut self.pressure);
     }
 
     /// Of the box.

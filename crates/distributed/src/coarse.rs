@@ -27,10 +27,14 @@ impl CoarseFactor {
         may_float: bool,
     ) -> Result<Self, DirectError> {
         let (nodal, nodes) = (space.nodal_dim(), space.velocity.map.node_count());
-        let is_fixed = !may_float || (0..nodes).any(|node| space.velocity.map.is_on_boundary(node));
+        let is_on_wall = |node| space.velocity.map.is_on_boundary(node);
+        let is_fixed = !may_float || space.bodies.holds_nodes() || (0..nodes).any(is_on_wall);
         let loose = if is_fixed { None } else { (0..nodes).find(|&node| space.is_free(node)) };
         let unknowns = Subset::new(space.dim(), |k| match k.checked_sub(nodal) {
-            Some(twist) => space.bodies.is_active(twist / rigid::<D>()),
+            Some(twist) => {
+                let body = twist / rigid::<D>();
+                space.bodies.is_active(body) && !space.bodies.is_held(body)
+            }
             None => space.is_free(k / D) && Some(k / D) != loose,
         });
         let dim = unknowns.len();

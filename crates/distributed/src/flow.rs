@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{
     BadDiagonal, BlockError, DirectError, Gcr, GcrParams, KrylovError, KrylovReport, LinOp, Reference,
-    SparseError,
+    SparseError, vector,
 };
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Traffic};
@@ -105,13 +105,14 @@ pub enum FlowError {
     /// A matrix of pressures is too large.
     #[error(transparent)]
     Sparse(#[from] SparseError),
-    /// Ranks do not share flows around bodies that are held.
-    #[error("ranks share flows around bodies that are free only")]
+    /// A mean flow is taken away around held bodies in a box without walls only, and the stress is not known
+    /// then.
+    #[error("flows without mean flow are those around held bodies in boxes without walls, without a stress")]
     Conditions,
-    /// As many wrenches as bodies are needed, or none.
-    #[error("{found} wrenches for {bodies} bodies")]
+    /// As many wrenches or motions as bodies are needed, or none.
+    #[error("{found} wrenches or motions for {bodies} bodies")]
     Count {
-        /// Wrenches given.
+        /// Entries given.
         found: usize,
         /// Bodies.
         bodies: usize,
@@ -153,6 +154,14 @@ where
     pub pressure: Vec<f64>,
     /// Velocity and spin of each body, the same on all ranks.
     pub twists: Vec<Twist<D>>,
+    /// Forces and torques on the bodies but those of the fluid and of `force`: given, or what held ones lack;
+    /// the same on all ranks.
+    pub wrenches: Vec<Wrench<D>>,
+    /// Where bodies are held in `unfitted`, the mean velocity over fluid and bodies, in a linear flow less
+    /// that of the flow.
+    pub mean_velocity: Option<Vector<D>>,
+    /// The force per unit of volume that takes the mean flow away, where that was wanted.
+    pub mean_force: Vector<D>,
     /// The stress, where it was wanted, the same on all ranks.
     pub stress: Option<Stress<D>>,
     /// Cells of all ranks.
@@ -181,6 +190,20 @@ where
     /// a cell there.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         self.cells.fields(balls)
+    }
+
+    /// Adds a multiple of a flow around the same bodies on the same cells.
+    pub(crate) fn add(&mut self, factor: f64, other: &Self) {
+        let velocities = self.velocity.iter_mut().zip(&other.velocity);
+        velocities.for_each(|(u, other)| *u += other * factor);
+        vector::axpy(factor, &other.pressure, &mut self.pressure);
+        let twists = self.twists.iter_mut().zip(&other.twists);
+        twists.for_each(|(twist, other)| *twist = *twist + *other * factor);
+        let wrenches = self.wrenches.iter_mut().zip(&other.wrenches);
+        wrenches.for_each(|(wrench, other)| *wrench = *wrench + *other * factor);
+        self.cells.add(factor, &other.cells);
+        self.iterations += other.iterations;
+        self.relative_residual = self.relative_residual.max(other.relative_residual);
     }
 
     /// Shear of the box: what stands at `x` in it is at `x + shear (y - y_lower) e_1` in space.
@@ -227,7 +250,7 @@ impl BoxFlow {
         bodies.check()?;
         let start = ranks.traffic();
         let tree_of_balls = BallTree::new(bodies.balls);
-        let shared = Shared { cuts, ranks, bodies: &tree_of_balls, offset: bodies.offset };
+        let shared = Shared { cuts, ranks, bodies: &tree_of_balls, offset: bodies.offset, held: &[] };
         let cycle = VCycle::new(tree, &shared, self.viscosity)?;
         let top = &cycle.levels[cycle.levels.len() - 1].operator;
         let space = top.space.clone();
@@ -255,6 +278,12 @@ impl BoxFlow {
             velocity: velocity.as_chunks::<D>().0[points.owned.clone()].iter().map(|&u| u.into()).collect(),
             pressure: pressure[operator.space.pressure.owned.clone()].to_vec(),
             twists: twists_of_all(bodies.balls, &operator.space, ranks, &twists),
+            wrenches: match bodies.wrenches {
+                [] => vec![Wrench::default(); bodies.balls.len()],
+                given => given.to_vec(),
+            },
+            mean_velocity: None,
+            mean_force: Vector::zeros(),
             stress: None,
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,

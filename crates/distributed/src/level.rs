@@ -227,7 +227,7 @@ impl<const D: usize> LevelOperator<'_, D> {
         Ok(BlockDiagonal { nodal, blocks: self.blocks(viscosity)?, rigid: rigid::<D>() })
     }
 
-    /// Inverses of `R^T A R` for the owned bodies, zero for those that are not rigid here.
+    /// Inverses of `R^T A R` for the owned bodies, zero for those that are not rigid here or held.
     fn blocks(&self, viscosity: f64) -> Result<Vec<f32>, FlowError> {
         let (bodies, map) = (&self.space.bodies, &self.space.velocity.map);
         let (n, size) = (rigid::<D>(), rigid::<D>() * rigid::<D>());
@@ -259,7 +259,7 @@ impl<const D: usize> LevelOperator<'_, D> {
         plan.accumulate::<f64, 1>(self.ranks, &mut blocks);
         blocks.truncate(bodies.owned * size);
         for (body, block) in blocks.chunks_exact_mut(size).enumerate() {
-            match bodies.is_active(body) {
+            match bodies.is_active(body) && !bodies.is_held(body) {
                 true => invert_spd(n, block)
                     .map_err(|source| FlowError::Body { body: bodies.ids[body] as usize, source })?,
                 false => block.fill(0.0),

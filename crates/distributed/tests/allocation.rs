@@ -46,6 +46,8 @@ where
         formulation,
         radii: vec![0.2, 0.15],
         wrenches: Vec::new(),
+        given: Vec::new(),
+        force_density: None,
         shear_rate: 1.0,
     }
 }

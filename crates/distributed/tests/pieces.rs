@@ -46,6 +46,8 @@ where
         formulation,
         radii: BODIES.map(|body| body.1).to_vec(),
         wrenches: Vec::new(),
+        given: Vec::new(),
+        force_density: None,
         shear_rate: 1.0,
     }
 }

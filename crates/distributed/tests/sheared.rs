@@ -34,6 +34,8 @@ where
         formulation: Formulation::Unfitted { lubrication: Lubrication::Deficit },
         radii: PARTICLES.map(|particle| particle.1).to_vec(),
         wrenches,
+        given: Vec::new(),
+        force_density: None,
         shear_rate: RATE,
     }
 }

@@ -45,6 +45,8 @@ where
             },
             radii: vec![self.radius; self.centers.len()],
             wrenches: Vec::new(),
+            given: Vec::new(),
+            force_density: None,
             shear_rate: 1.0,
         }
     }

@@ -61,6 +61,8 @@ where
         formulation,
         radii: vec![radius; places.len()],
         wrenches,
+        given: Vec::new(),
+        force_density: None,
         shear_rate: 1.0,
     }
 }

@@ -7,7 +7,7 @@
 //! of its operator are the sums over the own cells, and sums of these over all parts are right at every node.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Dim, Matrix, Space, Vector, Wrench};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
@@ -216,6 +216,20 @@ where
     /// Those of [`Problem::add_wrenches`] and [`Problem::set_twists`].
     pub fn data_under(&self, conditions: &Conditions<'_, D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
         conditions.data(self)
+    }
+
+    /// The share of the own cells and films in the forces and torques on the bodies near the part that make a
+    /// flow a solution, of the fields [`Problem::velocity`] gives and a vector.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] in a formulation without unknowns for twists.
+    pub fn own_wrenches(
+        &self,
+        conditions: &Conditions<'_, D>,
+        velocity: &[f64],
+        x: &[f64],
+    ) -> Result<Vec<Wrench<D>>, StokesError> {
+        self.wrenches(velocity, &self.pressure_and_films(x), conditions.force, &conditions.strain)
     }
 
     /// Integrals over the fluid of the own cells of a velocity that [`Problem::velocity`] gave, and of

@@ -1,8 +1,8 @@
 //! Two equal free spheres in an unbounded linear flow, exactly.
 //!
 //! The disturbance is a sum of Lamb's decaying solutions around both centres (Happel and Brenner 1965,
-//! section 3.2; Kim and Karrila 1991, section 4.2). With `psi_n = r^-(n+1) P_n^m(cos theta) cos(m phi)` around a centre,
-//! in units of the radius, the viscosity and the rate of strain, these are
+//! section 3.2; Kim and Karrila 1991, section 4.2). With `psi_n = r^-(n+1) P_n^m(cos theta) cos(m phi)`
+//! around a centre, in units of the radius, the viscosity and the rate of strain, these are
 //!
 //! ```text
 //! u = grad psi_n,   u = x cross grad psi'_n,

@@ -66,7 +66,7 @@ fn ratio_inside<const D: usize>() -> f64 {
     let tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], 2, &wants);
     let mut tree = tree.expect("four cells a side");
     let (ranks, cuts, none) = (Alone::default(), Cuts::one(&tree), BallTree::new(&[]));
-    let shared = Shared { cuts: &cuts, ranks: &ranks, bodies: &none, offset: 0.0 };
+    let shared = Shared { cuts: &cuts, ranks: &ranks, bodies: &none, offset: 0.0, held: &[] };
     let space = LevelSpace::new(&mut tree, 2, &shared, None);
     let pressures = SharedPressures::new(&mut tree, &shared, &space);
     let centre = Vector::<D>::repeat(0.5);

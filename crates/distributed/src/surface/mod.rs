@@ -6,30 +6,32 @@
 //! smoother. Only sums over cells go between ranks. Coarser levels are those of bodies whose nodes move with
 //! them.
 
+mod balance;
+mod conditions;
 mod operator;
 mod precondition;
 mod space;
+mod sums;
 
 use gluey_fem::{Cell, Cuts, ImplicitTree};
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
-use gluey_stokes::part::{
-    AssembledSmoother, FluidIntegrals, PartMethod, WeakCell, coarse_offset, rings_around_surfaces,
-};
+use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
-    Conditions, Discretisation, Film, Given, Lubrication, Problem, StokesError, StokesSystem, Stress,
+    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, Problem, StokesError, StokesSystem, Stress,
 };
 use rustc_hash::FxHashMap;
 
 use crate::agreement::{agreed, gathered};
-use crate::bodies::{Shared, rigid};
+use crate::bodies::Shared;
 use crate::cells::MyCells;
 use crate::cycle::VCycle;
 use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
 use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
+use conditions::{check_count, given, held};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
 use space::{NearBodies, SurfaceSpace, is_near_surface, owner_of_film};
@@ -59,16 +61,19 @@ where
     discretisation: Discretisation<D>,
     level: LevelSpace<D>,
     conditions: &'f Conditions<'f, D>,
+    /// What is known of the bodies near the part; wrenches of those alone that this rank owns.
+    given: Vec<GivenOf<D>>,
     /// What was sent before.
     start: Traffic,
 }
 
 impl BoxFlow {
     /// The flow around bodies whose surfaces cut the mesh, under conditions on all of them. All ranks call
-    /// this with the same arguments. A box without walls is sheared like the tree, and the flow has no mean.
+    /// this with the same arguments. A box without walls is sheared like the tree, and the flow has no mean
+    /// where all bodies are free.
     ///
     /// # Errors
-    /// [`FlowError`], on all ranks. [`FlowError::Conditions`] for bodies that are held.
+    /// [`FlowError`], on all ranks. [`FlowError::Conditions`] for a mean flow that cannot be taken away.
     pub fn solve_around_surfaces<const D: usize>(
         &self,
         around: &SurfaceBodies<'_, D>,
@@ -80,7 +85,10 @@ impl BoxFlow {
     where
         Dim<D>: Space<D>,
     {
-        check_conditions(conditions, around.balls.len())?;
+        check_count(conditions, around.balls.len())?;
+        if conditions.without_mean {
+            return self.balanced(around, tree, cuts, ranks, conditions);
+        }
         let cell_size = tree.frame().size(tree.max_level());
         let is_small = |ball: &Ball<D>| ball.bounding_radius() < cell_size;
         if let Some(body) = around.balls.iter().position(is_small) {
@@ -89,7 +97,8 @@ impl BoxFlow {
         }
         let start = ranks.traffic();
         let bodies = BallTree::new(around.balls);
-        let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset() };
+        let held = held(conditions, around.balls.len());
+        let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset(), held: &held };
         let frame = tree.frame().clone();
         let spreads = |cell: &Cell<D>| is_near_surface(&frame, &bodies, cell);
         let is_own = |film: &Film<D>| owner_of_film(tree, &shared, film) == ranks.rank();
@@ -98,9 +107,11 @@ impl BoxFlow {
         let levels =
             VCycle::under(tree, &shared, self.viscosity, Some(&Around { rings, spreads: &spreads }))?;
         let level = levels.levels[levels.levels.len() - 1].operator.space.clone();
+        let bodies = NearBodies::new(tree, &shared, &level.part);
         let setting = Setting {
             flow: self,
-            bodies: NearBodies::new(tree, &shared, &level.part),
+            given: given(conditions, &bodies, ranks.rank()),
+            bodies,
             shared,
             discretisation: part_of(&level),
             level,
@@ -109,23 +120,6 @@ impl BoxFlow {
         };
         setting.trusted(tree, levels, PartMethod::new(around.lubrication))
     }
-}
-
-/// # Errors
-/// [`FlowError::Count`], [`FlowError::Conditions`].
-fn check_conditions<const D: usize>(conditions: &Conditions<'_, D>, bodies: usize) -> Result<(), FlowError>
-where
-    Dim<D>: Space<D>,
-{
-    let found = match conditions.bodies {
-        Given::Wrenches([]) => bodies,
-        Given::Wrenches(wrenches) => wrenches.len(),
-        Given::Twists(_) | Given::Each(_) => return Err(FlowError::Conditions),
-    };
-    if conditions.without_mean {
-        return Err(FlowError::Conditions);
-    }
-    if found == bodies { Ok(()) } else { Err(FlowError::Count { found, bodies }) }
 }
 
 fn part_of<const D: usize>(level: &LevelSpace<D>) -> Discretisation<D> {
@@ -147,6 +141,8 @@ where
     /// Values at all nodes of the part, those of the velocity followed by the twists near it.
     velocity: Vec<f64>,
     pressure: Vec<f64>,
+    wrenches: Vec<Wrench<D>>,
+    mean_velocity: Option<Vector<D>>,
     stress: Option<Stress<D>>,
     sizes: Vec<LevelSizes>,
     report: Result<KrylovReport, KrylovError>,
@@ -201,7 +197,13 @@ where
     fn problem(&self, tree: &ImplicitTree<'_, D>, method: &PartMethod) -> Result<Problem<D>, StokesError> {
         let rank = self.shared.ranks.rank();
         let wanted = |film: &Film<D>| owner_of_film(tree, &self.shared, film) == rank;
-        self.named(method.problem(&self.discretisation, &self.bodies.balls, self.flow.viscosity, &wanted))
+        let problem = method.problem(&self.discretisation, &self.bodies.balls, self.flow.viscosity, &wanted);
+        let mut problem = self.named(problem)?;
+        if !self.shared.held.is_empty() {
+            let held: Vec<bool> = self.given.iter().map(|given| given.twist().is_some()).collect();
+            problem.system.space.hold(&held);
+        }
+        Ok(problem)
     }
 
     /// With the numbers of bodies among all.
@@ -234,19 +236,18 @@ where
         let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x);
         let solve_traffic = ranks.traffic().since(before);
         let mut space = operator.into_space();
-        let [_, p, _] = space.parts_mut(&mut x);
-        let mut pressure = p.to_vec();
-        space.pressures.remove_mean(ranks, &mut pressure);
-        space.parts_mut(&mut x)[1].copy_from_slice(&pressure);
-        let mut whole = vec![0.0; system.dim()];
-        space.spread(&x, &mut whole);
-        space.update_around(&mut whole);
-        let (mut velocity, pressure) = (problem.velocity(&lift, &whole), problem.pressure(&whole));
+        let [mut velocity, pressure, whole] = self.fields(problem, &mut space, &lift, &mut x);
         let integrals = self.integrals(problem, [&velocity, &pressure]);
-        if !self.level.part.mesh.periodic().contains(&false) {
+        let holds_any = !self.shared.held.is_empty();
+        let mut mean_velocity = None;
+        if holds_any || !self.level.part.mesh.periodic().contains(&false) {
             let mean = self.mean_velocity(problem, &space, &velocity, &integrals);
-            problem.subtract_uniform(&mean, &mut velocity);
+            match holds_any {
+                true => mean_velocity = Some(mean),
+                false => problem.subtract_uniform(&mean, &mut velocity),
+            }
         }
+        let wrenches = self.wrenches(problem, &velocity, &whole)?;
         let wants_stress = self.conditions.stress;
         let stress = wants_stress.then(|| {
             let mean = integrals.pressure / integrals.volume;
@@ -259,12 +260,32 @@ where
             space,
             velocity,
             pressure,
+            wrenches,
+            mean_velocity,
             stress,
             sizes,
             report,
             setup_traffic: before.since(self.start),
             solve_traffic,
         })
+    }
+
+    /// Velocity and pressure of the part and the vector that they belong to, from an owned one, whose
+    /// pressures lose their mean.
+    fn fields(
+        &self,
+        problem: &Problem<D>,
+        space: &mut SurfaceSpace<'a, D>,
+        lift: &[f64],
+        x: &mut [f64],
+    ) -> [Vec<f64>; 3] {
+        let mut pressure = space.parts(x)[1].to_vec();
+        space.pressures.remove_mean(space.ranks, &mut pressure);
+        space.parts_mut(x)[1].copy_from_slice(&pressure);
+        let mut whole = vec![0.0; problem.system.dim()];
+        space.spread(x, &mut whole);
+        space.update_around(&mut whole);
+        [problem.velocity(lift, &whole), problem.pressure(&whole), whole]
     }
 
     fn schur(
@@ -293,70 +314,16 @@ where
         problem: &Problem<D>,
         operator: &mut SurfaceOperator<'_, 'a, D>,
     ) -> Result<(Vec<f64>, Vec<f64>), FlowError> {
-        let Given::Wrenches(all) = self.conditions.bodies else { return Err(FlowError::Conditions) };
-        let mut wrenches = vec![Wrench::default(); if all.is_empty() { 0 } else { self.bodies.ids.len() }];
-        for &body in operator.space.own_bodies.iter().filter(|_| !all.is_empty()) {
-            wrenches[body as usize] = all[self.bodies.ids[body as usize] as usize];
-        }
-        let bodies = Given::Wrenches(&wrenches);
+        let wrenches: Vec<Wrench<D>> = self.given.iter().filter_map(GivenOf::wrench).collect();
+        let bodies = match self.conditions.bodies {
+            Given::Wrenches([]) => Given::Wrenches(&[]),
+            _ if self.shared.held.is_empty() => Given::Wrenches(&wrenches),
+            _ => Given::Each(&self.given),
+        };
         let (lift, mut whole) = problem.data_under(&Conditions { bodies, ..*self.conditions })?;
         let mut b = vec![0.0; operator.space.dim()];
         operator.space.gather(&mut whole, &mut b);
         Ok((lift, b))
-    }
-
-    /// Integrals over the fluid of all ranks.
-    fn integrals(&self, problem: &Problem<D>, fields: [&[f64]; 2]) -> FluidIntegrals<D> {
-        let own = problem.fluid_integrals(fields);
-        let mut sums = vec![own.volume, own.pressure];
-        sums.extend(own.velocity.iter());
-        self.shared.ranks.sum(&mut sums);
-        let velocity = Vector::from_column_slice(&sums[2..]);
-        FluidIntegrals { volume: sums[0], pressure: sums[1], velocity }
-    }
-
-    /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid
-    /// leaves of the box, in proportion to their volumes.
-    fn mean_velocity(
-        &self,
-        problem: &Problem<D>,
-        space: &SurfaceSpace<'a, D>,
-        velocity: &[f64],
-        integrals: &FluidIntegrals<D>,
-    ) -> Vector<D> {
-        let whole_box: f64 = self.level.part.mesh.domain().extent().product();
-        let balls = self.shared.bodies.balls();
-        let volume = |ball: &Ball<D>| ball.bounding_radius().powi(D as i32);
-        let all: f64 = balls.iter().map(volume).sum();
-        let twists = self.twists_of_all(problem, space, velocity);
-        let share = |ball: &Ball<D>| (whole_box - integrals.volume) * volume(ball) / all;
-        let of_bodies = balls.iter().zip(&twists).map(|(ball, twist)| twist.velocity * share(ball));
-        (integrals.velocity + of_bodies.sum::<Vector<D>>()) / whole_box
-    }
-
-    /// The stress of a flow.
-    fn stress(
-        &self,
-        problem: &Problem<D>,
-        fields: [&[f64]; 2],
-        whole: &[f64],
-    ) -> Result<Stress<D>, FlowError> {
-        let own = problem.own_stress(&self.conditions.strain, fields, whole)?;
-        let (all, n) = (self.shared.bodies.balls().len(), D * D);
-        let mut numbers = vec![0.0; 2 * all * n];
-        for (half, moments) in [&own.moments, &own.of_films].into_iter().enumerate() {
-            for (&id, moment) in self.bodies.ids.iter().zip(moments) {
-                numbers[(half * all + id as usize) * n..][..n].copy_from_slice(moment.as_slice());
-            }
-        }
-        numbers.extend([own.dissipation, own.dissipation_of_films]);
-        self.shared.ranks.sum(&mut numbers);
-        let moments = |half: usize| {
-            let entries = numbers[half * all * n..][..all * n].chunks_exact(n);
-            entries.map(Matrix::<D>::from_column_slice).collect()
-        };
-        let [dissipation, dissipation_of_films] = [0, 1].map(|k| numbers[2 * all * n + k]);
-        Ok(Stress { moments: moments(0), of_films: moments(1), dissipation, dissipation_of_films })
     }
 
     /// Steps in double precision, as in the serial solver: in films penalties and extrapolated nodes leave
@@ -430,40 +397,15 @@ where
             dof_count: counts[1] as usize,
             iterations: wasted + report.iterations,
             relative_residual: report.residual_norm / reference,
+            wrenches: attempt.wrenches,
+            mean_velocity: attempt.mean_velocity,
+            mean_force: Vector::zeros(),
             stress: attempt.stress,
             levels: sizes,
             setup_traffic: attempt.setup_traffic,
             solve_traffic: attempt.solve_traffic,
             cells: MyCells::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
         })
-    }
-
-    /// The twists of all bodies, of which each rank has its own.
-    fn twists_of_all(
-        &self,
-        problem: &Problem<D>,
-        space: &SurfaceSpace<'a, D>,
-        velocity: &[f64],
-    ) -> Vec<Twist<D>> {
-        let (all, n) = (self.shared.bodies.balls().len(), rigid::<D>());
-        if all == 0 {
-            return Vec::new();
-        }
-        let mut numbers = vec![0.0; all * n];
-        for &body in &space.own_bodies {
-            let twist = problem.system.space.twist(velocity, body as usize);
-            let own = &mut numbers[self.bodies.ids[body as usize] as usize * n..][..n];
-            own[..D].copy_from_slice(twist.velocity.as_slice());
-            own[D..].copy_from_slice(Dim::<D>::spin_slice(&twist.spin));
-        }
-        space.ranks.sum(&mut numbers);
-        let twist = |numbers: &[f64]| {
-            let mut twist = Twist::default();
-            twist.velocity.copy_from_slice(&numbers[..D]);
-            (D..n).for_each(|k| twist.spin[k - D] = numbers[k]);
-            twist
-        };
-        numbers.chunks_exact(n).map(twist).collect()
     }
 }
 

@@ -192,5 +192,8 @@ where
         vector::convert(1.0, own_load, wide);
         vector::residual_from_product(ru, wide);
         cycle.apply(space, wide, zu);
+        let twists = zu[space.level.owned_nodal_dim()..].chunks_exact_mut(rigid::<D>());
+        let held = twists.zip(&space.own_bodies).filter(|(_, body)| system.space.is_held(**body as usize));
+        held.for_each(|(twist, _)| twist.fill(0.0));
     }
 }

@@ -47,7 +47,7 @@ impl<const D: usize> NearBodies<D> {
     }
 
     /// The bodies whose twists belong to this rank, by their places.
-    fn owned(&self, rank: usize) -> Vec<u32> {
+    pub fn owned(&self, rank: usize) -> Vec<u32> {
         (0..self.ids.len() as u32).filter(|&place| self.owners[place as usize] == rank).collect()
     }
 }

@@ -86,8 +86,14 @@ fn check(case: &Case) -> Result<(), RunError> {
             "a box that is sheared for ever, but by unfitted",
         ),
         (case.flow.solver == Solver::Direct, "the direct solver"),
-        (case.gives_motions(), "particles that are held or driven"),
-        (case.body_force.is_some(), "a force on the fluid"),
+        (
+            case.gives_motions() && case.flow.formulation != Formulation::Unfitted,
+            "particles that are held or driven, but by unfitted",
+        ),
+        (
+            case.body_force.is_some() && case.flow.formulation != Formulation::Unfitted,
+            "a force on the fluid, but by unfitted",
+        ),
     ];
     match refused.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, what)) => Err(RunError::NotShared { what }),
@@ -113,6 +119,8 @@ where
         formulation: flow_params::<D>(case).formulation,
         radii: case.particles.iter().map(|particle| particle.radius).collect(),
         wrenches: case.wrenches(),
+        given: case.given_twists(),
+        force_density: case.force_density(),
         shear_rate: case.shear_rate,
     })
 }

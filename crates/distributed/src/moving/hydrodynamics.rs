@@ -1,0 +1,191 @@
+//! The flow that ranks share as [`Hydrodynamics`].
+
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces};
+use gluey_parallel::Communicator;
+use gluey_stokes::{Formulation, Lubrication};
+
+use super::told::{Order, Told};
+use super::{Suspension, SuspensionError};
+use crate::flow::MyFlow;
+
+/// The flow of a suspension as a model of how its particles move.
+pub struct SharedHydrodynamics<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    suspension: &'a Suspension<D>,
+    ranks: &'a dyn Communicator,
+    told: Told<D>,
+    /// Whether others follow and are to be told of the end.
+    leads: bool,
+    /// Whether a prediction has begun and not ended.
+    is_predicting: bool,
+    /// Of the last prediction, if it succeeded.
+    last: Option<MyFlow<D>>,
+    statistics: FlowStatistics,
+}
+
+impl<'a, const D: usize> SharedHydrodynamics<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// For ranks that all make the same predictions.
+    pub fn beside(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+        let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
+        Self { suspension, ranks, told, leads: false, is_predicting: false, last: None, statistics }
+    }
+
+    /// For rank zero, while the others [`Suspension::follow`].
+    pub fn leading(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+        let mut new = Self::beside(suspension, ranks);
+        new.leads = true;
+        new
+    }
+}
+
+impl<const D: usize> SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity of the image at a film beyond that of its particle.
+    fn slide(&self, film: &gluey_stokes::Film<D>) -> Vector<D> {
+        let mut slide = Vector::zeros();
+        if let (true, Some(second)) = (self.suspension.is_sheared(), film.side(1)) {
+            let places = &self.told.positions;
+            let direct = places[second][1] - places[film.body as usize][1];
+            slide[0] = self.suspension.shear_rate * self.told.shear_factor * (film.branch()[1] - direct);
+        }
+        slide
+    }
+}
+
+impl<const D: usize> Drop for SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn drop(&mut self) {
+        // A rank that panics ends the others anyhow.
+        if std::thread::panicking() {
+            return;
+        }
+        assert!(!self.is_predicting, "a flow that other ranks share was broken off");
+        if self.leads {
+            Order::End.share(self.ranks);
+        }
+    }
+}
+
+impl<const D: usize> Hydrodynamics<D> for SharedHydrodynamics<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    type Error = SuspensionError;
+
+    fn predict(
+        &mut self,
+        _t: f64,
+        particles: &[Particle<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), SuspensionError> {
+        let Self { suspension, ranks, told, .. } = self;
+        let places = particles.iter().map(|particle| particle.pose.position);
+        told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
+        self.is_predicting = true;
+        Order::Predict.share(*ranks);
+        told.share(*ranks);
+        self.last = None;
+        let start = std::time::Instant::now();
+        let flow = suspension.solve_as_told(*ranks, told);
+        self.is_predicting = false;
+        let flow = flow?;
+        // Those that are given without the rounding of what the flow is relative to.
+        for (index, (twist, found)) in twists.iter_mut().zip(&flow.twists).enumerate() {
+            *twist = suspension.given_twist(index, told.shear_factor).unwrap_or(*found);
+        }
+        self.statistics = FlowStatistics {
+            cell_count: flow.cell_count,
+            dof_count: flow.dof_count,
+            solve_count: 1,
+            iteration_count: flow.iterations,
+            residual: flow.relative_residual,
+            phases: vec![("shared flow", start.elapsed().as_secs_f64())],
+        };
+        self.last = Some(flow);
+        Ok(())
+    }
+
+    fn set_shear_factor(&mut self, factor: f64) {
+        self.told.shear_factor = factor;
+    }
+
+    fn set_strain(&mut self, strain: f64, with_stress: bool) {
+        if self.suspension.is_sheared() {
+            (self.told.strain, self.told.with_stress) = (strain, with_stress);
+        }
+    }
+
+    fn stress(&self) -> Option<MeanStress<D>> {
+        let stress = self.last.as_ref()?.stress.as_ref()?;
+        let volume = self.suspension.domain.extent().product();
+        Some(MeanStress {
+            rate: self.suspension.shear_rate * self.told.shear_factor,
+            viscosity: self.suspension.flow.viscosity,
+            of_bodies: stress.of_bodies(volume),
+            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            of_contacts: None,
+            of_repulsion: Matrix::zeros(),
+            dissipation: stress.dissipation / volume,
+        })
+    }
+
+    fn holding(&self) -> Option<Holding<D>> {
+        let (flow, given) = (self.last.as_ref()?, &self.suspension.given);
+        let held = given.iter().enumerate().filter(|(_, given)| given.is_some());
+        let density = self.suspension.force_density.unwrap_or_else(Vector::zeros);
+        Some(Holding {
+            mean_velocity: flow.mean_velocity?,
+            force_density: flow.mean_force + density,
+            wrenches: held.map(|(k, _)| (k, flow.wrenches[k] - self.told.wrenches[k])).collect(),
+        })
+    }
+
+    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
+        self.told.wrenches = Told::new(self.suspension).wrenches;
+        for (acting, more) in self.told.wrenches.iter_mut().zip(wrenches) {
+            acting.force += more.force;
+            acting.torque += more.torque;
+        }
+        Ok(())
+    }
+
+    fn films(&self, reach: f64) -> Vec<Film<D>> {
+        let lubrication = Lubrication::Deficit;
+        if self.last.is_none() || self.suspension.formulation != (Formulation::Unfitted { lubrication }) {
+            return Vec::new();
+        }
+        let (balls, domain) = (self.suspension.balls(&self.told), &self.suspension.domain);
+        let mut films = gluey_stokes::films(&balls, domain, reach);
+        films.retain(|film| !film.is_across_flow());
+        let is_held = |body: usize| self.suspension.given.get(body).is_some_and(Option::is_some);
+        let film = |film: gluey_stokes::Film<D>| Film {
+            first: film.body as usize,
+            second: film.side(1),
+            branch: film.branch(),
+            slide: self.slide(&film),
+            is_held: [0, 1].map(|side| film.side(side).is_some_and(is_held)),
+            gap: film.gap,
+            curvature_radius: film.curvature_radius(),
+        };
+        films.into_iter().map(film).collect()
+    }
+
+    fn statistics(&self) -> FlowStatistics {
+        self.statistics.clone()
+    }
+
+    /// Those in the cells of this rank.
+    fn fields(&self) -> Option<Fields<D>> {
+        self.last.as_ref().map(|flow| self.suspension.fields(flow, &self.told))
+    }
+}

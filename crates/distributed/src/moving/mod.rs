@@ -1,0 +1,293 @@
+//! The flow around particles that move, step after step, on ranks.
+//!
+//! Ranks share the flow. What is small is not shared: where particles are, how they move, which of them
+//! touch. Rank zero leads: it knows when a flow is wanted and tells the others where the particles are. The
+//! others follow, or do the same work on their particles beside it; what rank zero says holds.
+
+mod hydrodynamics;
+mod told;
+
+pub use hydrodynamics::SharedHydrodynamics;
+pub use told::{FrameName, ask_for_fields};
+
+use gluey_fem::{ImplicitTree, MeshError};
+use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Twist, Vector, Wrench};
+use gluey_levelset::{Ball, BallTree};
+use gluey_motion::Fields;
+use gluey_parallel::Communicator;
+use gluey_stokes::{Conditions, CutCellPressures, Field, Formulation, GivenOf, Refinement};
+
+use crate::cuts::{cuts_of_work, cuts_of_work_at_surfaces};
+use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
+use crate::surface::SurfaceBodies;
+use told::{Order, Told};
+
+/// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls, or far away where it has
+/// none: then its images in `y` slide along each other.
+#[derive(Clone, Debug)]
+pub struct Suspension<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Fluid and tolerance.
+    pub flow: BoxFlow,
+    /// The box.
+    pub domain: Aabb<D>,
+    /// Cells along its edges before any is refined.
+    pub roots: [u32; D],
+    /// Periods along its axes, where it has some. Without walls it is sheared for ever, by `unfitted` only.
+    pub periods: [Option<f64>; D],
+    /// How the mesh follows the particles.
+    pub refinement: Refinement,
+    /// How rigidity is imposed: `rigid-dofs` with aggregated pressures, or `unfitted`.
+    pub formulation: Formulation,
+    /// Radii of the particles.
+    pub radii: Vec<f64>,
+    /// Forces and torques on them, or no entries for none on any.
+    pub wrenches: Vec<Wrench<D>>,
+    /// Motions of the particles that are held or driven while the shear is not reversed, or no entries where
+    /// all are free; by `unfitted` only.
+    pub given: Vec<Option<Twist<D>>>,
+    /// Force per unit of volume on fluid and particles, between walls or where particles are held; by
+    /// `unfitted` only. Where particles are held in a box without walls and it is not given, it is what stops
+    /// the mean flow.
+    pub force_density: Option<Vector<D>>,
+    /// The shear rate.
+    pub shear_rate: f64,
+}
+
+/// Why there is no flow around the particles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SuspensionError {
+    /// The box has no mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The flow failed, on all ranks.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// Ranks have it not.
+    #[error(
+        "ranks share flows of `unfitted`, and of `rigid-dofs` with aggregated pressures around free particles \
+         between walls, without a force on the fluid, only"
+    )]
+    Formulation,
+}
+
+/// Solves for a flow under some conditions.
+type Solve<'s, const D: usize> = dyn FnMut(&Conditions<'_, D>) -> Result<MyFlow<D>, FlowError> + 's;
+
+impl<const D: usize> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow around particles at these places, under these forces and torques, with this multiple of the
+    /// shear. All ranks call this with the same numbers.
+    ///
+    /// # Errors
+    /// [`SuspensionError`], on all ranks.
+    pub fn solve(
+        &self,
+        ranks: &dyn Communicator,
+        positions: &[Vector<D>],
+        wrenches: &[Wrench<D>],
+        shear_factor: f64,
+    ) -> Result<MyFlow<D>, SuspensionError> {
+        let told = Told { positions: positions.to_vec(), wrenches: wrenches.to_vec(), ..Told::new(self) };
+        self.solve_as_told(ranks, &Told { shear_factor, ..told })
+    }
+
+    /// Whether the box has no walls.
+    fn is_sheared(&self) -> bool {
+        self.periods.iter().all(Option::is_some)
+    }
+
+    fn solve_as_told(&self, ranks: &dyn Communicator, told: &Told<D>) -> Result<MyFlow<D>, SuspensionError> {
+        let balls = self.balls(told);
+        let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
+        let tree_of_balls = BallTree::new(&balls);
+        let wants =
+            |lower: &Vector<D>, h: f64, level: u8| self.refinement.wants(lower, h, level, &tree_of_balls);
+        let periodic = self.periods.map(|period| period.is_some());
+        let tree = |depth: u8| {
+            let tree = ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants)?;
+            Ok::<_, MeshError>(tree.sheared(shear))
+        };
+        let deepest = self.refinement.deepest();
+        let mut whole = tree(deepest)?;
+        let cuts_of = |tree: &ImplicitTree<'_, D>| match self.formulation {
+            Formulation::Unfitted { .. } => cuts_of_work_at_surfaces(tree, &tree_of_balls, ranks),
+            _ => cuts_of_work(tree, &tree_of_balls, ranks),
+        };
+        let mut cuts = cuts_of(&whole);
+        let used = finest_level(&mut whole, &cuts.of(ranks.rank()), ranks);
+        if used < deepest {
+            // Cells as deep as gaps might ask for are not there: the lattice is that of the finest there are.
+            whole = tree(used)?;
+            cuts = cuts_of(&whole);
+        }
+        let shear = self.undisturbed(told.shear_factor);
+        let (balls, wrenches) = (&balls, &told.wrenches[..]);
+        Ok(match self.formulation {
+            Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate }
+                if !self.is_sheared() && self.force_density.is_none() && self.given.is_empty() =>
+            {
+                let bodies = RigidBodies { balls, offset, wrenches };
+                self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?
+            }
+            Formulation::Unfitted { lubrication } => {
+                let bodies = SurfaceBodies { balls, lubrication };
+                let mut solve = |conditions: &Conditions<'_, D>| {
+                    self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, conditions)
+                };
+                match self.is_sheared() {
+                    true => self.sheared(told, &mut solve)?,
+                    false => self.between_walls(told, &shear, &mut solve)?,
+                }
+            }
+            _ => return Err(SuspensionError::Formulation),
+        })
+    }
+
+    /// The motion that is given to a particle now.
+    fn given_twist(&self, particle: usize, shear_factor: f64) -> Option<Twist<D>> {
+        self.given.get(particle).copied().flatten().map(|twist| twist * shear_factor)
+    }
+
+    /// What is known of each particle in a flow relative to one that moves with `undisturbed` at its centre;
+    /// no entries where all are free.
+    fn given_bodies(&self, told: &Told<D>, undisturbed: impl Fn(&Vector<D>) -> Twist<D>) -> Vec<GivenOf<D>> {
+        let of = |(particle, place): (usize, &Vector<D>)| {
+            let given = self.given_twist(particle, told.shear_factor);
+            given.map_or_else(
+                || GivenOf::Wrench(told.wrenches[particle]),
+                |twist| GivenOf::Twist(twist - undisturbed(place)),
+            )
+        };
+        match self.given.is_empty() {
+            true => Vec::new(),
+            false => told.positions.iter().enumerate().map(of).collect(),
+        }
+    }
+
+    /// The flow in a box with walls or Couette flow around.
+    fn between_walls(
+        &self,
+        told: &Told<D>,
+        shear: Field<'_, D>,
+        solve: &mut Solve<'_, D>,
+    ) -> Result<MyFlow<D>, FlowError> {
+        let given = self.given_bodies(told, |_| Twist::default());
+        let density = self.force_density.unwrap_or_else(Vector::zeros);
+        let uniform = move |_: &Vector<D>| density;
+        let conditions = match given[..] {
+            [] => Conditions::boundary(shear).with_wrenches(&told.wrenches),
+            _ => Conditions::boundary(shear).with_bodies(&given),
+        };
+        let force: Option<Field<'_, D>> = if density.norm() > 0.0 { Some(&uniform) } else { None };
+        solve(&conditions.with_force(force))
+    }
+
+    /// The flow in a box that is sheared for ever, with the motions in space. Where all particles are free,
+    /// what acts on them is balanced by a uniform force on all of the box; forces between them have no sum.
+    /// Where some are held, these carry all of it.
+    fn sheared(&self, told: &Told<D>, solve: &mut Solve<'_, D>) -> Result<MyFlow<D>, FlowError> {
+        let (mut gradient, shear) = (Matrix::<D>::zeros(), self.undisturbed(told.shear_factor));
+        gradient[(0, 1)] = self.shear_rate * told.shear_factor;
+        let undisturbed = |place: &Vector<D>| {
+            let mut twist = Twist { velocity: shear(place), ..Twist::default() };
+            // About z, the only axis in 2D and the last one in 3D.
+            twist.spin[Dim::<D>::ROT - 1] = -0.5 * gradient[(0, 1)];
+            twist
+        };
+        let given = self.given_bodies(told, undisturbed);
+        let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
+        let back = match given[..] {
+            [] => -total / self.domain.extent().product(),
+            _ => self.force_density.unwrap_or_else(Vector::zeros),
+        };
+        let uniform = move |_: &Vector<D>| back;
+        let conditions = Conditions::in_linear_flow(&gradient);
+        let conditions = match given[..] {
+            [] => Conditions { stress: told.with_stress, ..conditions.with_wrenches(&told.wrenches) },
+            _ if self.force_density.is_none() => conditions.with_bodies(&given).without_mean_flow(),
+            _ => conditions.with_bodies(&given),
+        };
+        let conditions = if back.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let mut flow = solve(&conditions)?;
+        for (twist, place) in flow.twists.iter_mut().zip(&told.positions) {
+            *twist = *twist + undisturbed(place);
+        }
+        Ok(flow)
+    }
+
+    /// The undisturbed velocity.
+    fn undisturbed(&self, shear_factor: f64) -> impl Fn(&Vector<D>) -> Vector<D> + use<D> {
+        let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
+        move |x| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 })
+    }
+
+    fn balls(&self, told: &Told<D>) -> Vec<Ball<D>> {
+        let height = self.periods[1].unwrap_or(0.0);
+        let lattice = Lattice::new(self.periods).tilted(told.strain * height);
+        let origin = self.domain.lower[1];
+        let ball = |(place, &radius): (&Vector<D>, &f64)| Ball::in_space(place, radius, &lattice, origin);
+        told.positions.iter().zip(&self.radii).map(ball).collect()
+    }
+
+    /// The fields of a flow in the cells of a rank, in space.
+    fn fields(&self, flow: &MyFlow<D>, told: &Told<D>) -> Fields<D> {
+        let mut fields = flow.fields(&self.balls(told));
+        if self.is_sheared() {
+            let shear = flow.shear();
+            let undisturbed = self.undisturbed(told.shear_factor);
+            for (point, velocity) in fields.points.iter_mut().zip(&mut fields.velocity) {
+                point[0] += shear * (point[1] - self.domain.lower[1]);
+                *velocity += undisturbed(point);
+            }
+        }
+        fields
+    }
+
+    /// Does what rank zero asks for with its [`SharedHydrodynamics::leading`], until that ends. All other
+    /// ranks call this.
+    pub fn follow(&self, ranks: &dyn Communicator) {
+        self.follow_and_show(ranks, &mut |_, _| {});
+    }
+
+    /// The same, and hands `show` the fields in the cells of this rank when rank zero [asks](ask_for_fields)
+    /// for them: none if there is no flow.
+    pub fn follow_and_show(
+        &self,
+        ranks: &dyn Communicator,
+        show: &mut dyn FnMut(FrameName, Option<Fields<D>>),
+    ) {
+        let (mut told, mut last) = (Told::new(self), None::<MyFlow<D>>);
+        loop {
+            match Order::End.share(ranks) {
+                Order::End => return,
+                Order::Predict => {
+                    told.share(ranks);
+                    // Its memory is free for the next.
+                    drop(last.take());
+                    // An error is one on all ranks: rank zero says what it is.
+                    last = self.solve_as_told(ranks, &told).ok();
+                }
+                Order::Show(frame) => {
+                    show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));
+                }
+            }
+        }
+    }
+}
+
+/// Level of the smallest leaves of all ranks.
+fn finest_level<const D: usize>(
+    tree: &mut ImplicitTree<'_, D>,
+    own: &std::ops::Range<u64>,
+    ranks: &dyn Communicator,
+) -> u8 {
+    let mut finest = 0;
+    let depth = tree.max_level();
+    tree.for_each_leaf(depth, own, |leaf| finest = finest.max(leaf.level));
+    ranks.all_gather(&[u64::from(finest)]).into_iter().max().map_or(0, |level| level as u8)
+}

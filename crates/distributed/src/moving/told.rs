@@ -1,0 +1,97 @@
+//! What rank zero tells the others between two flows.
+
+use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_parallel::Communicator;
+
+use super::Suspension;
+
+/// A frame with the fields of the last flow that rank zero wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameName {
+    /// Which of several streams of frames it belongs to.
+    pub stream: u32,
+    /// Its step.
+    pub step: u32,
+}
+
+/// What rank zero wants of the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Order {
+    End,
+    Predict,
+    Show(FrameName),
+}
+
+impl Order {
+    /// What rank zero wants, on all ranks.
+    pub fn share(self, ranks: &dyn Communicator) -> Self {
+        let mut numbers = match self {
+            Self::End => [0.0; 3],
+            Self::Predict => [1.0, 0.0, 0.0],
+            Self::Show(FrameName { stream, step }) => [2.0, f64::from(stream), f64::from(step)],
+        };
+        ranks.share(&mut numbers);
+        let [order, stream, step] = numbers.map(|number| number as u32);
+        match order {
+            0 => Self::End,
+            1 => Self::Predict,
+            _ => Self::Show(FrameName { stream, step }),
+        }
+    }
+}
+
+/// For rank zero between two flows: has the others, who [`Suspension::follow_and_show`], show the fields of
+/// the last one.
+pub fn ask_for_fields(ranks: &dyn Communicator, frame: FrameName) {
+    Order::Show(frame).share(ranks);
+}
+
+/// What rank zero tells the others.
+#[derive(Clone, Debug)]
+pub(super) struct Told<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub positions: Vec<Vector<D>>,
+    pub wrenches: Vec<Wrench<D>>,
+    pub shear_factor: f64,
+    /// Of the images in a box without walls.
+    pub strain: f64,
+    pub with_stress: bool,
+}
+
+impl<const D: usize> Told<D>
+where
+    Dim<D>: Space<D>,
+{
+    pub fn new(suspension: &Suspension<D>) -> Self {
+        let count = suspension.radii.len();
+        let wrenches = match suspension.wrenches.len() {
+            0 => vec![Wrench::default(); count],
+            _ => suspension.wrenches.clone(),
+        };
+        let positions = vec![Vector::zeros(); count];
+        Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress: false }
+    }
+
+    /// Replaces all by what rank zero says.
+    pub fn share(&mut self, ranks: &dyn Communicator) {
+        let mut numbers = vec![self.shear_factor, self.strain, f64::from(u8::from(self.with_stress))];
+        numbers.extend(self.positions.iter().flatten());
+        for wrench in &self.wrenches {
+            numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
+        }
+        ranks.share(&mut numbers);
+        let mut told = numbers.into_iter();
+        let mut next = || told.next().unwrap_or_default();
+        [self.shear_factor, self.strain] = [next(), next()];
+        self.with_stress = next() > 0.0;
+        for position in &mut self.positions {
+            position.iter_mut().for_each(|x| *x = next());
+        }
+        for wrench in &mut self.wrenches {
+            wrench.force.iter_mut().for_each(|f| *f = next());
+            (0..Dim::<D>::ROT).for_each(|k| wrench.torque[k] = next());
+        }
+    }
+}
