@@ -26,8 +26,8 @@
 //! ```
 //!
 //! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
-//! (`docs/decisions/0036-surfaces-on-ranks.md`). Not for bodies that are held, or viscosities that vary;
-//! boxes without a wall for `unfitted` only.
+//! (`docs/decisions/0036-surfaces-on-ranks.md`); held bodies, forces on the fluid and boxes without a wall
+//! are for these only. Not for viscosities that vary.
 
 mod agreement;
 mod bodies;

@@ -37,6 +37,7 @@ where
         given: Vec::new(),
         force_density: None,
         shear_rate: RATE,
+        shear_stress: None,
     }
 }
 

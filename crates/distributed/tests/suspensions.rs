@@ -48,6 +48,7 @@ where
             given: Vec::new(),
             force_density: None,
             shear_rate: 1.0,
+            shear_stress: None,
         }
     }
 

@@ -23,6 +23,8 @@ where
     is_predicting: bool,
     /// Of the last prediction, if it succeeded.
     last: Option<MyFlow<D>>,
+    /// Of the last flow where the stress is given, positive also while the shear is reversed.
+    rate: f64,
     statistics: FlowStatistics,
 }
 
@@ -33,7 +35,16 @@ where
     /// For ranks that all make the same predictions.
     pub fn beside(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
         let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
-        Self { suspension, ranks, told, leads: false, is_predicting: false, last: None, statistics }
+        Self {
+            suspension,
+            ranks,
+            told,
+            leads: false,
+            is_predicting: false,
+            last: None,
+            rate: 1.0,
+            statistics,
+        }
     }
 
     /// For rank zero, while the others [`Suspension::follow`].
@@ -98,7 +109,8 @@ where
         let start = std::time::Instant::now();
         let flow = suspension.solve_as_told(*ranks, told);
         self.is_predicting = false;
-        let flow = flow?;
+        let (flow, rate) = flow?;
+        self.rate = rate;
         // Those that are given without the rounding of what the flow is relative to.
         for (index, (twist, found)) in twists.iter_mut().zip(&flow.twists).enumerate() {
             *twist = suspension.given_twist(index, told.shear_factor).unwrap_or(*found);
@@ -126,7 +138,7 @@ where
     }
 
     fn stress(&self) -> Option<MeanStress<D>> {
-        let stress = self.last.as_ref()?.stress.as_ref()?;
+        let stress = self.last.as_ref()?.stress.as_ref().filter(|_| self.told.with_stress)?;
         let volume = self.suspension.domain.extent().product();
         Some(MeanStress {
             rate: self.suspension.shear_rate * self.told.shear_factor,
@@ -137,6 +149,14 @@ where
             of_repulsion: Matrix::zeros(),
             dissipation: stress.dissipation / volume,
         })
+    }
+
+    fn set_pair_stress(&mut self, stress: &Matrix<D>) {
+        self.told.pair_stress = stress[(0, 1)];
+    }
+
+    fn clock_rate(&self) -> f64 {
+        self.rate
     }
 
     fn holding(&self) -> Option<Holding<D>> {

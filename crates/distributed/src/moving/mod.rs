@@ -52,8 +52,10 @@ where
     /// `unfitted` only. Where particles are held in a box without walls and it is not given, it is what stops
     /// the mean flow.
     pub force_density: Option<Vector<D>>,
-    /// The shear rate.
+    /// The shear rate; where the stress is given, one or minus one.
     pub shear_rate: f64,
+    /// The shear stress that is given in place of the rate, in a box without walls around free particles.
+    pub shear_stress: Option<f64>,
 }
 
 /// Why there is no flow around the particles.
@@ -71,6 +73,17 @@ pub enum SuspensionError {
          between walls, without a force on the fluid, only"
     )]
     Formulation,
+    /// The forces between particles drive them faster than the stress that is given.
+    #[error(
+        "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
+         {at_rest:.6}; take a larger stress or less repulsion"
+    )]
+    NotDriven {
+        /// The stress that is given.
+        stress: f64,
+        /// That at rest.
+        at_rest: f64,
+    },
 }
 
 /// Solves for a flow under some conditions.
@@ -93,7 +106,7 @@ where
         shear_factor: f64,
     ) -> Result<MyFlow<D>, SuspensionError> {
         let told = Told { positions: positions.to_vec(), wrenches: wrenches.to_vec(), ..Told::new(self) };
-        self.solve_as_told(ranks, &Told { shear_factor, ..told })
+        Ok(self.solve_as_told(ranks, &Told { shear_factor, ..told })?.0)
     }
 
     /// Whether the box has no walls.
@@ -101,7 +114,12 @@ where
         self.periods.iter().all(Option::is_some)
     }
 
-    fn solve_as_told(&self, ranks: &dyn Communicator, told: &Told<D>) -> Result<MyFlow<D>, SuspensionError> {
+    /// The flow, and where the stress is given the rate by which it is to be multiplied.
+    fn solve_as_told(
+        &self,
+        ranks: &dyn Communicator,
+        told: &Told<D>,
+    ) -> Result<(MyFlow<D>, f64), SuspensionError> {
         let balls = self.balls(told);
         let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
         let tree_of_balls = BallTree::new(&balls);
@@ -127,7 +145,7 @@ where
         }
         let shear = self.undisturbed(told.shear_factor);
         let (balls, wrenches) = (&balls, &told.wrenches[..]);
-        Ok(match self.formulation {
+        let flow = match self.formulation {
             Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate }
                 if !self.is_sheared() && self.force_density.is_none() && self.given.is_empty() =>
             {
@@ -139,13 +157,15 @@ where
                 let mut solve = |conditions: &Conditions<'_, D>| {
                     self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, conditions)
                 };
-                match self.is_sheared() {
-                    true => self.sheared(told, &mut solve)?,
-                    false => self.between_walls(told, &shear, &mut solve)?,
+                match (self.is_sheared(), self.shear_stress) {
+                    (true, Some(stress)) => return self.at_stress(stress, told, &mut solve),
+                    (true, None) => self.sheared(told, &mut solve)?,
+                    (false, _) => self.between_walls(told, &shear, &mut solve)?,
                 }
             }
             _ => return Err(SuspensionError::Formulation),
-        })
+        };
+        Ok((flow, 1.0))
     }
 
     /// The motion that is given to a particle now.
@@ -220,6 +240,37 @@ where
         Ok(flow)
     }
 
+    /// The flow at the shear stress that is given, its velocities by the strain, and its rate: the stress is
+    /// `r A + B`, `A` of the flow at the rate one and `B` of the forces between particles at rest.
+    fn at_stress(
+        &self,
+        stress: f64,
+        told: &Told<D>,
+        solve: &mut Solve<'_, D>,
+    ) -> Result<(MyFlow<D>, f64), SuspensionError> {
+        let direction = self.shear_rate * told.shear_factor;
+        let volume = self.domain.extent().product();
+        let of_bodies =
+            |flow: &MyFlow<D>| flow.stress.as_ref().map_or(0.0, |stress| stress.of_bodies(volume)[(0, 1)]);
+        let wrenches = vec![Wrench::default(); told.wrenches.len()];
+        let without = Told { wrenches, with_stress: true, ..told.clone() };
+        let flow = self.sheared(&without, solve)?;
+        let at_rate_one = self.flow.viscosity * direction + of_bodies(&flow);
+        if told.wrenches.iter().all(|wrench| wrench.force.amax() == 0.0) {
+            return Ok((flow, direction * stress / at_rate_one));
+        }
+        let pushed = solve(&Conditions::at_rest().with_wrenches(&told.wrenches).with_stress())?;
+        let at_rest = told.pair_stress + of_bodies(&pushed);
+        let rate = (direction * stress - at_rest) / at_rate_one;
+        if rate <= 0.0 || rate.is_nan() {
+            return Err(SuspensionError::NotDriven { stress, at_rest: direction * at_rest });
+        }
+        let wrenches = told.wrenches.iter().map(|wrench| *wrench * rate.recip()).collect();
+        let mut both = self.sheared(&Told { wrenches, with_stress: true, ..told.clone() }, solve)?;
+        both.iterations += flow.iterations + pushed.iterations;
+        Ok((both, rate))
+    }
+
     /// The undisturbed velocity.
     fn undisturbed(&self, shear_factor: f64) -> impl Fn(&Vector<D>) -> Vector<D> + use<D> {
         let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
@@ -270,7 +321,7 @@ where
                     // Its memory is free for the next.
                     drop(last.take());
                     // An error is one on all ranks: rank zero says what it is.
-                    last = self.solve_as_told(ranks, &told).ok();
+                    last = self.solve_as_told(ranks, &told).ok().map(|(flow, _)| flow);
                 }
                 Order::Show(frame) => {
                     show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));

@@ -58,6 +58,8 @@ where
     /// Of the images in a box without walls.
     pub strain: f64,
     pub with_stress: bool,
+    /// Shear stress of the forces between particles themselves, where the stress is given.
+    pub pair_stress: f64,
 }
 
 impl<const D: usize> Told<D>
@@ -71,12 +73,14 @@ where
             _ => suspension.wrenches.clone(),
         };
         let positions = vec![Vector::zeros(); count];
-        Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress: false }
+        let (with_stress, pair_stress) = (false, 0.0);
+        Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress, pair_stress }
     }
 
     /// Replaces all by what rank zero says.
     pub fn share(&mut self, ranks: &dyn Communicator) {
-        let mut numbers = vec![self.shear_factor, self.strain, f64::from(u8::from(self.with_stress))];
+        let with_stress = f64::from(u8::from(self.with_stress));
+        let mut numbers = vec![self.shear_factor, self.strain, self.pair_stress, with_stress];
         numbers.extend(self.positions.iter().flatten());
         for wrench in &self.wrenches {
             numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
@@ -84,7 +88,7 @@ where
         ranks.share(&mut numbers);
         let mut told = numbers.into_iter();
         let mut next = || told.next().unwrap_or_default();
-        [self.shear_factor, self.strain] = [next(), next()];
+        [self.shear_factor, self.strain, self.pair_stress] = [next(), next(), next()];
         self.with_stress = next() > 0.0;
         for position in &mut self.positions {
             position.iter_mut().for_each(|x| *x = next());

@@ -80,7 +80,6 @@ fn check(case: &Case) -> Result<(), RunError> {
     let refused = [
         (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
         (case.flow.formulation == Formulation::Paper, "the formulation paper"),
-        (case.shear_stress.is_some(), "a shear stress that is given"),
         (
             case.is_sheared() && case.flow.formulation != Formulation::Unfitted,
             "a box that is sheared for ever, but by unfitted",
@@ -122,5 +121,6 @@ where
         given: case.given_twists(),
         force_density: case.force_density(),
         shear_rate: case.shear_rate,
+        shear_stress: case.shear_stress,
     })
 }
