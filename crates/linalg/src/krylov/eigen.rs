@@ -1,5 +1,7 @@
 //! A few eigenvalues of dense symmetric matrices of some tens of rows.
 
+use std::sync::LazyLock;
+
 use super::lanczos::Tridiagonal;
 use crate::dense::{BlockError, DenseSymmetric};
 
@@ -78,7 +80,8 @@ pub fn lowest_modes(matrix: &mut DenseSymmetric, bound: f64) -> Result<Vec<(f64,
     let dim = matrix.dim();
     matrix.eliminate(dim)?;
     let count = MODES.min(dim);
-    let mut x: Vec<[f64; MODES]> = (0..dim).map(start).collect();
+    let mut x: Vec<[f64; MODES]> = STARTS.iter().copied().take(dim).collect();
+    x.extend((x.len()..dim).map(start));
     for _ in 0..INVERSE_STEPS {
         matrix.solve(&mut x);
         orthonormalise(&mut x, count);
@@ -100,6 +103,10 @@ pub fn lowest_modes(matrix: &mut DenseSymmetric, bound: f64) -> Result<Vec<(f64,
     };
     Ok(found.into_iter().map(mode).collect())
 }
+
+/// Rows of the vectors with which the iteration begins that are kept: a root and what it reaches have fewer.
+const KEPT: usize = 512;
+static STARTS: LazyLock<Vec<[f64; MODES]>> = LazyLock::new(|| (0..KEPT).map(start).collect());
 
 /// A row of the vectors with which the iteration begins.
 fn start(row: usize) -> [f64; MODES] {

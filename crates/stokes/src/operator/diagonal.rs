@@ -105,7 +105,7 @@ where
     Ok(nodal)
 }
 
-/// Inverses of `R^T A R` for every body, zero for those that are not active.
+/// Inverses of `R^T A R` for every body, zero for those that are not active or that no cell acts on.
 fn twist_blocks<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
@@ -122,6 +122,7 @@ where
     }
     let viscous = nalgebra::DMatrix::from_row_slice(n, n, &reference.viscous);
     let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
+    let mut is_touched = vec![false; space.body_count()];
     for cell in cells {
         let nodes = discretisation.velocity.cell(cell.cell as usize);
         let mut bodies: Vec<usize> =
@@ -139,12 +140,13 @@ where
             }
             let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
             let product = motion.transpose() * (&viscous * &motion) * cell.viscous;
+            is_touched[body] = true;
             blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
         }
     }
     let mut inverses = Vec::with_capacity(blocks.len() * rigid * rigid);
     for (body, mut block) in blocks.into_iter().enumerate() {
-        if !space.is_active(body) {
+        if !space.is_active(body) || !is_touched[body] {
             inverses.extend(std::iter::repeat_n(0f32, rigid * rigid));
             continue;
         }

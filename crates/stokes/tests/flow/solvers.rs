@@ -26,6 +26,18 @@ fn direct_and_multigrid_agree() {
     }
 }
 
+/// The finest cells lie in the gap between two discs; a third is away from them.
+#[test]
+fn a_body_that_the_finest_level_does_not_touch_is_no_obstacle() {
+    let mut discs = pair_at(Vector::<2>::new(0.403, 0.597), 0.2, 30.0);
+    discs.push(Ball::new(Vector::<2>::new(0.76, 0.24), RADIUS));
+    let [direct, multigrid] =
+        SOLVERS.map(|s| solve(params(RIGID, s, 1e-11), mesh(&resolved_gaps(6), &discs), &discs, &couette));
+    let difference = twist_distance(&direct.twists, &multigrid.twists);
+    let count = multigrid.iteration_count;
+    assert!(difference < 1e-8 && count <= 60, "{difference:e} in {count} iterations");
+}
+
 /// The two discs that nearly touch, on cells far larger than their gap.
 #[test]
 fn direct_and_multigrid_agree_on_the_doublet() {
