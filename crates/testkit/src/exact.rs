@@ -3,10 +3,12 @@
 mod inclusion;
 mod polynomial;
 mod sphere;
+mod sphere_pair;
 
 pub use inclusion::{InclusionViscosity, ViscousInclusion};
 pub use polynomial::{PolynomialFlow, WavyPressure};
 pub use sphere::{RigidSphere, ViscousSphere};
+pub use sphere_pair::{PairInStrain, PairStrain, pair_in_strain};
 
 use gluey_geom::{Matrix, Vector};
 

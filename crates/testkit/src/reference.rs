@@ -123,6 +123,12 @@ reference_table!(
     "pair2d_resistance.csv"
 );
 reference_table!(
+    /// Two equal spheres in unbounded fluid, by gap: `r_over_a, xi, A, B, one_minus_A, one_minus_B, C_rot`
+    /// (Batchelor and Green 1972).
+    sphere_pair_mobility,
+    "sphere_pair_mobility_unbounded.csv"
+);
+reference_table!(
     /// Square (0) and hexagonal (1) lattices of discs:
     /// `lattice, phi, gap_over_a, drag_F_over_muU, eta_axes_strain, eta_shear, rel_diff_drag`.
     lattices_of_discs,

@@ -28,7 +28,6 @@ mod norms;
 mod number;
 mod plot;
 mod set_up;
-mod sphere_pair;
 pub mod statistics;
 mod verdict;
 

@@ -5,13 +5,13 @@ use std::f64::consts::PI;
 use gluey_geom::{Aabb, Matrix, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
+use gluey_testkit::exact::{PairStrain, pair_in_strain};
 
 use crate::case::{Case, Extent, Tables, Task, VerifyError};
 use crate::method::Method;
 use crate::number::Number;
 use crate::plot::Plot;
 use crate::set_up::{level, mean_and_scatter, methods_in_sheared_boxes, shift, stress_of};
-use crate::sphere_pair::{Strain, pair_in_strain};
 use crate::statistics::rms;
 
 /// Radius in the unit box, which is periodic.
@@ -70,7 +70,7 @@ fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec
     let mut solver = FlowSolver::new(method.params::<3>(1e-8))?;
     let mut prepared = solver.prepared(mesh, &pair)?;
     let mut errors = Vec::new();
-    for strain in Strain::ALL {
+    for strain in PairStrain::ALL {
         let matrix: Matrix<3> = strain.matrix(&axes);
         let flow = prepared.solve(&Conditions::in_linear_flow(&matrix).with_stress())?;
         let sum = stress_of(&flow)?.of_bodies(1.0).dot(&matrix) / matrix.norm_squared();
