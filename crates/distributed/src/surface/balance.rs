@@ -3,12 +3,11 @@
 //! forces drive is the permeability.
 
 use gluey_fem::{Cuts, ImplicitTree};
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_parallel::Communicator;
 use gluey_stokes::{Conditions, GivenOf, StokesError};
 
 use super::SurfaceBodies;
-use super::conditions::held;
 use crate::flow::{BoxFlow, FlowError, MyFlow};
 
 impl BoxFlow {
@@ -28,7 +27,7 @@ impl BoxFlow {
     where
         Dim<D>: Space<D>,
     {
-        let held = held(conditions, around.balls.len());
+        let held = conditions.held(around.balls.len());
         if held.is_empty() || conditions.stress || tree.frame().periodic().contains(&false) {
             return Err(FlowError::Conditions);
         }
@@ -36,7 +35,7 @@ impl BoxFlow {
             self.solve_around_surfaces(around, tree, cuts, ranks, conditions)
         };
         let mut flow = solve(&Conditions { without_mean: false, ..*conditions })?;
-        let at_rest: Vec<GivenOf<D>> = held.into_iter().map(at_rest).collect();
+        let at_rest: Vec<GivenOf<D>> = held.into_iter().map(GivenOf::at_rest).collect();
         let (mut permeability, mut driven) = (Matrix::<D>::zeros(), Vec::new());
         for axis in 0..D {
             let unit = Vector::<D>::from_fn(|d, _| if d == axis { 1.0 } else { 0.0 });
@@ -58,12 +57,4 @@ impl BoxFlow {
         flow.mean_velocity = Some(mean + permeability * flow.mean_force);
         Ok(flow)
     }
-}
-
-/// A body that is held at rest, or free without forces.
-fn at_rest<const D: usize>(is_held: bool) -> GivenOf<D>
-where
-    Dim<D>: Space<D>,
-{
-    if is_held { GivenOf::Twist(Twist::default()) } else { GivenOf::Wrench(Wrench::default()) }
 }

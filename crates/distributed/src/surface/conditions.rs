@@ -24,19 +24,6 @@ where
     if found == bodies { Ok(()) } else { Err(FlowError::Count { found, bodies }) }
 }
 
-/// Which of so many bodies have motions that are given; no entries for none.
-pub(super) fn held<const D: usize>(conditions: &Conditions<'_, D>, bodies: usize) -> Vec<bool>
-where
-    Dim<D>: Space<D>,
-{
-    let held: Vec<bool> = match conditions.bodies {
-        Given::Wrenches(_) => Vec::new(),
-        Given::Twists(_) => vec![true; bodies],
-        Given::Each(each) => each.iter().map(|given| given.twist().is_some()).collect(),
-    };
-    if held.contains(&true) { held } else { Vec::new() }
-}
-
 /// What is known of the bodies near a part, for sums over ranks: wrenches of own bodies, motions of all.
 pub(super) fn given<const D: usize>(
     conditions: &Conditions<'_, D>,

@@ -31,7 +31,7 @@ use crate::cycle::VCycle;
 use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
 use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
-use conditions::{check_count, given, held};
+use conditions::{check_count, given};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
 use space::{NearBodies, SurfaceSpace, is_near_surface, owner_of_film};
@@ -97,7 +97,7 @@ impl BoxFlow {
         }
         let start = ranks.traffic();
         let bodies = BallTree::new(around.balls);
-        let held = held(conditions, around.balls.len());
+        let held = conditions.held(around.balls.len());
         let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset(), held: &held };
         let frame = tree.frame().clone();
         let spreads = |cell: &Cell<D>| is_near_surface(&frame, &bodies, cell);

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_linalg::vector;
 
 use super::conditions::{Conditions, GivenOf};
@@ -42,7 +42,7 @@ where
             return unsupported("stresses of flows without mean flow around held bodies");
         }
         let held = conditions.held(problem.bodies.len());
-        let at_rest: Vec<GivenOf<D>> = held.into_iter().map(at_rest).collect();
+        let at_rest: Vec<GivenOf<D>> = held.into_iter().map(GivenOf::at_rest).collect();
         let (mut permeability, mut driven, mut is_raised) = (Matrix::<D>::zeros(), Vec::new(), false);
         for axis in 0..D {
             let unit = Vector::<D>::from_fn(|d, _| if d == axis { 1.0 } else { 0.0 });
@@ -65,14 +65,6 @@ where
         flow.mean_velocity = Some(mean + permeability * flow.mean_force);
         Ok((flow, is_raised))
     }
-}
-
-/// A body that is held at rest, or free without forces.
-fn at_rest<const D: usize>(is_held: bool) -> GivenOf<D>
-where
-    Dim<D>: Space<D>,
-{
-    if is_held { GivenOf::Twist(Twist::default()) } else { GivenOf::Wrench(Wrench::default()) }
 }
 
 /// Adds a multiple of a flow around the same bodies on the same mesh.

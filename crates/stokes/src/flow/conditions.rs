@@ -64,6 +64,11 @@ impl<const D: usize> GivenOf<D>
 where
     Dim<D>: Space<D>,
 {
+    /// A body that is held at rest, or free without forces.
+    pub fn at_rest(is_held: bool) -> Self {
+        if is_held { Self::Twist(Twist::default()) } else { Self::Wrench(Wrench::default()) }
+    }
+
     /// The force and torque on a body that is free.
     pub fn wrench(&self) -> Option<Wrench<D>> {
         match self {
@@ -169,13 +174,14 @@ where
         }
     }
 
-    /// Which of so many bodies are held; no entries for none.
-    pub(super) fn held(&self, count: usize) -> Vec<bool> {
-        match self.bodies {
+    /// Which of so many bodies are held; no entries where all are free.
+    pub fn held(&self, count: usize) -> Vec<bool> {
+        let held: Vec<bool> = match self.bodies {
             Given::Wrenches(_) => Vec::new(),
             Given::Twists(_) => vec![true; count],
             Given::Each(bodies) => bodies.iter().map(|given| given.twist().is_some()).collect(),
-        }
+        };
+        if held.contains(&true) { held } else { Vec::new() }
     }
 
     /// The twists of the bodies that are held, unless all are free.
