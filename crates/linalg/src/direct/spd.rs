@@ -108,12 +108,8 @@ impl DirectSpd {
 
 impl Preconditioner<f64> for Substitution<'_> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        if !self.solver.factorised {
-            z.fill(f64::NAN);
-            return;
-        }
-        z.copy_from_slice(r);
-        substitute(&self.solver.symbolic, &self.solver.factor, &mut self.scratch, z);
+        let DirectSpd { symbolic, factor, factorised, .. } = self.solver;
+        answer(symbolic, factorised.then_some(factor), &mut self.scratch, (r, z));
     }
 }
 
@@ -121,12 +117,24 @@ impl Preconditioner<f64> for Substitution<'_> {
 /// factorisation the result is NaN, which every Krylov method here reports.
 impl Preconditioner<f64> for DirectSpd {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        if !self.factorised {
-            z.fill(f64::NAN);
-            return;
+        let Self { symbolic, factor, factorised, solve_scratch, .. } = self;
+        answer(symbolic, factorised.then_some(factor), solve_scratch, (r, z));
+    }
+}
+
+/// `z = (L L^T)^-1 r`, NaN without a factor.
+fn answer(
+    symbolic: &Symbolic,
+    factor: Option<&Vec<f64>>,
+    scratch: &mut Scratch,
+    (r, z): (&[f64], &mut [f64]),
+) {
+    match factor {
+        None => z.fill(f64::NAN),
+        Some(factor) => {
+            z.copy_from_slice(r);
+            substitute(symbolic, factor, scratch, z);
         }
-        z.copy_from_slice(r);
-        substitute(&self.symbolic, &self.factor, &mut self.solve_scratch, z);
     }
 }
 
