@@ -9,7 +9,7 @@ use std::io::IsTerminal;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Twist};
 use gluey_levelset::Ball;
-use gluey_linalg::{LinOp, vector};
+use gluey_linalg::{LinOp, parallel, vector};
 use gluey_stokes::{
     MultigridSolver, Problem, Refinement, SaddleSolver, SolveReport, StokesError, StokesSystem,
     SystemOperator,
@@ -146,7 +146,7 @@ where
 {
     let lift = problem.lift(&cases::couette);
     let b = problem.right_hand_side(&lift, options.case.force());
-    let mut x = vec![0.0; problem.system.dim()];
+    let mut x = parallel::filled(0.0, problem.system.dim());
     let stopwatch = Stopwatch::start();
     let report = solver.solve(&problem.system, &b, &mut x, options.tolerance)?;
     let times = stopwatch.stop();

@@ -67,6 +67,23 @@ pub fn for_each<T: Send>(x: &mut [T], work: impl Fn(usize, &mut [T]) + Sync) {
     x.par_chunks_mut(piece).enumerate().for_each(|(k, x)| work(k * piece, x));
 }
 
+/// Bytes from which memory comes from the system page by page.
+const OF_THE_SYSTEM: usize = 1 << 17;
+
+/// A vector of equal entries, as `vec![value; len]`, whose memory has been written, by the threads.
+///
+/// A vector of zeros fresh from the system is no memory at all: a page that is read before it is written is one
+/// page of zeros for all, and its first write a second fault, for which every other thread of the process is
+/// interrupted. Vectors that are added to are made here.
+pub fn filled<T: Copy + Send + Sync>(value: T, len: usize) -> Vec<T> {
+    let mut x = vec![value; len];
+    if size_of::<T>() * len >= OF_THE_SYSTEM {
+        // The compiler knows that these are zeros already.
+        for_each(std::hint::black_box(x.as_mut_slice()), |_, x| x.fill(value));
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,6 +111,13 @@ mod tests {
             for threads in [2, 4] {
                 assert_eq!(with_threads(threads, run), one);
             }
+        }
+    }
+
+    #[test]
+    fn filled_vectors_have_equal_entries() {
+        for (len, threads) in [(0, 1), (10, 1), (100_003, 1), (100_003, 3)] {
+            assert_eq!(with_threads(threads, || filled([0.5, 2.0], len)), vec![[0.5, 2.0]; len]);
         }
     }
 

@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use gluey_linalg::Jagged;
+use rayon::prelude::*;
 
 use crate::space::NodeMap;
 
@@ -29,25 +30,37 @@ pub(crate) struct NodePartition {
 
 impl NodePartition {
     /// `touched(chunk, nodes)` appends the nodes that a chunk touches.
-    fn new(first: Vec<u32>, touched: impl Fn(usize, &mut Vec<u32>)) -> Self {
+    fn new(first: Vec<u32>, touched: impl Fn(usize, &mut Vec<u32>) + Sync) -> Self {
         let mut partition = Self { first, ..Self::default() };
-        let mut nodes = Vec::new();
-        for chunk in 0..partition.first.len() - 1 {
-            touched(chunk, &mut nodes);
+        let ghosts_of = |chunk: usize| {
             let own = partition.owned(chunk);
+            let mut nodes = Vec::new();
+            touched(chunk, &mut nodes);
             nodes.retain(|&n| !own.contains(&(n as usize)));
             nodes.sort_unstable();
             nodes.dedup();
-            partition.ghosts.push(nodes.drain(..));
-        }
+            nodes
+        };
+        let count = partition.first.len() - 1;
+        let ghosts: Vec<Vec<u32>> = (0..count).into_par_iter().map(ghosts_of).collect();
+        partition.ghosts = ghosts.into_iter().collect();
         partition.find_owned_ghosts();
         partition
     }
 
     fn find_owned_ghosts(&mut self) {
-        let owner = |node: u32| self.first.partition_point(|&f| f <= node) - 1;
-        let owned = self.ghosts.items().iter().zip(0u32..).map(|(&node, position)| (owner(node), position));
-        self.owned_ghosts = Jagged::grouped(self.first.len() - 1, owned);
+        let owner = |&node: &u32| self.first.partition_point(|&f| f <= node) - 1;
+        let owners: Vec<usize> = self.ghosts.items().par_iter().map(owner).collect();
+        self.owned_ghosts = Jagged::grouped(self.first.len() - 1, owners.into_iter().zip(0u32..));
+    }
+
+    /// Local index of a node that a chunk touches.
+    fn local(&self, chunk: usize, node: u32) -> u16 {
+        let own = self.owned(chunk);
+        let ghost = || self.ghosts[chunk].binary_search(&node).expect("the chunk touches the node");
+        let local =
+            if own.contains(&(node as usize)) { node as usize - own.start } else { own.len() + ghost() };
+        u16::try_from(local).expect("a chunk touches few nodes")
     }
 
     /// Nodes that a chunk owns.
@@ -117,20 +130,21 @@ impl<const D: usize> Chunks<D> {
             pressure: NodePartition::new(first_nodes(pressure), |chunk, touched| {
                 touched.extend_from_slice(pressure.cells(cells_of(chunk, cell_count)));
             }),
-            pressure_locals: vec![0; pressure.node_count()],
             ..Self::default()
         };
-        let mut locals = LocalIndices::new(velocity.node_count());
-        for chunk in 0..chunks.count() {
-            locals.set(&chunks.velocity, chunk);
-            chunks.place_pressures(velocity, pressure, chunk, &locals);
+        let constraint_of = |node: &u32| Some(constraint_of[*node as usize]).filter(|&k| k != u32::MAX);
+        let piece = |chunk: usize| {
+            let mut piece = Piece::default();
+            piece.place_pressures(&chunks, velocity, pressure, chunk);
+            let local = |node: u32| chunks.velocity.local(chunk, node);
             let nodes = chunks.velocity.local_nodes(chunk);
-            let boundary = nodes.filter(|&n| velocity.is_on_boundary(n as usize)).map(|n| locals.of(n));
-            chunks.boundary.push(boundary.collect::<Vec<u16>>());
+            piece.boundary = nodes.filter(|&n| velocity.is_on_boundary(n as usize)).map(local).collect();
             let nodes = velocity.cells(cells_of(chunk, cell_count)).iter();
-            let hanging = nodes.map(|&n| constraint_of[n as usize]).filter(|&k| k != u32::MAX);
-            chunks.place_hanging(velocity, hanging.collect(), &locals);
-        }
+            piece.place_hanging(velocity, nodes.filter_map(constraint_of).collect(), local);
+            piece
+        };
+        let pieces: Vec<Piece> = (0..chunks.count()).into_par_iter().map(piece).collect();
+        pieces.into_iter().for_each(|piece| chunks.push(piece));
         chunks
     }
 
@@ -144,42 +158,16 @@ impl<const D: usize> Chunks<D> {
         cells_of(chunk, self.cell_count)
     }
 
-    fn place_pressures(
-        &mut self,
-        velocity: &NodeMap<D>,
-        pressure: &NodeMap<D>,
-        chunk: usize,
-        locals: &LocalIndices,
-    ) {
-        let own = self.pressure.owned(chunk);
-        let ghosts = &self.pressure.ghosts[chunk];
-        let mut ghost_locals = vec![0; ghosts.len()];
-        for cell in self.cells(chunk) {
-            for (corner, &q) in pressure.cell(cell).iter().enumerate() {
-                let local = locals.of(velocity.cell(cell)[corner_node::<D>(corner)]);
-                if own.contains(&(q as usize)) {
-                    self.pressure_locals[q as usize] = local;
-                } else if let Ok(k) = ghosts.binary_search(&q) {
-                    ghost_locals[k] = local;
-                }
-            }
-        }
-        self.ghost_pressure_locals.extend(ghost_locals);
-    }
-
-    /// Places hanging nodes, given by the numbers of their constraints.
-    fn place_hanging(&mut self, velocity: &NodeMap<D>, mut constraints: Vec<u32>, locals: &LocalIndices) {
-        constraints.sort_unstable();
-        constraints.dedup();
-        let mut hanging = Vec::with_capacity(constraints.len());
-        for k in constraints {
-            let constraint = &velocity.constraints()[k as usize];
-            self.masters.extend(constraint.masters.iter().map(|m| locals.of(m.0)));
-            self.weights.extend(constraint.masters.iter().map(|m| m.1));
-            hanging
-                .push(Hanging { local: locals.of(constraint.node), masters_end: self.masters.len() as u32 });
-        }
-        self.hanging.push(hanging);
+    /// Appends what belongs to the next chunk.
+    fn push(&mut self, mut piece: Piece) {
+        self.pressure_locals.append(&mut piece.pressure_locals);
+        self.ghost_pressure_locals.append(&mut piece.ghost_pressure_locals);
+        self.boundary.push(piece.boundary);
+        let before = self.masters.len() as u32;
+        let hanging = piece.hanging.into_iter();
+        self.hanging.push(hanging.map(|h| Hanging { masters_end: h.masters_end + before, ..h }));
+        self.masters.append(&mut piece.masters);
+        self.weights.append(&mut piece.weights);
     }
 
     /// Calls `visit(local, masters, weights)` for the hanging nodes of a chunk.
@@ -200,6 +188,60 @@ impl<const D: usize> Chunks<D> {
     /// Nodes in the buffer of a chunk.
     pub(crate) fn local_count(&self, chunk: usize) -> usize {
         self.velocity.owned(chunk).len() + self.velocity.ghosts.range(chunk).len()
+    }
+}
+
+/// What [`Chunks`] hold of one chunk, whose masters are counted from its first.
+#[derive(Default)]
+struct Piece {
+    pressure_locals: Vec<u16>,
+    ghost_pressure_locals: Vec<u16>,
+    hanging: Vec<Hanging>,
+    masters: Vec<u16>,
+    weights: Vec<f64>,
+    boundary: Vec<u16>,
+}
+
+impl Piece {
+    fn place_pressures<const D: usize>(
+        &mut self,
+        chunks: &Chunks<D>,
+        velocity: &NodeMap<D>,
+        pressure: &NodeMap<D>,
+        chunk: usize,
+    ) {
+        let own = chunks.pressure.owned(chunk);
+        let ghosts = &chunks.pressure.ghosts[chunk];
+        self.pressure_locals = vec![0; own.len()];
+        self.ghost_pressure_locals = vec![0; ghosts.len()];
+        for cell in chunks.cells(chunk) {
+            for (corner, &q) in pressure.cell(cell).iter().enumerate() {
+                let local = chunks.velocity.local(chunk, velocity.cell(cell)[corner_node::<D>(corner)]);
+                if own.contains(&(q as usize)) {
+                    self.pressure_locals[q as usize - own.start] = local;
+                } else if let Ok(k) = ghosts.binary_search(&q) {
+                    self.ghost_pressure_locals[k] = local;
+                }
+            }
+        }
+    }
+
+    /// Places hanging nodes, given by the numbers of their constraints.
+    fn place_hanging<const D: usize>(
+        &mut self,
+        velocity: &NodeMap<D>,
+        mut constraints: Vec<u32>,
+        local: impl Fn(u32) -> u16,
+    ) {
+        constraints.sort_unstable();
+        constraints.dedup();
+        for k in constraints {
+            let constraint = &velocity.constraints()[k as usize];
+            self.masters.extend(constraint.masters.iter().map(|m| local(m.0)));
+            self.weights.extend(constraint.masters.iter().map(|m| m.1));
+            let masters_end = self.masters.len() as u32;
+            self.hanging.push(Hanging { local: local(constraint.node), masters_end });
+        }
     }
 }
 

@@ -41,7 +41,7 @@ impl<T: Scalar> Stack<T> {
     /// The vectors in use and the one after them, whatever is in it.
     fn used_and_next(&mut self) -> (&[Vec<T>], &mut [T]) {
         if self.count == self.vectors.len() {
-            self.vectors.push(vec![T::ZERO; self.dim]);
+            self.vectors.push(parallel::filled(T::ZERO, self.dim));
         }
         let (used, rest) = self.vectors.split_at_mut(self.count);
         (used, &mut rest[0])

@@ -23,7 +23,7 @@ pub struct SparseMatrix<T = f64> {
 impl<T: Scalar> SparseMatrix<T> {
     /// The zero matrix of a pattern.
     pub fn zeros(pattern: Arc<Pattern>) -> Self {
-        let values = vec![T::ZERO; pattern.entry_count()];
+        let values = parallel::filled(T::ZERO, pattern.entry_count());
         Self { pattern, values }
     }
 

@@ -4,7 +4,11 @@
 //! The rows of a slice lie side by side, filled up to the longest with zeros: their products do not wait for
 //! one another, as those of one short row do.
 
-use super::{Pattern, SparseMatrix};
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::SparseMatrix;
 use crate::operator::LinOp;
 use crate::parallel;
 use crate::scalar::Scalar;
@@ -28,31 +32,28 @@ impl<T: Scalar> SellMatrix<T> {
         let pattern = matrix.pattern();
         let dim = pattern.row_count();
         debug_assert_eq!(dim, pattern.column_count());
-        let mut new = Self { dim, first: vec![0], columns: Vec::new(), values: Vec::new() };
-        for slice in 0..dim.div_ceil(ROWS) {
-            new.push_slice(slice * ROWS, pattern, matrix.values());
+        let slice = |k: usize| k * ROWS..((k + 1) * ROWS).min(dim);
+        let width = |k: usize| slice(k).map(|row| pattern.range(row).len()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..dim.div_ceil(ROWS)).into_par_iter().map(width).collect();
+        let mut first = Vec::with_capacity(widths.len() + 1);
+        first.push(0);
+        first.extend(widths.iter().scan(0, |end, width| {
+            *end += *width as u32;
+            Some(*end)
+        }));
+        let count = first.last().map_or(0, |&end| end as usize);
+        let mut new =
+            Self { dim, first, columns: vec![[0; ROWS]; count], values: vec![[T::ZERO; ROWS]; count] };
+        let (mut columns, mut values) = (&mut new.columns[..], &mut new.values[..]);
+        let mut slices = Vec::with_capacity(widths.len());
+        for (k, &width) in widths.iter().enumerate() {
+            let (of_columns, of_values) = (columns.split_off_mut(..width), values.split_off_mut(..width));
+            slices.push((slice(k), of_columns.unwrap_or_default(), of_values.unwrap_or_default()));
         }
+        slices.into_par_iter().for_each(|(rows, columns, values)| {
+            fill_slice(rows, matrix, columns, values);
+        });
         new
-    }
-
-    fn push_slice<S: Scalar>(&mut self, first_row: usize, pattern: &Pattern, values: &[S]) {
-        let row_count = ROWS.min(self.dim - first_row);
-        let length = |row: usize| pattern.range(first_row + row).len();
-        let width = (0..row_count).map(length).max().unwrap_or(0);
-        for k in 0..width {
-            // What fills up a row is a zero on the diagonal, or in the first column after the last row.
-            let mut columns: [u32; ROWS] =
-                std::array::from_fn(|row| if row < row_count { (first_row + row) as u32 } else { 0 });
-            let mut entries = [T::ZERO; ROWS];
-            for row in (0..row_count).filter(|&row| k < length(row)) {
-                let entry = pattern.range(first_row + row).start + k;
-                columns[row] = pattern.columns_of(first_row + row)[k];
-                entries[row] = T::from_f64(values[entry].to_f64());
-            }
-            self.columns.push(columns);
-            self.values.push(entries);
-        }
-        self.first.push(self.columns.len() as u32);
     }
 
     /// Products of the rows of a slice, with zeros after the last row.
@@ -67,6 +68,25 @@ impl<T: Scalar> SellMatrix<T> {
             }
         }
         sums
+    }
+}
+
+/// Fills a slice, which is as wide as its longest row. What fills up a row is a zero on the diagonal, or in the
+/// first column after the last row.
+fn fill_slice<T: Scalar, S: Scalar>(
+    rows: Range<usize>,
+    matrix: &SparseMatrix<S>,
+    columns: &mut [[u32; ROWS]],
+    values: &mut [[T; ROWS]],
+) {
+    for (place, row) in rows.enumerate() {
+        let range = matrix.pattern().range(row);
+        let entries = matrix.pattern().columns_of(row).iter().zip(&matrix.values()[range.clone()]);
+        for ((&column, value), (columns, values)) in entries.zip(columns.iter_mut().zip(values.iter_mut())) {
+            columns[place] = column;
+            values[place] = T::from_f64(value.to_f64());
+        }
+        columns[range.len()..].iter_mut().for_each(|columns| columns[place] = row as u32);
     }
 }
 

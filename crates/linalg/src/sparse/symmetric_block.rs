@@ -4,6 +4,7 @@ use super::prolongation::Prolongation;
 use super::{BlockGroups, BlockPattern, Pattern, SparseError, SparseMatrix};
 use crate::jagged::Jagged;
 use crate::operator::LinOp;
+use crate::parallel;
 
 /// One row per component of the row's node.
 type Block<const B: usize> = [[f64; B]; B];
@@ -64,7 +65,7 @@ impl<const B: usize> SymmetricBlockMatrix<B> {
             let all = pattern.columns_of(row).iter().copied();
             columns.push(all.take_while(|&column| column as usize <= row));
         }
-        let blocks = vec![[[0.0; B]; B]; columns.items().len()];
+        let blocks = parallel::filled([[0.0; B]; B], columns.items().len());
         Self { lower: Rows { columns, blocks } }
     }
 

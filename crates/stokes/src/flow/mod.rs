@@ -311,7 +311,7 @@ where
                 let (guess, last) = warm.moved(problem.discretisation()).into_guess(&problem.system, &b);
                 Ok((guess, Some(last)))
             }
-            _ => Ok((vec![0.0; problem.system.dim()], None)),
+            _ => Ok((gluey_linalg::parallel::filled(0.0, problem.system.dim()), None)),
         }
     }
 

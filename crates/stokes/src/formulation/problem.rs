@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
-use gluey_linalg::vector;
+use gluey_linalg::{parallel, vector};
 
 use super::load::add_load;
 use crate::error::StokesError;
@@ -228,7 +228,7 @@ where
 
     /// The load of the force `f(x)` per unit of volume.
     fn loads(&self, force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
-        let mut b = vec![0.0; self.system.dim()];
+        let mut b = parallel::filled(0.0, self.system.dim());
         match (force, &self.system.surfaces) {
             (None, _) => {}
             (Some(force), None) => {

@@ -3,6 +3,7 @@
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::{CellData, CellOperator, CellScalar};
 use gluey_geom::{Dim, Space};
+use gluey_linalg::parallel;
 
 use crate::solid::Penalty;
 use crate::space::{ActiveCell, Discretisation, VelocitySpace};
@@ -20,7 +21,7 @@ where
     let nodes = &discretisation.velocity;
     let viscous = discretisation.reference().viscous;
     let n = ReferenceMatrices::<D>::VELOCITY;
-    let mut nodal = vec![0.0; nodes.node_count() * D];
+    let mut nodal = parallel::filled(0.0, nodes.node_count() * D);
     for (cell, scale, own) in cells {
         for (i, &node) in nodes.cell(cell.cell as usize).iter().enumerate() {
             for c in 0..D {

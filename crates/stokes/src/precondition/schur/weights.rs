@@ -20,6 +20,8 @@ use gluey_fem::{ReferenceMatrices, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::SparseMatrix;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::cells::PressureMatrices;
 use crate::operator::{Elements, StokesSystem, viscous_diagonal};
@@ -88,7 +90,7 @@ where
     let is_centre = |q: usize| discretisation.pressure.point(q) == centre;
     let centre: Vec<bool> = (0..system.pressure.dim()).map(is_centre).collect();
     let fixed = fixed_nodes(&system.space);
-    ratios(&elements, &matrices, &fixed, &centre).next().expect("a uniform mesh has a centre node").1
+    ratios(&elements, &matrices, &fixed, &centre).first().expect("a uniform mesh has a centre node").1
 }
 
 /// The system on a mesh without the bodies.
@@ -108,18 +110,24 @@ where
     Dim<D>: Space<D>,
 {
     let is_fixed = |n: usize| space.body_of(n).is_some() || space.nodes().is_on_boundary(n);
-    (0..space.nodes().node_count()).map(is_fixed).collect()
+    (0..space.nodes().node_count()).into_par_iter().map(is_fixed).collect()
 }
 
 /// The unknown pressures that act on an active cell for whose index `is_meant` holds.
-fn pressures_of<const D: usize>(system: &StokesSystem<D>, is_meant: impl Fn(usize) -> bool) -> Vec<bool>
+fn pressures_of<const D: usize>(
+    system: &StokesSystem<D>,
+    is_meant: impl Fn(usize) -> bool + Sync,
+) -> Vec<bool>
 where
     Dim<D>: Space<D>,
 {
     let discretisation = system.discretisation();
     let mut meant = vec![false; system.pressure.dim()];
-    for (_, cell) in system.cells.iter().enumerate().filter(|(index, _)| is_meant(*index)) {
-        discretisation.pressure.cell(cell.cell as usize).iter().for_each(|&q| meant[q as usize] = true);
+    let cells: Vec<usize> =
+        (0..system.cells.len()).into_par_iter().filter(|&index| is_meant(index)).collect();
+    for index in cells {
+        let nodes = discretisation.pressure.cell(system.cells[index].cell as usize);
+        nodes.iter().for_each(|&q| meant[q as usize] = true);
     }
     for constraint in system.pressure.constraints().iter().rev() {
         let is_meant = meant[constraint.node as usize];
@@ -134,7 +142,7 @@ fn ratios<const D: usize>(
     matrices: &PressureMatrices,
     fixed: &[bool],
     special: &[bool],
-) -> impl Iterator<Item = (usize, f64)>
+) -> Vec<(usize, f64)>
 where
     Dim<D>: Space<D>,
 {
@@ -143,15 +151,11 @@ where
     let n = ReferenceMatrices::<D>::VELOCITY;
     let m = ReferenceMatrices::<D>::PRESSURE;
     let reference = discretisation.reference();
-    let cells = elements.cells().iter().enumerate().map(|(index, cell)| {
-        let (scale, own) = elements.viscous(index);
-        (cell, scale, own)
-    });
-    let mut row = Row::<D>::new(viscous_diagonal(discretisation, cells));
     let around = corners_of(system, special);
-    around.into_iter().enumerate().filter(|(_, around)| !around.is_empty()).map(move |(q, around)| {
+    let diagonal = diagonal_near(elements, &around);
+    let ratio = |row: &mut Row<D>, (q, around): (usize, &Vec<Corner>)| {
         let mut mass = 0.0;
-        for (index, corner, weight) in around {
+        for &(index, corner, weight) in around {
             let (scale, matrix) = matrices.of(index);
             mass += weight * weight * scale * matrix[corner * m + corner];
             let cell = &system.cells[index];
@@ -161,51 +165,77 @@ where
                 row.add(node, divergence.map(|b| weight * cell.divergence * b));
             }
         }
-        (q, row.take_sum() / mass)
-    })
+        (q, row.take_sum(&diagonal) / mass)
+    };
+    let around = around.par_iter().enumerate().filter(|(_, around)| !around.is_empty());
+    around.map_init(Row::default, ratio).collect()
 }
 
-/// The corners of active cells on which each special pressure acts: index of the cell, corner and weight.
-fn corners_of<const D: usize>(system: &StokesSystem<D>, special: &[bool]) -> Vec<Vec<(usize, usize, f64)>>
+/// A corner of an active cell: index of the cell, corner, and the weight with which a pressure acts there.
+type Corner = (usize, usize, f64);
+
+/// The corners of active cells on which each special pressure acts.
+fn corners_of<const D: usize>(system: &StokesSystem<D>, special: &[bool]) -> Vec<Vec<Corner>>
 where
     Dim<D>: Space<D>,
 {
     let discretisation = system.discretisation();
     let pressure = pressure_expansion(&system.pressure);
+    let corners = |index: usize| discretisation.pressure.cell(system.cells[index].cell as usize);
+    let specials = |node: u32| pressure.terms(node as usize).iter().filter(|term| special[term.0 as usize]);
+    let has_special = |index: &usize| corners(*index).iter().any(|&node| specials(node).next().is_some());
+    let cells: Vec<usize> = (0..system.cells.len()).into_par_iter().filter(has_special).collect();
     let mut around = vec![Vec::new(); special.len()];
-    for (index, cell) in system.cells.iter().enumerate() {
-        for (corner, &node) in discretisation.pressure.cell(cell.cell as usize).iter().enumerate() {
-            for &(q, weight) in pressure.terms(node as usize).iter().filter(|term| special[term.0 as usize]) {
-                around[q as usize].push((index, corner, weight));
-            }
+    for index in cells {
+        for (corner, &node) in corners(index).iter().enumerate() {
+            specials(node).for_each(|&(q, weight)| around[q as usize].push((index, corner, weight)));
         }
     }
     around
 }
 
-/// A row of `B` in nodal velocities, zero between two uses, and the diagonal of `A`.
+/// The diagonal of `A` at the nodes of these cells; elsewhere it may lack terms.
+fn diagonal_near<const D: usize>(elements: &Elements<'_, D>, corners: &[Vec<Corner>]) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let discretisation = elements.system().discretisation();
+    let nodes_of = |index: usize| discretisation.velocity.cell(elements.cells()[index].cell as usize);
+    let mut is_near = vec![false; discretisation.velocity.node_count()];
+    for &(index, ..) in corners.iter().flatten() {
+        nodes_of(index).iter().for_each(|&node| is_near[node as usize] = true);
+    }
+    let touches = |index: &usize| nodes_of(*index).iter().any(|&node| is_near[node as usize]);
+    let cells: Vec<usize> = (0..elements.cells().len()).into_par_iter().filter(touches).collect();
+    let cells = cells.into_iter().map(|index| {
+        let (scale, own) = elements.viscous(index);
+        (&elements.cells()[index], scale, own)
+    });
+    viscous_diagonal(discretisation, cells)
+}
+
+/// A row of `B` in nodal velocities, empty between two uses.
+#[derive(Default)]
 struct Row<const D: usize> {
-    values: Vec<[f64; D]>,
-    nodes: Vec<u32>,
-    diagonal: Vec<f64>,
+    place: FxHashMap<u32, usize>,
+    terms: Vec<(u32, [f64; D])>,
 }
 
 impl<const D: usize> Row<D> {
-    fn new(diagonal: Vec<f64>) -> Self {
-        Self { values: vec![[0.0; D]; diagonal.len() / D], nodes: Vec::new(), diagonal }
-    }
-
     fn add(&mut self, node: u32, divergence: [f64; D]) {
-        self.nodes.push(node);
-        self.values[node as usize].iter_mut().zip(divergence).for_each(|(value, b)| *value += b);
+        let place = *self.place.entry(node).or_insert(self.terms.len());
+        match self.terms.get_mut(place) {
+            Some((_, values)) => values.iter_mut().zip(divergence).for_each(|(value, b)| *value += b),
+            None => self.terms.push((node, divergence)),
+        }
     }
 
-    /// The sum of `b_k^2 / a_k` over the row.
-    fn take_sum(&mut self) -> f64 {
+    /// The sum of `b_k^2 / a_k` over the row, with `a` the diagonal of `A`.
+    fn take_sum(&mut self, diagonal: &[f64]) -> f64 {
+        self.place.clear();
         let mut sum = 0.0;
-        for node in self.nodes.drain(..) {
-            let values = std::mem::replace(&mut self.values[node as usize], [0.0; D]);
-            let diagonal = &self.diagonal[node as usize * D..][..D];
+        for (node, values) in self.terms.drain(..) {
+            let diagonal = &diagonal[node as usize * D..][..D];
             sum += values.iter().zip(diagonal).map(|(b, a)| b * b / a).sum::<f64>();
         }
         sum
