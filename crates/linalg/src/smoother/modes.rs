@@ -9,6 +9,8 @@
 //!
 //! restricted additive Schwarz (Cai and Sarkis 1999) with the blocks' inverses to low rank.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::dense::{BlockError, DenseSymmetric};
@@ -21,23 +23,27 @@ use crate::sparse::SymmetricBlockMatrix;
 const OMEGA: f64 = 0.4;
 /// Modes with eigenvalues below this are kept.
 const BOUND: f64 = 0.2;
+/// Patches that a thread takes at a time, and nodes.
+const PATCHES: usize = 32;
+const NODES: usize = 1024;
 
 /// The weak modes of patches of nodes with `B` components.
 #[derive(Clone, Debug)]
 pub struct WeakModes<const B: usize> {
     /// Nodes of each patch.
     patches: Jagged<u32>,
-    /// Number of modes of each patch.
-    counts: Vec<u32>,
     /// `w (1/lambda - omega)^1/2`, mode by mode, patch by patch.
     modes: Vec<f32>,
     /// The inverse number of patches of each node of each patch.
     weights: Vec<f32>,
     /// `omega D^-1` on nodes of patches, zero elsewhere.
     diagonal: Vec<f32>,
-    /// Residual and correction on a patch.
-    r: Vec<f32>,
-    z: Vec<f32>,
+    /// First number of each patch among the modes, then their number.
+    firsts: Vec<usize>,
+    /// Where each node is in the list of the nodes of all patches.
+    places: Jagged<u32>,
+    /// Corrections of all patches.
+    corrections: Vec<f32>,
 }
 
 /// Memory for [`weak_modes`].
@@ -80,44 +86,70 @@ impl<const B: usize> WeakModes<B> {
         let mut shares = vec![0u32; full.len() / B];
         patches.items().iter().for_each(|&node| shares[node as usize] += 1);
         let weights = patches.items().iter().map(|&node| 1.0 / shares[node as usize] as f32).collect();
-        let size = |patch: usize| patches[patch].len() * B;
-        let counts = found.clone().enumerate().map(|(k, modes)| (modes.len() / size(k).max(1)) as u32);
-        let counts = counts.collect();
         let mut modes = Vec::new();
         modes.reserve_exact(found.clone().map(Vec::len).sum());
-        found.for_each(|own| modes.extend_from_slice(own));
+        found.clone().for_each(|own| modes.extend_from_slice(own));
         let in_patch = |k: usize| shares[k / B] > 0;
         let diagonal = full.iter().enumerate();
         let diagonal = diagonal.map(|(k, d)| if in_patch(k) { (OMEGA / d) as f32 } else { 0.0 }).collect();
-        let largest = patches.iter().map(<[u32]>::len).max().unwrap_or(0) * B;
-        let [r, z] = [(); 2].map(|()| Vec::with_capacity(largest));
-        Self { counts, modes, weights, diagonal, patches, r, z }
+        let mut firsts = vec![0];
+        firsts.extend(found.scan(0, |end, own| {
+            *end += own.len();
+            Some(*end)
+        }));
+        let places = patches.items().iter().zip(0u32..).map(|(&node, place)| (node as usize, place));
+        let places = Jagged::grouped(full.len() / B, places);
+        Self { modes, weights, diagonal, patches, firsts, places, corrections: Vec::new() }
     }
 
     /// `z = G r`.
     pub fn apply(&mut self, r: &[f32], z: &mut [f32]) {
-        for ((z, r), d) in z.iter_mut().zip(r).zip(&self.diagonal) {
-            *z = d * r;
+        let mut corrections = std::mem::take(&mut self.corrections);
+        corrections.resize(self.patches.items().len() * B, 0.0);
+        self.correct(0..self.patches.len(), r, &mut corrections);
+        let of_places = corrections.as_chunks::<B>().0;
+        // Corrections of a node are added in the order of its patches.
+        z.par_chunks_mut(NODES * B).enumerate().for_each(|(k, z)| {
+            for (node, z) in (k * NODES..).zip(z.as_chunks_mut::<B>().0) {
+                let (d, r) = (&self.diagonal[node * B..][..B], &r[node * B..][..B]);
+                *z = std::array::from_fn(|c| d[c] * r[c]);
+                for &place in &self.places[node] {
+                    let (weight, correction) = (self.weights[place as usize], &of_places[place as usize]);
+                    z.iter_mut().zip(correction).for_each(|(z, own)| *z += weight * own);
+                }
+            }
+        });
+        self.corrections = corrections;
+    }
+
+    /// The corrections of a range of patches, without weights.
+    fn correct(&self, patches: Range<usize>, r: &[f32], corrections: &mut [f32]) {
+        let start = |patch: usize| self.patches.starts()[patch] as usize * B;
+        let first = start(patches.start);
+        if patches.len() > PATCHES {
+            let middle = patches.start + patches.len() / 2;
+            let (left, right) = corrections.split_at_mut(start(middle) - first);
+            rayon::join(
+                || self.correct(patches.start..middle, r, left),
+                || self.correct(middle..patches.end, r, right),
+            );
+            return;
         }
-        let (mut modes, mut weights) = (self.modes.as_slice(), self.weights.as_slice());
-        for (nodes, &count) in self.patches.iter().zip(&self.counts) {
-            let (of_patch, other_weights) = weights.split_at(nodes.len());
-            let (own, other_modes) = modes.split_at(count as usize * nodes.len() * B);
-            (modes, weights) = (other_modes, other_weights);
-            if own.is_empty() {
+        let mut local = Vec::new();
+        for patch in patches {
+            let z = &mut corrections[start(patch) - first..start(patch + 1) - first];
+            z.fill(0.0);
+            let modes = &self.modes[self.firsts[patch]..self.firsts[patch + 1]];
+            if modes.is_empty() {
                 continue;
             }
-            self.r.clear();
-            nodes.iter().for_each(|&node| self.r.extend_from_slice(&r[node as usize * B..][..B]));
-            self.z.clear();
-            self.z.resize(self.r.len(), 0.0);
-            for mode in own.chunks_exact(self.r.len()) {
-                let share = inner(mode, &self.r);
-                self.z.iter_mut().zip(mode).for_each(|(z, w)| *z += share * w);
-            }
-            for ((local, &node), weight) in self.z.chunks_exact(B).zip(nodes).zip(of_patch) {
-                let z = &mut z[node as usize * B..][..B];
-                z.iter_mut().zip(local).for_each(|(z, local)| *z += weight * local);
+            local.clear();
+            self.patches[patch]
+                .iter()
+                .for_each(|&node| local.extend_from_slice(&r[node as usize * B..][..B]));
+            for mode in modes.chunks_exact(local.len()) {
+                let share = inner(mode, &local);
+                z.iter_mut().zip(mode).for_each(|(z, w)| *z += share * w);
             }
         }
     }

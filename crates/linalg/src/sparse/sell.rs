@@ -10,11 +10,12 @@ use rayon::prelude::*;
 
 use super::SparseMatrix;
 use crate::operator::LinOp;
-use crate::parallel;
 use crate::scalar::Scalar;
 
 /// Rows of a slice.
 const ROWS: usize = 16;
+/// Slices that a thread multiplies at a time.
+const SLICES: usize = 64;
 
 /// A square sparse matrix in slices of rows.
 #[derive(Clone, Debug)]
@@ -97,12 +98,12 @@ impl<T: Scalar> LinOp<T> for SellMatrix<T> {
 
     fn apply(&mut self, x: &[T], y: &mut [T]) {
         let x = &x[..self.dim];
-        parallel::for_each(y, |first, y| {
-            // Pieces of vectors begin with slices.
+        let rows = |(piece, y): (usize, &mut [T])| {
             for (k, y) in y.chunks_mut(ROWS).enumerate() {
-                y.copy_from_slice(&self.slice_product(first / ROWS + k, x)[..y.len()]);
+                y.copy_from_slice(&self.slice_product(piece * SLICES + k, x)[..y.len()]);
             }
-        });
+        };
+        y.par_chunks_mut(SLICES * ROWS).enumerate().for_each(rows);
     }
 }
 

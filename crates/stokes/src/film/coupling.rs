@@ -20,6 +20,7 @@
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
 use gluey_linalg::{Jagged, Scalar};
 use nalgebra::Matrix2;
+use rayon::prelude::*;
 
 use super::deficit::Deficits;
 use super::near::{Film, Heights, Partner};
@@ -28,6 +29,8 @@ use crate::space::VelocitySpace;
 
 /// Least cosine between the normals of one film in two steps.
 const SAME_FILM: f64 = 0.7;
+/// Rows that a thread takes at a time, at least.
+const ROWS: usize = 64;
 
 /// Rows of the films' forces `g` in the Stokes system, `s B V - g`.
 #[derive(Clone, Debug)]
@@ -207,11 +210,13 @@ where
 
     /// `(y, z) += (s B^T g, s B x - g)` for reduced velocities.
     pub fn add<T: Scalar>(&self, [x, g]: [&[T]; 2], [y, z]: [&mut [T]; 2]) {
-        self.add_loads(g, y);
-        for (row, (g, z)) in self.rows.iter().zip(g.iter().zip(z)) {
-            let motion: f64 = row.iter().map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
+        let measure = |(row, (z, g)): (usize, (&mut T, &T))| {
+            let terms = self.rows[row].iter();
+            let motion: f64 = terms.map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
             *z += T::from_f64(motion - g.to_f64());
-        }
+        };
+        let rows = z.par_iter_mut().zip(g).enumerate().with_min_len(ROWS);
+        rayon::join(|| self.add_loads(g, y), || rows.for_each(measure));
     }
 
     /// `y += s B^T g`.

@@ -4,10 +4,14 @@
 use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Scalar};
+use rayon::prelude::*;
 
 use super::cells::cell_operator;
 use crate::solid::Penalty;
 use crate::space::{ActiveCell, Discretisation, VelocitySpace, cells_touching};
+
+/// Entries that a thread takes at a time.
+const PIECE: usize = 8192;
 
 /// The viscous operator of some cells, which counts its applications.
 #[derive(Clone, Debug)]
@@ -151,10 +155,30 @@ where
 
 /// `to = E^T from`.
 pub fn gather<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
-    to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
+    let pieces = to.par_chunks_mut(PIECE).zip(positions.par_chunks(PIECE));
+    pieces.for_each(|(to, positions)| {
+        to.iter_mut().zip(positions).for_each(|(value, &k)| *value = from[k as usize]);
+    });
 }
 
-/// `to += E from`.
+/// `to += E from`, for ascending positions.
 pub fn add_at<T: Scalar>(positions: &[u32], from: &[T], to: &mut [T]) {
-    positions.iter().zip(from).for_each(|(&k, &value)| to[k as usize] += value);
+    debug_assert!(positions.is_sorted(), "positions ascend");
+    add_behind(0, positions, from, to);
+}
+
+/// The same for a `to` that begins at position `first`.
+fn add_behind<T: Scalar>(first: usize, positions: &[u32], from: &[T], to: &mut [T]) {
+    if positions.len() <= PIECE {
+        positions.iter().zip(from).for_each(|(&k, &value)| to[k as usize - first] += value);
+        return;
+    }
+    let middle = positions.len() / 2;
+    let (positions, from) = (positions.split_at(middle), from.split_at(middle));
+    let start = positions.1[0] as usize;
+    let to = to.split_at_mut(start - first);
+    rayon::join(
+        || add_behind(first, positions.0, from.0, to.0),
+        || add_behind(start, positions.1, from.1, to.1),
+    );
 }

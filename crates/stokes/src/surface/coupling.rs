@@ -6,7 +6,8 @@ use gluey_fem::cut::{POINTS, ViscousMatrices, ViscousWeights};
 use gluey_fem::element::{gauss_cube, node_count, value};
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body};
-use gluey_linalg::{AffineConstraints, Scalar, Subset};
+use gluey_linalg::{AffineConstraints, Jagged, Scalar, Subset};
+use rayon::prelude::*;
 
 use super::aggregates::Aggregates;
 use super::cut_cells::{CutCell, CutCells, in_space};
@@ -14,6 +15,8 @@ use super::penalty::{PenaltyFactor, penalties};
 use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
 
+/// Nodes that a thread takes at a time.
+const NODES: usize = 1024;
 /// Pressure nodes of a cell, at most.
 const MOST_CORNERS: usize = 8;
 /// Unknowns of a twist, at most.
@@ -38,6 +41,8 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The velocity nodes of own cut cells in the nodes of the mesh: themselves, or what they take their
     /// values from.
     velocity: AffineConstraints,
+    /// The rows of `velocity` in which each node of the mesh is, with weights.
+    rows: Jagged<(u32, f64)>,
     /// Nodes among these with given values.
     boundary: Vec<u32>,
     /// The velocity nodes and the pressure nodes of own cut cells.
@@ -87,7 +92,10 @@ where
         };
         let (nodes, pressures) = (touched(velocity), touched(pressure));
         let of_cut = forms(&nodes, &aggregates.velocity);
-        let masters = (0..nodes.len()).flat_map(|row| of_cut.terms(row)).map(|term| term.0);
+        let terms = (0..nodes.len()).flat_map(|row| of_cut.terms(row).iter().map(move |term| (row, term)));
+        let masters = terms.clone().map(|(_, term)| term.0);
+        let rows = terms.map(|(row, &(node, weight))| (node as usize, (row as u32, weight)));
+        let rows = Jagged::grouped(nodes.whole(), rows);
         let mut boundary: Vec<u32> = masters.filter(|&node| velocity.is_on_boundary(node as usize)).collect();
         boundary.sort_unstable();
         boundary.dedup();
@@ -123,6 +131,7 @@ where
             narrow,
             pieces,
             velocity: of_cut,
+            rows,
             boundary,
             nodes,
             pressures,
@@ -280,18 +289,13 @@ where
         let SurfaceWorkspace { velocity, pressure, velocity_load, pressure_load, pieces } = work;
         let nodal = self.velocity.unknown_count() * D;
         let convert = |value: &X| T::from_f64(value.to_f64());
-        velocity.clear();
-        for row in 0..self.nodes.len() {
-            let mut sum = [T::ZERO; D];
-            for &(node, weight) in self.velocity.terms(row).iter().filter(|_| !x.is_empty()) {
-                let from = &x[node as usize * D..][..D];
-                (0..D).for_each(|c| sum[c] += T::from_f64(weight) * convert(&from[c]));
-            }
-            velocity.extend(sum);
-        }
+        let back = |value: T| X::from_f64(value.to_f64());
+        velocity.resize(self.nodes.len() * D + y.len() - nodal, T::ZERO);
+        let (at_nodes, of_twists) = velocity.split_at_mut(self.nodes.len() * D);
+        self.gather(x, at_nodes);
         match x.get(nodal..) {
-            Some(twists) => velocity.extend(twists.iter().map(convert)),
-            None => velocity.resize(velocity.len() + y.len() - nodal, T::ZERO),
+            Some(twists) => of_twists.iter_mut().zip(twists).for_each(|(to, twist)| *to = convert(twist)),
+            None => of_twists.fill(T::ZERO),
         }
         pressure.clear();
         if !p.is_empty() {
@@ -302,22 +306,42 @@ where
         pressure_load.clear();
         pressure_load.resize(if q.is_empty() { 0 } else { self.pressures.len() }, T::ZERO);
         operator.add([&*velocity, &*pressure], [&mut *velocity_load, &mut *pressure_load], pieces);
-        let back = |value: T| X::from_f64(value.to_f64());
-        for (row, load) in velocity_load[..self.nodes.len() * D].chunks_exact(D).enumerate() {
-            for &(node, weight) in self.velocity.terms(row) {
-                let to = &mut y[node as usize * D..][..D];
-                (0..D).for_each(|c| to[c] += back(T::from_f64(weight) * load[c]));
-            }
-        }
-        for (to, &load) in y[nodal..].iter_mut().zip(&velocity_load[self.nodes.len() * D..]) {
-            *to += back(load);
-        }
+        let (at_nodes, of_twists) = y.split_at_mut(nodal);
+        self.spread(velocity_load, at_nodes);
+        let twist_load = &velocity_load[self.nodes.len() * D..];
+        of_twists.iter_mut().zip(twist_load).for_each(|(to, &load)| *to += back(load));
         for &node in &self.boundary {
-            y[node as usize * D..][..D].fill(X::ZERO);
+            at_nodes[node as usize * D..][..D].fill(X::ZERO);
         }
         for (&node, &load) in self.pressures.positions().iter().zip(pressure_load.iter()) {
             q[node as usize] += back(load);
         }
+    }
+
+    /// Velocities at the nodes of own cut cells from those at all nodes; zero where there are none.
+    fn gather<T: Scalar, X: Scalar>(&self, x: &[X], velocity: &mut [T]) {
+        velocity.par_chunks_mut(NODES * D).enumerate().for_each(|(k, velocity)| {
+            for (row, velocity) in (k * NODES..).zip(velocity.as_chunks_mut::<D>().0) {
+                *velocity = [T::ZERO; D];
+                for &(node, weight) in self.velocity.terms(row).iter().filter(|_| !x.is_empty()) {
+                    let from = &x[node as usize * D..][..D];
+                    (0..D).for_each(|c| velocity[c] += T::from_f64(weight) * T::from_f64(from[c].to_f64()));
+                }
+            }
+        });
+    }
+
+    /// The transpose of [`SurfaceCoupling::gather`], added to the loads on all nodes.
+    fn spread<T: Scalar, X: Scalar>(&self, load: &[T], y: &mut [X]) {
+        let load = load.as_chunks::<D>().0;
+        y.par_chunks_mut(NODES * D).enumerate().for_each(|(k, y)| {
+            for (node, y) in (k * NODES..).zip(y.as_chunks_mut::<D>().0) {
+                for &(row, weight) in &self.rows[node] {
+                    let load = &load[row as usize];
+                    (0..D).for_each(|c| y[c] += X::from_f64((T::from_f64(weight) * load[c]).to_f64()));
+                }
+            }
+        });
     }
 }
 
