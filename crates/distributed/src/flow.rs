@@ -168,7 +168,9 @@ where
     pub cell_count: usize,
     /// Velocity and pressure unknowns of all ranks, as if there were no bodies and no hanging nodes.
     pub dof_count: usize,
-    /// Iterations of the solver.
+    /// Solves that it took: one, but for weak penalties, boxes without mean flow and given stresses.
+    pub solve_count: usize,
+    /// Iterations of the solver in all of them.
     pub iterations: usize,
     /// Norm of the true residual, over that of a fluid at rest.
     pub relative_residual: f64,
@@ -202,6 +204,7 @@ where
         let wrenches = self.wrenches.iter_mut().zip(&other.wrenches);
         wrenches.for_each(|(wrench, other)| *wrench = *wrench + *other * factor);
         self.cells.add(factor, &other.cells);
+        self.solve_count += other.solve_count;
         self.iterations += other.iterations;
         self.relative_residual = self.relative_residual.max(other.relative_residual);
     }
@@ -287,6 +290,7 @@ impl BoxFlow {
             stress: None,
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
+            solve_count: 1,
             iterations: report.iterations,
             relative_residual: report.residual_norm / reference,
             levels,

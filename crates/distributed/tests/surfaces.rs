@@ -135,7 +135,8 @@ where
             );
             assert!(difference < limit && of_twists < limit, "{size} ranks: {difference:e} {of_twists:e}");
             assert!(of_wrenches < limit, "{size} ranks: {of_wrenches:e}");
-            let solves = if self.drive == Drive::MotionWithoutMean { 1 + D } else { 1 };
+            let solves = parts[0].solve_count;
+            assert_eq!(solves, serial.solve_count, "{size} ranks");
             assert!(iterations[0].abs_diff(iterations[1]) <= solves, "{size} ranks: {iterations:?}");
             let again = run();
             assert_eq!((velocities(&again), &again[0].twists), (velocity, &parts[0].twists), "the same bits");

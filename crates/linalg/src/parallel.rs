@@ -72,9 +72,9 @@ const OF_THE_SYSTEM: usize = 1 << 17;
 
 /// A vector of equal entries, as `vec![value; len]`, whose memory has been written, by the threads.
 ///
-/// A vector of zeros fresh from the system is no memory at all: a page that is read before it is written is one
-/// page of zeros for all, and its first write a second fault, for which every other thread of the process is
-/// interrupted. Vectors that are added to are made here.
+/// A vector of zeros fresh from the system is no memory at all: a page that is read before it is written is
+/// one page of zeros for all, and its first write a second fault, for which every other thread of the process
+/// is interrupted. Vectors that are added to are made here.
 pub fn filled<T: Copy + Send + Sync>(value: T, len: usize) -> Vec<T> {
     let mut x = vec![value; len];
     if size_of::<T>() * len >= OF_THE_SYSTEM {

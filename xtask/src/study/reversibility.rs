@@ -19,8 +19,9 @@ const GLUEY: &str = "gluey";
 const ROUGH: &str = "gluey, rough";
 const INELASTIC: &str = "inelastic";
 const MODELS: [&str; 4] = [LUBRICATION, GLUEY, ROUGH, INELASTIC];
-/// Floor of gamma of rough particles, in squares of the radius.
-const ROUGHNESS: f64 = -0.05;
+/// Floor of gamma of rough discs and spheres, in squares of the radius. Discs are hardly pressed: at no
+/// amplitude do they come to -0.05.
+const ROUGHNESS: [f64; 2] = [-0.002, -0.05];
 
 pub const STUDY: Study = Study {
     title: "Who comes back in an oscillating shear",
@@ -29,7 +30,7 @@ pub const STUDY: Study = Study {
            contacts, or to time steps. Shown is the share of particles that are more than 0.05 radii from where they were a cycle \
            before, mean of the second half of the cycles, and their root mean square displacement in a cycle. Four models: lubrication \
            forces and no contact; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
-           does not fall below &minus;0.05 a&sup2;, and inelastic contact. Experiments with spheres (Pine et al. 2005, \
+           does not fall below &minus;0.002 a&sup2; (discs, which are hardly pressed) and &minus;0.05 a&sup2; (spheres), and inelastic contact. Experiments with spheres (Pine et al. 2005, \
            10.1038/nature04380) find that they come back up to an amplitude of about 0.14 &phi;<sup>&minus;1.93</sup>, 0.8 at 0.4; \
            particles of models without contact memory come to rest in arrangements without collisions below such an amplitude.",
     points,
@@ -60,7 +61,7 @@ fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> Po
         _ => {
             let point = point.with("contact.strategy", "gluey").with("flow.lubrication", "none");
             if model == ROUGH {
-                point.with("contact.gamma_min", ROUGHNESS * radius(place).powi(2))
+                point.with("contact.gamma_min", ROUGHNESS[place] * radius(place).powi(2))
             } else {
                 point
             }

@@ -118,7 +118,7 @@ where
         self.statistics = FlowStatistics {
             cell_count: flow.cell_count,
             dof_count: flow.dof_count,
-            solve_count: 1,
+            solve_count: flow.solve_count,
             iteration_count: flow.iterations,
             residual: flow.relative_residual,
             phases: vec![("shared flow", start.elapsed().as_secs_f64())],

@@ -173,7 +173,7 @@ where
             let attempt = self.attempt(tree, levels, (&problem, smoother))?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
-                return self.finished(&problem, attempt, wasted);
+                return self.finished(&problem, attempt, [rounds, wasted]);
             };
             if rounds == MOST_ROUNDS {
                 attempt.report?;
@@ -378,7 +378,7 @@ where
         &self,
         problem: &Problem<D>,
         attempt: Attempt<'a, D>,
-        wasted: usize,
+        [rounds, wasted]: [usize; 2],
     ) -> Result<MyFlow<D>, FlowError> {
         let Attempt { space, velocity, pressure, sizes, report, .. } = attempt;
         let (report, level) = (report?, &self.level);
@@ -395,6 +395,7 @@ where
             twists: self.twists_of_all(problem, &space, &velocity),
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
+            solve_count: rounds + 1,
             iterations: wasted + report.iterations,
             relative_residual: report.residual_norm / reference,
             wrenches: attempt.wrenches,

@@ -203,16 +203,7 @@ mod tests {
     #[test]
     fn weak_modes_are_inverted_and_others_damped() {
         let count = 12;
-        let groups: Vec<[usize; 2]> = (1..count).map(|k| [k - 1, k]).collect();
-        let mut matrix = SymmetricBlockMatrix::<1>::zeros(&Pattern::from_groups(count, &groups).unwrap());
-        for group in &groups {
-            let term =
-                |local: usize| LocalTerm { row: group[local] as u32, local: local as u32, weight: 1.0 };
-            matrix.add_local(&[0, 1].map(term), &[1.0, -1.0, -1.0, 1.0]);
-        }
-        for end in [0, count as u32 - 1] {
-            matrix.add_local(&[LocalTerm { row: end, local: 0, weight: 1.0 }], &[1.0]);
-        }
+        let mut matrix = springs(count);
         let mut smoother = WeakModes::new(&matrix, std::iter::once((0..count as u32).collect())).unwrap();
         for k in 1..=count {
             let angle = k as f64 * std::f64::consts::PI / (count + 1) as f64;
@@ -228,6 +219,53 @@ mod tests {
                 z.iter().zip(&mode).map(|(z, x)| (f64::from(*z) - kept * x).abs()).fold(0.0, f64::max);
             assert!(error < 1e-2, "{k}: {error}");
         }
+    }
+
+    /// `count` nodes between springs, the first and the last at walls.
+    fn springs(count: usize) -> SymmetricBlockMatrix<1> {
+        let groups: Vec<[usize; 2]> = (1..count).map(|k| [k - 1, k]).collect();
+        let mut matrix = SymmetricBlockMatrix::<1>::zeros(&Pattern::from_groups(count, &groups).unwrap());
+        for group in &groups {
+            let term =
+                |local: usize| LocalTerm { row: group[local] as u32, local: local as u32, weight: 1.0 };
+            matrix.add_local(&[0, 1].map(term), &[1.0, -1.0, -1.0, 1.0]);
+        }
+        for end in [0, count as u32 - 1] {
+            matrix.add_local(&[LocalTerm { row: end, local: 0, weight: 1.0 }], &[1.0]);
+        }
+        matrix
+    }
+
+    /// Patches that overlap, each by itself: `G r = omega D^-1 r + W sum (G_patch r - omega D^-1 r)`.
+    #[test]
+    fn threads_add_what_each_patch_corrects() {
+        let (count, width) = (5 * NODES / 2, 12);
+        let matrix = springs(count);
+        let patches: Vec<Vec<u32>> =
+            (0..count).step_by(5).map(|k| (k as u32..(k + width).min(count) as u32).collect()).collect();
+        assert!(patches.len() > 3 * PATCHES);
+        let r: Vec<f32> = (0..count).map(|i| (0.37 * i as f32).sin()).collect();
+        let mut shares = vec![0.0f32; count];
+        patches.iter().flatten().for_each(|&node| shares[node as usize] += 1.0);
+        let mut want: Vec<f32> = r.iter().map(|r| OMEGA as f32 * r / 2.0).collect();
+        for patch in &patches {
+            let mut alone = vec![0.0; count];
+            WeakModes::new(&matrix, std::iter::once(patch.clone())).unwrap().apply(&r, &mut alone);
+            for &node in patch {
+                let node = node as usize;
+                want[node] += (alone[node] - OMEGA as f32 * r[node] / 2.0) / shares[node];
+            }
+        }
+        let mut smoother = WeakModes::new(&matrix, patches.iter().cloned()).unwrap();
+        let mut applied = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut z = vec![f32::NAN; count];
+            pool.install(|| smoother.apply(&r, &mut z));
+            z
+        };
+        let one = applied(1);
+        assert!(one.iter().zip(&want).all(|(z, want)| (z - want).abs() < 1e-5));
+        assert_eq!(applied(3), one);
     }
 
     #[test]

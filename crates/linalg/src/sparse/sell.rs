@@ -72,8 +72,8 @@ impl<T: Scalar> SellMatrix<T> {
     }
 }
 
-/// Fills a slice, which is as wide as its longest row. What fills up a row is a zero on the diagonal, or in the
-/// first column after the last row.
+/// Fills a slice, which is as wide as its longest row. What fills up a row is a zero on the diagonal, or in
+/// the first column after the last row.
 fn fill_slice<T: Scalar, S: Scalar>(
     rows: Range<usize>,
     matrix: &SparseMatrix<S>,

@@ -182,3 +182,22 @@ fn add_behind<T: Scalar>(first: usize, positions: &[u32], from: &[T], to: &mut [
         || add_behind(start, positions.1, from.1, to.1),
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_gathered_and_added_where_they_belong() {
+        let positions: Vec<u32> = (0..5 * PIECE as u32 / 2).map(|k| 3 * k + k % 2).collect();
+        let from: Vec<f64> = (0..positions.len()).map(|k| (0.3 * k as f64).cos()).collect();
+        let mut whole: Vec<f64> = (0..3 * positions.len()).map(|k| k as f64).collect();
+        let mut want = whole.clone();
+        positions.iter().zip(&from).for_each(|(&k, from)| want[k as usize] += from);
+        add_at(&positions, &from, &mut whole);
+        assert_eq!(whole, want);
+        let mut gathered = vec![f64::NAN; positions.len()];
+        gather(&positions, &whole, &mut gathered);
+        assert!(gathered.iter().zip(&positions).all(|(x, &k)| *x == want[k as usize]));
+    }
+}

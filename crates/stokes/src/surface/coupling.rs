@@ -92,13 +92,10 @@ where
         };
         let (nodes, pressures) = (touched(velocity), touched(pressure));
         let of_cut = forms(&nodes, &aggregates.velocity);
-        let terms = (0..nodes.len()).flat_map(|row| of_cut.terms(row).iter().map(move |term| (row, term)));
-        let masters = terms.clone().map(|(_, term)| term.0);
-        let rows = terms.map(|(row, &(node, weight))| (node as usize, (row as u32, weight)));
-        let rows = Jagged::grouped(nodes.whole(), rows);
-        let mut boundary: Vec<u32> = masters.filter(|&node| velocity.is_on_boundary(node as usize)).collect();
-        boundary.sort_unstable();
-        boundary.dedup();
+        let rows = rows_of_nodes(&of_cut, nodes.whole());
+        let is_given =
+            |node: &u32| !rows[*node as usize].is_empty() && velocity.is_on_boundary(*node as usize);
+        let boundary: Vec<u32> = (0..nodes.whole() as u32).filter(is_given).collect();
         let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
         let penalties = penalties(discretisation, &cut, aggregates, penalty)?;
         let medium = (bodies, viscosity);
@@ -352,6 +349,12 @@ fn roots_and_bodies<const D: usize>(cut: &CutCells<D>, aggregates: &Aggregates) 
     roots.sort_unstable();
     roots.dedup_by_key(|root| root.0);
     roots.into_iter().unzip()
+}
+
+/// The rows of `forms` in which each of so many nodes is, with weights.
+fn rows_of_nodes(forms: &AffineConstraints, count: usize) -> Jagged<(u32, f64)> {
+    let terms = (0..forms.row_count()).flat_map(|row| forms.terms(row).iter().map(move |term| (row, term)));
+    Jagged::grouped(count, terms.map(|(row, &(node, weight))| (node as usize, (row as u32, weight))))
 }
 
 /// Some nodes in all nodes, of which ghosts take their values from others.
