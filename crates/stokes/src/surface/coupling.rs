@@ -110,14 +110,13 @@ where
             || CutOperator::new(of_pieces(), counts).sheared(shear),
         );
         drop((data, own));
-        let discretisation = discretisation.clone();
         let (roots, bodies_at_roots) = roots_and_bodies(&cut, aggregates);
         let corners = node_count::<D>(1);
         let corner = |q: usize, x: &[f64; D]| if q < corners { value::<D>(1, q, x) } else { 0.0 };
         let rule = gauss_cube::<D>(POINTS);
         let corner_values = rule.iter().map(|(x, _)| std::array::from_fn(|q| corner(q, x))).collect();
         Ok(Self {
-            discretisation,
+            discretisation: discretisation.clone(),
             viscosity,
             points: rule.into_iter().map(|point| point.0).collect(),
             corner_values,
