@@ -45,11 +45,11 @@ pub fn weighted_cuts<const D: usize>(
         before += weight;
         before > first
     });
-    let key = holder.and_then(|k| {
+    let key = holder.map(|k| {
         let within = first + weights[k] - before;
         let mut asked = tree.forgotten();
         // The last leaves of a block may weigh less than what is left: the next begins then.
-        asked.key_after(&block(k), within, weight).or(Some(block(k).end))
+        asked.key_after(&block(k), within, weight).unwrap_or_else(|| asked.end_of_leaf(block(k).end))
     });
     let key = if ranks.rank() == 0 { 0 } else { key.unwrap_or(end) };
     Cuts::new(ranks.all_gather(&[key]), end)

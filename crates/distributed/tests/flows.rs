@@ -129,7 +129,7 @@ fn cuts_are_those_of_one_rank_that_counts_everything() {
     }
 }
 
-/// Leaves of unlike weights: each rank has its share, but for one leaf at each end.
+/// Leaves of unlike weights: each rank has its share, but for one leaf at each end, and none is cut in two.
 #[test]
 fn cuts_share_work() {
     let wants = ADAPTIVE.wants::<2>();
@@ -142,6 +142,9 @@ fn cuts_share_work() {
         let work = |rank: usize| tree().weigh_leaves(&found[0].of(rank), &weight);
         assert_eq!((0..size).map(work).sum::<u64>(), all);
         assert!((0..size).all(|rank| work(rank).abs_diff(all / size as u64) <= 10), "{size}");
+        let mut tree = tree();
+        let starts = (0..size).map(|rank| found[0].of(rank).start);
+        assert!(starts.into_iter().all(|start| tree.end_of_leaf(start) == start), "{size}");
     }
 }
 

@@ -75,7 +75,7 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
 
     /// Place in the order of cells: that of its lower corner on the finest lattice.
     pub fn key(&self, cell: &Cell<D>) -> u64 {
-        cell.morton(self.max_level())
+        self.frame.key(cell)
     }
 
     /// Keys of the lower corners in a cell.
@@ -195,6 +195,13 @@ impl<'a, const D: usize> ImplicitTree<'a, D> {
             }
         });
         found
+    }
+
+    /// The first key from this one on at which no leaf is cut in two.
+    pub fn end_of_leaf(&mut self, key: u64) -> u64 {
+        let (mut before, depth) = (None, self.max_level());
+        self.for_each_leaf(depth, &(key.saturating_sub(1)..key), |leaf| before = Some(leaf));
+        before.map_or(key, |leaf| self.keys(&leaf).end)
     }
 
     /// The leaf that is `cell`, of a level up to `depth`, or one of its ancestors.
