@@ -46,11 +46,16 @@ mod schur;
 mod space;
 mod surface;
 mod transfer;
+mod warm_start;
 
 pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
-pub use moving::{FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields};
+pub use moving::{
+    Follower, FrameName, Memory, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
+    ask_to_keep,
+};
 pub use surface::SurfaceBodies;
+pub use warm_start::{PieceError, SavedPiece};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

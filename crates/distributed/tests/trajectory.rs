@@ -7,7 +7,7 @@ use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
 use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Hydrodynamics, Integrator, Scheme};
+use gluey_motion::{FlowStatistics, Hydrodynamics, Integrator, Scheme};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, CutCellPressures, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
@@ -76,8 +76,18 @@ where
     places.iter().map(at).collect()
 }
 
-/// Places after all steps, and whether the particles ever touched.
-fn trajectory<const D: usize, H: Hydrodynamics<D>>(meeting: Meeting, mut flow: H) -> (Vec<Vector<D>>, bool)
+/// What became of particles.
+#[derive(Clone, Debug, PartialEq)]
+struct Trajectory<const D: usize> {
+    /// Places after all steps.
+    places: Vec<Vector<D>>,
+    /// Whether they ever touched.
+    touched: bool,
+    /// Iterations of each step.
+    iterations: Vec<usize>,
+}
+
+fn trajectory<const D: usize, H: Hydrodynamics<D>>(meeting: Meeting, mut flow: H) -> Trajectory<D>
 where
     Dim<D>: Space<D>,
     PairContact<D>: ContactModel<D>,
@@ -85,10 +95,11 @@ where
     let (mut particles, mut integrator) = (particles::<D>(meeting), Integrator::new(Scheme::AdamsBashforth2));
     let mut contact = PairContact::new(ContactParams::default());
     let count = particles.len();
-    let (radii, mut touched) = (vec![meeting.radius; count], false);
+    let (radii, mut touched, mut iterations) = (vec![meeting.radius; count], false, Vec::new());
     let [mut twists, mut drift] = [(); 2].map(|()| vec![Twist::default(); count]);
     for step in 0..STEPS {
         flow.predict(step as f64 * STEP, &particles, &mut twists).unwrap();
+        iterations.push(flow.statistics().iteration_count);
         integrator.body_drift(STEP, &mut drift);
         let poses: Vec<_> = particles.iter().map(|particle| particle.pose).collect();
         let velocity_weight = integrator.velocity_weight(STEP);
@@ -97,13 +108,38 @@ where
         touched |= !contact.contacts().is_empty();
         integrator.advance(STEP, &mut particles, &twists);
     }
-    (particles.iter().map(|particle| particle.pose.position).collect(), touched)
+    let places = particles.iter().map(|particle| particle.pose.position).collect();
+    Trajectory { places, touched, iterations }
 }
 
 /// The serial solver of the same flow.
-struct Serial<'a, const D: usize>(&'a Suspension<D>)
+struct Serial<'a, const D: usize>
 where
-    Dim<D>: Space<D>;
+    Dim<D>: Space<D>,
+{
+    suspension: &'a Suspension<D>,
+    solver: FlowSolver<D>,
+    iteration_count: usize,
+}
+
+fn solver<const D: usize>(suspension: &Suspension<D>) -> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    let Suspension { formulation, flow, .. } = suspension;
+    let (solver, formulation) = (SolverKind::Multigrid, *formulation);
+    let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance };
+    FlowSolver::new(params).unwrap()
+}
+
+impl<'a, const D: usize> Serial<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(suspension: &'a Suspension<D>) -> Self {
+        Self { suspension, solver: solver(suspension), iteration_count: 0 }
+    }
+}
 
 impl<const D: usize> Hydrodynamics<D> for Serial<'_, D>
 where
@@ -117,17 +153,24 @@ where
         particles: &[Particle<D>],
         twists: &mut [Twist<D>],
     ) -> Result<(), StokesError> {
-        let Suspension { domain, roots, periods, refinement, formulation, wrenches, flow, .. } = self.0;
+        let Suspension { domain, roots, periods, refinement, wrenches, .. } = self.suspension;
         let ball = |particle: &Particle<D>| Ball::periodic(particle.pose.position, particle.radius, *periods);
         let balls: Vec<Ball<D>> = particles.iter().map(ball).collect();
         let mesh = refinement.mesh(*domain, *roots, periods.map(|p| p.is_some()), &balls)?;
-        let (solver, formulation) = (SolverKind::Multigrid, *formulation);
-        let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance };
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
         let conditions = Conditions::boundary(&shear).with_wrenches(wrenches);
-        let flow = FlowSolver::<D>::new(params)?.solve_under(mesh, &balls, &conditions)?;
+        if self.suspension.formulation == RIGID_DOFS {
+            // On ranks each flow starts from zero.
+            self.solver = solver(self.suspension);
+        }
+        let flow = self.solver.solve_under(mesh, &balls, &conditions)?;
         twists.copy_from_slice(&flow.twists);
+        self.iteration_count = flow.iteration_count;
         Ok(())
+    }
+
+    fn statistics(&self) -> FlowStatistics {
+        FlowStatistics { iteration_count: self.iteration_count, ..FlowStatistics::default() }
     }
 
     fn set_shear_factor(&mut self, _: f64) {}
@@ -142,26 +185,33 @@ fn ranks_take_particles_where_the_serial_solver_does<const D: usize>(
     PairContact<D>: ContactModel<D>,
 {
     let suspension = suspension::<D>(meeting, formulation);
-    let (serial, touched) = trajectory(meeting, Serial(&suspension));
-    assert_eq!(touched, formulation == RIGID_DOFS, "particles meet unless films keep them apart");
+    let serial = trajectory(meeting, Serial::new(&suspension));
+    assert_eq!(serial.touched, formulation == RIGID_DOFS, "particles meet unless films keep them apart");
     for &size in sizes {
         let run = || {
             // Every second number of ranks is led by rank zero, which alone knows particles and contacts.
             Threads::run(size, |ranks| match (size % 2, ranks.rank()) {
-                (0, 0) => Some(trajectory(meeting, SharedHydrodynamics::leading(&suspension, ranks)).0),
+                (0, 0) => Some(trajectory(meeting, SharedHydrodynamics::leading(&suspension, ranks))),
                 (0, _) => {
                     suspension.follow(ranks);
                     None
                 }
-                _ => Some(trajectory(meeting, SharedHydrodynamics::beside(&suspension, ranks)).0),
+                _ => Some(trajectory(meeting, SharedHydrodynamics::beside(&suspension, ranks))),
             })
             .unwrap()
         };
         let found: Vec<_> = run().into_iter().flatten().collect();
         assert_eq!(found.len(), if size % 2 == 0 { 1 } else { size });
-        assert!(found.iter().all(|places| *places == found[0]), "ranks agree");
-        let difference = serial.iter().zip(&found[0]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        println!("{size} ranks: {difference:.1e}");
+        assert!(found.iter().all(|trajectory| *trajectory == found[0]), "ranks agree");
+        let places = serial.places.iter().zip(&found[0].places);
+        let difference = places.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let iterations = [&found[0].iterations, &serial.iterations];
+        println!("{size} ranks: {difference:.1e}, iterations {iterations:?}");
+        let mut pairs = iterations[0].iter().zip(iterations[1]);
+        assert!(pairs.all(|(a, b)| a.abs_diff(*b) <= 1), "{size} ranks: {iterations:?}");
+        if formulation == UNFITTED {
+            assert!(iterations[0][1..3].iter().all(|later| *later < iterations[0][0]), "{iterations:?}");
+        }
         assert!(difference < limit, "{size} ranks: {difference:e}");
         assert_eq!(run()[0].as_ref(), Some(&found[0]), "the same bits");
     }
@@ -170,7 +220,7 @@ fn ranks_take_particles_where_the_serial_solver_does<const D: usize>(
 #[test]
 fn ranks_take_particles_where_the_serial_solver_does_in_2d() {
     ranks_take_particles_where_the_serial_solver_does::<2>((PAIR, RIGID_DOFS), &[1, 2, 3, 4, 8], 4.8e-12);
-    ranks_take_particles_where_the_serial_solver_does::<2>((PAIR, UNFITTED), &[2, 8], 1.3e-12);
+    ranks_take_particles_where_the_serial_solver_does::<2>((PAIR, UNFITTED), &[2, 8], 3e-13);
 }
 
 #[test]
@@ -182,7 +232,7 @@ fn ranks_take_three_discs_through_contact_where_the_serial_solver_does() {
 fn ranks_take_particles_where_the_serial_solver_does_in_3d() {
     let pair = Meeting { surface: 4, ..PAIR };
     ranks_take_particles_where_the_serial_solver_does::<3>((pair, RIGID_DOFS), &[1, 2, 3], 1.4e-13);
-    ranks_take_particles_where_the_serial_solver_does::<3>((pair, UNFITTED), &[3], 3.6e-13);
+    ranks_take_particles_where_the_serial_solver_does::<3>((pair, UNFITTED), &[3], 6.5e-14);
 }
 
 /// The others end with rank zero, whatever ends it.

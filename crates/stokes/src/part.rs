@@ -11,8 +11,8 @@ use gluey_geom::{Aabb, Dim, Matrix, Space, Vector, Wrench};
 use gluey_levelset::Ball;
 
 use crate::error::StokesError;
-use crate::film::{Film, Lubrication, thin_films};
-use crate::flow::{Conditions, Stress, fluid_weights, own_stress, subtract_uniform};
+use crate::film::{Film, FilmCoupling, Lubrication, thin_films};
+use crate::flow::{Conditions, NodalFields, Stress, WarmStart, fluid_weights, own_stress, subtract_uniform};
 use crate::formulation::{Problem, Unfitted};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface;
@@ -85,6 +85,14 @@ pub fn rings_around_surfaces<const D: usize>(
     let edge = |film: &Film<D>| film.shape(film.height(&heights)).edge();
     let widest = films.iter().filter(|film| wanted(film)).map(edge).fold(0.0, f64::max);
     RINGS + (widest / cell_size).ceil() as usize
+}
+
+/// Numbers that [`NodalFields::films`] has for a film: a body, its partner (negative for walls), and vectors.
+pub fn numbers_of_film<const D: usize>() -> usize
+where
+    Dim<D>: Space<D>,
+{
+    FilmCoupling::<D>::KEPT
 }
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
@@ -188,6 +196,14 @@ where
         here
     }
 
+    /// The first bodies of own films, ascending.
+    pub fn bodies_with_films(&self) -> Vec<u32> {
+        let mut bodies: Vec<u32> = self.films.iter().flat_map(|films| films.first_bodies()).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
+    }
+
     /// Entries of the films' rows in reduced velocities.
     pub fn film_rows(&self) -> impl Iterator<Item = &[(u32, f64)]> {
         self.films.iter().flat_map(|films| (0..films.dim()).map(|row| films.row(row)))
@@ -248,9 +264,36 @@ where
         sums
     }
 
-    /// Takes a uniform velocity from a velocity that [`Problem::velocity`] gave.
-    pub fn subtract_uniform(&self, by: &Vector<D>, velocity: &mut [f64]) {
-        subtract_uniform(&self.system.space, velocity, by, |_| true);
+    /// Takes a uniform velocity from a velocity that [`Problem::velocity`] gave, and from the vector that it
+    /// belongs to.
+    pub fn subtract_uniform(&self, by: &Vector<D>, velocity: &mut [f64], x: &mut [f64]) {
+        let space = &self.system.space;
+        subtract_uniform(space, velocity, by, |_| true);
+        subtract_uniform(space, x, by, |node| space.is_free(node));
+    }
+
+    /// What is kept of a vector for the next flow to start from: the deviation from the field that carries
+    /// the data, right at the nodes of own cells if the vector is right at all that these depend on.
+    pub fn deviation(&self, x: &[f64]) -> NodalFields {
+        NodalFields::of(&self.system, x, self.pressure(x))
+    }
+
+    /// The vector that a solve starts from after flows whose deviations were moved to this part: the last
+    /// one, and the one before if it is known. `b` is the right-hand side that [`Problem::data_under`] gives.
+    /// `complete` is to bring those velocities of others to a vector which own films depend on.
+    pub fn guess(
+        &self,
+        [last, before]: [Option<NodalFields>; 2],
+        b: &[f64],
+        complete: &mut dyn FnMut(&mut [f64]),
+    ) -> Vec<f64> {
+        let system = &self.system;
+        match last {
+            Some(last) => {
+                WarmStart::new(self.discretisation().clone(), last, before).guess(system, b, complete)
+            }
+            None => vec![0.0; system.dim()],
+        }
     }
 
     /// What the own cells and films add to the stress in a linear flow of this strain, for pressures whose

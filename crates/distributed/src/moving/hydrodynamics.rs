@@ -1,12 +1,14 @@
 //! The flow that ranks share as [`Hydrodynamics`].
 
+use std::rc::Rc;
+
 use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
-use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces};
+use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
 use gluey_parallel::Communicator;
 use gluey_stokes::{Formulation, Lubrication};
 
 use super::told::{Order, Told};
-use super::{Suspension, SuspensionError};
+use super::{Memory, Suspension, SuspensionError};
 use crate::flow::MyFlow;
 
 /// The flow of a suspension as a model of how its particles move.
@@ -19,10 +21,10 @@ where
     told: Told<D>,
     /// Whether others follow and are to be told of the end.
     leads: bool,
-    /// Whether a prediction has begun and not ended.
-    is_predicting: bool,
     /// Of the last prediction, if it succeeded.
     last: Option<MyFlow<D>>,
+    /// What the next flow starts from.
+    memory: Rc<Memory<D>>,
     /// Of the last flow where the stress is given, positive also while the shear is reversed.
     rate: f64,
     statistics: FlowStatistics,
@@ -40,8 +42,8 @@ where
             ranks,
             told,
             leads: false,
-            is_predicting: false,
             last: None,
+            memory: Rc::default(),
             rate: 1.0,
             statistics,
         }
@@ -52,6 +54,13 @@ where
         let mut new = Self::beside(suspension, ranks);
         new.leads = true;
         new
+    }
+
+    /// With flows in this memory.
+    #[must_use]
+    pub fn remembering(mut self, memory: Rc<Memory<D>>) -> Self {
+        self.memory = memory;
+        self
     }
 }
 
@@ -80,7 +89,7 @@ where
         if std::thread::panicking() {
             return;
         }
-        assert!(!self.is_predicting, "a flow that other ranks share was broken off");
+        assert!(!self.memory.is_broken(), "a flow that other ranks share was broken off");
         if self.leads {
             Order::End.share(self.ranks);
         }
@@ -99,16 +108,16 @@ where
         particles: &[Particle<D>],
         twists: &mut [Twist<D>],
     ) -> Result<(), SuspensionError> {
-        let Self { suspension, ranks, told, .. } = self;
+        let Self { suspension, ranks, told, memory, .. } = self;
         let places = particles.iter().map(|particle| particle.pose.position);
         told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
-        self.is_predicting = true;
+        memory.is_predicting.set(true);
         Order::Predict.share(*ranks);
         told.share(*ranks);
         self.last = None;
         let start = std::time::Instant::now();
-        let flow = suspension.solve_as_told(*ranks, told);
-        self.is_predicting = false;
+        let flow = suspension.solve_as_told(*ranks, told, memory);
+        memory.is_predicting.set(false);
         let (flow, rate) = flow?;
         self.rate = rate;
         // Those that are given without the rounding of what the flow is relative to.
@@ -202,6 +211,21 @@ where
 
     fn statistics(&self) -> FlowStatistics {
         self.statistics.clone()
+    }
+
+    /// Nothing: what the next flow starts from is in pieces, which the [`Memory`] of each rank has until this
+    /// is called again.
+    fn checkpoint(&self) -> Result<Vec<u8>, SuspensionError> {
+        if self.leads {
+            Order::Remember.share(self.ranks);
+        }
+        self.memory.remember();
+        Ok(Vec::new())
+    }
+
+    /// What one process starts from is no start for a flow in pieces, which begins at zero then.
+    fn resume(&mut self, _: &[u8]) -> Result<(), ResumeError<SuspensionError>> {
+        Ok(())
     }
 
     /// Those in the cells of this rank.

@@ -5,10 +5,12 @@
 //! others follow, or do the same work on their particles beside it; what rank zero says holds.
 
 mod hydrodynamics;
+mod memory;
 mod told;
 
 pub use hydrodynamics::SharedHydrodynamics;
-pub use told::{FrameName, ask_for_fields};
+pub use memory::Memory;
+pub use told::{FrameName, ask_for_fields, ask_to_keep};
 
 use gluey_fem::{ImplicitTree, MeshError};
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Twist, Vector, Wrench};
@@ -19,7 +21,8 @@ use gluey_stokes::{Conditions, CutCellPressures, Field, Formulation, GivenOf, Re
 
 use crate::cuts::{cuts_of_work, cuts_of_work_at_surfaces};
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
-use crate::surface::SurfaceBodies;
+use crate::surface::{SharedTree, SurfaceBodies};
+use crate::warm_start::SavedPiece;
 use told::{Order, Told};
 
 /// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls, or far away where it has
@@ -106,7 +109,7 @@ where
         shear_factor: f64,
     ) -> Result<MyFlow<D>, SuspensionError> {
         let told = Told { positions: positions.to_vec(), wrenches: wrenches.to_vec(), ..Told::new(self) };
-        Ok(self.solve_as_told(ranks, &Told { shear_factor, ..told })?.0)
+        Ok(self.solve_as_told(ranks, &Told { shear_factor, ..told }, &Memory::default())?.0)
     }
 
     /// Whether the box has no walls.
@@ -114,11 +117,13 @@ where
         self.periods.iter().all(Option::is_some)
     }
 
-    /// The flow, and where the stress is given the rate by which it is to be multiplied.
+    /// The flow, and where the stress is given the rate by which it is to be multiplied. In `unfitted` the
+    /// first solve starts from the flows in memory, and its flow is kept there for the next.
     fn solve_as_told(
         &self,
         ranks: &dyn Communicator,
         told: &Told<D>,
+        memory: &Memory<D>,
     ) -> Result<(MyFlow<D>, f64), SuspensionError> {
         let balls = self.balls(told);
         let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
@@ -154,14 +159,19 @@ where
             }
             Formulation::Unfitted { lubrication } => {
                 let bodies = SurfaceBodies { balls, lubrication };
+                let mut kept = memory.last.take();
+                let mut first = Some(&mut kept);
+                let mut leaves = SharedTree { tree: &mut whole, cuts: &cuts, ranks };
                 let mut solve = |conditions: &Conditions<'_, D>| {
-                    self.flow.solve_around_surfaces(&bodies, &mut whole, &cuts, ranks, conditions)
+                    self.flow.solve_from(&bodies, &mut leaves, conditions, first.take())
                 };
-                match (self.is_sheared(), self.shear_stress) {
-                    (true, Some(stress)) => return self.at_stress(stress, told, &mut solve),
-                    (true, None) => self.sheared(told, &mut solve)?,
-                    (false, _) => self.between_walls(told, &shear, &mut solve)?,
-                }
+                let found = match (self.is_sheared(), self.shear_stress) {
+                    (true, Some(stress)) => self.at_stress(stress, told, &mut solve)?,
+                    (true, None) => (self.sheared(told, &mut solve)?, 1.0),
+                    (false, _) => (self.between_walls(told, &shear, &mut solve)?, 1.0),
+                };
+                memory.last.replace(kept);
+                return Ok(found);
             }
             _ => return Err(SuspensionError::Formulation),
         };
@@ -313,6 +323,11 @@ where
         ranks: &dyn Communicator,
         show: &mut dyn FnMut(FrameName, Option<Fields<D>>),
     ) {
+        self.follow_for(ranks, &Memory::default(), &mut Showing(show));
+    }
+
+    /// The same with flows in `memory`, for a follower who keeps them too.
+    pub fn follow_for(&self, ranks: &dyn Communicator, memory: &Memory<D>, follower: &mut dyn Follower<D>) {
         let (mut told, mut last) = (Told::new(self), None::<MyFlow<D>>);
         loop {
             match Order::End.share(ranks) {
@@ -322,14 +337,36 @@ where
                     // Its memory is free for the next.
                     drop(last.take());
                     // An error is one on all ranks: rank zero says what it is.
-                    last = self.solve_as_told(ranks, &told).ok().map(|(flow, _)| flow);
+                    last = self.solve_as_told(ranks, &told, memory).ok().map(|(flow, _)| flow);
                 }
                 Order::Show(frame) => {
-                    show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));
+                    follower.show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));
                 }
+                Order::Remember => memory.remember(),
+                Order::Keep(name) => follower.keep(name, memory.saved()),
             }
         }
     }
+}
+
+/// What other ranks do with flows when rank zero asks for it.
+pub trait Follower<const D: usize> {
+    /// Shows the fields in the cells of this rank; none if there is no flow.
+    fn show(&mut self, frame: FrameName, fields: Option<Fields<D>>);
+
+    /// Keeps for a checkpoint what the flow after it starts from.
+    fn keep(&mut self, name: u64, pieces: Vec<SavedPiece>);
+}
+
+/// Shows fields and keeps nothing.
+struct Showing<'s, const D: usize>(&'s mut dyn FnMut(FrameName, Option<Fields<D>>));
+
+impl<const D: usize> Follower<D> for Showing<'_, D> {
+    fn show(&mut self, frame: FrameName, fields: Option<Fields<D>>) {
+        (self.0)(frame, fields);
+    }
+
+    fn keep(&mut self, _: u64, _: Vec<SavedPiece>) {}
 }
 
 /// Level of the smallest leaves of all ranks.

@@ -20,6 +20,8 @@ pub(super) enum Order {
     End,
     Predict,
     Show(FrameName),
+    Remember,
+    Keep(u64),
 }
 
 impl Order {
@@ -29,13 +31,17 @@ impl Order {
             Self::End => [0.0; 3],
             Self::Predict => [1.0, 0.0, 0.0],
             Self::Show(FrameName { stream, step }) => [2.0, f64::from(stream), f64::from(step)],
+            Self::Remember => [3.0, 0.0, 0.0],
+            Self::Keep(name) => [4.0, (name >> 32) as f64, (name & u64::from(u32::MAX)) as f64],
         };
         ranks.share(&mut numbers);
-        let [order, stream, step] = numbers.map(|number| number as u32);
+        let [order, first, second] = numbers.map(|number| number as u32);
         match order {
             0 => Self::End,
             1 => Self::Predict,
-            _ => Self::Show(FrameName { stream, step }),
+            2 => Self::Show(FrameName { stream: first, step: second }),
+            3 => Self::Remember,
+            _ => Self::Keep(u64::from(first) << 32 | u64::from(second)),
         }
     }
 }
@@ -44,6 +50,12 @@ impl Order {
 /// the last one.
 pub fn ask_for_fields(ranks: &dyn Communicator, frame: FrameName) {
     Order::Show(frame).share(ranks);
+}
+
+/// For rank zero between two flows: has the others keep, under a name, what the flow after the step that was
+/// checkpointed last starts from.
+pub fn ask_to_keep(ranks: &dyn Communicator, name: u64) {
+    Order::Keep(name).share(ranks);
 }
 
 /// What rank zero tells the others.

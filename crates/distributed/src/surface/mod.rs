@@ -13,6 +13,8 @@ mod precondition;
 mod space;
 mod sums;
 
+use std::sync::Arc;
+
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
@@ -20,7 +22,8 @@ use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
 use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
-    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, Problem, StokesError, StokesSystem, Stress,
+    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
+    StokesSystem, Stress,
 };
 use rustc_hash::FxHashMap;
 
@@ -31,10 +34,12 @@ use crate::cycle::VCycle;
 use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
 use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
+use crate::warm_start::{Moved, WarmStart};
 use conditions::{check_count, given};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
-use space::{NearBodies, SurfaceSpace, is_near_surface, owner_of_film};
+pub use space::NearBodies;
+use space::{SurfaceSpace, is_near_surface, owner_of_film};
 
 /// Iterations between restarts.
 const RESTART: usize = 60;
@@ -50,6 +55,13 @@ pub struct SurfaceBodies<'a, const D: usize> {
     pub lubrication: Lubrication,
 }
 
+/// A tree and the ranks that share its leaves.
+pub struct SharedTree<'s, 't, const D: usize> {
+    pub tree: &'s mut ImplicitTree<'t, D>,
+    pub cuts: &'s Cuts,
+    pub ranks: &'s dyn Communicator,
+}
+
 /// What a flow is computed with.
 struct Setting<'f, 'a, const D: usize>
 where
@@ -63,6 +75,8 @@ where
     conditions: &'f Conditions<'f, D>,
     /// What is known of the bodies near the part; wrenches of those alone that this rank owns.
     given: Vec<GivenOf<D>>,
+    /// Whether the flow is kept for the next one.
+    keeps: bool,
     /// What was sent before.
     start: Traffic,
 }
@@ -85,10 +99,29 @@ impl BoxFlow {
     where
         Dim<D>: Space<D>,
     {
+        self.solve_from(around, &mut SharedTree { tree, cuts, ranks }, conditions, None)
+    }
+
+    /// The same from the last flows, which this one becomes one of where it is to be kept.
+    ///
+    /// # Errors
+    /// As above; nothing is kept then.
+    pub(crate) fn solve_from<const D: usize>(
+        &self,
+        around: &SurfaceBodies<'_, D>,
+        leaves: &mut SharedTree<'_, '_, D>,
+        conditions: &Conditions<'_, D>,
+        kept: Option<&mut Option<Arc<WarmStart<D>>>>,
+    ) -> Result<MyFlow<D>, FlowError>
+    where
+        Dim<D>: Space<D>,
+    {
         check_count(conditions, around.balls.len())?;
         if conditions.without_mean {
-            return self.balanced(around, tree, cuts, ranks, conditions);
+            return self.balanced(around, leaves, conditions, kept);
         }
+        let SharedTree { tree, cuts, ranks } = leaves;
+        let (cuts, ranks) = (*cuts, *ranks);
         let cell_size = tree.frame().size(tree.max_level());
         let is_small = |ball: &Ball<D>| ball.bounding_radius() < cell_size;
         if let Some(body) = around.balls.iter().position(is_small) {
@@ -116,9 +149,16 @@ impl BoxFlow {
             discretisation: part_of(&level),
             level,
             conditions,
+            keeps: kept.is_some(),
             start,
         };
-        setting.trusted(tree, levels, PartMethod::new(around.lubrication))
+        let mut nothing = None;
+        let kept = kept.unwrap_or(&mut nothing);
+        let before = kept.take().map(|last| last.moved(ranks, &setting.level));
+        let method = PartMethod::new(around.lubrication);
+        let flow;
+        (flow, *kept) = setting.trusted(tree, levels, method, before)?;
+        Ok(flow)
     }
 }
 
@@ -141,6 +181,8 @@ where
     /// Values at all nodes of the part, those of the velocity followed by the twists near it.
     velocity: Vec<f64>,
     pressure: Vec<f64>,
+    /// What the next flow may start from.
+    deviation: Option<NodalFields>,
     wrenches: Vec<Wrench<D>>,
     mean_velocity: Option<Vector<D>>,
     stress: Option<Stress<D>>,
@@ -160,7 +202,8 @@ where
         tree: &mut ImplicitTree<'_, D>,
         mut levels: VCycle<'a, D>,
         mut method: PartMethod,
-    ) -> Result<MyFlow<D>, FlowError> {
+        mut before: Option<Moved>,
+    ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let (ranks, mut rounds, mut wasted) = (self.shared.ranks, 0, 0);
         loop {
             let problem = agreed(ranks, self.problem(tree, &method))?;
@@ -170,10 +213,10 @@ where
                 continue;
             }
             let smoother = agreed(ranks, smoother)?;
-            let attempt = self.attempt(tree, levels, (&problem, smoother))?;
+            let attempt = self.attempt(tree, levels, (&problem, smoother), before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
-                return self.finished(&problem, attempt, [rounds, wasted]);
+                return self.finished((tree, &problem), attempt, [rounds, wasted], before);
             };
             if rounds == MOST_ROUNDS {
                 attempt.report?;
@@ -217,6 +260,7 @@ where
         tree: &mut ImplicitTree<'_, D>,
         levels: VCycle<'a, D>,
         (problem, smoother): (&Problem<D>, AssembledSmoother<'_, D>),
+        before: Option<&mut Moved>,
     ) -> Result<Attempt<'a, D>, FlowError> {
         let (ranks, system) = (self.shared.ranks, &problem.system);
         let space = SurfaceSpace::new(tree, &self.shared, &self.level, (problem, &self.bodies));
@@ -230,13 +274,14 @@ where
         let schur = self.schur(tree, system, &space)?;
         let mut operator = SurfaceOperator::new(system, space.clone());
         let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur);
-        let (lift, b) = self.data(problem, &mut operator)?;
+        let (lift, [whole, b]) = self.data(problem, &mut operator)?;
+        let mut x = self.guess((tree, problem), &mut operator.space, &whole, before);
+        drop(whole);
         let before = ranks.traffic();
-        let mut x = vec![0.0; b.len()];
         let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x);
         let solve_traffic = ranks.traffic().since(before);
         let mut space = operator.into_space();
-        let [mut velocity, pressure, whole] = self.fields(problem, &mut space, &lift, &mut x);
+        let [mut velocity, pressure, mut whole] = self.fields(problem, &mut space, &lift, &mut x);
         let integrals = self.integrals(problem, [&velocity, &pressure]);
         let holds_any = !self.shared.held.is_empty();
         let mut mean_velocity = None;
@@ -244,7 +289,7 @@ where
             let mean = self.mean_velocity(problem, &space, &velocity, &integrals);
             match holds_any {
                 true => mean_velocity = Some(mean),
-                false => problem.subtract_uniform(&mean, &mut velocity),
+                false => problem.subtract_uniform(&mean, &mut velocity, &mut whole),
             }
         }
         let wrenches = self.wrenches(problem, &velocity, &whole)?;
@@ -260,6 +305,7 @@ where
             space,
             velocity,
             pressure,
+            deviation: self.keeps.then(|| problem.deviation(&whole)),
             wrenches,
             mean_velocity,
             stress,
@@ -268,6 +314,25 @@ where
             setup_traffic: before.since(self.start),
             solve_traffic,
         })
+    }
+
+    /// The owned vector that a solve with the sums `b` over own cells as its right-hand side starts from. All
+    /// ranks call this.
+    fn guess(
+        &self,
+        (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
+        space: &mut SurfaceSpace<'a, D>,
+        b: &[f64],
+        before: Option<&mut Moved>,
+    ) -> Vec<f64> {
+        let mut x = vec![0.0; space.dim()];
+        if let Some(before) = before {
+            let bodies = problem.system.bodies_with_films();
+            let fields = before.near((tree, &self.shared), &self.bodies, &bodies);
+            let whole = problem.guess(fields, b, &mut |x| space.update_velocities(x));
+            space.copy_owned(&whole, &mut x);
+        }
+        x
     }
 
     /// Velocity and pressure of the part and the vector that they belong to, from an owned one, whose
@@ -308,12 +373,13 @@ where
         SchurInverse::of_cells(tree, &self.shared, &self.level, pressures, &cells)
     }
 
-    /// The field that carries the data, and the right-hand side.
+    /// The field that carries the data, and the right-hand side: the sums over own cells, without what is
+    /// others', and that of all.
     fn data(
         &self,
         problem: &Problem<D>,
         operator: &mut SurfaceOperator<'_, 'a, D>,
-    ) -> Result<(Vec<f64>, Vec<f64>), FlowError> {
+    ) -> Result<(Vec<f64>, [Vec<f64>; 2]), FlowError> {
         let wrenches: Vec<Wrench<D>> = self.given.iter().filter_map(GivenOf::wrench).collect();
         let bodies = match self.conditions.bodies {
             Given::Wrenches([]) => Given::Wrenches(&[]),
@@ -323,7 +389,7 @@ where
         let (lift, mut whole) = problem.data_under(&Conditions { bodies, ..*self.conditions })?;
         let mut b = vec![0.0; operator.space.dim()];
         operator.space.gather(&mut whole, &mut b);
-        Ok((lift, b))
+        Ok((lift, [whole, b]))
     }
 
     /// Steps in double precision, as in the serial solver: in films penalties and extrapolated nodes leave
@@ -374,18 +440,22 @@ where
         found.filter_map(|(place, factor)| Some((*place?, factor))).collect()
     }
 
+    /// The flow, and what the next one may start from.
     fn finished(
         &self,
-        problem: &Problem<D>,
+        (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
         attempt: Attempt<'a, D>,
         [rounds, wasted]: [usize; 2],
-    ) -> Result<MyFlow<D>, FlowError> {
-        let Attempt { space, velocity, pressure, sizes, report, .. } = attempt;
+        before: Option<Moved>,
+    ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
+        let Attempt { space, velocity, pressure, deviation, sizes, report, .. } = attempt;
         let (report, level) = (report?, &self.level);
+        let here = (tree, &self.shared);
+        let kept = deviation.map(|last| WarmStart::new(here, level, &self.bodies, last, before).into());
         let (points, nodal) = (&level.velocity, level.nodal_dim());
         let counts = counts_of_all(level, space.ranks);
         let reference = if report.reference_norm > 0.0 { report.reference_norm } else { 1.0 };
-        Ok(MyFlow {
+        let flow = MyFlow {
             points: points.owned.clone().map(|node| points.map.point(node)).collect(),
             velocity: velocity[..nodal].as_chunks::<D>().0[points.owned.clone()]
                 .iter()
@@ -406,7 +476,8 @@ where
             setup_traffic: attempt.setup_traffic,
             solve_traffic: attempt.solve_traffic,
             cells: MyCells::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
-        })
+        };
+        Ok((flow, kept))
     }
 }
 

@@ -203,21 +203,30 @@ where
     /// An owned vector from sums over own cells, with divergences that sum to zero.
     pub fn gather<T: Scalar + Number>(&mut self, whole: &mut [T], y: &mut [T]) {
         self.plan.accumulate::<T, 1>(self.ranks, whole);
-        let first = self.whole_velocity_dim();
-        let owned = self.level.pressure.owned.clone();
-        let films = whole.len() - self.film_dim;
-        let [_, p, f] = self.parts_mut(y);
-        p.copy_from_slice(&whole[first + owned.start..first + owned.end]);
-        f.copy_from_slice(&whole[films..]);
+        self.copy_owned(whole, y);
+        let [_, p, _] = self.parts_mut(y);
         self.pressures.remove_mean(self.ranks, p);
-        let length = self.velocity_dim();
-        self.copy_velocities(whole, &mut y[..length]);
     }
 
     /// Velocities and twists from sums over own cells.
     pub fn gather_velocities<T: Scalar + Number>(&mut self, whole: &mut [T], y: &mut [T]) {
         self.velocities.accumulate::<T, 1>(self.ranks, whole);
         self.copy_velocities(whole, y);
+    }
+
+    /// Brings the velocities and twists of others to a whole vector, or to its velocities alone.
+    pub fn update_velocities(&mut self, whole: &mut [f64]) {
+        self.velocities.update::<f64, 1>(self.ranks, whole);
+    }
+
+    /// Copies an owned vector out of a whole one.
+    pub fn copy_owned<T: Copy>(&self, whole: &[T], x: &mut [T]) {
+        let (first, owned) = (self.whole_velocity_dim(), self.level.pressure.owned.clone());
+        let films = whole.len() - self.film_dim;
+        let [u, p, f] = self.parts_mut(x);
+        self.copy_velocities(whole, u);
+        p.copy_from_slice(&whole[first + owned.start..first + owned.end]);
+        f.copy_from_slice(&whole[films..]);
     }
 
     /// Brings the velocities of others in all cells around own ones that are cut to a nodal field.

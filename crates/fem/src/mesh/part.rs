@@ -47,6 +47,11 @@ impl Cuts {
         Self::new((0..ranks).map(first).collect(), end)
     }
 
+    /// First keys of the runs, and the end of the last.
+    pub fn firsts(&self) -> &[u64] {
+        &self.firsts
+    }
+
     /// Number of runs.
     pub fn count(&self) -> usize {
         self.firsts.len() - 1

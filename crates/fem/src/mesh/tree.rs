@@ -134,6 +134,13 @@ impl<const D: usize> TreeMesh<D> {
         Self { max_level, leaves, index, ..self }
     }
 
+    /// The box with these cells, whatever else it holds, as a rank knows a part of a mesh.
+    #[must_use]
+    pub fn with_cells(self, cells: Vec<Cell<D>>) -> Self {
+        let level = self.max_level;
+        self.with_leaves(level, cells)
+    }
+
     /// The same tree in a box with this shear.
     #[must_use]
     pub fn sheared(self, shear: f64) -> Self {
@@ -185,6 +192,11 @@ impl<const D: usize> TreeMesh<D> {
     /// Level of the finest lattice (a mesh may have no cell that fine).
     pub fn max_level(&self) -> u8 {
         self.max_level
+    }
+
+    /// Place of a cell in the order of cells: that of its lower corner on the finest lattice.
+    pub fn key(&self, cell: &Cell<D>) -> u64 {
+        cell.morton(self.max_level)
     }
 
     /// The meshed box.

@@ -1,7 +1,5 @@
 //! Evaluation of a field of one mesh at the nodes of another over the same box, and of a velocity at a point.
 
-use std::ops::Range;
-
 use gluey_geom::{Dim, Space, Twist, Vector};
 use rayon::prelude::*;
 
@@ -35,32 +33,43 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         to_nodes: &NodeMap<D>,
         fields: &mut [(&[f64], &mut [f64])],
     ) {
+        let points = (to_nodes.node_count(), |node| to_nodes.point(node));
+        self.transfer_to_points(from_nodes, components, points, fields);
+    }
+
+    /// The same for a number of points, `to[k] = field(x_k)`.
+    pub fn transfer_to_points(
+        &self,
+        from_nodes: &NodeMap<D>,
+        components: usize,
+        (count, point): (usize, impl Fn(usize) -> Vector<D> + Sync),
+        fields: &mut [(&[f64], &mut [f64])],
+    ) {
         let mut parts: Vec<Vec<(&[f64], &mut [f64])>> =
-            (0..to_nodes.node_count().div_ceil(SHARE)).map(|_| Vec::new()).collect();
+            (0..count.div_ceil(SHARE)).map(|_| Vec::new()).collect();
         for (from, to) in fields {
             let pieces = to.chunks_mut(SHARE * components);
             parts.iter_mut().zip(pieces).for_each(|(part, piece)| part.push((from, piece)));
         }
         parts.par_iter_mut().enumerate().for_each(|(k, fields)| {
-            let nodes = k * SHARE..((k + 1) * SHARE).min(to_nodes.node_count());
-            self.transfer_to(nodes, from_nodes, components, to_nodes, fields);
+            let points = (k * SHARE..((k + 1) * SHARE).min(count)).map(&point);
+            self.transfer_share(points, from_nodes, components, fields);
         });
     }
 
-    /// The same at some nodes, whose values are all of what fields become.
-    fn transfer_to(
+    /// The same at some points, whose values are all of what fields become.
+    fn transfer_share(
         &self,
-        nodes: Range<usize>,
+        points: impl Iterator<Item = Vector<D>>,
         from_nodes: &NodeMap<D>,
         components: usize,
-        to_nodes: &NodeMap<D>,
         fields: &mut [(&[f64], &mut [f64])],
     ) {
         let degree = from_nodes.degree();
-        for (place, node) in nodes.enumerate() {
+        for (place, point) in points.enumerate() {
             let target = place * components..(place + 1) * components;
             fields.iter_mut().for_each(|(_, to)| to[target.clone()].fill(0.0));
-            let Some((cell, x)) = self.locate(to_nodes, node) else { continue };
+            let Some((cell, x)) = self.locate(&point) else { continue };
             let line: [[f64; 3]; D] = std::array::from_fn(|d| values_1d(degree, x[d]));
             for (i, &source) in from_nodes.cell(cell).iter().enumerate() {
                 let index = multi_index::<D>(i, degree + 1);
@@ -76,20 +85,26 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         }
     }
 
-    /// Cell that holds a node of another mesh, with the coordinates in it.
-    pub fn locate(&self, nodes: &NodeMap<D>, node: usize) -> Option<(usize, [f64; D])> {
-        let finest = self.mesh.max_level();
-        let h = self.mesh.size(finest);
-        let offset = (nodes.point(node) - self.mesh.domain().lower) / h;
-        let coords = std::array::from_fn(|d| {
-            let last = (self.mesh.roots()[d] << finest) - 1;
-            (offset[d].floor().max(0.0) as u32).min(last)
-        });
-        let cell = self.mesh.find_covering(&Cell { level: finest, coords })?;
+    /// Cell that holds a point of the box, with the coordinates of the point in it.
+    pub fn locate(&self, point: &Vector<D>) -> Option<(usize, [f64; D])> {
+        let (lattice, offset) = self.lattice_cell(point);
+        let cell = self.mesh.find_covering(&lattice)?;
         let found = &self.mesh.cells()[cell];
-        let width = f64::from(1u32 << (finest - found.level));
+        let width = f64::from(1u32 << (lattice.level - found.level));
         let x = std::array::from_fn(|d| offset[d] / width - f64::from(found.coords[d]));
         Some((cell, x))
+    }
+
+    /// Cell of the finest lattice that holds a point of the box, be it a cell of the mesh or not, and the
+    /// coordinates of the point in such cells.
+    pub fn lattice_cell(&self, point: &Vector<D>) -> (Cell<D>, Vector<D>) {
+        let level = self.mesh.max_level();
+        let offset = (point - self.mesh.domain().lower) / self.mesh.size(level);
+        let coords = std::array::from_fn(|d| {
+            let last = (self.mesh.roots()[d] << level) - 1;
+            (offset[d].floor().max(0.0) as u32).min(last)
+        });
+        (Cell { level, coords }, offset)
     }
 
     /// Velocity and half the vorticity of a nodal velocity field at a point. The gradient jumps between

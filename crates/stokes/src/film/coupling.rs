@@ -193,6 +193,11 @@ where
         self.rows.iter().zip(b).map(|(row, b)| motion(row) - b).collect()
     }
 
+    /// The first body of each film.
+    pub fn first_bodies(&self) -> impl Iterator<Item = u32> + '_ {
+        self.films.iter().map(|film| film.body)
+    }
+
     /// Number of rows.
     pub fn dim(&self) -> usize {
         self.scales.len()

@@ -22,13 +22,13 @@ use crate::film::{FilmForce, Lubrication};
 use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, symmetric};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
-use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given, GivenOf};
 pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use stress::Stress;
+pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 
 /// Parameters of a [`FlowSolver`].
@@ -324,13 +324,7 @@ where
         before: Option<NodalFields>,
     ) {
         if self.params.solver == SolverKind::Multigrid {
-            let space = &problem.system.space;
-            let mut velocity = x[..space.dim()].to_vec();
-            space.expand(&mut velocity);
-            let bodies = velocity.split_off(space.full_dim());
-            let films = problem.system.films.as_ref();
-            let films = films.map_or_else(Vec::new, |films| films.kept(problem.system.parts(x)[2]));
-            let last = NodalFields { velocity, pressure: pressure.to_vec(), bodies, films };
+            let last = NodalFields::of(&problem.system, x, pressure.to_vec());
             let before = before.filter(|_| problem.rigidity.is_smooth_in_time());
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }

@@ -32,6 +32,22 @@ pub struct NodalFields {
     pub films: Vec<f64>,
 }
 
+impl NodalFields {
+    /// Those of a reduced vector, with the pressures at their nodes.
+    pub(crate) fn of<const D: usize>(system: &StokesSystem<D>, x: &[f64], pressure: Vec<f64>) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let space = &system.space;
+        let mut velocity = x[..space.dim()].to_vec();
+        space.expand(&mut velocity);
+        let bodies = velocity.split_off(space.full_dim());
+        let films = system.films.as_ref();
+        let films = films.map_or_else(Vec::new, |films| films.kept(system.parts(x)[2]));
+        Self { velocity, pressure, bodies, films }
+    }
+}
+
 /// Stored fields that do not belong to a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -131,6 +147,16 @@ where
 
     /// The reduced vector a solve on its mesh starts from for the right-hand side `b`, and the last flow.
     pub fn into_guess(self, system: &StokesSystem<D>, b: &[f64]) -> (Vec<f64>, NodalFields) {
+        (self.guess(system, b, &mut |_| ()), self.last)
+    }
+
+    /// The reduced vector. Films get forces after `complete` brought velocities from elsewhere to it.
+    pub fn guess(
+        &self,
+        system: &StokesSystem<D>,
+        b: &[f64],
+        complete: &mut dyn FnMut(&mut [f64]),
+    ) -> Vec<f64> {
         let mut guess = self.last.clone();
         if let Some(before) = &self.before {
             extrapolate(&before.velocity, &mut guess.velocity);
@@ -147,6 +173,7 @@ where
             bodies.copy_from_slice(&guess.bodies);
         }
         space.clear_held(&mut x);
+        complete(&mut x);
         if let Some(films) = &system.films {
             guess.films = films.of_motions(&x, system.parts(b)[2]);
             films.restore(&self.last.films, &mut guess.films);
@@ -160,7 +187,7 @@ where
         x.append(&mut guess.pressure);
         x.append(&mut guess.films);
         x.resize(system.dim(), 0.0);
-        (x, self.last)
+        x
     }
 }
 

@@ -43,7 +43,9 @@ impl<'a, const D: usize> NumberedNodes<'a, D> {
         let mut is_in = vec![false; mesh.velocity.node_count()];
         let evaluator = Evaluator::new(&mesh.mesh);
         for &node in self.nodes.positions() {
-            let Some((cell, x)) = evaluator.locate(&self.mesh.velocity, node as usize) else { continue };
+            let Some((cell, x)) = evaluator.locate(&self.mesh.velocity.point(node as usize)) else {
+                continue;
+            };
             let place = (0..D).rev().try_fold(0, |place, d| {
                 let along = 2.0 * x[d];
                 (along == along.round()).then_some(3 * place + along as usize)

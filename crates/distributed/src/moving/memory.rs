@@ -1,0 +1,64 @@
+//! What a rank keeps of the flows of a suspension, from step to step and for checkpoints.
+
+use std::cell::{Cell, RefCell};
+use std::sync::Arc;
+
+use gluey_geom::{Dim, Space};
+use gluey_parallel::Communicator;
+
+use super::Suspension;
+use crate::warm_start::{PieceError, SavedPiece, WarmStart};
+
+/// The flows that the next one starts from, as far as they are on this rank, and those that a checkpoint of
+/// the step before would have.
+pub struct Memory<const D: usize> {
+    pub(super) last: RefCell<Option<Arc<WarmStart<D>>>>,
+    remembered: RefCell<Option<Arc<WarmStart<D>>>>,
+    /// Whether a flow has begun and not ended.
+    pub(super) is_predicting: Cell<bool>,
+}
+
+impl<const D: usize> Default for Memory<D> {
+    fn default() -> Self {
+        Self { last: RefCell::default(), remembered: RefCell::default(), is_predicting: Cell::new(false) }
+    }
+}
+
+impl<const D: usize> Memory<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Keeps what the next flow starts from for a checkpoint.
+    pub(super) fn remember(&self) {
+        self.remembered.replace(self.last.borrow().clone());
+    }
+
+    /// Whether a flow was broken off: other ranks wait for what this one has to say of it.
+    pub fn is_broken(&self) -> bool {
+        self.is_predicting.get()
+    }
+
+    /// What a checkpoint is to have of this rank; nothing before the first flow. All ranks have something or
+    /// none has.
+    pub fn saved(&self) -> Vec<SavedPiece> {
+        self.remembered.borrow().as_ref().map_or(Vec::new(), |kept| kept.saved())
+    }
+
+    /// Goes on from pieces of a checkpoint: those that [`SavedPiece::holder`] gives to this rank, or where
+    /// there are none any other.
+    ///
+    /// # Errors
+    /// [`PieceError`] for pieces that do not belong to the suspension; nothing has changed then.
+    pub fn restore(
+        &self,
+        suspension: &Suspension<D>,
+        ranks: &dyn Communicator,
+        saved: Vec<SavedPiece>,
+    ) -> Result<(), PieceError> {
+        let periodic = suspension.periods.map(|period| period.is_some());
+        let tree_box = (suspension.domain, suspension.roots, periodic);
+        let restored = WarmStart::restored(tree_box, suspension.radii.len(), ranks, saved)?;
+        self.last.replace(Some(Arc::new(restored)));
+        Ok(())
+    }
+}
