@@ -2,16 +2,14 @@
 //!
 //! Rows of output are not in it, but how far their files had come ([`CsvMarks`]).
 //!
-//! A file is 8 bytes that say what it is, a version (u32, little-endian), the blake3 digest of the rest, and
-//! the rest: a [`Checkpoint`] in postcard encoding, compressed by zlib. It carries the case, so that it
-//! cannot be taken for one of another case.
+//! A file is a [`Checkpoint`] in postcard encoding, behind a digest. It carries the case, so that it cannot
+//! be taken for one of another case. Where ranks share the flow, what the next one starts from is in files
+//! of its own beside it, one for the cells of each rank ([`FlowPieces`]).
 
 use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use flate2::Compression;
-use flate2::read::{ZlibDecoder, ZlibEncoder};
 use gluey_geom::{Dim, Space};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -21,15 +19,12 @@ use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::csv::CsvMarks;
 use crate::output::{Mark, OutputError, write_atomically};
 use crate::phases::PhaseTable;
+use crate::sealed::{Kind, Unopened};
 use crate::simulation::{RestoreError, SimulationState};
 
-const MAGIC: &[u8; 8] = b"gluey-ck";
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 13;
-const DIGEST_LENGTH: usize = 32;
-const HEADER_LENGTH: usize = MAGIC.len() + 4 + DIGEST_LENGTH;
-/// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
-const COMPRESSION_LEVEL: u32 = 1;
+const VERSION: u32 = 14;
+const KIND: Kind = Kind { magic: b"gluey-ck", layout: VERSION };
 
 /// A run between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +47,29 @@ where
     pub phases: PhaseTable,
     /// Wall time so far, in seconds.
     pub wall_s: f64,
+    /// Ranks that shared the flow, 0 where it was not to be shared.
+    pub ranks: usize,
+    /// The files with what the next flow starts from, where ranks share it.
+    pub pieces: Option<FlowPieces>,
+}
+
+/// Files beside a checkpoint with what the next flow starts from, one for the cells of each rank that wrote
+/// them: any number of ranks can go on from them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FlowPieces {
+    /// What their names begin with: the name of the checkpoint when it was written.
+    pub stem: String,
+    /// What tells them from those of other checkpoints.
+    pub name: u64,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl FlowPieces {
+    /// The piece of a run of cells, from 0, of a checkpoint that is at `checkpoint` now.
+    pub fn path(&self, checkpoint: &Path, run: usize) -> PathBuf {
+        checkpoint.with_file_name(format!("{}.flow-{:016x}-{run:04}", self.stem, self.name))
+    }
 }
 
 /// A checkpoint could not be used.
@@ -101,6 +119,14 @@ pub enum CheckpointError {
         /// Why.
         source: toml::ser::Error,
     },
+    /// A piece of its flow cannot be gone on with, here or on another rank.
+    #[error("{message}: a piece of the flow of the checkpoint {}", path.display())]
+    Piece {
+        /// The checkpoint.
+        path: PathBuf,
+        /// The piece, and what is wrong with it.
+        message: String,
+    },
     /// The simulation cannot go on from it.
     #[error("{}: does not fit the case", path.display())]
     Unfit {
@@ -109,6 +135,19 @@ pub enum CheckpointError {
         /// Why.
         source: RestoreError<HydrodynamicsError>,
     },
+}
+
+impl CheckpointError {
+    /// For the file of a checkpoint, or a piece of its flow.
+    pub(crate) fn unopened(path: &Path, why: Unopened) -> Self {
+        let path = path.to_owned();
+        match why {
+            Unopened::Read(source) => Self::Read { path, source },
+            Unopened::Foreign => Self::Foreign { path },
+            Unopened::Layout(found) => Self::Version { path, found },
+            Unopened::Damaged => Self::Damaged { path },
+        }
+    }
 }
 
 /// The first line in which two cases differ.
@@ -140,17 +179,21 @@ where
             let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
             let gluey = env!("CARGO_PKG_VERSION").to_owned();
             let payload = Payload { gluey, case: canonical(case).map_err(io::Error::other)?, run };
-            let bytes = postcard::to_stdvec(&payload).map_err(io::Error::other)?;
-            let mut body = Vec::new();
-            ZlibEncoder::new(bytes.as_slice(), Compression::new(COMPRESSION_LEVEL)).read_to_end(&mut body)?;
-            Ok(body)
+            KIND.sealed(&postcard::to_stdvec(&payload).map_err(io::Error::other)?)
         };
-        let body = encode().map_err(|error| OutputError::new(path, "encode the checkpoint", error))?;
-        let mut file = MAGIC.to_vec();
-        file.extend(VERSION.to_le_bytes());
-        file.extend(blake3::hash(&body).as_bytes());
-        file.extend(body);
+        let file = encode().map_err(|error| OutputError::new(path, "encode the checkpoint", error))?;
         write_atomically(path, &file)
+    }
+
+    /// The same for a run on so many ranks. On others than those that wrote it numbers differ in their last
+    /// digits: rows behind the checkpoint are computed anew.
+    #[must_use]
+    pub(crate) fn on(mut self, ranks: usize) -> Self {
+        let is_last = self.ranks != ranks;
+        let rows = [Some(&mut self.output.rows), self.output.gaps.as_mut()];
+        let tables = [self.rheology.as_mut(), self.forces.as_mut(), Some(&mut self.solver)];
+        rows.into_iter().chain(tables).flatten().for_each(|mark| mark.is_last = is_last);
+        self
     }
 
     /// Reads a checkpoint of a run of `case`. The end of the run may differ: a run can be prolonged.
@@ -170,37 +213,8 @@ where
 
 /// What stands in the file, its case and run not yet decoded.
 fn payload(path: &Path) -> Result<Payload, CheckpointError> {
-    let path = path.to_owned();
-    let bytes = match fs::read(&path) {
-        Ok(bytes) => bytes,
-        Err(source) => return Err(CheckpointError::Read { path, source }),
-    };
-    let Some((header, body)) = bytes.split_at_checked(HEADER_LENGTH) else {
-        return Err(if is_start(&bytes[..bytes.len().min(MAGIC.len())]) {
-            CheckpointError::Damaged { path }
-        } else {
-            CheckpointError::Foreign { path }
-        });
-    };
-    let (magic, rest) = header.split_at(MAGIC.len());
-    let (version, digest) = rest.split_at(4);
-    if magic != MAGIC {
-        return Err(CheckpointError::Foreign { path });
-    }
-    let found = version.iter().rev().fold(0, |number, &byte| number << 8 | u32::from(byte));
-    if found != VERSION {
-        return Err(CheckpointError::Version { path, found });
-    }
-    if blake3::hash(body).as_bytes() != digest {
-        return Err(CheckpointError::Damaged { path });
-    }
-    let payload: Option<Payload> = inflated(body).and_then(|bytes| postcard::from_bytes(&bytes).ok());
-    payload.ok_or(CheckpointError::Damaged { path })
-}
-
-/// Whether a checkpoint may begin so.
-fn is_start(bytes: &[u8]) -> bool {
-    MAGIC.starts_with(bytes) && !bytes.is_empty()
+    let bytes = KIND.opened(path).map_err(|why| CheckpointError::unopened(path, why))?;
+    postcard::from_bytes(&bytes).map_err(|_| CheckpointError::Damaged { path: path.to_owned() })
 }
 
 /// What a checkpoint says of itself.
@@ -216,6 +230,8 @@ pub struct CheckpointSummary {
     pub step: usize,
     /// Wall time so far, in seconds.
     pub wall_s: f64,
+    /// Files with the flow that belong to it.
+    pub pieces: Option<FlowPieces>,
 }
 
 impl CheckpointSummary {
@@ -225,8 +241,8 @@ impl CheckpointSummary {
     /// When the file cannot be read.
     pub fn is_announced_by(path: &Path) -> io::Result<bool> {
         let mut start = Vec::new();
-        fs::File::open(path)?.take(MAGIC.len() as u64).read_to_end(&mut start)?;
-        Ok(is_start(&start))
+        fs::File::open(path)?.take(KIND.magic.len() as u64).read_to_end(&mut start)?;
+        Ok(KIND.begins(&start))
     }
 
     /// Reads what stands in a checkpoint, whatever its case is.
@@ -237,29 +253,22 @@ impl CheckpointSummary {
         let payload = payload(path)?;
         let damaged = || CheckpointError::Damaged { path: path.to_owned() };
         let case: Case = toml::from_str(&payload.case).map_err(|_| damaged())?;
-        let (step, wall_s) = match case.dimension {
+        let (step, wall_s, pieces) = match case.dimension {
             2 => progress::<2>(&payload.run),
             _ => progress::<3>(&payload.run),
         }
         .ok_or_else(damaged)?;
-        Ok(Self { layout: VERSION, gluey: payload.gluey, case, step, wall_s })
+        Ok(Self { layout: VERSION, gluey: payload.gluey, case, step, wall_s, pieces })
     }
 }
 
-/// Steps done and seconds spent.
-fn progress<const D: usize>(run: &[u8]) -> Option<(usize, f64)>
+/// Steps done, seconds spent, and pieces of the flow.
+fn progress<const D: usize>(run: &[u8]) -> Option<(usize, f64, Option<FlowPieces>)>
 where
     Dim<D>: Space<D>,
 {
     let checkpoint: Checkpoint<D> = postcard::from_bytes(run).ok()?;
-    Some((checkpoint.state.step, checkpoint.wall_s))
-}
-
-/// Bytes before compression; `None` if `body` is not compressed.
-fn inflated(body: &[u8]) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
-    ZlibDecoder::new(body).read_to_end(&mut bytes).ok()?;
-    Some(bytes)
+    Some((checkpoint.state.step, checkpoint.wall_s, checkpoint.pieces))
 }
 
 /// The case as text, without its end and its streams of frames, all defaults stated.

@@ -35,6 +35,7 @@ pub mod progress;
 pub mod reference;
 mod report;
 mod run;
+mod sealed;
 mod shown;
 mod simulation;
 pub mod summary;
@@ -44,7 +45,7 @@ mod trajectory;
 pub mod view;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
-pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary};
+pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary, FlowPieces};
 pub use flow::FlowError;
 pub use hydrodynamics::HydrodynamicsError;
 pub use memory::TooLarge;

@@ -5,6 +5,8 @@
 mod checkpoint_file;
 mod contacts;
 mod error;
+#[cfg(feature = "ranks")]
+mod flow_pieces;
 mod frames;
 mod leftovers;
 mod log;
@@ -131,8 +133,10 @@ where
     tables: Tables,
     solver: SolverLog,
     frames: Frames<'a, D>,
-    checkpoints: Option<CheckpointFile>,
+    checkpoints: Option<CheckpointFile<'a>>,
     recorder: Option<Recorder>,
+    /// Ranks that share the flow, 0 where it is not to be shared.
+    ranks: usize,
     /// The run before the step that is being done, where checkpoints are written.
     last_good: Option<Checkpoint<D>>,
     started: Instant,
@@ -161,7 +165,8 @@ where
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
         drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
-        let checkpoints = CheckpointFile::new(options, !drafts.is_empty());
+        let ranks = others.map_or(0, Others::rank_count);
+        let checkpoints = CheckpointFile::new(options, !drafts.is_empty(), others);
         let (csv, tables, solver) = match &options.resume {
             None => {
                 if !drafts.is_empty() {
@@ -171,7 +176,7 @@ where
                 (csv, Tables::create::<D>(case, &options.csv)?, SolverLog::create(&options.csv)?)
             }
             Some(path) => {
-                let checkpoint = Checkpoint::read(case, path)?;
+                let checkpoint = Checkpoint::read(case, path)?.on(ranks);
                 wall_before_s = checkpoint.wall_s;
                 let Checkpoint { rheology, forces, .. } = checkpoint.clone();
                 let tables = Tables::resume(&options.csv, &TableMarks { rheology, forces })?;
@@ -196,6 +201,7 @@ where
             frames,
             checkpoints,
             recorder,
+            ranks,
             last_good,
             started,
             saved: started,
@@ -352,6 +358,8 @@ where
                 solver: self.solver.mark(),
                 phases: self.simulation.phases().clone(),
                 wall_s: self.wall_s(),
+                ranks: self.ranks,
+                pieces: None,
             });
         }
         Ok(())

@@ -47,6 +47,16 @@ pub enum PieceError {
 }
 
 impl SavedPiece {
+    /// Which run it is, from 0.
+    pub fn run(&self) -> usize {
+        self.run
+    }
+
+    /// Number of runs.
+    pub fn run_count(&self) -> usize {
+        self.firsts.len().saturating_sub(1)
+    }
+
     /// The rank among `ranks` that goes on from run `run` of `runs`.
     pub fn holder(run: usize, runs: usize, ranks: usize) -> usize {
         run * ranks / runs

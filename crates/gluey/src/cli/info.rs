@@ -131,7 +131,7 @@ fn runs(folder: &Path) -> Result<Vec<RunInfo>, InfoError> {
 
 impl CheckpointInfo {
     fn of(path: &Path) -> Result<Self, gluey::CheckpointError> {
-        let CheckpointSummary { layout, gluey, case, step, wall_s } = CheckpointSummary::read(path)?;
+        let CheckpointSummary { layout, gluey, case, step, wall_s, .. } = CheckpointSummary::read(path)?;
         let (file, time) = (path.to_owned(), step as f64 * case.time.step);
         Ok(Self { file, case: CaseSummary::without_end(&case), step, time, wall_s, gluey, layout })
     }

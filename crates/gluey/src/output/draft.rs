@@ -1,7 +1,8 @@
 //! A text file that grows line by line, and goes on growing after its writer was killed.
 //!
 //! A [`Mark`] in a checkpoint says how far the file had come. A run that resumes keeps all whole lines behind
-//! the mark: what it writes there is compared with them, byte by byte, until there are no more.
+//! the mark: what it writes there is compared with them, byte by byte, until there are no more. One that
+//! cannot have the same bits leaves them where they are and goes on in a draft of its own.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -24,6 +25,9 @@ pub struct Mark {
     pub lines: u64,
     /// Their blake3 digest.
     pub digest: [u8; 32],
+    /// Whether lines behind it are to be left alone, since those to come will differ in their last digits.
+    #[serde(skip)]
+    pub is_last: bool,
 }
 
 /// Rows could not be written or gone on with; those on disk are as they were.
@@ -104,10 +108,15 @@ impl Draft {
         let path = draft_path(complete, mark.draft);
         let failed = |error| OutputError::new(complete, "go on with the file", error);
         if holds(&path, mark).map_err(failed)? {
+            if mark.is_last {
+                let copy = copy(&path, complete, mark.bytes).map_err(failed)?;
+                return Ok(Self::open(complete, copy, mark).map_err(failed)?);
+            }
             return Ok(Self::open(complete, mark.draft, mark).map_err(failed)?);
         }
         if holds(complete, mark).map_err(failed)? {
-            let copy = copy(complete, complete, u64::MAX).map_err(failed)?;
+            let bytes = if mark.is_last { mark.bytes } else { u64::MAX };
+            let copy = copy(complete, complete, bytes).map_err(failed)?;
             return Ok(Self::open(complete, copy, mark).map_err(failed)?);
         }
         Err(RowsError::Missing { draft: path, complete: complete.to_owned(), lines: mark.lines })
@@ -197,7 +206,7 @@ impl Draft {
     /// How far the file has come.
     pub fn mark(&self) -> Mark {
         let digest = *self.hasher.finalize().as_bytes();
-        Mark { draft: self.number, bytes: self.bytes, lines: self.lines, digest }
+        Mark { draft: self.number, bytes: self.bytes, lines: self.lines, digest, is_last: false }
     }
 
     /// Makes sure that what was written outlives a power failure.
@@ -315,6 +324,17 @@ mod tests {
             other => panic!("{other:?}"),
         }
         assert_eq!(read(&draft_path(&complete, 1)), "t\n0\n1\n2\n");
+    }
+
+    #[test]
+    fn lines_behind_the_last_mark_stay_in_their_draft() {
+        let (_folder, complete, mark) = killed();
+        let mut draft = Draft::resume(&complete, &Mark { is_last: true, ..mark }).expect("marked");
+        draft.write("5\n").expect("another line");
+        assert_eq!(draft.mark().draft, 2);
+        draft.finish().expect("complete");
+        assert_eq!(read(&complete), "t\n0\n5\n");
+        assert_eq!(read(&draft_path(&complete, 1)), "t\n0\n1\n2\n3");
     }
 
     #[test]

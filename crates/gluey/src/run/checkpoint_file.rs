@@ -1,17 +1,22 @@
 //! Where a run writes its checkpoints: two generations of them.
 
+use std::collections::VecDeque;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use gluey_geom::{Dim, Space};
 
+use super::frames::Others;
 use super::options::RunOptions;
 use super::paths::ResultPaths;
 use crate::case::Case;
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
 use crate::output::{OutputError, set_aside};
 use crate::progress::{Notice, Progress};
+
+/// Checkpoints that are there at a time.
+const GENERATIONS: usize = 2;
 
 /// Whose the files are that a run finds where it is to write its first checkpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,14 +32,18 @@ enum Found {
 }
 
 /// The checkpoint of a run, and the one before it.
-pub(super) struct CheckpointFile {
+pub(super) struct CheckpointFile<'a> {
     path: PathBuf,
     found: Found,
+    /// The ranks that share the flow.
+    others: Option<&'a dyn Others>,
+    /// Pieces of the flow of the last checkpoint and of the one before.
+    pieces: VecDeque<Option<FlowPieces>>,
 }
 
-impl CheckpointFile {
+impl<'a> CheckpointFile<'a> {
     /// Where `options` say; `has_drafts` tells whether earlier runs left rows.
-    pub fn new(options: &RunOptions, has_drafts: bool) -> Option<Self> {
+    pub fn new(options: &RunOptions, has_drafts: bool, others: Option<&'a dyn Others>) -> Option<Self> {
         let path = options.checkpoint.clone()?;
         let full = |path: &Path| path.canonicalize().ok();
         let resumes = |path: &Path| options.resume.as_deref().is_some_and(|file| full(file) == full(path));
@@ -44,11 +53,52 @@ impl CheckpointFile {
             (.., true) => Found::Wanted,
             _ => Found::Unwanted,
         };
-        Some(Self { path, found })
+        // The older first; those that stay for somebody else are not this run's to remove.
+        let pieces = match found {
+            Found::Wanted => VecDeque::new(),
+            Found::OwnPrevious => [pieces_of(&ResultPaths::previous(&path))].into(),
+            _ => [pieces_of(&ResultPaths::previous(&path)), pieces_of(&path)].into(),
+        };
+        Some(Self { path, found, others, pieces })
     }
 
     /// Writes a checkpoint. There is a whole one under one of the two names at every moment.
     pub fn write<const D: usize>(
+        &mut self,
+        checkpoint: &Checkpoint<D>,
+        case: &Case,
+        progress: &dyn Progress,
+    ) -> Result<(), OutputError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let Some(others) = self.others else { return self.write_alone(checkpoint, case, progress) };
+        let encode = |error| OutputError::new(&self.path, "encode the checkpoint", io::Error::other(error));
+        let digest = blake3::hash(&postcard::to_stdvec(&checkpoint.state).map_err(encode)?);
+        let name = digest.as_bytes()[..8].iter().fold(0, |name, &byte| name << 8 | u64::from(byte));
+        let pieces = others.write_flow(&self.path, name)?;
+        self.write_alone(&Checkpoint { pieces: pieces.clone(), ..checkpoint.clone() }, case, progress)?;
+        self.pieces.push_back(pieces);
+        self.remove_old_pieces()
+    }
+
+    /// Removes pieces of checkpoints that are not there any more.
+    fn remove_old_pieces(&mut self) -> Result<(), OutputError> {
+        while self.pieces.len() > GENERATIONS {
+            let Some(old) = self.pieces.pop_front().flatten() else { continue };
+            if self.pieces.contains(&Some(old.clone())) {
+                continue;
+            }
+            for path in (0..old.count).map(|run| old.path(&self.path, run)) {
+                remove(&path)
+                    .map_err(|error| OutputError::new(&path, "remove an old piece of a flow", error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the one file.
+    fn write_alone<const D: usize>(
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
@@ -78,6 +128,11 @@ impl CheckpointFile {
         }
         checkpoint.write(case, &self.path)
     }
+}
+
+/// The pieces that belong to a checkpoint, if it is one.
+fn pieces_of(checkpoint: &Path) -> Option<FlowPieces> {
+    CheckpointSummary::read(checkpoint).ok()?.pieces
 }
 
 /// Makes `older` another name of the file `path`, which keeps its own, or a copy where files have one name.

@@ -11,6 +11,7 @@ use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
+use crate::checkpoint::FlowPieces;
 use crate::output::OutputError;
 use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
@@ -24,6 +25,10 @@ pub(super) trait Others {
     /// Has them write the fields in their cells at a step, as one of the streams of the run. All are on disk
     /// then.
     fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError>;
+
+    /// Writes, with them, what the flow after the last step that was remembered starts from, in files for a
+    /// checkpoint that is to be written next; none if it starts from nothing. All are on disk then.
+    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, OutputError>;
 }
 
 /// A stream of frames that a run is to write.

@@ -1,34 +1,78 @@
-//! Frames whose fields ranks write in pieces, each those in its own cells.
+//! What ranks write in pieces, each those in its own cells: fields of frames, flows of checkpoints.
 //!
 //! Rank zero asks for a frame, the others write and say whether they could. Then it writes its own piece and
-//! the file that names all of them.
+//! the file that names all of them. Pieces of a checkpoint are all there before it is.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
-use gluey_distributed::{FrameName, ask_for_fields};
+use gluey_distributed::{Follower, FrameName, Memory, SavedPiece, ask_for_fields, ask_to_keep};
+use gluey_geom::{Dim, Space};
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Message};
 
+use super::flow_pieces;
 use super::frames::{Others, StreamOptions};
+use crate::checkpoint::FlowPieces;
 use crate::output::{OutputError, vtk};
 
 /// All ranks but zero, as rank zero sees them.
-pub(super) struct OtherRanks<'a>(pub &'a dyn Communicator);
+pub(super) struct OtherRanks<'a, const D: usize> {
+    pub ranks: &'a dyn Communicator,
+    /// Of rank zero.
+    pub memory: Rc<Memory<D>>,
+}
 
-impl Others for OtherRanks<'_> {
+impl<const D: usize> Others for OtherRanks<'_, D>
+where
+    Dim<D>: Space<D>,
+{
     fn rank_count(&self) -> usize {
-        self.0.size()
+        self.ranks.size()
     }
 
     fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError> {
-        ask_for_fields(self.0, FrameName { stream: stream as u32, step: step as u32 });
-        first_failure(self.0, None)
+        ask_for_fields(self.ranks, FrameName { stream: stream as u32, step: step as u32 });
+        first_failure(self.ranks, None)
+    }
+
+    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, OutputError> {
+        if self.memory.is_broken() {
+            let source = io::Error::other("the flow that ranks share was broken off");
+            return Err(OutputError::new(checkpoint, "keep the flow for", source));
+        }
+        ask_to_keep(self.ranks, name);
+        let own = flow_pieces::write(checkpoint, name, &self.memory.saved());
+        first_failure(self.ranks, None)?;
+        own
+    }
+}
+
+/// A rank other than zero, which writes what rank zero asks for and tells it what came of it.
+pub(super) struct Follows<'a> {
+    pub ranks: &'a dyn Communicator,
+    pub streams: Vec<StreamOptions>,
+    pub checkpoint: Option<PathBuf>,
+}
+
+impl<const D: usize> Follower<D> for Follows<'_>
+where
+    Dim<D>: Space<D>,
+{
+    fn show(&mut self, frame: FrameName, fields: Option<Fields<D>>) {
+        write_piece(self.ranks, &self.streams, frame, fields);
+    }
+
+    fn keep(&mut self, name: u64, pieces: Vec<SavedPiece>) {
+        let checkpoint = self.checkpoint.as_deref().unwrap_or(Path::new(""));
+        // What went wrong is told by rank zero.
+        let _ = first_failure(self.ranks, flow_pieces::write(checkpoint, name, &pieces).err());
     }
 }
 
 /// Writes the fields in the cells of a rank other than zero, which it tells what came of it.
-pub(super) fn write_piece<const D: usize>(
+fn write_piece<const D: usize>(
     ranks: &dyn Communicator,
     streams: &[StreamOptions],
     frame: FrameName,

@@ -1,13 +1,15 @@
 //! Cases whose flow is shared by ranks: which can be, and what becomes of them.
 
+use std::rc::Rc;
+
 use gluey_contact::{ContactModel, PairContact};
-use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
+use gluey_distributed::{BoxFlow, Memory, SharedHydrodynamics, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::Communicator;
 
 use super::frames::StreamOptions;
-use super::pieces::{OtherRanks, write_piece};
-use super::{Run, RunError, RunOptions, claim_outputs, leftovers, logged, occupied};
+use super::pieces::{Follows, OtherRanks};
+use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, leftovers, logged, occupied};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 use crate::flow::{FlowError, flow_params, refinement, tree};
 use crate::hydrodynamics::HydrodynamicsError;
@@ -46,14 +48,18 @@ where
     PairContact<D>: ContactModel<D>,
 {
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
+    let memory = Rc::new(Memory::default());
+    if let Some(checkpoint) = &options.resume {
+        flow_pieces::restore((case, checkpoint), &suspension, ranks, &memory)?;
+    }
     if ranks.rank() > 0 {
-        let streams = StreamOptions::of_run(case, options);
-        suspension.follow_and_show(ranks, &mut |frame, fields| write_piece(ranks, &streams, frame, fields));
+        let (streams, checkpoint) = (StreamOptions::of_run(case, options), options.checkpoint.clone());
+        suspension.follow_for(ranks, &memory, &mut Follows { ranks, streams, checkpoint });
         return Ok(None);
     }
     // However this ends, the others learn of it when the leader is dropped.
-    let leader = SharedHydrodynamics::leading(&suspension, ranks);
-    let others = OtherRanks(ranks);
+    let leader = SharedHydrodynamics::leading(&suspension, ranks).remembering(memory.clone());
+    let others = OtherRanks { ranks, memory };
     let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
