@@ -6,7 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::films::{Film, FilmClosed, FilmMemory, Step};
+use crate::films::{Film, FilmError, FilmMemory, Step};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -113,7 +113,7 @@ where
     /// names, sorted by particles.
     ///
     /// # Errors
-    /// [`FilmClosed`] where particles are so crowded that none can be given room; take smaller steps then.
+    /// [`FilmError`] where particles are so crowded that none can be given room; take smaller steps then.
     ///
     /// [`Hydrodynamics`]: crate::Hydrodynamics
     pub fn open_films(
@@ -122,7 +122,7 @@ where
         particles: &[Particle<D>],
         films: &[Film<D>],
         twists: &mut [Twist<D>],
-    ) -> Result<(), FilmClosed> {
+    ) -> Result<(), FilmError> {
         let mut memory = std::mem::take(&mut self.films);
         let corrected = memory.correct(&self.film_step(dt, particles), films, twists);
         self.films = memory;

@@ -1,7 +1,7 @@
 //! Why a simulation cannot go on.
 
 use gluey_contact::{ContactError, MemoryError};
-use gluey_motion::{FilmClosed, NoForces, ResumeError};
+use gluey_motion::{FilmError, NoForces, ResumeError};
 use thiserror::Error;
 
 use crate::shown::shown;
@@ -47,7 +47,7 @@ pub enum StepError<E: std::error::Error + 'static> {
         /// Time at the start of the step.
         time: f64,
         /// Why.
-        source: FilmClosed,
+        source: FilmError,
     },
     /// A velocity is infinite or not a number.
     #[error("the velocity of particle {particle} is not finite in step {step} (t = {})", shown(*time))]

@@ -1,0 +1,283 @@
+//! Gaps after a step where the impulses of films contradict each other.
+//!
+//! Each film asks for the gap that its impulse `I` gives. Where particles are crowded they have fewer ways to
+//! move than there are films, and cannot meet all. What is met instead is the balance of impulses on each
+//! particle: displaced by `x` from where the flow takes it, the particle `i` of the radius `a_i` meets the
+//! impulse `2 a_i x_i` of its drag, and
+//!
+//! `2 a_i x_i = sum_k +- n_k L_k`, `A_k Phi(g_k) = A_k I_k - L_k`, `g_k = gap_k(x) > 0`,
+//!
+//! in the units in which the drag of two particles against each other is `A_k`, as in `R`. That is the
+//! minimum of `sum_k A_k int (Phi - I_k) dg_k + sum_i a_i |x_i|^2`. Where impulses agree, `L` and `x` follow
+//! from the errors of the step alone. A film much thinner than its neighbours is changed by them in
+//! proportion to itself: none is closed, whatever they ask for.
+//!
+//! Solved for the loads `L`, which are free: `gap_k(x(L)) - Phi^-1(I_k - L_k/A_k) = 0`, where gaps are linear
+//! in `x` the gradient of a convex function, by Newton's method with conjugate gradients. Gaps are linearised
+//! about the bodies where they are, then about where they went, until they are exact. The distance of
+//! centres is convex in `x`: gaps are never below those linearised.
+
+use gluey_geom::{Dim, Space, Twist, Vector};
+
+use super::error::{FilmClosed, FilmError};
+use super::film::Film;
+use super::step::Step;
+
+/// A gap this near to where it should be, relative to it, is there...
+const TOLERANCE: f64 = 1e-6;
+/// ... or as near as this share of the thinnest film.
+const LEAST: f64 = 1e-2;
+/// Linearisations of the gaps at most. Steps in which particles move far around each other would take more:
+/// what is left then are gaps wider than they should be.
+const MOST_PASSES: usize = 20;
+/// Newton steps of one of them at most. A linear problem takes one to ten.
+const MOST_NEWTON_STEPS: usize = 100;
+/// Iterations of a Newton step at most; what is left then is left to the next.
+const MOST_ITERATIONS: usize = 2000;
+/// Films are taken to yield at least so much in a Newton step, over the mobility of their particles
+/// (Levenberg 1944, 10.1090/qam/10666): where more of them are closed than particles have ways to move, gaps
+/// do not tell their loads. More where steps had to be shortened a lot, less where they were right.
+const SOFTENINGS: [f64; 2] = [1e-6, 0.1];
+/// By which factor.
+const HARDENING: f64 = 10.0;
+/// Newton steps are shortened where the slope along them does not fall to this share of itself...
+const SLOPE: f64 = 0.9;
+/// ... to no less than this share.
+const SHORTEST: f64 = 1e-12;
+/// Steps below this share are much shortened.
+const SHORT: f64 = 0.25;
+/// Linear problems are solved this much more accurately than gaps.
+const MARGIN: f64 = 0.1;
+
+/// Films whose gaps are linear in the displacements of their particles.
+struct Balance<'a, const D: usize> {
+    /// Films, and the impulses that they ask for.
+    wanted: &'a [(&'a Film<D>, f64)],
+    /// Their particles; a wall has the number that comes after those of the particles.
+    ends: Vec<[usize; 2]>,
+    /// `1/(2 a)` of each particle; zero for those that are held, and for walls.
+    mobilities: Vec<f64>,
+    normals: Vec<Vector<D>>,
+    /// Gaps without loads.
+    free_gaps: Vec<f64>,
+    /// `L`.
+    loads: Vec<f64>,
+    state: State,
+}
+
+/// What loads lead to.
+#[derive(Clone, Default)]
+struct State {
+    /// Gaps that films have under their loads.
+    gaps: Vec<f64>,
+    /// `-dg/dL` of each film.
+    compliances: Vec<f64>,
+    /// Gaps between the particles less those of their films.
+    excess: Vec<f64>,
+}
+
+/// Moves particles so that impulses balance; returns those that films have then.
+///
+/// # Errors
+/// [`FilmError`].
+pub(super) fn balance<const D: usize>(
+    step: &Step<'_, D>,
+    wanted: &[(&Film<D>, f64)],
+    twists: &mut [Twist<D>],
+) -> Result<Vec<f64>, FilmError>
+where
+    Dim<D>: Space<D>,
+{
+    let free = twists.to_vec();
+    let mut balance = Balance::new(step, wanted);
+    let mut history = Vec::new();
+    for pass in 0..MOST_PASSES {
+        balance.linearise(step, &free, (pass > 0).then_some(&*twists));
+        let is_solved = balance.solve(&mut history);
+        for ((twist, free), moved) in twists.iter_mut().zip(&free).zip(balance.displacements(&balance.loads))
+        {
+            twist.velocity = free.velocity + moved / step.weight;
+        }
+        if !is_solved {
+            break;
+        }
+        let off = balance.farthest(|k| step.gap_after(wanted[k].0, twists) - balance.state.gaps[k]);
+        if off <= 2.0 * TOLERANCE || pass + 1 == MOST_PASSES {
+            return Ok(balance.impulses());
+        }
+        history.push(off);
+    }
+    Err(balance.failure(step, twists, history))
+}
+
+impl<'a, const D: usize> Balance<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(step: &Step<'_, D>, wanted: &'a [(&'a Film<D>, f64)]) -> Self {
+        let wall = step.particles.len();
+        let mut mobilities: Vec<f64> = step.particles.iter().map(|particle| 0.5 / particle.radius).collect();
+        mobilities.push(0.0);
+        let mut ends = Vec::with_capacity(wanted.len());
+        for (film, _) in wanted {
+            let both = [film.first, film.second.unwrap_or(wall)];
+            both.iter().zip(film.is_held).filter(|(_, held)| *held).for_each(|(&k, _)| mobilities[k] = 0.0);
+            ends.push(both);
+        }
+        let (zeros, normals) = (vec![0.0; wanted.len()], Vec::with_capacity(wanted.len()));
+        let state = State { gaps: wanted.iter().map(|(film, _)| film.gap).collect(), ..State::default() };
+        Self { wanted, ends, mobilities, normals, free_gaps: zeros.clone(), loads: zeros, state }
+    }
+
+    /// Linearises about the bodies where these velocities take them, or where they are now: the gap after
+    /// displacements is `n . (b + x) - |b| + g`.
+    fn linearise(&mut self, step: &Step<'_, D>, free: &[Twist<D>], moved: Option<&[Twist<D>]>) {
+        self.normals.clear();
+        for ((film, _), free_gap) in self.wanted.iter().zip(&mut self.free_gaps) {
+            let normal = match (film.second, moved) {
+                (Some(_), Some(moved)) => step.branch_after(film, moved).normalize(),
+                _ => film.branch.normalize(),
+            };
+            *free_gap = normal.dot(&step.branch_after(film, free)) - film.branch.norm() + film.gap;
+            self.normals.push(normal);
+        }
+    }
+
+    /// Why there is no balance.
+    fn failure(&self, step: &Step<'_, D>, twists: &[Twist<D>], history: Vec<f64>) -> FilmError {
+        let left = |film: &Film<D>| step.gap_after(film, twists);
+        let films = self.wanted.iter().map(|(film, _)| *film);
+        let closed = films.min_by(|a, b| left(a).total_cmp(&left(b))).filter(|film| left(film) <= 0.0);
+        closed.map_or(FilmError::NotBalanced { history }, |film| {
+            let Film { first, second, gap, .. } = *film;
+            FilmError::Closed(FilmClosed { first, second, gap, left: left(film), is_given: false })
+        })
+    }
+}
+
+impl<const D: usize> Balance<'_, D> {
+    /// The impulses of the films under their loads.
+    fn impulses(&self) -> Vec<f64> {
+        let loads = self.loads.iter().zip(self.wanted);
+        loads.map(|(load, (film, impulse))| impulse - load / film.curvature_radius).collect()
+    }
+
+    /// Displacements of all particles under these loads.
+    fn displacements(&self, loads: &[f64]) -> Vec<Vector<D>> {
+        let mut moved = vec![Vector::zeros(); self.mobilities.len()];
+        for ((&[first, second], normal), &load) in self.ends.iter().zip(&self.normals).zip(loads) {
+            moved[first] -= normal * load;
+            moved[second] += normal * load;
+        }
+        moved.iter_mut().zip(&self.mobilities).for_each(|(moved, mobility)| *moved *= *mobility);
+        moved
+    }
+
+    /// By how much these loads open each gap.
+    fn openings(&self, loads: &[f64]) -> Vec<f64> {
+        let moved = self.displacements(loads);
+        let normals = self.ends.iter().zip(&self.normals);
+        normals.map(|(&[first, second], normal)| normal.dot(&(moved[second] - moved[first]))).collect()
+    }
+
+    /// What these loads lead to; gaps are sought from those of the last.
+    fn state(&self, loads: &[f64]) -> State {
+        let openings = self.openings(loads);
+        let mut state = State::default();
+        for (k, (film, impulse)) in self.wanted.iter().enumerate() {
+            let a = film.curvature_radius;
+            let (gap, slope) = film.gap_of(impulse - loads[k] / a, self.state.gaps[k]);
+            state.gaps.push(gap);
+            state.compliances.push(slope / a);
+            state.excess.push(self.free_gaps[k] + openings[k] - gap);
+        }
+        state
+    }
+
+    /// The unit in which errors of a gap are told.
+    fn unit(&self, k: usize) -> f64 {
+        self.state.gaps[k] + LEAST / TOLERANCE * self.wanted[k].0.thinnest()
+    }
+
+    /// The largest of some errors of gaps, in their units.
+    fn farthest(&self, error: impl Fn(usize) -> f64) -> f64 {
+        // What is not a number is farthest.
+        let farther = |most: f64, off: f64| if off > most || off.is_nan() { off } else { most };
+        (0..self.wanted.len()).map(|k| error(k).abs() / self.unit(k)).fold(0.0, farther)
+    }
+
+    /// Newton's method for the loads; whether it came to an end.
+    fn solve(&mut self, history: &mut Vec<f64>) -> bool {
+        self.state = self.state(&self.loads);
+        let [least, most] = SOFTENINGS;
+        let mut softening = least;
+        for _ in 0..MOST_NEWTON_STEPS {
+            let off = self.farthest(|k| self.state.excess[k]);
+            if off <= TOLERANCE {
+                return true;
+            }
+            history.push(off);
+            let step = self.newton_step(softening);
+            softening = match self.go_along(&step) {
+                ..SHORT => (softening * HARDENING).min(most),
+                1.0 => (softening / HARDENING).max(least),
+                _ => softening,
+            };
+        }
+        false
+    }
+
+    /// Goes along a step as far as the slope of what is minimised allows; returns the share of it.
+    fn go_along(&mut self, step: &[f64]) -> f64 {
+        let slope_of = |state: &State| state.excess.iter().zip(step).map(|(f, x)| f * x).sum::<f64>();
+        let slope = slope_of(&self.state);
+        let mut length = 1.0;
+        loop {
+            let loads: Vec<f64> = self.loads.iter().zip(step).map(|(load, x)| load + length * x).collect();
+            let state = self.state(&loads);
+            if slope_of(&state) <= SLOPE * slope.abs() || length <= SHORTEST {
+                (self.loads, self.state) = (loads, state);
+                return length;
+            }
+            length *= 0.5;
+        }
+    }
+
+    /// Solves `(B M B^T + C) x = -excess` with the compliances `C`, by conjugate gradients with its diagonal
+    /// as preconditioner (Hestenes and Stiefel 1952).
+    fn newton_step(&self, softening: f64) -> Vec<f64> {
+        let State { compliances, excess, .. } = &self.state;
+        let soft = self.ends.iter().zip(compliances).map(|(ends, c)| c + softening * self.mobility(ends));
+        let compliances: Vec<f64> = soft.collect();
+        let diagonal: Vec<f64> =
+            self.ends.iter().zip(&compliances).map(|(ends, c)| c + self.mobility(ends)).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let scaled = |r: &[f64]| r.iter().zip(&diagonal).map(|(r, d)| r / d).collect::<Vec<f64>>();
+        let mut residual: Vec<f64> = excess.iter().map(|f| -f).collect();
+        let mut x = vec![0.0; residual.len()];
+        let mut direction = scaled(&residual);
+        let mut square = dot(&residual, &direction);
+        for _ in 0..MOST_ITERATIONS {
+            if self.farthest(|k| residual[k]) <= MARGIN * TOLERANCE {
+                break;
+            }
+            let mut image = self.openings(&direction);
+            image.iter_mut().zip(&compliances).zip(&direction).for_each(|((y, c), x)| *y += c * x);
+            let length = square / dot(&direction, &image);
+            for k in 0..x.len() {
+                x[k] += length * direction[k];
+                residual[k] -= length * image[k];
+            }
+            let ahead = scaled(&residual);
+            let next = dot(&residual, &ahead);
+            let turn = next / square;
+            direction.iter_mut().zip(ahead).for_each(|(x, y)| *x = y + turn * *x);
+            square = next;
+        }
+        x
+    }
+
+    fn mobility(&self, ends: &[usize; 2]) -> f64 {
+        ends.iter().map(|&k| self.mobilities[k]).sum()
+    }
+}

@@ -1,0 +1,124 @@
+//! Steps in which no gap closes.
+//!
+//! Where lubrication resists, the gap `g` of two particles follows `R(g) dg/dt = F` with a force `F` that
+//! varies slowly and a resistance `R` that grows without bound as `g -> 0`: like `1/g` between spheres, like
+//! `g^(-3/2)` between discs. An explicit scheme for `g` itself is inaccurate once the gap halves in a few
+//! steps, and may step over zero. The *impulse*
+//!
+//! `Phi(g) = int R dg`, `d Phi/dt = F`,
+//!
+//! is taken by the same scheme instead, at the same order: `Phi(g^{n+1}) = Phi(g^n) + c F^n + (dt - c)
+//! F^{n-1}`, and the particles are moved along the line of centres to the gap that this gives. Since `Phi ->
+//! -inf` as `g -> 0`, gaps stay positive for any step. `Phi` is what the gluey contact model remembers as
+//! `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its limit of a vanishing viscosity a gap is closed as
+//! long as `gamma < 0`. Here that limit is met where a film is thinner than positions resolve.
+//!
+//! Targets of many films may contradict each other: [`balance`] says what is done then.
+//!
+//! Only the shape of `R` matters, not its scale: `R = 1 + s (rho(g) - rho(G))` for `g < G` and one beyond,
+//! with `rho = A/g` for spheres, `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
+
+mod balance;
+mod error;
+mod film;
+mod step;
+
+pub use error::{FilmClosed, FilmError};
+pub use film::Film;
+pub(crate) use step::Step;
+
+use gluey_geom::{Dim, Space, Twist, Vector};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// The forces in films at the last step.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+pub(crate) struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
+
+/// The force `F` in a film and its impulse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = ""))]
+struct Remembered<const D: usize> {
+    first: usize,
+    second: Option<usize>,
+    branch: Vector<D>,
+    force: f64,
+    /// `Phi` after the step.
+    impulse: f64,
+}
+
+impl<const D: usize> FilmMemory<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Tells that the flow was reversed.
+    pub fn reverse(&mut self) {
+        self.0.iter_mut().for_each(|film| film.force = -film.force);
+    }
+
+    /// Forgets.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Corrects `twists` so that films have the gaps that their impulses give, and remembers the forces.
+    ///
+    /// # Errors
+    /// [`FilmError`] where others leave no room; the memory is as before then.
+    pub fn correct(
+        &mut self,
+        step: &Step<'_, D>,
+        films: &[Film<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), FilmError> {
+        let (mut impulses, mut memory) = (Vec::with_capacity(films.len()), Vec::with_capacity(films.len()));
+        for film in films {
+            let Film { first, second, branch, .. } = *film;
+            let gap = film.gap.max(film.thinnest());
+            let rate =
+                |twists: &[Twist<D>]| branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
+            let force = film.resistance(gap) * rate(twists);
+            let before = self.of(film, films);
+            let old_force = match (before, step.history) {
+                (_, []) => 0.0,
+                (Some(before), _) => before.force,
+                (None, history) => film.resistance(gap) * rate(history),
+            };
+            let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
+            let start = closed.map_or(film.impulse(gap), |before| before.impulse);
+            let impulse = start + step.weight * force + step.history_weight * old_force;
+            memory.push(Remembered { first, second, branch, force, impulse });
+            impulses.push(impulse);
+        }
+        step.open(films, &mut impulses, twists)?;
+        memory.iter_mut().zip(impulses).for_each(|(film, impulse)| film.impulse = impulse);
+        self.0 = memory;
+        Ok(())
+    }
+
+    /// What is remembered of a film, which is one of these.
+    fn of(&self, film: &Film<D>, films: &[Film<D>]) -> Option<&Remembered<D>> {
+        let old = of_pair(&self.0, film, |old| (old.first, old.second));
+        let apart = |old: &Remembered<D>, film: &Film<D>| (old.branch - film.branch).norm_squared();
+        let nearest = old.iter().min_by(|a, b| apart(a, film).total_cmp(&apart(b, film)))?;
+        // Of images across borders, the one in about this direction, if it is not that of another film.
+        let mut others = of_pair(films, film, |film| (film.first, film.second)).iter();
+        let is_of_another = others.any(|other| apart(nearest, other) < apart(nearest, film));
+        (nearest.branch.dot(&film.branch) > 0.0 && !is_of_another).then_some(nearest)
+    }
+}
+
+/// The part of a list, sorted by particles, that joins the same as a film.
+fn of_pair<'a, T, const D: usize>(
+    list: &'a [T],
+    film: &Film<D>,
+    pair: impl Fn(&T) -> (usize, Option<usize>),
+) -> &'a [T] {
+    let wanted = (film.first, film.second);
+    let start = list.partition_point(|item| pair(item) < wanted);
+    let count = list[start..].iter().take_while(|item| pair(item) == wanted).count();
+    &list[start..start + count]
+}

@@ -1,0 +1,128 @@
+//! A step of a scheme, and what becomes of films in it.
+
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+
+use super::balance::balance;
+use super::error::{FilmClosed, FilmError};
+use super::film::{Film, memory_reach};
+
+/// Gaps that corrections push below this share of the reach are corrected too.
+const PUSHED: f64 = 0.5;
+
+/// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
+pub(crate) struct Step<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub weight: f64,
+    pub history_weight: f64,
+    pub particles: &'a [Particle<D>],
+    /// `u^{n-1}`; empty at the first step.
+    pub history: &'a [Twist<D>],
+}
+
+impl<const D: usize> Step<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// See [`crate::Integrator::film_reach`].
+    pub fn reach(&self, twists: &[Twist<D>]) -> f64 {
+        let farthest = (0..twists.len()).map(|k| self.shift(k, twists).norm()).fold(0.0, f64::max);
+        // Two particles approach each other at twice the speed of each.
+        self.memory_reach() + 2.0 * farthest
+    }
+
+    /// See [`crate::Integrator::film_reach_in_shear`].
+    pub fn reach_in_shear(&self, twists: &[Twist<D>], rate: f64) -> f64 {
+        let strain = rate * (self.weight + self.history_weight);
+        let rest = |k: usize| {
+            let mut shift = self.shift(k, twists);
+            shift[0] -= strain * self.particles[k].pose.position[1];
+            shift
+        };
+        let count = twists.len();
+        let mean = (0..count).map(rest).sum::<Vector<D>>() / count.max(1) as f64;
+        let farthest = (0..count).map(|k| (rest(k) - mean).norm()).fold(0.0, f64::max);
+        // Centres at the distance `2 a + reach` approach each other by the strain times that, besides.
+        let (strain, diameter) = (strain.abs(), 2.0 * self.largest_radius());
+        (self.memory_reach() + 2.0 * farthest + strain * diameter) / (1.0 - strain.min(0.5))
+    }
+
+    fn memory_reach(&self) -> f64 {
+        memory_reach(self.largest_radius())
+    }
+
+    fn largest_radius(&self) -> f64 {
+        self.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max)
+    }
+
+    /// Displacement of a particle.
+    fn shift(&self, k: usize, twists: &[Twist<D>]) -> Vector<D> {
+        let old = self.history.get(k).map_or(Vector::zeros(), |twist| twist.velocity);
+        twists[k].velocity * self.weight + old * self.history_weight
+    }
+
+    /// Corrects velocities so that films have the gaps that `impulses` give, as far as these agree, and puts
+    /// there what the films have in the end.
+    ///
+    /// # Errors
+    /// [`FilmError`].
+    pub fn open(
+        &self,
+        films: &[Film<D>],
+        impulses: &mut [f64],
+        twists: &mut [Twist<D>],
+    ) -> Result<(), FilmError> {
+        let free = twists.to_vec();
+        let is_near = |film: &Film<D>, twists: &[Twist<D>], share: f64| {
+            !film.is_given() && self.gap_after(film, twists) < share * film.reach_of_correction()
+        };
+        let concerns = |(film, impulse): (&Film<D>, &f64)| {
+            let is_wanted = film.gap < film.reach_of_correction() || *impulse < 0.0;
+            is_near(film, &free, 1.0) || (is_wanted && !film.is_given())
+        };
+        let mut is_in: Vec<bool> = films.iter().zip(impulses.iter()).map(concerns).collect();
+        let found = loop {
+            twists.copy_from_slice(&free);
+            let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
+            let wanted: Vec<_> = chosen.iter().map(|&k| (&films[k], impulses[k])).collect();
+            let found = balance(self, &wanted, twists)?;
+            // Large steps push particles onto others that were far away.
+            let more: Vec<usize> =
+                (0..films.len()).filter(|&k| !is_in[k] && is_near(&films[k], twists, PUSHED)).collect();
+            more.iter().for_each(|&k| is_in[k] = true);
+            if more.is_empty() {
+                break chosen.into_iter().zip(found);
+            }
+        };
+        found.for_each(|(k, impulse)| impulses[k] = impulse);
+        let mut given = films.iter().filter(|film| film.is_given());
+        Ok(given.try_for_each(|film| self.check_given(film, twists))?)
+    }
+
+    /// Refuses given motions that close a film by more than rounding.
+    fn check_given(&self, film: &Film<D>, twists: &[Twist<D>]) -> Result<(), FilmClosed> {
+        let left = self.gap_after(film, twists);
+        let Film { first, second, gap, .. } = *film;
+        match left < -film.thinnest() {
+            true => Err(FilmClosed { first, second, gap, left, is_given: true }),
+            false => Ok(()),
+        }
+    }
+
+    /// From the centre of the first particle of a film to its partner, or to the wall, after the step.
+    pub fn branch_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> Vector<D> {
+        let dt = self.weight + self.history_weight;
+        film.branch + film.across(|k| self.shift(k, twists), dt)
+    }
+
+    /// Gap of a film after the step.
+    pub fn gap_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> f64 {
+        let (moved, distance) = (self.branch_after(film, twists), film.branch.norm());
+        match film.second {
+            Some(_) => moved.norm() - distance + film.gap,
+            // Along a wall the distance is that along its normal.
+            None => moved.dot(&film.branch) / distance - distance + film.gap,
+        }
+    }
+}
