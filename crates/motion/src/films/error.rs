@@ -55,3 +55,15 @@ fn cure(is_given: bool) -> &'static str {
         false => "take smaller steps",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::FilmError;
+
+    #[test]
+    fn of_a_long_history_the_end_is_told() {
+        let history: Vec<f64> = (1..=25).map(f64::from).collect();
+        let told = FilmError::NotBalanced { history }.to_string();
+        assert!(told.contains("off by ..., 6.0e0, 7.0e0") && told.contains("2.5e1, relative"), "{told}");
+    }
+}

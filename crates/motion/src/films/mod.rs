@@ -21,10 +21,12 @@
 mod balance;
 mod error;
 mod film;
+mod opening;
 mod step;
 
 pub use error::{FilmClosed, FilmError};
 pub use film::Film;
+use opening::open;
 pub(crate) use step::Step;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
@@ -93,7 +95,7 @@ where
             memory.push(Remembered { first, second, branch, force, impulse });
             impulses.push(impulse);
         }
-        step.open(films, &mut impulses, twists)?;
+        open(step, films, &mut impulses, twists)?;
         memory.iter_mut().zip(impulses).for_each(|(film, impulse)| film.impulse = impulse);
         self.0 = memory;
         Ok(())

@@ -1,13 +1,8 @@
-//! A step of a scheme, and what becomes of films in it.
+//! A step of a scheme: where it takes particles, and the films between them.
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 
-use super::balance::balance;
-use super::error::{FilmClosed, FilmError};
 use super::film::{Film, memory_reach};
-
-/// Gaps that corrections push below this share of the reach are corrected too.
-const PUSHED: f64 = 0.5;
 
 /// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
 pub(crate) struct Step<'a, const D: usize>
@@ -60,54 +55,6 @@ where
     fn shift(&self, k: usize, twists: &[Twist<D>]) -> Vector<D> {
         let old = self.history.get(k).map_or(Vector::zeros(), |twist| twist.velocity);
         twists[k].velocity * self.weight + old * self.history_weight
-    }
-
-    /// Corrects velocities so that films have the gaps that `impulses` give, as far as these agree, and puts
-    /// there what the films have in the end.
-    ///
-    /// # Errors
-    /// [`FilmError`].
-    pub fn open(
-        &self,
-        films: &[Film<D>],
-        impulses: &mut [f64],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), FilmError> {
-        let free = twists.to_vec();
-        let is_near = |film: &Film<D>, twists: &[Twist<D>], share: f64| {
-            !film.is_given() && self.gap_after(film, twists) < share * film.reach_of_correction()
-        };
-        let concerns = |(film, impulse): (&Film<D>, &f64)| {
-            let is_wanted = film.gap < film.reach_of_correction() || *impulse < 0.0;
-            is_near(film, &free, 1.0) || (is_wanted && !film.is_given())
-        };
-        let mut is_in: Vec<bool> = films.iter().zip(impulses.iter()).map(concerns).collect();
-        let found = loop {
-            twists.copy_from_slice(&free);
-            let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
-            let wanted: Vec<_> = chosen.iter().map(|&k| (&films[k], impulses[k])).collect();
-            let found = balance(self, &wanted, twists)?;
-            // Large steps push particles onto others that were far away.
-            let more: Vec<usize> =
-                (0..films.len()).filter(|&k| !is_in[k] && is_near(&films[k], twists, PUSHED)).collect();
-            more.iter().for_each(|&k| is_in[k] = true);
-            if more.is_empty() {
-                break chosen.into_iter().zip(found);
-            }
-        };
-        found.for_each(|(k, impulse)| impulses[k] = impulse);
-        let mut given = films.iter().filter(|film| film.is_given());
-        Ok(given.try_for_each(|film| self.check_given(film, twists))?)
-    }
-
-    /// Refuses given motions that close a film by more than rounding.
-    fn check_given(&self, film: &Film<D>, twists: &[Twist<D>]) -> Result<(), FilmClosed> {
-        let left = self.gap_after(film, twists);
-        let Film { first, second, gap, .. } = *film;
-        match left < -film.thinnest() {
-            true => Err(FilmClosed { first, second, gap, left, is_given: true }),
-            false => Ok(()),
-        }
     }
 
     /// From the centre of the first particle of a film to its partner, or to the wall, after the step.

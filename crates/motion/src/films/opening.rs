@@ -1,0 +1,69 @@
+//! Keeps the films of a step open.
+
+use gluey_geom::{Dim, Space, Twist};
+
+use super::balance::balance;
+use super::error::{FilmClosed, FilmError};
+use super::film::Film;
+use super::step::Step;
+
+/// Gaps that corrections push below this share of the reach are corrected too.
+const PUSHED: f64 = 0.5;
+
+/// Corrects velocities so that films have the gaps that `impulses` give, as far as these agree, and puts
+/// there what the films have in the end.
+///
+/// # Errors
+/// [`FilmError`].
+pub(super) fn open<const D: usize>(
+    step: &Step<'_, D>,
+    films: &[Film<D>],
+    impulses: &mut [f64],
+    twists: &mut [Twist<D>],
+) -> Result<(), FilmError>
+where
+    Dim<D>: Space<D>,
+{
+    let free = twists.to_vec();
+    let is_near = |film: &Film<D>, twists: &[Twist<D>], share: f64| {
+        !film.is_given() && step.gap_after(film, twists) < share * film.reach_of_correction()
+    };
+    let concerns = |(film, impulse): (&Film<D>, &f64)| {
+        let is_wanted = film.gap < film.reach_of_correction() || *impulse < 0.0;
+        is_near(film, &free, 1.0) || (is_wanted && !film.is_given())
+    };
+    let mut is_in: Vec<bool> = films.iter().zip(impulses.iter()).map(concerns).collect();
+    let found = loop {
+        twists.copy_from_slice(&free);
+        let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
+        let wanted: Vec<_> = chosen.iter().map(|&k| (&films[k], impulses[k])).collect();
+        let found = balance(step, &wanted, twists)?;
+        // Large steps push particles onto others that were far away.
+        let more: Vec<usize> =
+            (0..films.len()).filter(|&k| !is_in[k] && is_near(&films[k], twists, PUSHED)).collect();
+        more.iter().for_each(|&k| is_in[k] = true);
+        if more.is_empty() {
+            break chosen.into_iter().zip(found);
+        }
+    };
+    found.for_each(|(k, impulse)| impulses[k] = impulse);
+    let mut given = films.iter().filter(|film| film.is_given());
+    Ok(given.try_for_each(|film| check_given(step, film, twists))?)
+}
+
+/// Refuses given motions that close a film by more than rounding.
+fn check_given<const D: usize>(
+    step: &Step<'_, D>,
+    film: &Film<D>,
+    twists: &[Twist<D>],
+) -> Result<(), FilmClosed>
+where
+    Dim<D>: Space<D>,
+{
+    let left = step.gap_after(film, twists);
+    let Film { first, second, gap, .. } = *film;
+    match left < -film.thinnest() {
+        true => Err(FilmClosed { first, second, gap, left, is_given: true }),
+        false => Ok(()),
+    }
+}
