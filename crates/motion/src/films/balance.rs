@@ -1,16 +1,15 @@
-//! Gaps after a step where the impulses of films contradict each other.
+//! Gaps after a step, in balance with the drag of the particles.
 //!
-//! Each film asks for the gap that its impulse `I` gives. Where particles are crowded they have fewer ways to
-//! move than there are films, and cannot meet all. What is met instead is the balance of impulses on each
-//! particle: displaced by `x` from where the flow takes it, the particle `i` of the radius `a_i` meets the
-//! impulse `2 a_i x_i` of its drag, and
+//! Each film asks for an impulse `I`. Particles may be so crowded that they have fewer ways to move than
+//! there are films, and cannot do what all ask for. Displaced by `x` from where the flow takes it, the
+//! particle `i` of the radius `a_i` meets the impulse `2 a_i x_i` of its drag, and
 //!
-//! `2 a_i x_i = sum_k +- n_k L_k`, `A_k Phi(g_k) = A_k I_k - L_k`, `g_k = gap_k(x) > 0`,
+//! `2 a_i x_i = sum_k +- n_k L_k`, `L_k = A_k (I_k - Phi(g_k))`, `g_k = gap_k(x) > 0`,
 //!
-//! in the units in which the drag of two particles against each other is `A_k`, as in `R`. That is the
-//! minimum of `sum_k A_k int (Phi - I_k) dg_k + sum_i a_i |x_i|^2`. Where impulses agree, `L` and `x` follow
-//! from the errors of the step alone. A film much thinner than its neighbours is changed by them in
-//! proportion to itself: none is closed, whatever they ask for.
+//! in the units in which the drag of two particles against each other is `A_k`, as in `R`: what films do not
+//! get loads the particles. That is the minimum of `sum_k A_k int (Phi - I_k) dg_k + sum_i a_i |x_i|^2`. A
+//! film much thinner than its neighbours is changed by them in proportion to itself: none is closed, whatever
+//! they ask for.
 //!
 //! Solved for the loads `L`, which are free: `gap_k(x(L)) - Phi^-1(I_k - L_k/A_k) = 0`, where gaps are linear
 //! in `x` the gradient of a convex function, by Newton's method with conjugate gradients. Gaps are linearised

@@ -1,22 +1,24 @@
 //! Steps in which no gap closes.
 //!
-//! Where lubrication resists, the gap `g` of two particles follows `R(g) dg/dt = F` with a force `F` that
-//! varies slowly and a resistance `R` that grows without bound as `g -> 0`: like `1/g` between spheres, like
+//! What lubrication adds to the drag of two particles at the gap `g` is a force `F = R(g) dg/dt` that varies
+//! slowly, and a resistance `R` that grows without bound as `g -> 0`: like `1/g` between spheres, like
 //! `g^(-3/2)` between discs. An explicit scheme for `g` itself is inaccurate once the gap halves in a few
 //! steps, and may step over zero. The *impulse*
 //!
 //! `Phi(g) = int R dg`, `d Phi/dt = F`,
 //!
-//! is taken by the same scheme instead, at the same order: `Phi(g^{n+1}) = Phi(g^n) + c F^n + (dt - c)
-//! F^{n-1}`, and the particles are moved along the line of centres to the gap that this gives. Since `Phi ->
-//! -inf` as `g -> 0`, gaps stay positive for any step. `Phi` is what the gluey contact model remembers as
-//! `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its limit of a vanishing viscosity a gap is closed as
-//! long as `gamma < 0`. Here that limit is met where a film is thinner than positions resolve.
+//! is taken by the same scheme instead, at the same order: the film asks for the impulse `I = Phi(g^n) + c
+//! F^n + (dt - c) F^{n-1}`. What it asks for and what it has at the gap after the step are brought to balance
+//! with the drag of the particles ([`balance`]): for one pair, which the flow alone would take to the gap
+//! `g*`,
+//! `g + Phi(g) = g* + I`. Since `Phi -> -inf` as `g -> 0`, gaps stay positive for any step. `Phi` is what the
+//! gluey contact model remembers as `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its limit of a
+//! vanishing viscosity a gap is closed as long as `gamma < 0`. Here that limit is met where a film is thinner
+//! than positions resolve.
 //!
-//! Targets of many films may contradict each other: [`balance`] says what is done then.
-//!
-//! Only the shape of `R` matters, not its scale: `R = 1 + s (rho(g) - rho(G))` for `g < G` and one beyond,
-//! with `rho = A/g` for spheres, `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
+//! Only the shape of `R` matters, not its scale: over the drag of two particles against each other it is
+//! `R = s (rho(g) - rho(G))` for `g < G`, and next to nothing beyond, with `rho = A/g` for spheres,
+//! `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
 
 mod balance;
 mod error;
