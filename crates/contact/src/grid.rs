@@ -59,6 +59,16 @@ impl<const D: usize> Grid<D> {
         (0..D).rev().fold(0, |cell, d| cell * self.counts[d] + place[d])
     }
 
+    /// Place along each axis of a cell.
+    pub(crate) fn coordinates(&self, cell: usize) -> [usize; D] {
+        let mut rest = cell;
+        self.counts.map(|count| {
+            let place = rest % count;
+            rest /= count;
+            place
+        })
+    }
+
     /// Calls `visit` with the numbers of each run of neighbouring cells around a point, in increasing order.
     pub(crate) fn for_each_row(&self, x: &Vector<D>, mut visit: impl FnMut(Range<usize>)) {
         let place = self.place(x);

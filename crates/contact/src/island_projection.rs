@@ -5,9 +5,10 @@ use gluey_geom::Vector;
 use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};
 use crate::islands::{Island, Islands, Slot};
 use crate::parallel;
+use crate::part::Partners;
 use crate::projection::{self, Effort, Failure, LinearProblem, Linearised, Tuning};
 use crate::rows::{GROUND, Row};
-use crate::solver::{Factor, SolveFailure, SolveReport};
+use crate::solver::{ELSEWHERE, Factor, SolveFailure, SolveReport};
 use crate::{ContactParams, Mobility};
 
 /// Context of the solves of a step: what is the same for all islands.
@@ -108,7 +109,28 @@ impl<const D: usize> IslandWorkspace<D> {
 
     /// Solves for the islands that are fresh.
     pub(crate) fn solve<M: Mobility<D>>(&mut self, islands: &Islands<D>, context: &SolveContext<'_, M>) {
-        let all = IslandSlice {
+        self.slice(islands, context.tuning.solver.scratch_count()).solve(context);
+    }
+
+    /// Solves for the only island, which `partners` have other rows of.
+    pub(crate) fn solve_shared(
+        &mut self,
+        islands: &Islands<D>,
+        partners: &dyn Partners<D>,
+        (params, tuning, velocity_weight): (&ContactParams, Tuning, f64),
+    ) -> Outcome {
+        let mut island = self.slice(islands, tuning.solver.scratch_count());
+        let mut effort = Effort::default();
+        island.scale(|largest| partners.complete(&mut [], largest));
+        let mut problem = SharedProblem { island: &mut island, partners, tuning, velocity_weight };
+        projection::solve(&mut problem, params, &mut effort)?;
+        island.unscale();
+        Ok(effort)
+    }
+
+    /// All islands with all vectors.
+    fn slice<'a>(&'a mut self, islands: &'a Islands<D>, scratch_count: usize) -> IslandSlice<'a, D> {
+        IslandSlice {
             islands: &islands.islands,
             rows: &islands.rows,
             ends: &islands.ends,
@@ -123,9 +145,8 @@ impl<const D: usize> IslandWorkspace<D> {
             moved: &mut self.moved,
             scratch: &mut self.scratch,
             outcomes: &mut self.outcomes,
-            scratch_count: context.tuning.solver.scratch_count(),
-        };
-        all.solve(context);
+            scratch_count,
+        }
     }
 }
 
@@ -232,21 +253,27 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
 
     /// Solves the only island of the slice.
     fn solve_one<M: Mobility<D>>(&mut self, context: &SolveContext<'_, M>) -> Outcome {
-        self.scale();
+        self.scale(|_| {});
         let mut effort = Effort::default();
         projection::solve(&mut IslandProblem { island: self, context }, context.params, &mut effort)?;
-        for (force, scale) in self.forces.iter_mut().zip(&*self.scales) {
-            *force *= scale;
-        }
+        self.unscale();
         Ok(effort)
     }
 
-    fn scale(&mut self) {
+    /// Forces as they are, in place of scaled ones.
+    fn unscale(&mut self) {
+        for (force, scale) in self.forces.iter_mut().zip(&*self.scales) {
+            *force *= scale;
+        }
+    }
+
+    /// Scales rows, forces and floors; `complete` is that of [`scale_rows`].
+    fn scale(&mut self, complete: impl FnOnce(&mut [f64; 1])) {
         for (scaled, (row, [tail, head])) in self.scaled_rows.iter_mut().zip(self.rows.iter().zip(self.ends))
         {
             *scaled = NormalRow { normal: row.normal, tail: *tail, head: *head };
         }
-        scale_rows(self.weights, self.scaled_rows, self.scales);
+        scale_rows(self.weights, self.scaled_rows, self.scales, complete);
         for (k, scale) in self.scales.iter().enumerate() {
             self.forces[k] /= scale;
             self.floors[k] /= scale;
@@ -288,8 +315,9 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
         }
     }
 
-    /// The row whose gap at the end of the step is farthest from what it should be, beyond the tolerance.
-    fn farthest_off(&self, tolerance: f64) -> Option<(usize, f64)> {
+    /// The row whose gap at the end of the step is farthest from what it should be, beyond the tolerance,
+    /// that gap, and how far it is off.
+    fn farthest_off(&self, tolerance: f64) -> Option<(usize, f64, f64)> {
         let mut farthest = None;
         let mut largest = 2.0 * tolerance;
         for k in 0..self.rows.len() {
@@ -298,10 +326,33 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
             let slack = compliance * self.scales[k] * (self.forces[k] - self.floors[k]);
             let off = gap.min(slack).abs();
             if off > largest {
-                (farthest, largest) = (Some((k, gap)), off);
+                (farthest, largest) = (Some((k, gap, off)), off);
             }
         }
         farthest
+    }
+
+    /// Solves the linear problem, and moves the slots to the end of the step.
+    fn project(
+        &mut self,
+        response: impl Response<NormalRow<D>>,
+        tuning: &Tuning,
+        c: f64,
+    ) -> Result<SolveReport, SolveFailure> {
+        let mut problem = LinearProblem {
+            operator: ScaledDelassus { rows: self.scaled_rows, response, motions: self.changes },
+            weights: self.weights,
+            free_gaps: self.free_gaps,
+            floors: self.floors,
+            forces: self.forces,
+            scratch: self.scratch,
+        };
+        let report = problem.solve(tuning)?;
+        self.changes.iter_mut().for_each(|change| *change /= c);
+        for (moved, (slot, change)) in self.moved.iter_mut().zip(self.slots.iter().zip(&*self.changes)) {
+            *moved = slot.free + change * c;
+        }
+        Ok(report)
     }
 }
 
@@ -318,32 +369,84 @@ impl<const D: usize, M: Mobility<D>> Linearised for IslandProblem<'_, '_, D, M> 
     }
 
     fn project(&mut self) -> Result<SolveReport, SolveFailure> {
-        let (island, context) = (&mut *self.island, self.context);
-        let response = IslandMobility { weights: island.weights, slots: island.slots, context };
-        let mut problem = LinearProblem {
-            operator: ScaledDelassus { rows: island.scaled_rows, response, motions: island.changes },
-            weights: island.weights,
-            free_gaps: island.free_gaps,
-            floors: island.floors,
-            forces: island.forces,
-            scratch: island.scratch,
-        };
-        let report = problem.solve(&context.tuning)?;
-        let c = context.velocity_weight;
-        island.changes.iter_mut().for_each(|change| *change /= c);
-        for (moved, (slot, change)) in island.moved.iter_mut().zip(island.slots.iter().zip(&*island.changes))
-        {
-            *moved = slot.free + change * c;
-        }
-        Ok(report)
+        let (weights, slots, context) = (self.island.weights, self.island.slots, self.context);
+        let response = IslandMobility { weights, slots, context };
+        self.island.project(response, &context.tuning, context.velocity_weight)
     }
 
     fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
-        let off = self.island.farthest_off(self.context.tuning.tolerance)?;
+        let (row, gap, _) = self.island.farthest_off(self.context.tuning.tolerance)?;
         self.island.set_free_gaps(Instant::End);
-        Some(off)
+        Some((row, gap))
     }
 }
+
+/// The only island of a slice as the part of one that other ranks have other rows of.
+struct SharedProblem<'a, 'b, const D: usize> {
+    island: &'a mut IslandSlice<'b, D>,
+    partners: &'a dyn Partners<D>,
+    tuning: Tuning,
+    velocity_weight: f64,
+}
+
+impl<const D: usize> Linearised for SharedProblem<'_, '_, D> {
+    fn begin(&mut self) {
+        self.island.moved.fill(Vector::zeros());
+        self.island.set_free_gaps(Instant::Beginning);
+    }
+
+    fn project(&mut self) -> Result<SolveReport, SolveFailure> {
+        let response = SharedMobility { weights: self.island.weights, partners: self.partners };
+        self.island.project(response, &self.tuning, self.velocity_weight)
+    }
+
+    fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
+        let own = self.island.farthest_off(self.tuning.tolerance);
+        let own_off = own.map_or(0.0, |(.., off)| off);
+        let mut largest = [own_off];
+        self.partners.complete(&mut [], &mut largest);
+        if largest[0] == 0.0 {
+            return None;
+        }
+        self.island.set_free_gaps(Instant::End);
+        let farthest = own.filter(|_| own_off == largest[0]).map(|(row, gap, _)| (row, gap));
+        Some(farthest.unwrap_or((ELSEWHERE, f64::NAN)))
+    }
+}
+
+/// The mobility of slots on which other ranks act too.
+struct SharedMobility<'a, const D: usize> {
+    /// `c` times the mobility of each slot.
+    weights: &'a [f64],
+    partners: &'a dyn Partners<D>,
+}
+
+impl<const D: usize> Response<NormalRow<D>> for SharedMobility<'_, D> {
+    /// A force here moves slots of contacts elsewhere.
+    const IS_COUPLED: bool = true;
+
+    fn respond(&self, motions: &mut [Vector<D>]) {
+        self.partners.accumulate(&mut motions[1..]);
+        motions.iter_mut().zip(self.weights).for_each(|(motion, weight)| *motion *= *weight);
+        self.partners.update(&mut motions[1..]);
+    }
+
+    /// Nobody has all rows.
+    fn factor(&self, _: &[NormalRow<D>]) -> Option<Factor> {
+        None
+    }
+
+    fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
+        self.partners.complete(sums, largest);
+    }
+
+    fn first(&self) -> usize {
+        self.partners.rank() << ROWS_OF_A_RANK
+    }
+}
+
+/// Logarithm of a number of rows that ranks hardly have.
+const ROWS_OF_A_RANK: usize = 20;
 
 /// The mobility of an island's slots.
 struct IslandMobility<'a, const D: usize, M> {

@@ -48,13 +48,16 @@ impl<'a> InfeasibilityMonitor<'a> {
         self.mark.copy_from_slice(forces);
         problem.operator.apply(self.ray, self.image);
         let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let mut sums = [-dot(problem.free_gaps, self.ray), forces.len() as f64];
+        let mut sizes = [largest(problem.free_gaps), largest(self.image), largest(self.ray)];
+        problem.operator.complete(&mut sums, &mut sizes);
         // q + A x >= 0 implies |x|_1 >= -q.y / |A y|_inf.
-        let fall = -dot(problem.free_gaps, self.ray);
-        let needed = forces.len() as f64 * largest(problem.free_gaps).max(problem.tolerance);
-        if norm * fall <= INFINITE * needed * largest(self.image) || fall <= 0.0 {
+        let ([fall, count], [free_gap, image, ray]) = (sums, sizes);
+        let needed = count * free_gap.max(problem.tolerance);
+        if norm * fall <= INFINITE * needed * image || fall <= 0.0 {
             return None;
         }
-        let threshold = NEGLIGIBLE * largest(self.ray);
+        let threshold = NEGLIGIBLE * ray;
         Some((0..forces.len()).filter(|&k| self.ray[k].abs() > threshold).collect())
     }
 }

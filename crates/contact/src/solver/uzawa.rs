@@ -4,7 +4,7 @@
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
     ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    gaps_under, largest_eigenvalue, residual, split,
+    gaps_under, largest_eigenvalue, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
@@ -33,7 +33,7 @@ impl ProjectionSolver for Uzawa {
         let mut least = f64::INFINITY;
         loop {
             gaps_under(problem, forces, gaps);
-            log.record(residual(gaps, forces, problem.floors, norm));
+            log.record(problem.residual(gaps, forces, norm));
             if log.has_converged(problem) {
                 return Ok(log.report());
             }
