@@ -33,6 +33,7 @@ mod agreement;
 mod bodies;
 mod cells;
 mod coarse;
+mod contact;
 mod cuts;
 mod cycle;
 mod flow;
@@ -48,6 +49,7 @@ mod surface;
 mod transfer;
 mod warm_start;
 
+pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
 pub use moving::{
