@@ -64,6 +64,21 @@ pub(crate) trait Response<R: JacobianRow> {
     fn first(&self) -> usize {
         0
     }
+
+    /// See [`DelassusOperator::is_shared`].
+    fn is_shared(&self) -> bool {
+        false
+    }
+
+    /// See [`DelassusOperator::gather`].
+    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        None
+    }
+
+    /// See [`DelassusOperator::scatter`].
+    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        Vec::new()
+    }
 }
 
 /// `S A S` of scaled rows.
@@ -103,5 +118,17 @@ impl<R: JacobianRow, C: Response<R>> DelassusOperator for ScaledDelassus<'_, R, 
 
     fn first(&self) -> usize {
         self.response.first()
+    }
+
+    fn is_shared(&self) -> bool {
+        self.response.is_shared()
+    }
+
+    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        self.response.gather(words)
+    }
+
+    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        self.response.scatter(words)
     }
 }

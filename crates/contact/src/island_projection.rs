@@ -1,14 +1,15 @@
 //! The projection of round particles, island by island and in parallel.
 
+mod shared;
+
 use gluey_geom::Vector;
 
 use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};
 use crate::islands::{Island, Islands, Slot};
 use crate::parallel;
-use crate::part::Partners;
 use crate::projection::{self, Effort, Failure, LinearProblem, Linearised, Tuning};
 use crate::rows::{GROUND, Row};
-use crate::solver::{ELSEWHERE, Factor, SolveFailure, SolveReport};
+use crate::solver::{Factor, SolveFailure, SolveReport};
 use crate::{ContactParams, Mobility};
 
 /// Context of the solves of a step: what is the same for all islands.
@@ -110,22 +111,6 @@ impl<const D: usize> IslandWorkspace<D> {
     /// Solves for the islands that are fresh.
     pub(crate) fn solve<M: Mobility<D>>(&mut self, islands: &Islands<D>, context: &SolveContext<'_, M>) {
         self.slice(islands, context.tuning.solver.scratch_count()).solve(context);
-    }
-
-    /// Solves for the only island, which `partners` have other rows of.
-    pub(crate) fn solve_shared(
-        &mut self,
-        islands: &Islands<D>,
-        partners: &dyn Partners<D>,
-        (params, tuning, velocity_weight): (&ContactParams, Tuning, f64),
-    ) -> Outcome {
-        let mut island = self.slice(islands, tuning.solver.scratch_count());
-        let mut effort = Effort::default();
-        island.scale(|largest| partners.complete(&mut [], largest));
-        let mut problem = SharedProblem { island: &mut island, partners, tuning, velocity_weight };
-        projection::solve(&mut problem, params, &mut effort)?;
-        island.unscale();
-        Ok(effort)
     }
 
     /// All islands with all vectors.
@@ -381,73 +366,6 @@ impl<const D: usize, M: Mobility<D>> Linearised for IslandProblem<'_, '_, D, M> 
     }
 }
 
-/// The only island of a slice as the part of one that other ranks have other rows of.
-struct SharedProblem<'a, 'b, const D: usize> {
-    island: &'a mut IslandSlice<'b, D>,
-    partners: &'a dyn Partners<D>,
-    tuning: Tuning,
-    velocity_weight: f64,
-}
-
-impl<const D: usize> Linearised for SharedProblem<'_, '_, D> {
-    fn begin(&mut self) {
-        self.island.moved.fill(Vector::zeros());
-        self.island.set_free_gaps(Instant::Beginning);
-    }
-
-    fn project(&mut self) -> Result<SolveReport, SolveFailure> {
-        let response = SharedMobility { weights: self.island.weights, partners: self.partners };
-        self.island.project(response, &self.tuning, self.velocity_weight)
-    }
-
-    fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
-        let own = self.island.farthest_off(self.tuning.tolerance);
-        let own_off = own.map_or(0.0, |(.., off)| off);
-        let mut largest = [own_off];
-        self.partners.complete(&mut [], &mut largest);
-        if largest[0] == 0.0 {
-            return None;
-        }
-        self.island.set_free_gaps(Instant::End);
-        let farthest = own.filter(|_| own_off == largest[0]).map(|(row, gap, _)| (row, gap));
-        Some(farthest.unwrap_or((ELSEWHERE, f64::NAN)))
-    }
-}
-
-/// The mobility of slots on which other ranks act too.
-struct SharedMobility<'a, const D: usize> {
-    /// `c` times the mobility of each slot.
-    weights: &'a [f64],
-    partners: &'a dyn Partners<D>,
-}
-
-impl<const D: usize> Response<NormalRow<D>> for SharedMobility<'_, D> {
-    /// A force here moves slots of contacts elsewhere.
-    const IS_COUPLED: bool = true;
-
-    fn respond(&self, motions: &mut [Vector<D>]) {
-        self.partners.accumulate(&mut motions[1..]);
-        motions.iter_mut().zip(self.weights).for_each(|(motion, weight)| *motion *= *weight);
-        self.partners.update(&mut motions[1..]);
-    }
-
-    /// Nobody has all rows.
-    fn factor(&self, _: &[NormalRow<D>]) -> Option<Factor> {
-        None
-    }
-
-    fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
-        self.partners.complete(sums, largest);
-    }
-
-    fn first(&self) -> usize {
-        self.partners.rank() << ROWS_OF_A_RANK
-    }
-}
-
-/// Logarithm of a number of rows that ranks hardly have.
-const ROWS_OF_A_RANK: usize = 20;
-
 /// The mobility of an island's slots.
 struct IslandMobility<'a, const D: usize, M> {
     /// `c` times the mobility of each slot.
@@ -490,16 +408,26 @@ impl<const D: usize, M: Mobility<D>> Response<NormalRow<D>> for IslandMobility<'
         if M::COUPLED {
             return None;
         }
-        let mut factor = Factor::new(D * self.slots.len());
-        for row in rows {
-            // What does not move has no degrees of freedom.
-            let end = |slot: u32, sign: f64| {
-                let root = sign * self.weights[slot as usize].sqrt();
-                let entries = (0..D).map(move |d| (D * slot as usize + d, root * row.normal[d]));
-                entries.filter(|(_, value)| *value != 0.0)
-            };
-            factor.push(end(row.tail, -1.0).chain(end(row.head, 1.0)));
-        }
-        Some(factor)
+        let factor = Factor::new(D * self.slots.len());
+        Some(with_rows(factor, rows, self.weights, |slot| slot as usize))
     }
+}
+
+/// The rows of a factor, with the roots of the weights; particles of slots have these numbers.
+fn with_rows<const D: usize>(
+    mut factor: Factor,
+    rows: &[NormalRow<D>],
+    weights: &[f64],
+    number: impl Fn(u32) -> usize,
+) -> Factor {
+    for row in rows {
+        // What does not move has no degrees of freedom.
+        let end = |slot: u32, sign: f64| {
+            let (root, first) = (sign * weights[slot as usize].sqrt(), D * number(slot));
+            let entries = (0..D).map(move |d| (first + d, root * row.normal[d]));
+            entries.filter(|(_, value)| *value != 0.0)
+        };
+        factor.push(end(row.tail, -1.0).chain(end(row.head, 1.0)));
+    }
+    factor
 }

@@ -25,6 +25,8 @@
 //! # Ok::<(), gluey_parallel::RankFailure>(())
 //! ```
 //!
+//! Contacts between particles are shared too ([`SharedContact`], `docs/decisions/0038-contact-on-ranks.md`).
+//!
 //! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
 //! (`docs/decisions/0036-surfaces-on-ranks.md`); held bodies, forces on the fluid and boxes without a wall
 //! are for these only. Not for viscosities that vary.

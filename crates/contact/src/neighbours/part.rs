@@ -70,6 +70,11 @@ impl<const D: usize> NeighbourList<D> {
         self.collect();
     }
 
+    /// Number of a place's particle among those of all ranks; none for walls.
+    pub(crate) fn name(&self, place: u32) -> Option<u32> {
+        self.ownership.as_ref()?.names.get(place as usize).copied()
+    }
+
     /// Whether a place is one of a particle that this rank owns.
     pub(crate) fn is_own(&self, place: usize) -> bool {
         self.ownership.as_ref().is_none_or(|owned| owned.is_own[place])

@@ -285,9 +285,14 @@ where
         let place = |place: u32| Some(place).filter(|&place| self.is_shared(place));
         let places: Vec<_> = self.shared.slots.iter().skip(1).map(|slot| place(slot.place)).collect();
         partners.select(Some(&places));
+        let name = |place: u32| self.contact.neighbours.name(place).unwrap_or(u32::MAX);
+        let numbers: Vec<u32> = self.shared.slots.iter().map(|slot| name(slot.place)).collect();
         let Self { contact, shared, workspace, .. } = self;
-        let outcome =
-            workspace.solve_shared(shared, partners, (&contact.params, tuning, frame.velocity_weight));
+        let outcome = workspace.solve_shared(
+            shared,
+            (partners, &numbers),
+            (&contact.params, tuning, frame.velocity_weight),
+        );
         partners.select(None);
         match outcome {
             Ok(effort) => report.count_effort(&effort),

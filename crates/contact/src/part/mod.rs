@@ -33,6 +33,12 @@ pub trait Partners<const D: usize> {
     /// `largest` by the largest over all ranks.
     fn complete(&self, sums: &mut [f64], largest: &mut [f64]);
 
+    /// The words of all ranks in their order, on rank zero.
+    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>>;
+
+    /// What rank zero, which alone has some, has for each rank.
+    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64>;
+
     /// Adds the values of copies to those of the owners' particles, in the order of the ranks; those of
     /// copies are zero then.
     fn accumulate(&self, values: &mut [Vector<D>]);
@@ -134,3 +140,6 @@ pub enum PartFailure {
     /// Other ranks know what it is.
     Elsewhere,
 }
+
+#[cfg(test)]
+mod tests;

@@ -31,7 +31,7 @@ impl ProjectionSolver for Accelerated {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, ahead, before, mark, ray, image] = split(scratch, forces.len());
         let mut norm = NORM_SAFETY * largest_eigenvalue(problem.operator, ray, image);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], problem, forces);
         let mut log = ConvergenceLog::new();
         let (mut least, mut momentum) = (f64::INFINITY, 1.0);
         ahead.copy_from_slice(forces);

@@ -34,6 +34,8 @@ struct State<'a> {
     direction: &'a mut [f64],
     /// `A direction`.
     image: &'a mut [f64],
+    /// How far the last step along a conjugate direction moved the forces.
+    moved: f64,
 }
 
 impl ProjectionSolver for ActiveSet {
@@ -49,8 +51,8 @@ impl ProjectionSolver for ActiveSet {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], forces);
-        let mut state = State { gaps, free, chopped, direction, image };
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], problem, forces);
+        let mut state = State { gaps, free, chopped, direction, image, moved: 0.0 };
         let mut log = ConvergenceLog::new();
         let refresh = REFRESH + 2 * problem.count(forces.len());
         state.begin(problem, forces);
@@ -68,6 +70,7 @@ impl ProjectionSolver for ActiveSet {
             } else {
                 let [chopped, reduced] = measures.sums;
                 state.iterate(problem, forces, norm, chopped <= reduced);
+                monitor.note(norm * state.moved);
             }
         }
     }
@@ -127,6 +130,7 @@ impl State<'_> {
             return;
         }
         let length = slope / curvature;
+        self.moved = length.abs().min(feasible) * square.sqrt();
         self.advance(forces, length.min(feasible));
         if length > feasible {
             self.split(forces, problem.floors);

@@ -25,6 +25,7 @@ mod infeasibility;
 mod newton;
 mod spectrum;
 mod uzawa;
+mod whole;
 
 pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
@@ -50,6 +51,22 @@ pub trait DelassusOperator {
     /// Makes sums over the contacts that are here sums over all contacts of the problem, and largest numbers
     /// the largest over all, where others hold some of them.
     fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}
+
+    /// Whether others hold some of the contacts. Then columns of [`DelassusOperator::factor`] have the same
+    /// numbers everywhere, of any size.
+    fn is_shared(&self) -> bool {
+        false
+    }
+
+    /// What all who share the problem have, each in its turn, at the first of them.
+    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        None
+    }
+
+    /// What the first of those who share the problem has for this one.
+    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        Vec::new()
+    }
 
     /// A number for the first contact here, far from those of contacts elsewhere.
     fn first(&self) -> usize {

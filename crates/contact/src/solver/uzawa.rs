@@ -28,7 +28,7 @@ impl ProjectionSolver for Uzawa {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, mark, ray, image] = split(scratch, forces.len());
         let mut norm = largest_eigenvalue(problem.operator, ray, image);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], problem, forces);
         let mut log = ConvergenceLog::new();
         let mut least = f64::INFINITY;
         loop {

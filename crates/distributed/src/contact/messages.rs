@@ -44,25 +44,33 @@ impl<const D: usize> Verdict<D> {
 
 /// What each rank gets from rank zero, who has it for all.
 pub(super) fn deal<const D: usize>(ranks: &dyn Communicator, mut all: Vec<Dealt<D>>) -> Dealt<D> {
-    let mut lengths = vec![0.0; ranks.size()];
     let others = all.split_off(all.len().min(1));
-    let told: Vec<Message> = (1..)
-        .zip(&others)
-        .map(|(rank, dealt)| Message { rank, bytes: bytes_of(&words::of_dealt(dealt)) })
-        .collect();
-    told.iter().for_each(|message| lengths[message.rank] = message.bytes.len() as f64);
-    ranks.share(&mut lengths);
-    match (ranks.rank(), all.pop()) {
-        (0, Some(own)) => {
-            ranks.exchange(&told, &mut []);
+    match all.pop() {
+        Some(own) => {
+            let words = others.iter().map(words::of_dealt);
+            scatter(ranks, Some(std::iter::once(Vec::new()).chain(words).collect()));
             own
         }
-        (rank, _) => {
-            let mut message = [Message { rank: 0, bytes: vec![0; lengths[rank] as usize] }];
-            ranks.exchange(&[], &mut message);
-            words::dealt_of(rank, &words_of(&message[0].bytes))
-        }
+        None => words::dealt_of(ranks.rank(), &scatter(ranks, None)),
     }
+}
+
+/// What rank zero, which alone has some, has for each rank.
+pub(super) fn scatter(ranks: &dyn Communicator, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+    let mut words = words.unwrap_or_default();
+    let mut lengths = vec![0.0; ranks.size()];
+    lengths.iter_mut().zip(&words).for_each(|(length, words)| *length = words.len() as f64);
+    ranks.share(&mut lengths);
+    let rank = ranks.rank();
+    if rank > 0 {
+        let mut message = [Message { rank: 0, bytes: vec![0; lengths[rank] as usize * u64::SIZE] }];
+        ranks.exchange(&[], &mut message);
+        return words_of(&message[0].bytes);
+    }
+    let message = |(rank, words): (usize, &Vec<u64>)| Message { rank, bytes: bytes_of(words) };
+    let told: Vec<Message> = words.iter().enumerate().skip(1).map(message).collect();
+    ranks.exchange(&told, &mut []);
+    if words.is_empty() { Vec::new() } else { words.swap_remove(0) }
 }
 
 /// The words of all ranks in their order, on rank zero.

@@ -6,6 +6,8 @@ use gluey_contact::part::{Dealt, Partners};
 use gluey_geom::Vector;
 use gluey_parallel::{Communicator, GhostPlan, Wanted};
 
+use super::messages::{collect, scatter};
+
 /// The ranks that share a step.
 pub(super) struct Sharers<'a, const D: usize> {
     ranks: &'a dyn Communicator,
@@ -77,6 +79,14 @@ impl<const D: usize> Partners<D> for Sharers<'_, D> {
 
     fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
         self.ranks.reduce(sums, largest);
+    }
+
+    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        collect(self.ranks, words)
+    }
+
+    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        scatter(self.ranks, words)
     }
 
     fn accumulate(&self, values: &mut [Vector<D>]) {
