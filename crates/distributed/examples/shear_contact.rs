@@ -12,7 +12,8 @@
 //! `--steps N`, `--tolerance T` (residual in diameters; without it that of the default, 1e-13 of the largest
 //! displacement), `--solver auto|uzawa|accelerated|active-set`, `--exact` (gaps at the end of the step are
 //! exact), `--ranks N,M,...` (threads; without it, the processes of `mpirun`). Counts are those of the last
-//! step. Times go to the standard error, so that equal runs print equal lines.
+//! step. Times go to the standard error, so that equal runs print equal lines: those of steps, and the processor
+//! time that each rank took for the last one, where the system counts it.
 
 use std::time::Instant;
 
@@ -118,21 +119,25 @@ where
     let mut traffic = Traffic::default();
     if ranks.rank() > 0 {
         let mut follower = ContactFollower::<D>::default();
+        let mut worked = 0;
         for _ in 0..options.steps {
-            let before = ranks.traffic();
+            let (before, start) = (ranks.traffic(), processor_time());
             follower.step(ranks).unwrap_or_else(|failure| fail(&failure.to_string()));
-            traffic = ranks.traffic().since(before);
+            (traffic, worked) = (ranks.traffic().since(before), processor_time() - start);
         }
+        ranks.all_gather(&[worked]);
         TrafficRecord::new(ranks, &traffic);
         return String::new();
     }
     let mut shear = Shear::<D>::new(options, ranks);
-    let mut report = ContactReport::default();
+    let (mut report, mut worked) = (ContactReport::default(), 0);
     for step in 0..options.steps {
         let before = ranks.traffic();
-        report = shear.step(step, options);
+        (report, worked) = shear.step(step, options);
         traffic = ranks.traffic().since(before);
     }
+    let worked = ranks.all_gather(&[worked]).into_iter().map(|time| time as f64 * 1e-9);
+    eprintln!("processor time of each rank: {:.3?} s", worked.collect::<Vec<_>>());
     let traffic = TrafficRecord::new(ranks, &traffic);
     let record = Record::new(options, ranks.size(), &report, (&shear, traffic));
     serde_json::to_string(&record).unwrap_or_else(|error| fail(&error.to_string()))
@@ -171,7 +176,7 @@ where
         Self { positions, radii, drift, side, contact: SharedContact::new(contact, ranks) }
     }
 
-    fn step(&mut self, number: usize, options: &Options) -> ContactReport {
+    fn step(&mut self, number: usize, options: &Options) -> (ContactReport, u64) {
         let tilt_step = self.side * options.dt;
         self.contact.set_sliding(number as f64 * tilt_step, tilt_step);
         let flow = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] } else { 0.0 });
@@ -179,9 +184,9 @@ where
             self.positions.iter().map(|x| Twist { velocity: flow(x), ..Twist::default() }).collect();
         let (positions, radii, drift) = (&self.positions, &self.radii, &self.drift);
         let step = StepGeometry { positions, radii, drift, velocity_weight: options.dt, dt: options.dt };
-        let start = Instant::now();
+        let (start, start_of_work) = (Instant::now(), processor_time());
         let report = self.contact.correct(&step, &mut twists);
-        let seconds = start.elapsed().as_secs_f64();
+        let (seconds, worked) = (start.elapsed().as_secs_f64(), processor_time() - start_of_work);
         let report = report.unwrap_or_else(|error| fail(&error.to_string()));
         eprintln!(
             "step {number}: {seconds:.4} s, {} iterations, {:?}",
@@ -191,8 +196,14 @@ where
         for (x, twist) in self.positions.iter_mut().zip(&twists) {
             *x += twist.velocity * options.dt;
         }
-        report
+        (report, worked)
     }
+}
+
+/// Nanoseconds that the processor gave this thread; 0 where Linux does not say.
+fn processor_time() -> u64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    told.split(' ').next().and_then(|time| time.parse().ok()).unwrap_or(0)
 }
 
 /// The largest of the ranks, and the mean.

@@ -75,6 +75,13 @@ impl Cells {
 
     /// Finds the ranks of each cell and its neighbours; `point` is that of a place.
     fn find_near<'a, const D: usize>(&mut self, grid: &Grid<D>, point: impl Fn(u32) -> &'a Vector<D>) {
+        // Around most cells all is of one rank.
+        let mut range = self.ranks.clone();
+        grid.join_neighbours(&mut range, |[a, b], [c, d]| match (b < a, d < c) {
+            (true, _) => [c, d],
+            (_, true) => [a, b],
+            _ => [a.min(c), b.max(d)],
+        });
         let mut ranks = Vec::new();
         self.near.clear();
         self.near_starts.clear();
@@ -82,7 +89,9 @@ impl Cells {
         for cell in 0..grid.cell_count() {
             ranks.clear();
             let [first, end] = [self.starts[cell], self.starts[cell + 1]];
-            if first < end {
+            if first < end && range[cell][0] == range[cell][1] {
+                ranks.push(range[cell][0]);
+            } else if first < end {
                 self.add_ranks(grid, point(self.members[first as usize]), &mut ranks);
             }
             ranks.sort_unstable();
@@ -195,10 +204,12 @@ impl<const D: usize> Dealer<D> {
         let Self { order, wrapped, cells, .. } = self;
         cells.find_near(grid, |place| &wrapped[order[place as usize] as usize]);
         let mut beyond = Vec::new();
+        let is_periodic = domain.lattice.periods().map(|period| period.is_some());
         for (place, &particle) in order.iter().enumerate() {
-            let near = cells.near(cells.of_place[place] as usize);
+            let cell = cells.of_place[place] as usize;
+            let near = cells.near(cell);
             near.iter().for_each(|&rank| holders[rank as usize].push(place as u32));
-            if domain.is_periodic() {
+            if grid.is_at_side(cell, &is_periodic) {
                 let x = wrapped[particle as usize];
                 beyond.clear();
                 for_each_image(&x, &domain.lattice, reach, |image| {
