@@ -105,6 +105,9 @@ fn processes(_: &Options) {
 
 /// The line of a run, on rank zero.
 fn run(options: &Options, ranks: &dyn Communicator) -> String {
+    // A rank has one thread, this one.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    let _pool = pool.unwrap_or_else(|error| fail(&error.to_string()));
     match options.dimension {
         2 => steps::<2>(options, ranks),
         3 => steps::<3>(options, ranks),
