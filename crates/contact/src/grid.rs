@@ -69,7 +69,7 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Whether something within a cell's width of a side of the points, in these directions, may lie in a cell.
+    /// Whether a point within a cell's width of a side of all points, in these directions, may lie in a cell.
     pub(crate) fn is_at_side(&self, cell: usize, directions: &[bool; D]) -> bool {
         let place = self.coordinates(cell);
         (0..D).any(|d| directions[d] && (place[d] == 0 || place[d] + 2 >= self.counts[d]))

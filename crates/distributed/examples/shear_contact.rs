@@ -2,7 +2,7 @@
 //! JSON for each number of them. One rank does what a process without ranks does.
 //!
 //! ```sh
-//! cargo run --release -p gluey-distributed --example shear_contact -- --dimension 3 --count 10000 --ranks 1,8,64
+//! cargo run --release -p gluey-distributed --example shear_contact -- --count 10000 --ranks 1,8,64
 //! cargo build --release -p gluey-distributed --example shear_contact --features mpi
 //! mpirun -n 2 target/release/examples/shear_contact --dimension 3 --count 1000000
 //! ```
@@ -12,8 +12,8 @@
 //! `--steps N`, `--tolerance T` (residual in diameters; without it that of the default, 1e-13 of the largest
 //! displacement), `--solver auto|uzawa|accelerated|active-set`, `--exact` (gaps at the end of the step are
 //! exact), `--ranks N,M,...` (threads; without it, the processes of `mpirun`). Counts are those of the last
-//! step. Times go to the standard error, so that equal runs print equal lines: those of steps, and the processor
-//! time that each rank took for the last one, where the system counts it.
+//! step. Times go to the standard error, so that equal runs print equal lines: those of steps, and the
+//! processor time that each rank took for the last one, where the system counts it.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Particles dealt to ranks by space: along a Morton curve through the cells of a grid, cut into equal numbers.
+//! Particles dealt to ranks by space: along a Morton curve through the cells of a grid, cut into equal
+//! numbers.
 
 use gluey_geom::Vector;
 
@@ -30,7 +31,7 @@ pub(super) struct Dealer<const D: usize> {
     spatial: SpatialOrder,
     wrapped: Vec<Vector<D>>,
     windings: Vec<[i32; 3]>,
-    /// Particles in the order of space, the ranks of particles in it, and how far to search around each of it.
+    /// Particles in the order of space, their ranks in it, and how far to search around each of it.
     order: Vec<u32>,
     places: Vec<u32>,
     reach: Vec<f64>,

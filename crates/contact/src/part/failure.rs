@@ -66,8 +66,8 @@ impl PartFailure {
         }
     }
 
-    /// The error of ranks that failed together, from the words of each: contacts that are infeasible are those
-    /// of all of them, another error is that of the first. `None` if nobody says what it was.
+    /// The error of ranks that failed together, from the words of each: contacts that are infeasible are
+    /// those of all, another error is that of the first. `None` if nobody says what it was.
     pub fn merged(failures: &[Vec<u64>]) -> Option<ContactError> {
         let mut errors = failures.iter().filter_map(|words| error_of(words));
         let mut first = errors.next()?;

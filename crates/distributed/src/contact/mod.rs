@@ -29,8 +29,8 @@ use words::Outcome;
 /// everything where there is one rank.
 pub struct SharedContact<'a, const D: usize> {
     ranks: &'a dyn Communicator,
-    /// Knows whether the others, who follow a [`Suspension`](crate::Suspension), wait for this rank; none where
-    /// they know themselves when a step comes.
+    /// Knows whether the others, who follow a [`Suspension`](crate::Suspension), wait for this rank; none
+    /// where they know themselves when a step comes.
     memory: Option<Rc<Memory<D>>>,
     lead: Lead<D, WithFixed>,
     part: PartContact<D>,

@@ -33,7 +33,7 @@ where
         self.remembered.replace(self.last.borrow().clone());
     }
 
-    /// Whether a flow or a step of contact was broken off: other ranks wait for what this one has to say of it.
+    /// Whether a flow or a step of contact was broken off: others wait for what this rank has to say of it.
     pub fn is_broken(&self) -> bool {
         self.is_sharing.get()
     }

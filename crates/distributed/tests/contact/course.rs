@@ -45,7 +45,7 @@ where
     Dim<D>: Space<D>,
 {
     pub positions: Vec<Vector<D>>,
-    /// Velocities of the last step; where there was an error those that were predicted, if they are as before.
+    /// Velocities of the last step.
     pub velocities: Vec<Vector<D>>,
     pub contacts: Vec<Contact>,
     pub memory: ContactState,
@@ -118,7 +118,7 @@ pub fn packed<const D: usize>(count: usize, fraction: f64) -> (Setting<D>, f64) 
     (setting, side)
 }
 
-/// Walls at the bottom and the top of a box, which are particles' diameters apart from it; the lower one rises.
+/// Walls a radius below and above a box; the lower one rises.
 pub fn floor_and_ceiling<const D: usize>(domain: Domain<D>, side: f64) -> Domain<D> {
     let up = Vector::from_fn(|d, _| f64::from(u8::from(d == 1)));
     let floor = Wall { normal: up, offset: -RADIUS, speed: 0.3 };

@@ -43,8 +43,8 @@ where
     serial
 }
 
-/// In space, between walls, in a channel, in a box that is sheared for ever; with particles that are held, through
-/// a reversal.
+/// In space, between walls, in a channel, in a box that is sheared for ever; with particles that are held,
+/// through a reversal.
 fn suspensions<const D: usize>(count: usize, fraction: f64, limits: [Limits; 4])
 where
     Dim<D>: Space<D>,
