@@ -76,10 +76,10 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Replaces the value of each cell by what `join` makes of it and of those of the cells around it.
-    pub(crate) fn join_neighbours<T: Copy>(&self, values: &mut Vec<T>, join: impl Fn(T, T) -> T) {
+    pub(crate) fn join_neighbours<T: Copy>(&self, values: &mut [T], join: impl Fn(T, T) -> T) {
         let mut stride = 1;
         for count in self.counts {
-            let before = values.clone();
+            let before = values.to_vec();
             for (cell, value) in values.iter_mut().enumerate() {
                 let place = cell / stride % count;
                 if place > 0 {

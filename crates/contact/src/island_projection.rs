@@ -2,6 +2,8 @@
 
 mod shared;
 
+pub(crate) use shared::SharedContext;
+
 use gluey_geom::Vector;
 
 use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};

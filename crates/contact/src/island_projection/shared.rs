@@ -11,20 +11,26 @@ use crate::part::Partners;
 use crate::projection::{self, Effort, Linearised, Tuning};
 use crate::solver::{ELSEWHERE, Factor, SolveFailure, SolveReport};
 
+/// Context of the solve of an island that several ranks have rows of.
+pub(crate) struct SharedContext<'a, const D: usize> {
+    pub params: &'a ContactParams,
+    pub tuning: Tuning,
+    /// `c`.
+    pub velocity_weight: f64,
+    /// Those who have the other rows.
+    pub partners: &'a dyn Partners<D>,
+    /// Of the particle of each slot, the same on all ranks.
+    pub numbers: &'a [u32],
+}
+
 impl<const D: usize> IslandWorkspace<D> {
-    /// Solves for the only island, which `partners` have other rows of; particles of slots have these numbers
-    /// on all ranks.
-    pub(crate) fn solve_shared(
-        &mut self,
-        islands: &Islands<D>,
-        (partners, numbers): (&dyn Partners<D>, &[u32]),
-        (params, tuning, velocity_weight): (&ContactParams, Tuning, f64),
-    ) -> Outcome {
-        let mut island = self.slice(islands, tuning.solver.scratch_count());
+    /// Solves for the only island.
+    pub(crate) fn solve_shared(&mut self, islands: &Islands<D>, context: &SharedContext<'_, D>) -> Outcome {
+        let mut island = self.slice(islands, context.tuning.solver.scratch_count());
         let mut effort = Effort::default();
-        island.scale(|largest| partners.complete(&mut [], largest));
-        let mut problem = SharedProblem { island: &mut island, partners, numbers, tuning, velocity_weight };
-        projection::solve(&mut problem, params, &mut effort)?;
+        island.scale(|largest| context.partners.complete(&mut [], largest));
+        let mut problem = SharedProblem { island: &mut island, context };
+        projection::solve(&mut problem, context.params, &mut effort)?;
         island.unscale();
         Ok(effort)
     }
@@ -33,10 +39,7 @@ impl<const D: usize> IslandWorkspace<D> {
 /// The only island of a slice as the part of one that other ranks have other rows of.
 struct SharedProblem<'a, 'b, const D: usize> {
     island: &'a mut IslandSlice<'b, D>,
-    partners: &'a dyn Partners<D>,
-    numbers: &'a [u32],
-    tuning: Tuning,
-    velocity_weight: f64,
+    context: &'a SharedContext<'a, D>,
 }
 
 impl<const D: usize> Linearised for SharedProblem<'_, '_, D> {
@@ -46,16 +49,16 @@ impl<const D: usize> Linearised for SharedProblem<'_, '_, D> {
     }
 
     fn project(&mut self) -> Result<SolveReport, SolveFailure> {
-        let response =
-            SharedMobility { weights: self.island.weights, partners: self.partners, numbers: self.numbers };
-        self.island.project(response, &self.tuning, self.velocity_weight)
+        let SharedContext { partners, numbers, tuning, velocity_weight, .. } = *self.context;
+        let response = SharedMobility { weights: self.island.weights, partners, numbers };
+        self.island.project(response, &tuning, velocity_weight)
     }
 
     fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
-        let own = self.island.farthest_off(self.tuning.tolerance);
+        let own = self.island.farthest_off(self.context.tuning.tolerance);
         let own_off = own.map_or(0.0, |(.., off)| off);
         let mut largest = [own_off];
-        self.partners.complete(&mut [], &mut largest);
+        self.context.partners.complete(&mut [], &mut largest);
         if largest[0] == 0.0 {
             return None;
         }

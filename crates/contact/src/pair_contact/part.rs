@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Vector};
 
 use super::{Buffers, PairContact, PairMemory, Participation};
-use crate::island_projection::IslandWorkspace;
+use crate::island_projection::{IslandWorkspace, SharedContext};
 use crate::islands::{Grouping, Islands, SortedParticles};
 use crate::memory::GammaRule;
 use crate::neighbours::{Ownership, PartSearch};
@@ -288,11 +288,14 @@ where
         let name = |place: u32| self.contact.neighbours.name(place).unwrap_or(u32::MAX);
         let numbers: Vec<u32> = self.shared.slots.iter().map(|slot| name(slot.place)).collect();
         let Self { contact, shared, workspace, .. } = self;
-        let outcome = workspace.solve_shared(
-            shared,
-            (partners, &numbers),
-            (&contact.params, tuning, frame.velocity_weight),
-        );
+        let context = SharedContext {
+            params: &contact.params,
+            tuning,
+            velocity_weight: frame.velocity_weight,
+            partners,
+            numbers: &numbers,
+        };
+        let outcome = workspace.solve_shared(shared, &context);
         partners.select(None);
         match outcome {
             Ok(effort) => report.count_effort(&effort),

@@ -61,7 +61,8 @@ impl<'a> InfeasibilityMonitor<'a> {
         norm: f64,
     ) -> Option<Vec<usize>> {
         let is_due = iteration >= FIRST && iteration.is_power_of_two();
-        if !is_due && !(self.has_leapt && iteration.is_multiple_of(LOOKS_AFTER_LEAP)) {
+        let is_looked_at = is_due || self.has_leapt && iteration.is_multiple_of(LOOKS_AFTER_LEAP);
+        if !is_looked_at {
             return None;
         }
         for k in 0..forces.len() {
