@@ -1,4 +1,5 @@
-//! Cases whose flow ranks share, here threads: the numbers in their tables are those of one process.
+//! Cases whose flow and contact ranks share, here threads: the numbers in their tables are those of one
+//! process.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,7 @@ use tempfile::TempDir;
 
 #[path = "runs/mod.rs"]
 mod runs;
-use runs::{case, run_named};
+use runs::{case, column, run_named};
 
 /// A case that steps twice.
 fn in_steps(dimension: usize, rest: &str) -> Case {
@@ -117,6 +118,52 @@ fn at_a_given_stress_the_rate_is_the_same() {
              suspension = {{ volume_fraction = 0.3, count = 6, seed = 5, min_gap = 0.05 }}"
         );
         ranks_are_as_one_process(what, &in_steps(2, &text), &["", "-rheology"], 7.8e-9);
+    }
+}
+
+/// Discs in a channel that touch, in islands that reach across ranks: tables and contacts are those of one
+/// process, the bits the same run after run, and a checkpoint goes on with another number of ranks.
+#[test]
+fn contacts_are_shared_too() {
+    // A line of discs that nearly touch, each faster than the next one.
+    let disc = |k: usize| {
+        let (x, y) = (0.2 + 0.098 * k as f64, 0.55 - 0.02 * k as f64);
+        format!("{{ position = [{x}, {y}], radius = 0.05 }}")
+    };
+    let discs: Vec<String> = (0..6).map(disc).collect();
+    let until = |end: f64| {
+        case(&format!(
+            "name = \"r\"\ndimension = 2\nparticles = [{}]\ndomain = {{ boundary = \"periodic\" }}\n\
+             time = {{ step = 0.05, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
+             [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-10\n\
+             [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\n",
+            discs.join(", ")
+        ))
+    };
+    let long = until(0.15);
+    ranks_are_as_one_process("contacts", &long, &[""], 1.3e-7);
+    let [whole, again, stopped] = [(); 3].map(|()| TempDir::new().expect("a folder"));
+    for folder in [&whole, &again] {
+        assert!(run_on(3, &long, &with_checkpoints(folder.path())).iter().all(Result::is_ok));
+    }
+    let rows = |folder: &Path| fs::read_to_string(folder.join("t.csv")).expect("rows");
+    assert_eq!(rows(whole.path()), rows(again.path()), "the same bits");
+    let pairs = column(&whole.path().join("t-solver.csv"), "contact_pairs");
+    assert!(pairs.iter().copied().fold(0.0, f64::max) >= 4.0, "{pairs:?}");
+    assert!(run_on(3, &until(0.1), &with_checkpoints(stopped.path())).iter().all(Result::is_ok));
+    for size in [3, 2, 1] {
+        let folder = copy_of(stopped.path());
+        let options = with_checkpoints(folder.path());
+        let options = RunOptions { resume: options.checkpoint.clone(), ..options };
+        assert!(run_on(size, &long, &options).iter().all(Result::is_ok), "{size} ranks");
+        assert!(
+            size != 3 || rows(folder.path()) == rows(whole.path()),
+            "the bits of a run that nothing stopped"
+        );
+        let csv = [whole.path(), folder.path()].map(|folder| folder.join("t.csv"));
+        let difference = largest_difference(&csv[0], &csv[1], &[""]);
+        println!("contacts, gone on with by {size} ranks: {difference:.1e}");
+        assert!(difference < 8.6e-8, "{size} ranks: {difference:e}");
     }
 }
 

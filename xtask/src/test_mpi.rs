@@ -1,6 +1,6 @@
 //! `cargo xtask test-mpi`: what is there under MPI, as processes on this machine: the same bits as by
-//! threads, for several numbers of ranks; cases of `gluey run` as one process computes them, through contact,
-//! and their frames; and an end for all when one rank fails or is killed.
+//! threads, of flows and contacts for several numbers of ranks; cases of `gluey run` as one process computes
+//! them, through contact, and their frames; and an end for all when one rank fails or is killed.
 
 mod frames;
 
@@ -20,6 +20,12 @@ const FLOWS: [&str; 8] = [
     "--dimension 3 --level 4 --bodies",
     "--dimension 2 --level 5 --bodies --unfitted",
     "--dimension 3 --level 4 --bodies --unfitted",
+];
+/// Contacts that are solved for.
+const CONTACTS: [&str; 3] = [
+    "--dimension 2 --fraction 0.6 --count 400 --steps 12",
+    "--dimension 3 --fraction 0.4 --count 500 --steps 12 --exact",
+    "--dimension 3 --fraction 0.4 --count 500 --steps 4 --solver accelerated",
 ];
 /// Two spheres that the shear drives at each other.
 const CASE: &str = r#"name = "near"
@@ -154,12 +160,12 @@ pub enum MpiError {
         text: String,
     },
     /// The bits depend on how messages travel.
-    #[error("{ranks} ranks, {flow}: MPI and threads differ\n  MPI:     {mpi}\n  threads: {threads}")]
+    #[error("{ranks} ranks, {problem}: MPI and threads differ\n  MPI:     {mpi}\n  threads: {threads}")]
     Differ {
         /// Number of ranks.
         ranks: &'static str,
-        /// Options of the flow.
-        flow: &'static str,
+        /// Options of the flow or of the contacts.
+        problem: &'static str,
         /// The line under MPI.
         mpi: String,
         /// The line of threads.
@@ -185,17 +191,11 @@ pub enum MpiError {
 pub fn run(root: &Path) -> Result<(), MpiError> {
     let launcher = Launcher::find()?;
     build(root)?;
-    let program = root.join("target/release/examples/box_flow");
-    for flow in FLOWS {
-        for ranks in RANKS {
-            let mpi = line(&mut launcher.command(ranks, &program, flow))?;
-            let mut threads = Command::new(&program);
-            threads.args(["--ranks", ranks]).args(flow.split(' '));
-            let threads = line(&mut threads)?;
-            if mpi != threads {
-                return Err(MpiError::Differ { ranks, flow, mpi, threads });
-            }
-            println!("{ranks} ranks, {flow}: the same bits by MPI and by threads");
+    let [program, contact] =
+        ["box_flow", "shear_contact"].map(|name| root.join("target/release/examples").join(name));
+    for (program, problems) in [(&program, &FLOWS[..]), (&contact, &CONTACTS)] {
+        for problem in problems {
+            launcher.compare_with_threads(program, problem)?;
         }
     }
     let mut failing = launcher.command("3", &program, "--level 3 --fail-rank 1");
@@ -418,7 +418,8 @@ fn build(root: &Path) -> Result<(), MpiError> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut command = Command::new(&cargo);
     command.args(["build", "--release", "--workspace", "--features", "gluey/mpi", "--bin", "gluey"]);
-    let status = command.args(["--example", "box_flow"]).current_dir(root).status();
+    let status =
+        command.args(["--example", "box_flow", "--example", "shear_contact"]).current_dir(root).status();
     let status = status.map_err(|source| MpiError::Start { program: cargo, source })?;
     if status.success() { Ok(()) } else { Err(MpiError::Build) }
 }
@@ -437,6 +438,21 @@ impl Launcher {
         };
         said("mpicc")?;
         Ok(Self { is_open_mpi: said("mpirun")?.contains("Open MPI") })
+    }
+
+    /// A program prints the same line by MPI and by threads.
+    fn compare_with_threads(&self, program: &PathBuf, problem: &'static str) -> Result<(), MpiError> {
+        for ranks in RANKS {
+            let mpi = line(&mut self.command(ranks, program, problem))?;
+            let mut threads = Command::new(program);
+            threads.args(["--ranks", ranks]).args(problem.split(' '));
+            let threads = line(&mut threads)?;
+            if mpi != threads {
+                return Err(MpiError::Differ { ranks, problem, mpi, threads });
+            }
+            println!("{ranks} ranks, {problem}: the same bits by MPI and by threads");
+        }
+        Ok(())
     }
 
     /// More processes than cores are as good as fewer here, also for root in a container.

@@ -27,14 +27,21 @@ pub(crate) trait JacobianRow: Copy {
     fn opening(&self, motions: &[Self::Motion]) -> f64;
 }
 
-/// Scales rows to equal compliance, and writes their scales.
-pub(crate) fn scale_rows<R: JacobianRow>(weights: &[R::Weight], rows: &mut [R], scales: &mut [f64]) {
+/// Scales rows to equal compliance, and writes their scales; `complete` makes the largest compliance here
+/// that of all rows.
+pub(crate) fn scale_rows<R: JacobianRow>(
+    weights: &[R::Weight],
+    rows: &mut [R],
+    scales: &mut [f64],
+    complete: impl FnOnce(&mut [f64; 1]),
+) {
     for (row, scale) in rows.iter().zip(&mut *scales) {
         *scale = row.compliance(weights);
     }
-    let largest = scales.iter().copied().fold(0.0, f64::max);
+    let mut largest = [scales.iter().copied().fold(0.0, f64::max)];
+    complete(&mut largest);
     for (row, scale) in rows.iter_mut().zip(scales) {
-        *scale = (largest / *scale).sqrt();
+        *scale = (largest[0] / *scale).sqrt();
         *row = row.scaled(*scale);
     }
 }
@@ -49,6 +56,29 @@ pub(crate) trait Response<R: JacobianRow> {
 
     /// `R` with `S A S = R R^T`, if it is known and sparse.
     fn factor(&self, rows: &[R]) -> Option<Factor>;
+
+    /// See [`DelassusOperator::complete`].
+    fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}
+
+    /// See [`DelassusOperator::first`].
+    fn first(&self) -> usize {
+        0
+    }
+
+    /// See [`DelassusOperator::is_shared`].
+    fn is_shared(&self) -> bool {
+        false
+    }
+
+    /// See [`DelassusOperator::gather`].
+    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        None
+    }
+
+    /// See [`DelassusOperator::scatter`].
+    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        Vec::new()
+    }
 }
 
 /// `S A S` of scaled rows.
@@ -80,5 +110,25 @@ impl<R: JacobianRow, C: Response<R>> DelassusOperator for ScaledDelassus<'_, R, 
 
     fn factor(&self) -> Option<Factor> {
         self.response.factor(self.rows)
+    }
+
+    fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
+        self.response.complete(sums, largest);
+    }
+
+    fn first(&self) -> usize {
+        self.response.first()
+    }
+
+    fn is_shared(&self) -> bool {
+        self.response.is_shared()
+    }
+
+    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        self.response.gather(words)
+    }
+
+    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        self.response.scatter(words)
     }
 }

@@ -1,5 +1,9 @@
 //! The projection of round particles, island by island and in parallel.
 
+mod shared;
+
+pub(crate) use shared::SharedContext;
+
 use gluey_geom::Vector;
 
 use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};
@@ -108,7 +112,12 @@ impl<const D: usize> IslandWorkspace<D> {
 
     /// Solves for the islands that are fresh.
     pub(crate) fn solve<M: Mobility<D>>(&mut self, islands: &Islands<D>, context: &SolveContext<'_, M>) {
-        let all = IslandSlice {
+        self.slice(islands, context.tuning.solver.scratch_count()).solve(context);
+    }
+
+    /// All islands with all vectors.
+    fn slice<'a>(&'a mut self, islands: &'a Islands<D>, scratch_count: usize) -> IslandSlice<'a, D> {
+        IslandSlice {
             islands: &islands.islands,
             rows: &islands.rows,
             ends: &islands.ends,
@@ -123,9 +132,8 @@ impl<const D: usize> IslandWorkspace<D> {
             moved: &mut self.moved,
             scratch: &mut self.scratch,
             outcomes: &mut self.outcomes,
-            scratch_count: context.tuning.solver.scratch_count(),
-        };
-        all.solve(context);
+            scratch_count,
+        }
     }
 }
 
@@ -232,21 +240,27 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
 
     /// Solves the only island of the slice.
     fn solve_one<M: Mobility<D>>(&mut self, context: &SolveContext<'_, M>) -> Outcome {
-        self.scale();
+        self.scale(|_| {});
         let mut effort = Effort::default();
         projection::solve(&mut IslandProblem { island: self, context }, context.params, &mut effort)?;
-        for (force, scale) in self.forces.iter_mut().zip(&*self.scales) {
-            *force *= scale;
-        }
+        self.unscale();
         Ok(effort)
     }
 
-    fn scale(&mut self) {
+    /// Forces as they are, in place of scaled ones.
+    fn unscale(&mut self) {
+        for (force, scale) in self.forces.iter_mut().zip(&*self.scales) {
+            *force *= scale;
+        }
+    }
+
+    /// Scales rows, forces and floors; `complete` is that of [`scale_rows`].
+    fn scale(&mut self, complete: impl FnOnce(&mut [f64; 1])) {
         for (scaled, (row, [tail, head])) in self.scaled_rows.iter_mut().zip(self.rows.iter().zip(self.ends))
         {
             *scaled = NormalRow { normal: row.normal, tail: *tail, head: *head };
         }
-        scale_rows(self.weights, self.scaled_rows, self.scales);
+        scale_rows(self.weights, self.scaled_rows, self.scales, complete);
         for (k, scale) in self.scales.iter().enumerate() {
             self.forces[k] /= scale;
             self.floors[k] /= scale;
@@ -288,8 +302,9 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
         }
     }
 
-    /// The row whose gap at the end of the step is farthest from what it should be, beyond the tolerance.
-    fn farthest_off(&self, tolerance: f64) -> Option<(usize, f64)> {
+    /// The row whose gap at the end of the step is farthest from what it should be, beyond the tolerance,
+    /// that gap, and how far it is off.
+    fn farthest_off(&self, tolerance: f64) -> Option<(usize, f64, f64)> {
         let mut farthest = None;
         let mut largest = 2.0 * tolerance;
         for k in 0..self.rows.len() {
@@ -298,10 +313,33 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
             let slack = compliance * self.scales[k] * (self.forces[k] - self.floors[k]);
             let off = gap.min(slack).abs();
             if off > largest {
-                (farthest, largest) = (Some((k, gap)), off);
+                (farthest, largest) = (Some((k, gap, off)), off);
             }
         }
         farthest
+    }
+
+    /// Solves the linear problem, and moves the slots to the end of the step.
+    fn project(
+        &mut self,
+        response: impl Response<NormalRow<D>>,
+        tuning: &Tuning,
+        c: f64,
+    ) -> Result<SolveReport, SolveFailure> {
+        let mut problem = LinearProblem {
+            operator: ScaledDelassus { rows: self.scaled_rows, response, motions: self.changes },
+            weights: self.weights,
+            free_gaps: self.free_gaps,
+            floors: self.floors,
+            forces: self.forces,
+            scratch: self.scratch,
+        };
+        let report = problem.solve(tuning)?;
+        self.changes.iter_mut().for_each(|change| *change /= c);
+        for (moved, (slot, change)) in self.moved.iter_mut().zip(self.slots.iter().zip(&*self.changes)) {
+            *moved = slot.free + change * c;
+        }
+        Ok(report)
     }
 }
 
@@ -318,30 +356,15 @@ impl<const D: usize, M: Mobility<D>> Linearised for IslandProblem<'_, '_, D, M> 
     }
 
     fn project(&mut self) -> Result<SolveReport, SolveFailure> {
-        let (island, context) = (&mut *self.island, self.context);
-        let response = IslandMobility { weights: island.weights, slots: island.slots, context };
-        let mut problem = LinearProblem {
-            operator: ScaledDelassus { rows: island.scaled_rows, response, motions: island.changes },
-            weights: island.weights,
-            free_gaps: island.free_gaps,
-            floors: island.floors,
-            forces: island.forces,
-            scratch: island.scratch,
-        };
-        let report = problem.solve(&context.tuning)?;
-        let c = context.velocity_weight;
-        island.changes.iter_mut().for_each(|change| *change /= c);
-        for (moved, (slot, change)) in island.moved.iter_mut().zip(island.slots.iter().zip(&*island.changes))
-        {
-            *moved = slot.free + change * c;
-        }
-        Ok(report)
+        let (weights, slots, context) = (self.island.weights, self.island.slots, self.context);
+        let response = IslandMobility { weights, slots, context };
+        self.island.project(response, &context.tuning, context.velocity_weight)
     }
 
     fn linearise(&mut self, _pass: usize) -> Option<(usize, f64)> {
-        let off = self.island.farthest_off(self.context.tuning.tolerance)?;
+        let (row, gap, _) = self.island.farthest_off(self.context.tuning.tolerance)?;
         self.island.set_free_gaps(Instant::End);
-        Some(off)
+        Some((row, gap))
     }
 }
 
@@ -387,16 +410,26 @@ impl<const D: usize, M: Mobility<D>> Response<NormalRow<D>> for IslandMobility<'
         if M::COUPLED {
             return None;
         }
-        let mut factor = Factor::new(D * self.slots.len());
-        for row in rows {
-            // What does not move has no degrees of freedom.
-            let end = |slot: u32, sign: f64| {
-                let root = sign * self.weights[slot as usize].sqrt();
-                let entries = (0..D).map(move |d| (D * slot as usize + d, root * row.normal[d]));
-                entries.filter(|(_, value)| *value != 0.0)
-            };
-            factor.push(end(row.tail, -1.0).chain(end(row.head, 1.0)));
-        }
-        Some(factor)
+        let factor = Factor::new(D * self.slots.len());
+        Some(with_rows(factor, rows, self.weights, |slot| slot as usize))
     }
+}
+
+/// The rows of a factor, with the roots of the weights; particles of slots have these numbers.
+fn with_rows<const D: usize>(
+    mut factor: Factor,
+    rows: &[NormalRow<D>],
+    weights: &[f64],
+    number: impl Fn(u32) -> usize,
+) -> Factor {
+    for row in rows {
+        // What does not move has no degrees of freedom.
+        let end = |slot: u32, sign: f64| {
+            let (root, first) = (sign * weights[slot as usize].sqrt(), D * number(slot));
+            let entries = (0..D).map(move |d| (first + d, root * row.normal[d]));
+            entries.filter(|(_, value)| *value != 0.0)
+        };
+        factor.push(end(row.tail, -1.0).chain(end(row.head, 1.0)));
+    }
+    factor
 }

@@ -46,6 +46,15 @@ pub(crate) struct Islands<const D: usize> {
     slot_of: Vec<u32>,
 }
 
+/// How contacts are parted.
+#[derive(Clone, Copy)]
+pub(crate) enum Grouping<'a> {
+    /// Into connected components.
+    Components,
+    /// All into one island, to which these places belong whether contacts join them or not.
+    Whole(&'a [u32]),
+}
+
 /// Particles in the order of their places.
 pub(crate) struct SortedParticles<'a, const D: usize> {
     pub positions: &'a [Vector<D>],
@@ -55,15 +64,19 @@ pub(crate) struct SortedParticles<'a, const D: usize> {
 }
 
 impl<const D: usize> Islands<D> {
-    /// Parts `rows`; `as_one` puts all of them and all places into one island.
+    /// Parts `rows`.
     pub(crate) fn part(
         &mut self,
         rows: &[Row<D>],
         places: &SortedParticles<'_, D>,
-        as_one: bool,
+        grouping: Grouping<'_>,
         is_fresh: impl Fn(&Row<D>) -> bool,
     ) {
-        let count = self.label(rows, places, as_one);
+        let count = match grouping {
+            Grouping::Components => self.label(rows, places),
+            Grouping::Whole(_) => self.label_as_one(rows),
+        };
+        let members = if let Grouping::Whole(members) = grouping { members } else { &[] };
         let (labels, islands) = (&self.labels, &self.island_of);
         let island = |k: usize| islands[labels[k] as usize] as usize;
         sort_by_key(rows.len(), count, island, &mut self.starts, &mut self.order);
@@ -77,13 +90,13 @@ impl<const D: usize> Islands<D> {
         self.slot_of.resize(places.positions.len(), u32::MAX);
         for island in 0..count {
             let range = self.starts[island] as usize..self.starts[island + 1] as usize;
-            self.fill(range, places, as_one, &is_fresh);
+            self.fill(range, places, members, &is_fresh);
         }
     }
 
     /// Finds the components; afterwards `labels` holds a root for each row, `island_of` the island of each
     /// root. Returns how many islands there are.
-    fn label(&mut self, rows: &[Row<D>], places: &SortedParticles<'_, D>, as_one: bool) -> usize {
+    fn label(&mut self, rows: &[Row<D>], places: &SortedParticles<'_, D>) -> usize {
         let count = places.positions.len();
         self.parents.clear();
         self.parents.extend(0..count as u32);
@@ -96,10 +109,7 @@ impl<const D: usize> Islands<D> {
         self.labels.clear();
         let mut island_count = 0;
         for row in rows {
-            let root = match as_one {
-                true => 0,
-                false => root(&mut self.parents, if movable(row.head) { row.head } else { row.tail }),
-            };
+            let root = root(&mut self.parents, if movable(row.head) { row.head } else { row.tail });
             if self.island_of[root as usize] == u32::MAX {
                 self.island_of[root as usize] = island_count;
                 island_count += 1;
@@ -109,20 +119,27 @@ impl<const D: usize> Islands<D> {
         island_count as usize
     }
 
+    /// The same with all rows in one island, which is there even without rows.
+    fn label_as_one(&mut self, rows: &[Row<D>]) -> usize {
+        self.labels.clear();
+        self.labels.resize(rows.len(), 0);
+        self.island_of.clear();
+        self.island_of.push(0);
+        1
+    }
+
     /// Numbers the particles of one island.
     fn fill(
         &mut self,
         range: Range<usize>,
         places: &SortedParticles<'_, D>,
-        as_one: bool,
+        members: &[u32],
         is_fresh: &impl Fn(&Row<D>) -> bool,
     ) {
         let first = self.slots.len();
         self.slots.push(Slot { place: GROUND, position: Vector::zeros(), free: Vector::zeros() });
         self.weights.push(0.0);
-        if as_one {
-            (0..places.positions.len() as u32).for_each(|place| _ = self.slot(place, first, places));
-        }
+        members.iter().for_each(|&place| _ = self.slot(place, first, places));
         for k in range.clone() {
             let Row { tail, head, .. } = self.rows[k];
             let ends = [tail, head].map(|place| self.slot(place, first, places));

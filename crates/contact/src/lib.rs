@@ -55,6 +55,7 @@ mod network;
 mod pair_contact;
 mod parallel;
 mod params;
+pub mod part;
 mod projection;
 mod push_apart;
 mod record;

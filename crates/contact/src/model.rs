@@ -4,6 +4,7 @@ use gluey_geom::{Dim, Pose, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+use crate::projection::Effort;
 use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
@@ -113,6 +114,31 @@ pub struct ContactReport {
 }
 
 impl ContactReport {
+    /// The report on the pairs of both: effort is that of the island that took most.
+    #[must_use]
+    pub fn joined(self, other: Self) -> Self {
+        let smaller = |a: WorstPair, b: WorstPair| if (b.gap, b.pair) < (a.gap, a.pair) { b } else { a };
+        let worst = match (self.worst, other.worst) {
+            (Some(a), Some(b)) => Some(smaller(a, b)),
+            (a, b) => a.or(b),
+        };
+        Self {
+            iterations: self.iterations.max(other.iterations),
+            passes: self.passes.max(other.passes),
+            residual: self.residual.max(other.residual),
+            pair_count: self.pair_count + other.pair_count,
+            active_count: self.active_count + other.active_count,
+            worst,
+        }
+    }
+
+    /// Counts the effort of an island.
+    pub(crate) fn count_effort(&mut self, effort: &Effort) {
+        self.iterations = self.iterations.max(effort.iterations);
+        self.passes = self.passes.max(effort.passes);
+        self.residual = self.residual.max(effort.residual);
+    }
+
     /// Counts a pair that took part.
     pub(crate) fn count_pair(&mut self, gap: f64, force: f64, pair: impl FnOnce() -> PairKey) {
         self.pair_count += 1;

@@ -10,6 +10,11 @@ pub(crate) struct ContactRecord {
 }
 
 impl ContactRecord {
+    /// The gap that the last step left of what is remembered, unless the record was resumed.
+    pub(crate) fn expected(&self, place: usize) -> Option<f64> {
+        self.contacts.get(place).map(|contact| contact.gap)
+    }
+
     /// Replaces the contacts by those that `list` adds, and the memory by theirs.
     pub(crate) fn replace(&mut self, list: impl FnOnce(&mut Vec<Contact>)) {
         self.contacts.clear();

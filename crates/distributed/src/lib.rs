@@ -25,6 +25,8 @@
 //! # Ok::<(), gluey_parallel::RankFailure>(())
 //! ```
 //!
+//! Contacts between particles are shared too ([`SharedContact`], `docs/decisions/0038-contact-on-ranks.md`).
+//!
 //! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
 //! (`docs/decisions/0036-surfaces-on-ranks.md`); held bodies, forces on the fluid and boxes without a wall
 //! are for these only. Not for viscosities that vary.
@@ -33,6 +35,7 @@ mod agreement;
 mod bodies;
 mod cells;
 mod coarse;
+mod contact;
 mod cuts;
 mod cycle;
 mod flow;
@@ -48,6 +51,7 @@ mod surface;
 mod transfer;
 mod warm_start;
 
+pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
 pub use moving::{

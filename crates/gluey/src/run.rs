@@ -30,7 +30,6 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use gluey_contact::{ContactModel, PairContact, WithFixed};
 use gluey_geom::{Dim, Particle, Space, Vector};
 
 pub use error::RunError;
@@ -93,7 +92,10 @@ fn logged(
 
 fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<2>(case)?, None)?.finish(),
+        Hydrodynamics::Stokes => {
+            let models = (stokes::<2>(case)?, Contacts::alone(case));
+            Run::start(case, options, progress, models, None)?.finish()
+        }
         Hydrodynamics::PairMobility => Err(HydrodynamicsError::unfit(case).into()),
     }
 }
@@ -101,9 +103,13 @@ fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<
 fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
         Hydrodynamics::PairMobility => {
-            Run::start(case, options, progress, pair_mobility(case), None)?.finish()
+            let models = (pair_mobility(case), Contacts::alone(case));
+            Run::start(case, options, progress, models, None)?.finish()
         }
-        Hydrodynamics::Stokes => Run::start(case, options, progress, stokes::<3>(case)?, None)?.finish(),
+        Hydrodynamics::Stokes => {
+            let models = (stokes::<3>(case)?, Contacts::alone(case));
+            Run::start(case, options, progress, models, None)?.finish()
+        }
     }
 }
 
@@ -127,7 +133,7 @@ where
     case: &'a Case,
     options: &'a RunOptions,
     progress: &'a dyn Progress,
-    simulation: Simulation<D, H, Contacts<D>>,
+    simulation: Simulation<D, H, Contacts<'a, D>>,
     measures: Measures<D>,
     csv: CsvWriter<D>,
     tables: Tables,
@@ -148,19 +154,18 @@ where
 impl<'a, const D: usize, H> Run<'a, D, H>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    /// At time 0, or at the checkpoint to resume; `others` share the flow.
+    /// At time 0, or at the checkpoint to resume; `others` share flow and contact.
     fn start(
         case: &'a Case,
         options: &'a RunOptions,
         progress: &'a dyn Progress,
-        hydrodynamics: H,
+        (hydrodynamics, contact): (H, Contacts<'a, D>),
         others: Option<&'a dyn Others>,
     ) -> Result<Self, RunError> {
-        let mut simulation = simulation(case, hydrodynamics);
+        let mut simulation = simulation(case, hydrodynamics, contact);
         let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
@@ -420,14 +425,13 @@ fn panic_message(payload: &(dyn Any + Send)) -> String {
 /// Brings a simulation and its measures to where `checkpoint`, which was read from `path`, is, and gives the
 /// files of rows that belong to it.
 fn go_on<const D: usize, H>(
-    simulation: &mut Simulation<D, H, Contacts<D>>,
+    simulation: &mut Simulation<D, H, Contacts<'_, D>>,
     measures: &mut Measures<D>,
     checkpoint: Checkpoint<D>,
     [path, csv]: [&Path; 2],
 ) -> Result<CsvWriter<D>, RunError>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
@@ -440,14 +444,15 @@ where
 }
 
 /// A case at time 0.
-fn simulation<const D: usize, H>(case: &Case, hydrodynamics: H) -> Simulation<D, H, Contacts<D>>
+fn simulation<'a, const D: usize, H>(
+    case: &Case,
+    hydrodynamics: H,
+    contact: Contacts<'a, D>,
+) -> Simulation<D, H, Contacts<'a, D>>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
-    let fixed = WithFixed::new(case.given_particles());
-    let contact = PairContact::with_mobility(case.contact.params(), fixed).within(case.surroundings());
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
     if case.has_forces() {

@@ -74,22 +74,34 @@ pub trait Communicator {
     /// Adds up `values`, entry by entry, over all ranks, for all of them: a binary tree over the ranks, each
     /// adding what comes from higher ones to its own.
     fn sum(&self, values: &mut [f64]) {
+        self.reduce(values, &mut []);
+    }
+
+    /// Adds up `sums` like [`Communicator::sum`], and replaces `largest` by the largest of all ranks, in the
+    /// same messages.
+    fn reduce(&self, sums: &mut [f64], largest: &mut [f64]) {
         count(self.counter(), |traffic| traffic.reductions += 1);
-        let length = size_of_val(values);
+        let mut values = [&*sums, &*largest].concat();
+        let length = size_of_val(&values[..]);
         for step in up_the_tree(self.rank(), self.size()) {
             match step {
                 Step::From(rank) => {
                     let bytes = receive(self, rank, length);
-                    values.iter_mut().zip(read_all::<f64>(&bytes)).for_each(|(sum, value)| *sum += value);
+                    for (k, (value, other)) in values.iter_mut().zip(read_all::<f64>(&bytes)).enumerate() {
+                        *value = if k < sums.len() { *value + other } else { value.max(other) };
+                    }
                 }
                 Step::To(rank) => {
                     let mut bytes = Vec::new();
-                    write_all(values, &mut bytes);
+                    write_all(&values, &mut bytes);
                     send(self, rank, bytes);
                 }
             }
         }
-        self.share(values);
+        self.share(&mut values);
+        let (of_sums, of_largest) = values.split_at(sums.len());
+        sums.copy_from_slice(of_sums);
+        largest.copy_from_slice(of_largest);
     }
 
     /// Replaces `values`, of which all ranks have as many, by those of rank zero.

@@ -218,6 +218,11 @@ impl GhostPlan {
         self.ghosts.places.iter().flatten().copied()
     }
 
+    /// Places here of what has ghosts elsewhere, rank by rank.
+    pub fn owned(&self) -> impl Iterator<Item = u32> {
+        self.owned.places.iter().flatten().copied()
+    }
+
     /// Sets the ghosts of a field with `C` interleaved components to the values of their owners.
     pub fn update<T: Number, const C: usize>(&mut self, ranks: &dyn Communicator, x: &mut [T]) {
         self.owned.pack::<T, C>(x);

@@ -42,10 +42,23 @@ impl<const D: usize> AffineFit<D> {
     /// Fits `displacements` at `positions`: besides the motion of the `frame`, `L` is fitted on the
     /// directions that are free.
     pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], frame: &Frame<D>) -> Self {
+        Self::completed(positions, displacements, frame, |_| {})
+    }
+
+    /// The same where others hold some of the particles: `complete` makes sums over those here sums over
+    /// all.
+    pub(crate) fn completed(
+        positions: &[Vector<D>],
+        displacements: &[Vector<D>],
+        frame: &Frame<D>,
+        complete: impl Fn(&mut [f64]),
+    ) -> Self {
         let sliding = frame.gradient();
-        let scale = 1.0 / positions.len().max(1) as f64;
-        let center = positions.iter().sum::<Vector<D>>() * scale;
-        let mean = displacements.iter().sum::<Vector<D>>() * scale;
+        let mut sums = [positions.iter().sum::<Vector<D>>(), displacements.iter().sum::<Vector<D>>()];
+        let mut count = [positions.len() as f64];
+        complete(&mut count);
+        sums.iter_mut().for_each(|sum| complete(sum.as_mut_slice()));
+        let [center, mean] = sums.map(|sum| sum * (1.0 / count[0].max(1.0)));
         let (mut moments, mut products) = (Matrix::<D>::zeros(), Matrix::<D>::zeros());
         for (x, s) in positions.iter().zip(displacements) {
             let x = x - center;
@@ -53,6 +66,8 @@ impl<const D: usize> AffineFit<D> {
             moments += x * x.transpose();
             products += s * x.transpose();
         }
+        complete(moments.as_mut_slice());
+        complete(products.as_mut_slice());
         let fitted = regression(moments, products, frame.free);
         let is_useful = fitted.norm() > 0.0 && fitted.norm() <= LARGEST_STRAIN;
         let gradient = if is_useful { fitted + sliding } else { sliding };

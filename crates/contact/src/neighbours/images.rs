@@ -8,7 +8,7 @@ use gluey_geom::{Lattice, Vector};
 use crate::Domain;
 
 /// Positions brought into the periods, `0 <= x < period`, and how many periods each was moved by.
-pub(super) fn wrap<const D: usize>(
+pub(crate) fn wrap<const D: usize>(
     positions: &[Vector<D>],
     domain: &Domain<D>,
     wrapped: &mut Vec<Vector<D>>,
@@ -32,7 +32,7 @@ fn winding<const D: usize>(x: &Vector<D>, lattice: &Lattice<D>) -> [i32; 3] {
 }
 
 /// Visits the images of a position in the periods that come within a margin of them, but for itself.
-pub(super) fn for_each_image<const D: usize>(
+pub(crate) fn for_each_image<const D: usize>(
     x: &Vector<D>,
     lattice: &Lattice<D>,
     margin: f64,

@@ -4,14 +4,16 @@
 mod affine;
 mod images;
 mod order;
+mod part;
 
 use gluey_geom::{Lattice, Vector};
 
-use crate::broadphase::{BestOf, Broadphase};
+use crate::broadphase::BestOf;
 use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
 use affine::{AffineFit, Frame};
-use images::{for_each_image, wrap};
-use order::SpatialOrder;
+pub(crate) use images::{for_each_image, wrap};
+pub(crate) use order::SpatialOrder;
+pub(crate) use part::{Ownership, PartSearch};
 
 /// Pairs nearer than this part of their summed radii are kept in the list whatever they do (the skin of the
 /// list), so that one search serves several steps.
@@ -60,6 +62,8 @@ pub(crate) struct NeighbourList<const D: usize> {
     widening: f64,
     /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
     wall_slack: f64,
+    /// Whose the particles are, where this is the list of one of several ranks.
+    ownership: Option<Ownership>,
     search: Search<D>,
 }
 
@@ -92,10 +96,14 @@ impl<const D: usize> NeighbourList<D> {
 
     /// The name of the contact, in the numbering of the caller.
     pub(crate) fn key(&self, candidate: &Candidate) -> PairKey {
-        let head = self.order[candidate.head as usize] as usize;
+        let name = |place: u32| {
+            let particle = self.order[place as usize] as usize;
+            self.ownership.as_ref().map_or(particle, |owned| owned.names[particle] as usize)
+        };
+        let head = name(candidate.head);
         match self.wall(candidate) {
             Some(wall) => PairKey::wall(head, wall),
-            None => PairKey::across(self.order[candidate.tail as usize] as usize, head, candidate.image),
+            None => PairKey::across(name(candidate.tail), head, candidate.image),
         }
     }
 
@@ -230,9 +238,9 @@ impl<const D: usize> NeighbourList<D> {
         for (number, wall) in domain.walls.iter().enumerate() {
             let tail = (self.count() + number) as u32;
             for place in 0..self.count() {
-                if wall.distance(&self.positions[place]) - self.radii[place]
-                    <= self.wall_reach(wall, place, step.dt)
-                {
+                let is_near = wall.distance(&self.positions[place]) - self.radii[place]
+                    <= self.wall_reach(wall, place, step.dt);
+                if is_near && self.is_own(place) {
                     self.candidates.push(Candidate { tail, head: place as u32, image: [0; 3] });
                 }
             }
@@ -271,31 +279,21 @@ impl<const D: usize> NeighbourList<D> {
         self.set_reach(step, domain)?;
         self.load(step, displacements);
         self.radii.extend(self.order.iter().map(|&i| step.radii[i as usize]));
-        self.place_balls(domain);
-        let Search { broadphase, centers, reaches, pairs, .. } = &mut self.search;
-        broadphase.meeting(centers, reaches, self.order.len(), pairs);
-        self.collect();
+        self.search_within_reach(domain);
         self.remaining_reach.clone_from(&self.reach);
         Ok(())
     }
 
     /// How far to search around each place, for the displacements that are loaded.
     fn set_reach(&mut self, step: &StepGeometry<'_, D>, domain: &Domain<D>) -> Result<(), ContactError> {
-        let fit = AffineFit::new(&self.positions, &self.free, &frame_of_step(domain));
-        self.reach.clear();
-        for (place, &particle) in self.order.iter().enumerate() {
-            let particle = particle as usize;
-            let (radius, rest) = (step.radii[particle], fit.rest(&self.positions[place], &self.free[place]));
-            if let Some(&period) =
-                domain.lattice.periods().iter().flatten().find(|period| rest > 0.5 * **period)
-            {
-                return Err(ContactError::TooFast { particle, displacement: rest, period });
-            }
-            // The next steps may strain as much before they search.
-            let need = ((1.0 + self.margin) * radius + self.widening * rest) / (1.0 - fit.strain);
-            self.reach.push(need * (1.0 + fit.strain) + SKIN * radius);
-        }
-        Ok(())
+        let moves = Moves {
+            order: &self.order,
+            positions: &self.positions,
+            displacements: &self.free,
+            margin: self.margin,
+            widening: self.widening,
+        };
+        moves.reach(step.radii, domain, &mut self.reach)
     }
 
     /// The balls of the search: one per particle, and the images that could meet one.
@@ -330,7 +328,7 @@ impl<const D: usize> NeighbourList<D> {
                 None => (ball, [0; 3]),
                 Some(ghost) => search.ghosts[ghost],
             };
-            if head <= tail {
+            if head <= tail || self.ownership.as_ref().is_some_and(|owned| !owned.has_pair(tail, head)) {
                 continue;
             }
             self.starts.resize(tail as usize + 1, self.candidates.len() as u32);
@@ -363,11 +361,54 @@ impl<const D: usize> NeighbourList<D> {
     /// Whether the search reached as far as pairs could come together under `displacements` (by place).
     fn has_all_pairs(&self, domain: &Domain<D>, displacements: &[Vector<D>]) -> bool {
         let fit = AffineFit::new(&self.positions, displacements, &frame_of_step(domain));
-        (0..self.order.len()).all(|place| {
-            let rest = fit.rest(&self.positions[place], &displacements[place]);
-            ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain)
-                <= self.remaining_reach[place]
-        })
+        let motion = |place: usize| (&self.positions[place], &displacements[place]);
+        (0..self.order.len())
+            .all(|place| self.need(place, &fit, motion(place)) <= self.remaining_reach[place])
+    }
+
+    /// How far to search around a place at `motion.0` that moves by `motion.1`.
+    fn need(&self, place: usize, fit: &AffineFit<D>, motion: (&Vector<D>, &Vector<D>)) -> f64 {
+        let rest = fit.rest(motion.0, motion.1);
+        ((1.0 + self.margin) * self.radii[place] + rest) / (1.0 - fit.strain)
+    }
+}
+
+/// Particles in an order, and how far they are to move.
+pub(crate) struct Moves<'a, const D: usize> {
+    pub order: &'a [u32],
+    /// By place in the order.
+    pub positions: &'a [Vector<D>],
+    pub displacements: &'a [Vector<D>],
+    /// Gap kept between particles, relative to their radii.
+    pub margin: f64,
+    /// Factor of what displacements have besides their affine part.
+    pub widening: f64,
+}
+
+impl<const D: usize> Moves<'_, D> {
+    /// How far to search around each place.
+    pub(crate) fn reach(
+        &self,
+        radii: &[f64],
+        domain: &Domain<D>,
+        reach: &mut Vec<f64>,
+    ) -> Result<(), ContactError> {
+        let fit = AffineFit::new(self.positions, self.displacements, &frame_of_step(domain));
+        reach.clear();
+        for (place, &particle) in self.order.iter().enumerate() {
+            let particle = particle as usize;
+            let rest = fit.rest(&self.positions[place], &self.displacements[place]);
+            let radius = radii[particle];
+            if let Some(&period) =
+                domain.lattice.periods().iter().flatten().find(|period| rest > 0.5 * **period)
+            {
+                return Err(ContactError::TooFast { particle, displacement: rest, period });
+            }
+            // The next steps may strain as much before they search.
+            let need = ((1.0 + self.margin) * radius + self.widening * rest) / (1.0 - fit.strain);
+            reach.push(need * (1.0 + fit.strain) + SKIN * radius);
+        }
+        Ok(())
     }
 }
 

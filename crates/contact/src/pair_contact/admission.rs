@@ -32,8 +32,7 @@ where
         buffers.forces.clear();
         buffers.takes_part.clear();
         for (k, state) in self.record.state.pairs.iter().enumerate() {
-            let expected = self.record.contacts.get(k).map(|contact| contact.gap);
-            let candidate = check_known(state, expected, step, &self.domain)
+            let candidate = check_known(state, self.record.expected(k), step, &self.domain)
                 .map(|()| neighbours.find_or_add(state.pair))?;
             let size = buffers.memory.len().max(neighbours.candidates.len());
             buffers.memory.resize(size, PairMemory::default());
@@ -46,6 +45,12 @@ where
         buffers.forces.extend(buffers.memory.iter().map(|memory| memory.lambda));
         self.admit(step, buffers);
         Ok(())
+    }
+
+    /// Whether remembered contacts still are where the last step left them.
+    pub(super) fn check_memory(&self, step: &StepGeometry<'_, D>) -> Result<(), ContactError> {
+        let mut pairs = self.record.state.pairs.iter().enumerate();
+        pairs.try_for_each(|(k, state)| check_known(state, self.record.expected(k), step, &self.domain))
     }
 
     /// Lets candidates that `displacements` close take part; whether there are any.

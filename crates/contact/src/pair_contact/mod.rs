@@ -1,12 +1,14 @@
 //! The contact step: find pairs, project, re-linearise, remember.
 
 mod admission;
+mod lead;
+mod part;
 mod velocity_correction;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
 use crate::island_projection::{IslandWorkspace, SolveContext};
-use crate::islands::{Island, Islands, SortedParticles};
+use crate::islands::{Grouping, Island, Islands, SortedParticles};
 use crate::memory::GammaRule;
 use crate::model::validate;
 use crate::neighbours::NeighbourList;
@@ -17,6 +19,8 @@ use crate::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
     Domain, MemoryError, Mobility, StepGeometry, StokesDrag,
 };
+
+pub use part::PartContact;
 
 /// Contacts between discs or spheres, and with walls, by one of the [`ContactLaw`]s.
 ///
@@ -211,10 +215,8 @@ where
         twists: &mut [Twist<D>],
         buffers: &mut Buffers<D>,
     ) -> Result<ContactReport, ContactError> {
-        let moves =
-            twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift);
         buffers.free.clear();
-        buffers.free.extend(moves);
+        buffers.free.extend(lead::free_moves(step, twists));
         let tolerance = self.tolerance(step, &buffers.free);
         self.neighbours.margin = 0.5 * self.margin();
         self.neighbours.begin(step, &self.domain, &buffers.free)?;
@@ -290,12 +292,27 @@ where
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
-        let tuning = Tuning {
+        let tuning = self.tuning(tolerance);
+        self.part_islands(step, &tuning, buffers);
+        self.solve_parted(step, tuning, buffers, report)
+    }
+
+    fn tuning(&self, tolerance: f64) -> Tuning {
+        Tuning {
             solver: self.params.solver.method(),
             tolerance,
             iteration_limit: self.params.iteration_limit,
-        };
-        self.part_islands(step, &tuning, buffers);
+        }
+    }
+
+    /// Solves the fresh islands.
+    fn solve_parted(
+        &mut self,
+        step: &StepGeometry<'_, D>,
+        tuning: Tuning,
+        buffers: &mut Buffers<D>,
+        report: &mut ContactReport,
+    ) -> Result<(), ContactError> {
         let context = SolveContext {
             params: &self.params,
             mobility: &self.mobility,
@@ -307,11 +324,10 @@ where
         self.workspace.solve(&self.islands, &context);
         let islands = self.islands.islands.iter().zip(&self.workspace.outcomes);
         for (island, outcome) in islands.filter(|(island, _)| island.is_fresh) {
-            let effort =
-                outcome.as_ref().map_err(|failure| self.explain(failure, island.rows.start, tolerance))?;
-            report.iterations = report.iterations.max(effort.iterations);
-            report.passes = report.passes.max(effort.passes);
-            report.residual = report.residual.max(effort.residual);
+            let effort = outcome
+                .as_ref()
+                .map_err(|failure| self.explain(failure, island.rows.start, tuning.tolerance))?;
+            report.count_effort(effort);
             self.take_over(island, step.velocity_weight, buffers);
         }
         Ok(())
@@ -324,7 +340,10 @@ where
         let places =
             SortedParticles { positions: &self.neighbours.positions, free: &self.neighbours.free, weights };
         let is_fresh = |row: &Row<D>| takes_part[row.candidate as usize] == Participation::Fresh;
-        self.islands.part(rows, &places, M::COUPLED, is_fresh);
+        // Where particles are coupled all belong together.
+        let all: Vec<u32> = if M::COUPLED { (0..weights.len() as u32).collect() } else { Vec::new() };
+        let grouping = if M::COUPLED { Grouping::Whole(&all) } else { Grouping::Components };
+        self.islands.part(rows, &places, grouping, is_fresh);
         self.workspace.prepare(&self.islands, tuning.solver.scratch_count(), |row| {
             let PairMemory { gamma, lambda } = memory[row.candidate as usize];
             (forces[row.candidate as usize], rule.floor(gamma, lambda))

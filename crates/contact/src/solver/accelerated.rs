@@ -8,7 +8,7 @@
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
     ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    gaps_under, largest_eigenvalue, residual, split,
+    gaps_under, largest_eigenvalue, split,
 };
 
 /// Safety of the estimated norm, a lower bound.
@@ -31,14 +31,14 @@ impl ProjectionSolver for Accelerated {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, ahead, before, mark, ray, image] = split(scratch, forces.len());
         let mut norm = NORM_SAFETY * largest_eigenvalue(problem.operator, ray, image);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], problem, forces);
         let mut log = ConvergenceLog::new();
         let (mut least, mut momentum) = (f64::INFINITY, 1.0);
         ahead.copy_from_slice(forces);
         loop {
             gaps_under(problem, ahead, gaps);
             // At the extrapolated forces, which in the end are the forces.
-            log.record(residual(gaps, ahead, problem.floors, norm));
+            log.record(problem.residual(gaps, ahead, norm));
             if log.has_converged(problem) {
                 forces.copy_from_slice(ahead);
                 return Ok(log.report());
@@ -49,22 +49,23 @@ impl ProjectionSolver for Accelerated {
                 (norm, least, momentum) = (2.0 * norm, log.residual, 1.0);
             }
             before.copy_from_slice(forces);
-            let uphill = descend(forces, ahead, gaps, before, problem.floors, 1.0 / norm);
-            momentum =
-                extrapolate(forces, before, ahead, problem.floors, if uphill { 1.0 } else { momentum });
+            let mut turned = [descend(forces, ahead, gaps, before, problem.floors, 1.0 / norm)];
+            problem.operator.complete(&mut turned, &mut []);
+            let momentum_now = if turned[0] > 0.0 { 1.0 } else { momentum };
+            momentum = extrapolate(forces, before, ahead, problem.floors, momentum_now);
         }
     }
 }
 
-/// `x = max(floor, y - rho w)`; whether the step turns back on the extrapolation:
-/// `(y - x) . (x - before) > 0`.
-fn descend(x: &mut [f64], y: &[f64], gaps: &[f64], before: &[f64], floors: &[f64], rho: f64) -> bool {
+/// `x = max(floor, y - rho w)`; the step turns back on the extrapolation where this is positive:
+/// `(y - x) . (x - before)`.
+fn descend(x: &mut [f64], y: &[f64], gaps: &[f64], before: &[f64], floors: &[f64], rho: f64) -> f64 {
     let mut product = 0.0;
     for k in 0..x.len() {
         x[k] = (y[k] - rho * gaps[k]).max(floors[k]);
         product += (y[k] - x[k]) * (x[k] - before[k]);
     }
-    product > 0.0
+    product
 }
 
 /// `y = max(floor, x + beta (x - before))`; returns the next momentum.

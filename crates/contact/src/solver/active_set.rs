@@ -8,8 +8,8 @@
 
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
-    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport, dot,
-    gaps_under, largest_eigenvalue, residual, split,
+    ConvergenceLog, InfeasibilityMonitor, Measures, Projection, ProjectionSolver, SolveFailure, SolveReport,
+    dot, gaps_under, largest_eigenvalue, residual, split,
 };
 
 /// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they
@@ -34,6 +34,8 @@ struct State<'a> {
     direction: &'a mut [f64],
     /// `A direction`.
     image: &'a mut [f64],
+    /// How far the last step along a conjugate direction moved the forces.
+    moved: f64,
 }
 
 impl ProjectionSolver for ActiveSet {
@@ -49,22 +51,26 @@ impl ProjectionSolver for ActiveSet {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], forces);
-        let mut state = State { gaps, free, chopped, direction, image };
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], problem, forces);
+        let mut state = State { gaps, free, chopped, direction, image, moved: 0.0 };
         let mut log = ConvergenceLog::new();
+        let refresh = REFRESH + 2 * problem.count(forces.len());
         state.begin(problem, forces);
         let mut fresh = true;
         loop {
-            log.record(residual(state.gaps, forces, problem.floors, norm));
+            let mut measures = state.measures(problem, forces, norm);
+            log.record(measures.complete(problem));
             if log.has_converged(problem) && fresh {
                 return Ok(log.report());
             }
             log.check(&mut monitor, problem, forces, norm)?;
-            fresh = log.has_converged(problem) || log.iteration.is_multiple_of(REFRESH + 2 * forces.len());
+            fresh = log.has_converged(problem) || log.iteration.is_multiple_of(refresh);
             if fresh {
                 state.begin(problem, forces);
             } else {
-                state.iterate(problem, forces, norm);
+                let [chopped, reduced] = measures.sums;
+                state.iterate(problem, forces, norm, chopped <= reduced);
+                monitor.note(norm * state.moved);
             }
         }
     }
@@ -90,8 +96,16 @@ impl State<'_> {
         }
     }
 
-    fn iterate(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
-        if dot(self.chopped, self.chopped) <= self.reduced(forces, problem.floors, norm) {
+    /// The residual, the square of the chopped gradient, and the product of the free one with its part that
+    /// a step can follow.
+    fn measures(&self, problem: &Projection<'_>, forces: &[f64], norm: f64) -> Measures<2> {
+        let sums = [dot(self.chopped, self.chopped), self.reduced(forces, problem.floors, norm)];
+        Measures { here: residual(self.gaps, forces, problem.floors, norm), sums }
+    }
+
+    /// A step; `proportional` where forces at their floors are not worse than the others.
+    fn iterate(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64, proportional: bool) {
+        if proportional {
             self.conjugate_step(problem, forces, norm);
         } else {
             self.release_step(problem, forces, norm);
@@ -106,13 +120,17 @@ impl State<'_> {
 
     fn conjugate_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
         problem.operator.apply(self.direction, self.image);
-        let curvature = dot(self.direction, self.image);
-        if curvature <= NULL * norm * dot(self.direction, self.direction) {
+        let (direction, image) = (&*self.direction, &*self.image);
+        let mut sums = [dot(direction, image), dot(direction, direction), dot(self.gaps, direction)];
+        let mut longest = [-self.feasible_length(forces, problem.floors)];
+        problem.operator.complete(&mut sums, &mut longest);
+        let ([curvature, square, slope], feasible) = (sums, -longest[0]);
+        if curvature <= NULL * norm * square {
             self.gradient_step(problem, forces, norm);
             return;
         }
-        let length = dot(self.gaps, self.direction) / curvature;
-        let feasible = self.feasible_length(forces, problem.floors);
+        let length = slope / curvature;
+        self.moved = length.abs().min(feasible) * square.sqrt();
         self.advance(forces, length.min(feasible));
         if length > feasible {
             self.split(forces, problem.floors);
@@ -120,7 +138,9 @@ impl State<'_> {
             return;
         }
         self.split(forces, problem.floors);
-        let beta = dot(self.free, self.image) / curvature;
+        let mut product = [dot(self.free, self.image)];
+        problem.operator.complete(&mut product, &mut []);
+        let beta = product[0] / curvature;
         for (direction, free) in self.direction.iter_mut().zip(&*self.free) {
             *direction = free - beta * *direction;
         }
@@ -157,9 +177,11 @@ impl State<'_> {
     fn release_step(&mut self, problem: &mut Projection<'_>, forces: &mut [f64], norm: f64) {
         self.direction.copy_from_slice(self.chopped);
         problem.operator.apply(self.direction, self.image);
-        let square = dot(self.direction, self.direction);
-        let curvature = dot(self.direction, self.image).max(NULL * norm * square);
-        self.advance(forces, dot(self.gaps, self.direction) / curvature);
+        let (direction, image) = (&*self.direction, &*self.image);
+        let mut sums = [dot(direction, direction), dot(direction, image), dot(self.gaps, direction)];
+        problem.operator.complete(&mut sums, &mut []);
+        let [square, curvature, slope] = sums;
+        self.advance(forces, slope / curvature.max(NULL * norm * square));
         self.split(forces, problem.floors);
         self.direction.copy_from_slice(self.free);
     }

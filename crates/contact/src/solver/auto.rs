@@ -52,8 +52,9 @@ impl Budget {
         scratch: &mut [f64],
     ) -> Result<SolveReport, SolveFailure> {
         let (start, each) = FIRST_TRY;
-        let first_try = start + each * forces.len();
-        let outcome = if forces.len() <= FEW {
+        let count = problem.count(forces.len());
+        let first_try = start + each * count;
+        let outcome = if count <= FEW {
             self.attempt(&Uzawa, UZAWA_LIMIT, problem, forces, scratch)
         } else {
             self.attempt(&ActiveSet, first_try, problem, forces, scratch)

@@ -25,6 +25,7 @@ mod infeasibility;
 mod newton;
 mod spectrum;
 mod uzawa;
+mod whole;
 
 pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
@@ -46,7 +47,35 @@ pub trait DelassusOperator {
     fn factor(&self) -> Option<Factor> {
         None
     }
+
+    /// Makes sums over the contacts that are here sums over all contacts of the problem, and largest numbers
+    /// the largest over all, where others hold some of them.
+    fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}
+
+    /// Whether others hold some of the contacts. Then columns of [`DelassusOperator::factor`] have the same
+    /// numbers everywhere, of any size.
+    fn is_shared(&self) -> bool {
+        false
+    }
+
+    /// What all who share the problem have, each in its turn, at the first of them.
+    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        None
+    }
+
+    /// What the first of those who share the problem has for this one.
+    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        Vec::new()
+    }
+
+    /// A number for the first contact here, far from those of contacts elsewhere.
+    fn first(&self) -> usize {
+        0
+    }
 }
+
+/// Stands for a contact that is not among those here.
+pub(crate) const ELSEWHERE: usize = usize::MAX;
 
 /// One projection problem.
 pub struct Projection<'a> {
@@ -94,7 +123,7 @@ pub struct SolveFailure {
     pub report: SolveReport,
     /// Residuals on the way.
     pub history: ResidualHistory,
-    /// Contact with the largest residual.
+    /// Contact with the largest residual; `usize::MAX` if others hold it.
     pub worst: usize,
     /// Contacts that no forces can satisfy together, if that is why the solve failed.
     pub infeasible: Option<Vec<usize>>,
@@ -166,6 +195,44 @@ impl ConvergenceLog {
     }
 }
 
+impl Projection<'_> {
+    /// Number of contacts, those elsewhere included.
+    fn count(&self, here: usize) -> usize {
+        let mut count = [here as f64];
+        self.operator.complete(&mut count, &mut []);
+        count[0] as usize
+    }
+
+    /// [`residual`] over all contacts.
+    fn residual(&self, gaps: &[f64], forces: &[f64], norm: f64) -> (usize, f64) {
+        let mut measures = Measures::<0>::of(self, gaps, forces, norm);
+        measures.complete(self)
+    }
+}
+
+/// What is to be summed over all contacts together with their residual, for it takes one message.
+struct Measures<const N: usize> {
+    /// The contact with the largest residual here, and that residual.
+    here: (usize, f64),
+    sums: [f64; N],
+}
+
+impl Measures<0> {
+    fn of(problem: &Projection<'_>, gaps: &[f64], forces: &[f64], norm: f64) -> Self {
+        Self { here: residual(gaps, forces, problem.floors, norm), sums: [] }
+    }
+}
+
+impl<const N: usize> Measures<N> {
+    /// Completes the sums; the contact with the largest residual of all, and that residual.
+    fn complete(&mut self, problem: &Projection<'_>) -> (usize, f64) {
+        let (worst, own) = self.here;
+        let mut largest = [own];
+        problem.operator.complete(&mut self.sums, &mut largest);
+        (if own == largest[0] { worst } else { ELSEWHERE }, largest[0])
+    }
+}
+
 /// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as
 /// largest.
 fn residual(gaps: &[f64], forces: &[f64], floors: &[f64], norm: f64) -> (usize, f64) {
@@ -192,6 +259,7 @@ fn gaps_under(problem: &mut Projection<'_>, forces: &[f64], gaps: &mut [f64]) {
 /// Products are summed in lanes, which is as fixed an order as any and can be vectorised.
 const LANE_COUNT: usize = 8;
 
+/// The product over the contacts here: see [`DelassusOperator::complete`].
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (left, right) = (a.chunks_exact(LANE_COUNT), b.chunks_exact(LANE_COUNT));
     let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();

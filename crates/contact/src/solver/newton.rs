@@ -14,7 +14,7 @@
 //! other carry forces (a jammed cluster), some ten or a hundred of these do.
 
 use super::envelope::Envelope;
-use super::{DelassusOperator, Factor, Projection, SolveReport, gaps_under, residual};
+use super::{DelassusOperator, Factor, Projection, SolveReport, gaps_under, residual, whole};
 
 /// Smallest and largest `sigma ||A||`.
 const SIGMAS: (f64, f64) = (1e3, 1e14);
@@ -184,6 +184,9 @@ pub(super) fn improve(
     norm: f64,
     step_limit: usize,
 ) -> Option<SolveReport> {
+    if problem.operator.is_shared() {
+        return whole::improve(problem, forces, norm, step_limit);
+    }
     let factor = DelassusOperator::factor(problem.operator)?;
     Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
 }

@@ -9,14 +9,16 @@ const ITERATION_COUNT: usize = 20;
 /// `y` are vectors to work on.
 pub fn largest_eigenvalue(operator: &mut dyn DelassusOperator, x: &mut [f64], y: &mut [f64]) -> f64 {
     // Signs and sizes that no regular packing has, so that the start is not orthogonal to the answer.
-    for (k, x) in x.iter_mut().enumerate() {
+    for (k, x) in (operator.first()..).zip(x.iter_mut()) {
         *x = (k as f64 * 0.618_033_988_749_894_9).fract() - 0.3;
     }
     let mut quotient = 0.0;
     for _ in 0..ITERATION_COUNT {
         operator.apply(x, y);
-        quotient = dot(x, y) / dot(x, x);
-        let norm = dot(y, y).sqrt();
+        let mut products = [dot(x, y), dot(x, x), dot(y, y)];
+        operator.complete(&mut products, &mut []);
+        quotient = products[0] / products[1];
+        let norm = products[2].sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
             break;
         }

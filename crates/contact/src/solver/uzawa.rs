@@ -4,7 +4,7 @@
 use super::infeasibility::MONITOR_VECTOR_COUNT;
 use super::{
     ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    gaps_under, largest_eigenvalue, residual, split,
+    gaps_under, largest_eigenvalue, split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.
@@ -28,12 +28,12 @@ impl ProjectionSolver for Uzawa {
     ) -> Result<SolveReport, SolveFailure> {
         let [gaps, mark, ray, image] = split(scratch, forces.len());
         let mut norm = largest_eigenvalue(problem.operator, ray, image);
-        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], forces);
+        let mut monitor = InfeasibilityMonitor::new([mark, ray, image], problem, forces);
         let mut log = ConvergenceLog::new();
         let mut least = f64::INFINITY;
         loop {
             gaps_under(problem, forces, gaps);
-            log.record(residual(gaps, forces, problem.floors, norm));
+            log.record(problem.residual(gaps, forces, norm));
             if log.has_converged(problem) {
                 return Ok(log.report());
             }

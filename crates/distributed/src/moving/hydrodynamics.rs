@@ -89,7 +89,7 @@ where
         if std::thread::panicking() {
             return;
         }
-        assert!(!self.memory.is_broken(), "a flow that other ranks share was broken off");
+        assert!(!self.memory.is_broken(), "what other ranks share was broken off");
         if self.leads {
             Order::End.share(self.ranks);
         }
@@ -111,13 +111,13 @@ where
         let Self { suspension, ranks, told, memory, .. } = self;
         let places = particles.iter().map(|particle| particle.pose.position);
         told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
-        memory.is_predicting.set(true);
+        memory.is_sharing.set(true);
         Order::Predict.share(*ranks);
         told.share(*ranks);
         self.last = None;
         let start = std::time::Instant::now();
         let flow = suspension.solve_as_told(*ranks, told, memory);
-        memory.is_predicting.set(false);
+        memory.is_sharing.set(false);
         let (flow, rate) = flow?;
         self.rate = rate;
         // Those that are given without the rounding of what the flow is relative to.

@@ -14,13 +14,13 @@ use crate::warm_start::{PieceError, SavedPiece, WarmStart};
 pub struct Memory<const D: usize> {
     pub(super) last: RefCell<Option<Arc<WarmStart<D>>>>,
     remembered: RefCell<Option<Arc<WarmStart<D>>>>,
-    /// Whether a flow has begun and not ended.
-    pub(super) is_predicting: Cell<bool>,
+    /// Whether something that ranks share has begun and not ended.
+    pub(crate) is_sharing: Cell<bool>,
 }
 
 impl<const D: usize> Default for Memory<D> {
     fn default() -> Self {
-        Self { last: RefCell::default(), remembered: RefCell::default(), is_predicting: Cell::new(false) }
+        Self { last: RefCell::default(), remembered: RefCell::default(), is_sharing: Cell::new(false) }
     }
 }
 
@@ -33,9 +33,9 @@ where
         self.remembered.replace(self.last.borrow().clone());
     }
 
-    /// Whether a flow was broken off: other ranks wait for what this one has to say of it.
+    /// Whether a flow or a step of contact was broken off: others wait for what this rank has to say of it.
     pub fn is_broken(&self) -> bool {
-        self.is_predicting.get()
+        self.is_sharing.get()
     }
 
     /// What a checkpoint is to have of this rank; nothing before the first flow. All ranks have something or

@@ -1,8 +1,9 @@
 //! The flow around particles that move, step after step, on ranks.
 //!
-//! Ranks share the flow. What is small is not shared: where particles are, how they move, which of them
-//! touch. Rank zero leads: it knows when a flow is wanted and tells the others where the particles are. The
-//! others follow, or do the same work on their particles beside it; what rank zero says holds.
+//! Ranks share the flow, and contacts. What is small is not shared: where particles are, how they move, what
+//! contacts remember. Rank zero leads: it knows when a flow is wanted and tells the others where the
+//! particles are. The others follow, or do the same work on their particles beside it; what rank zero says
+//! holds.
 
 mod hydrodynamics;
 mod memory;
@@ -10,6 +11,7 @@ mod told;
 
 pub use hydrodynamics::SharedHydrodynamics;
 pub use memory::Memory;
+pub(crate) use told::Order;
 pub use told::{FrameName, ask_for_fields, ask_to_keep};
 
 use gluey_fem::{ImplicitTree, MeshError};
@@ -19,11 +21,12 @@ use gluey_motion::Fields;
 use gluey_parallel::Communicator;
 use gluey_stokes::{Conditions, CutCellPressures, Field, Formulation, GivenOf, Refinement};
 
+use crate::contact::ContactFollower;
 use crate::cuts::{cuts_of_work, cuts_of_work_at_surfaces};
 use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
 use crate::surface::{SharedTree, SurfaceBodies};
 use crate::warm_start::SavedPiece;
-use told::{Order, Told};
+use told::Told;
 
 /// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls, or far away where it has
 /// none: then its images in `y` slide along each other.
@@ -329,6 +332,7 @@ where
     /// The same with flows in `memory`, for a follower who keeps them too.
     pub fn follow_for(&self, ranks: &dyn Communicator, memory: &Memory<D>, follower: &mut dyn Follower<D>) {
         let (mut told, mut last) = (Told::new(self), None::<MyFlow<D>>);
+        let mut contact = ContactFollower::default();
         loop {
             match Order::End.share(ranks) {
                 Order::End => return,
@@ -341,6 +345,10 @@ where
                 }
                 Order::Show(frame) => {
                     follower.show(frame, last.as_ref().map(|flow| self.fields(flow, &told)));
+                }
+                Order::Contact => {
+                    // An error is one on all ranks here too.
+                    let _ = contact.step(ranks);
                 }
                 Order::Remember => memory.remember(),
                 Order::Keep(name) => follower.keep(name, memory.saved()),

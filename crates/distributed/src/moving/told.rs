@@ -16,12 +16,13 @@ pub struct FrameName {
 
 /// What rank zero wants of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Order {
+pub(crate) enum Order {
     End,
     Predict,
     Show(FrameName),
     Remember,
     Keep(u64),
+    Contact,
 }
 
 impl Order {
@@ -32,6 +33,7 @@ impl Order {
             Self::Predict => [1.0, 0.0, 0.0],
             Self::Show(FrameName { stream, step }) => [2.0, f64::from(stream), f64::from(step)],
             Self::Remember => [3.0, 0.0, 0.0],
+            Self::Contact => [5.0, 0.0, 0.0],
             Self::Keep(name) => [4.0, (name >> 32) as f64, (name & u64::from(u32::MAX)) as f64],
         };
         ranks.share(&mut numbers);
@@ -41,6 +43,7 @@ impl Order {
             1 => Self::Predict,
             2 => Self::Show(FrameName { stream: first, step: second }),
             3 => Self::Remember,
+            5 => Self::Contact,
             _ => Self::Keep(u64::from(first) << 32 | u64::from(second)),
         }
     }

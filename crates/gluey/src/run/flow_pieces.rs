@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use gluey_contact::{ContactModel, PairContact};
 use gluey_distributed::{Memory, SavedPiece, Suspension};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Message};
@@ -45,7 +44,6 @@ pub(super) fn restore<const D: usize>(
 ) -> Result<(), CheckpointError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
 {
     let read = || {
         let Some(pieces) = Checkpoint::<D>::read(case, checkpoint)?.pieces else { return Ok(()) };

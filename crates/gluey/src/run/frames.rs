@@ -106,7 +106,6 @@ where
 impl<'a, const D: usize> Frames<'a, D>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
 {
     /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
     pub fn create(
@@ -138,7 +137,7 @@ where
     pub fn write<H>(
         &mut self,
         case: &Case,
-        simulation: &Simulation<D, H, Contacts<D>>,
+        simulation: &Simulation<D, H, Contacts<'_, D>>,
     ) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
@@ -195,11 +194,10 @@ where
 
 /// What contacts exert on each particle; nothing where there is no contact model.
 fn contact_forces<const D: usize, H>(
-    simulation: &Simulation<D, H, Contacts<D>>,
+    simulation: &Simulation<D, H, Contacts<'_, D>>,
 ) -> Result<Option<Vec<Vector<D>>>, RunError>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
     let contact = simulation.contact();
@@ -216,10 +214,9 @@ where
 }
 
 /// The box as it is sheared now.
-fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, Contacts<D>>) -> Container<D>
+fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, Contacts<'_, D>>) -> Container<D>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
     H: gluey_motion::Hydrodynamics<D>,
 {
     let container = case.container();

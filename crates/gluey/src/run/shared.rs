@@ -1,12 +1,12 @@
-//! Cases whose flow is shared by ranks: which can be, and what becomes of them.
+//! Cases whose flow and contact are shared by ranks: which can be, and what becomes of them.
 
 use std::rc::Rc;
 
-use gluey_contact::{ContactModel, PairContact};
-use gluey_distributed::{BoxFlow, Memory, SharedHydrodynamics, Suspension};
+use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::Communicator;
 
+use super::contacts::{self, Contacts};
 use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
 use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, leftovers, logged, occupied};
@@ -20,8 +20,8 @@ use crate::report::RunReport;
 /// Iterations after which a flow is given up.
 const MOST_ITERATIONS: usize = 500;
 
-/// Runs `case` like [`run`] with a flow that `ranks` share. All ranks call this; rank zero moves the
-/// particles, writes the results and returns a report.
+/// Runs `case` like [`run`] with flow and contact that `ranks` share. All ranks call this; rank zero moves
+/// the particles, writes the results and returns a report.
 pub fn run_shared(
     case: &Case,
     options: &RunOptions,
@@ -45,7 +45,6 @@ fn run_beside<const D: usize>(
 ) -> Result<Option<RunReport>, RunError>
 where
     Dim<D>: Space<D>,
-    PairContact<D>: ContactModel<D>,
 {
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
     let memory = Rc::new(Memory::default());
@@ -59,12 +58,14 @@ where
     }
     // However this ends, the others learn of it when the leader is dropped.
     let leader = SharedHydrodynamics::leading(&suspension, ranks).remembering(memory.clone());
+    let contact = SharedContact::leading(contacts::of_case(case), ranks, memory.clone());
+    let models = (leader, Contacts::by(contact));
     let others = OtherRanks { ranks, memory };
     let _claims = claim_outputs(case, options, progress)?;
     occupied::check_free(case, options)?;
     leftovers::remove(case, options)?;
     let report = logged(case, options, progress, |log| {
-        Run::start(case, options, log, leader, Some(&others))?.finish()
+        Run::start(case, options, log, models, Some(&others))?.finish()
     })?;
     Ok(Some(report))
 }

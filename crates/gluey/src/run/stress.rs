@@ -14,13 +14,12 @@ use super::contacts::Contacts;
 /// A force is `6 pi eta lambda` with lambda from the projection, in whose metric a sphere feels its own
 /// Stokes drag only (Verdon et al. 2010, eq. 29): forces of clusters are as exact as that.
 fn of_contacts<const D: usize>(
-    contact: &Contacts<D>,
+    contact: &Contacts<'_, D>,
     particles: &[Particle<D>],
     viscosity: f64,
 ) -> Result<Option<Matrix<D>>, ContactError>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
 {
     if D == 2 {
         return Ok(None);
@@ -39,12 +38,11 @@ where
 /// If the contacts are not those of these particles.
 pub(super) fn with_contacts<const D: usize>(
     stress: MeanStress<D>,
-    contact: &Contacts<D>,
+    contact: &Contacts<'_, D>,
     particles: &[Particle<D>],
 ) -> Result<MeanStress<D>, ContactError>
 where
     Dim<D>: Space<D>,
-    Contacts<D>: ContactModel<D>,
 {
     Ok(MeanStress { of_contacts: of_contacts(contact, particles, stress.viscosity)?, ..stress })
 }

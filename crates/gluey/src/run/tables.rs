@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::ContactModel;
 use gluey_geom::{Dim, Space};
 use gluey_motion::Hydrodynamics;
 
@@ -66,12 +65,11 @@ impl Tables {
     /// Adds the rows of the step that was predicted and corrected last.
     pub fn write<const D: usize, H>(
         &mut self,
-        simulation: &Simulation<D, H, Contacts<D>>,
+        simulation: &Simulation<D, H, Contacts<'_, D>>,
         smallest_gap_over_a: Option<f64>,
     ) -> Result<(), RunError>
     where
         Dim<D>: Space<D>,
-        Contacts<D>: ContactModel<D>,
         H: Hydrodynamics<D>,
         HydrodynamicsError: From<H::Error>,
     {

@@ -18,7 +18,7 @@ where
     fn scaled_rows(&self) -> (Vec<PointRow<D>>, Vec<f64>) {
         let mut rows: Vec<PointRow<D>> = self.points.iter().map(|point| self.row(point)).collect();
         let mut scales = vec![0.0; rows.len()];
-        scale_rows(&self.bodies.weights, &mut rows, &mut scales);
+        scale_rows(&self.bodies.weights, &mut rows, &mut scales, |_| {});
         (rows, scales)
     }
 

@@ -1,0 +1,307 @@
+//! Contact of discs or spheres in a sheared box on several ranks, and what they said to each other: a line of
+//! JSON for each number of them. One rank does what a process without ranks does.
+//!
+//! ```sh
+//! cargo run --release -p gluey-distributed --example shear_contact -- --count 10000 --ranks 1,8,64
+//! cargo build --release -p gluey-distributed --example shear_contact --features mpi
+//! mpirun -n 2 target/release/examples/shear_contact --dimension 3 --count 1000000
+//! ```
+//!
+//! Particles of diameter 1 in no order, `u* = (y, 0, 0)`, images that slide. Options: `--dimension 2|3`,
+//! `--count N`, `--fraction F` (of the area or volume that particles fill), `--dt T` (length of a step),
+//! `--steps N`, `--tolerance T` (residual in diameters; without it that of the default, 1e-13 of the largest
+//! displacement), `--solver auto|uzawa|accelerated|active-set`, `--exact` (gaps at the end of the step are
+//! exact), `--ranks N,M,...` (threads; without it, the processes of `mpirun`). Counts are those of the last
+//! step. Times go to the standard error, so that equal runs print equal lines: those of steps, and the
+//! processor time that each rank took for the last one, where the system counts it.
+
+use std::time::Instant;
+
+use gluey_contact::{
+    ContactLaw, ContactModel, ContactParams, ContactReport, Domain, GammaUpdate, PairContact, SolverKind,
+    StepGeometry, WithFixed,
+};
+use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
+use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_parallel::{Communicator, Threads, Traffic};
+use gluey_testkit::packing::Packing;
+use serde::Serialize;
+
+/// Latency of a message and bytes a second of a rank, of the model.
+const LATENCY: f64 = 1e-6;
+const BANDWIDTH: f64 = 12e9;
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Options {
+    dimension: usize,
+    count: usize,
+    fraction: f64,
+    dt: f64,
+    steps: usize,
+    tolerance: Option<f64>,
+    solver: SolverKind,
+    exact: bool,
+}
+
+fn main() {
+    let solver = SolverKind::default();
+    let (dimension, count, fraction, dt, steps, tolerance, exact) = (3, 1000, 0.4, 0.05, 4, None, false);
+    let mut options = Options { dimension, count, fraction, dt, steps, tolerance, solver, exact };
+    let mut ranks: Option<Vec<usize>> = None;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        if name == "--exact" {
+            options.exact = true;
+            continue;
+        }
+        let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
+        match name.as_str() {
+            "--dimension" => options.dimension = parsed(&name, &value),
+            "--count" => options.count = parsed(&name, &value),
+            "--fraction" => options.fraction = parsed(&name, &value),
+            "--dt" => options.dt = parsed(&name, &value),
+            "--steps" => options.steps = parsed(&name, &value),
+            "--tolerance" => options.tolerance = Some(parsed(&name, &value)),
+            "--solver" => options.solver = parsed(&name, &value),
+            "--ranks" => ranks = Some(value.split(',').map(|n| parsed(&name, n)).collect()),
+            _ => fail(&format!(
+                "{name} is no option: --dimension, --count, --fraction, --dt, --steps, --tolerance, --solver, --exact, --ranks"
+            )),
+        }
+    }
+    let Some(ranks) = ranks else { return processes(&options) };
+    for size in ranks {
+        match Threads::run(size, |ranks| run(&options, ranks)) {
+            Ok(lines) => println!("{}", lines[0]),
+            Err(failure) => fail(&failure.to_string()),
+        }
+    }
+}
+
+fn parsed<T: std::str::FromStr>(name: &str, value: &str) -> T {
+    value.parse().unwrap_or_else(|_| fail(&format!("{name} {value}: no such value")))
+}
+
+fn fail(why: &str) -> ! {
+    eprintln!("error: {why}");
+    std::process::exit(1);
+}
+
+#[cfg(feature = "mpi")]
+fn processes(options: &Options) {
+    let ended = gluey_parallel::Processes::run(|ranks| {
+        let line = run(options, ranks);
+        if ranks.rank() == 0 {
+            println!("{line}");
+        }
+    });
+    ended.unwrap_or_else(|error| fail(&error.to_string()));
+}
+
+#[cfg(not(feature = "mpi"))]
+fn processes(_: &Options) {
+    fail("--ranks is needed: this program was built without the feature mpi");
+}
+
+/// The line of a run, on rank zero.
+fn run(options: &Options, ranks: &dyn Communicator) -> String {
+    // A rank has one thread, this one.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    let _pool = pool.unwrap_or_else(|error| fail(&error.to_string()));
+    match options.dimension {
+        2 => steps::<2>(options, ranks),
+        3 => steps::<3>(options, ranks),
+        other => fail(&format!("--dimension {other}: 2 or 3")),
+    }
+}
+
+fn steps<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
+where
+    Dim<D>: Space<D>,
+{
+    let mut traffic = Traffic::default();
+    if ranks.rank() > 0 {
+        let mut follower = ContactFollower::<D>::default();
+        let mut worked = 0;
+        for _ in 0..options.steps {
+            let (before, start) = (ranks.traffic(), processor_time());
+            follower.step(ranks).unwrap_or_else(|failure| fail(&failure.to_string()));
+            (traffic, worked) = (ranks.traffic().since(before), processor_time() - start);
+        }
+        ranks.all_gather(&[worked]);
+        TrafficRecord::new(ranks, &traffic);
+        return String::new();
+    }
+    let mut shear = Shear::<D>::new(options, ranks);
+    let (mut report, mut worked) = (ContactReport::default(), 0);
+    for step in 0..options.steps {
+        let before = ranks.traffic();
+        (report, worked) = shear.step(step, options);
+        traffic = ranks.traffic().since(before);
+    }
+    let worked = ranks.all_gather(&[worked]).into_iter().map(|time| time as f64 * 1e-9);
+    eprintln!("processor time of each rank: {:.3?} s", worked.collect::<Vec<_>>());
+    let traffic = TrafficRecord::new(ranks, &traffic);
+    let record = Record::new(options, ranks.size(), &report, (&shear, traffic));
+    serde_json::to_string(&record).unwrap_or_else(|error| fail(&error.to_string()))
+}
+
+/// Particles on their way.
+struct Shear<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    positions: Vec<Vector<D>>,
+    radii: Vec<f64>,
+    drift: Vec<Vector<D>>,
+    side: f64,
+    contact: SharedContact<'a, D>,
+}
+
+impl<'a, const D: usize> Shear<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(options: &Options, ranks: &'a dyn Communicator) -> Self {
+        let Packing { positions, side } = Packing::<D>::fluid(options.count, options.fraction, 1);
+        let farthest = f64::max(0.5, options.dt * side);
+        let params = ContactParams {
+            law: ContactLaw::Gluey,
+            exact_gap: options.exact,
+            gamma_update: GammaUpdate::Consistent,
+            solver: options.solver,
+            tolerance: options.tolerance.map_or(ContactParams::default().tolerance, |t| t / farthest),
+            ..ContactParams::default()
+        };
+        let domain = Domain::periodic(&Vector::repeat(side));
+        let contact = PairContact::with_mobility(params, WithFixed::default()).within(domain);
+        let (radii, drift) = (vec![0.5; positions.len()], vec![Vector::zeros(); positions.len()]);
+        Self { positions, radii, drift, side, contact: SharedContact::new(contact, ranks) }
+    }
+
+    fn step(&mut self, number: usize, options: &Options) -> (ContactReport, u64) {
+        let tilt_step = self.side * options.dt;
+        self.contact.set_sliding(number as f64 * tilt_step, tilt_step);
+        let flow = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] } else { 0.0 });
+        let mut twists: Vec<Twist<D>> =
+            self.positions.iter().map(|x| Twist { velocity: flow(x), ..Twist::default() }).collect();
+        let (positions, radii, drift) = (&self.positions, &self.radii, &self.drift);
+        let step = StepGeometry { positions, radii, drift, velocity_weight: options.dt, dt: options.dt };
+        let (start, start_of_work) = (Instant::now(), processor_time());
+        let report = self.contact.correct(&step, &mut twists);
+        let (seconds, worked) = (start.elapsed().as_secs_f64(), processor_time() - start_of_work);
+        let report = report.unwrap_or_else(|error| fail(&error.to_string()));
+        eprintln!(
+            "step {number}: {seconds:.4} s, {} iterations, {:?}",
+            report.iterations,
+            self.contact.load()
+        );
+        for (x, twist) in self.positions.iter_mut().zip(&twists) {
+            *x += twist.velocity * options.dt;
+        }
+        (report, worked)
+    }
+}
+
+/// Nanoseconds that the processor gave this thread; 0 where Linux does not say.
+fn processor_time() -> u64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    told.split(' ').next().and_then(|time| time.parse().ok()).unwrap_or(0)
+}
+
+/// The largest of the ranks, and the mean.
+#[derive(Serialize)]
+struct Spread {
+    mean: f64,
+    largest: u64,
+}
+
+#[derive(Serialize)]
+struct TrafficRecord {
+    messages: Spread,
+    bytes: Spread,
+    exchanges: u64,
+    reductions: u64,
+}
+
+#[derive(Serialize)]
+struct Record {
+    #[serde(flatten)]
+    options: Options,
+    ranks: usize,
+    iterations: usize,
+    passes: usize,
+    residual: f64,
+    contacts: usize,
+    pairs: usize,
+    most_pairs_of_a_rank: usize,
+    /// In islands that reach across ranks.
+    shared_pairs: usize,
+    /// Of the bits of all positions, forces and memory.
+    checksum: String,
+    traffic: TrafficRecord,
+    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if
+    /// nothing overlapped.
+    modelled_communication_seconds: f64,
+}
+
+impl Record {
+    fn new<const D: usize>(
+        options: &Options,
+        ranks: usize,
+        report: &ContactReport,
+        (shear, traffic): (&Shear<'_, D>, TrafficRecord),
+    ) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let contacts = shear.contact.contacts();
+        let of_contacts = contacts.iter().flat_map(|contact| [contact.lambda, contact.gamma]);
+        let numbers = shear.positions.iter().flat_map(|x| x.iter().copied()).chain(of_contacts);
+        let hash = numbers.map(f64::to_bits).fold(FNV_OFFSET, mix);
+        let hops = 2.0 * (ranks as f64).log2().ceil() * traffic.reductions as f64;
+        let modelled_communication_seconds =
+            LATENCY * (traffic.messages.largest as f64 + hops) + traffic.bytes.largest as f64 / BANDWIDTH;
+        let ContactLoad { most_pairs, shared_pair_count, .. } = shear.contact.load();
+        Self {
+            options: *options,
+            ranks,
+            iterations: report.iterations,
+            passes: report.passes,
+            residual: report.residual,
+            contacts: contacts.len(),
+            pairs: report.pair_count,
+            most_pairs_of_a_rank: most_pairs,
+            shared_pairs: shared_pair_count,
+            checksum: format!("{hash:016x}"),
+            traffic,
+            modelled_communication_seconds,
+        }
+    }
+}
+
+impl TrafficRecord {
+    fn new(ranks: &dyn Communicator, own: &Traffic) -> Self {
+        Self {
+            messages: spread(ranks, own.messages),
+            bytes: spread(ranks, own.bytes),
+            exchanges: own.exchanges,
+            reductions: own.reductions,
+        }
+    }
+}
+
+fn spread(ranks: &dyn Communicator, own: u64) -> Spread {
+    let all = ranks.all_gather(&[own]);
+    let largest = all.iter().copied().max().unwrap_or(0);
+    Spread { mean: all.iter().sum::<u64>() as f64 / all.len() as f64, largest }
+}
+
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Fowler, Noll and Vo's hash, byte by byte.
+fn mix(hash: u64, bits: u64) -> u64 {
+    bits.to_le_bytes()
+        .iter()
+        .fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}

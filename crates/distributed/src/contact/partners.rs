@@ -1,0 +1,112 @@
+//! The other ranks as contact sees them: ghosts of particles, sums and maxima.
+
+use std::cell::RefCell;
+
+use gluey_contact::part::{Dealt, Partners};
+use gluey_geom::Vector;
+use gluey_parallel::{Communicator, GhostPlan, Wanted};
+
+use super::messages::{collect, scatter};
+
+/// The ranks that share a step.
+pub(super) struct Sharers<'a, const D: usize> {
+    ranks: &'a dyn Communicator,
+    /// Of all particles that were dealt, and of those selected.
+    all: RefCell<Border>,
+    selected: RefCell<Option<Border>>,
+    /// Values by particle.
+    buffer: RefCell<Vec<f64>>,
+}
+
+/// Who sends what to whom, and which particles that are.
+struct Border {
+    plan: GhostPlan,
+    /// Place among the values, and particle.
+    particles: Vec<(u32, u32)>,
+}
+
+impl Border {
+    /// Of values that stand in the order of the particles; `place` says where, if they do.
+    fn new(plan: GhostPlan, place: impl Fn(u32) -> Option<u32>) -> Self {
+        let mut particles: Vec<u32> = plan.owned().chain(plan.ghosts()).collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let particles =
+            particles.into_iter().filter_map(|particle| Some((place(particle)?, particle))).collect();
+        Self { plan, particles }
+    }
+}
+
+impl<'a, const D: usize> Sharers<'a, D> {
+    /// Finds out who has copies of which particles. All ranks call this.
+    pub fn new(ranks: &'a dyn Communicator, dealt: &Dealt<D>) -> Self {
+        let particles = &dealt.particles;
+        let copies = (0u32..).zip(particles).filter(|(_, particle)| particle.owner != dealt.rank);
+        let wanted = copies.map(|(place, particle)| Wanted {
+            owner: particle.owner as usize,
+            key: u64::from(particle.order),
+            place,
+        });
+        let find = |key: u64| {
+            let place = particles.binary_search_by_key(&key, |particle| u64::from(particle.order));
+            place.ok().map(|place| place as u32)
+        };
+        let plan = GhostPlan::new(ranks, wanted.collect(), find);
+        let buffer = RefCell::new(vec![0.0; particles.len() * D]);
+        let (all, selected) = (RefCell::new(Border::new(plan, Some)), RefCell::new(None));
+        Self { ranks, all, selected, buffer }
+    }
+
+    /// Lets `work` exchange the values at the border.
+    fn with_border(&self, values: &mut [Vector<D>], work: impl Fn(&mut GhostPlan, &mut [f64])) {
+        let (mut all, mut selected) = (self.all.borrow_mut(), self.selected.borrow_mut());
+        let Border { plan, particles } = selected.as_mut().unwrap_or(&mut all);
+        let buffer = &mut *self.buffer.borrow_mut();
+        for &(place, particle) in &*particles {
+            buffer[particle as usize * D..][..D].copy_from_slice(values[place as usize].as_slice());
+        }
+        work(plan, buffer);
+        for &(place, particle) in &*particles {
+            values[place as usize].as_mut_slice().copy_from_slice(&buffer[particle as usize * D..][..D]);
+        }
+    }
+}
+
+impl<const D: usize> Partners<D> for Sharers<'_, D> {
+    fn rank(&self) -> usize {
+        self.ranks.rank()
+    }
+
+    fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
+        self.ranks.reduce(sums, largest);
+    }
+
+    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
+        collect(self.ranks, words)
+    }
+
+    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+        scatter(self.ranks, words)
+    }
+
+    fn accumulate(&self, values: &mut [Vector<D>]) {
+        self.with_border(values, |plan, buffer| plan.accumulate::<f64, D>(self.ranks, buffer));
+    }
+
+    fn update(&self, values: &mut [Vector<D>]) {
+        self.with_border(values, |plan, buffer| plan.update::<f64, D>(self.ranks, buffer));
+    }
+
+    fn select(&self, particles: Option<&[Option<u32>]>) {
+        let selected = particles.map(|particles| {
+            let mut places = vec![u32::MAX; self.buffer.borrow().len() / D];
+            for (place, particle) in (0u32..).zip(particles) {
+                particle.iter().for_each(|&particle| places[particle as usize] = place);
+            }
+            let place = |particle: u32| Some(places[particle as usize]).filter(|&place| place != u32::MAX);
+            let plan = self.all.borrow().plan.restricted(self.ranks, |particle| place(particle).is_some());
+            Border::new(plan, place)
+        });
+        self.selected.replace(selected);
+    }
+}
