@@ -6,109 +6,56 @@
 //! mpirun -n 8 target/release/examples/box_flow --dimension 3 --level 4
 //! ```
 //!
-//! Options: `--dimension 2|3`, `--level L` (`2^L` cells along an edge), `--adaptive` (fine cells at a sphere
-//! only), `--bodies` (three rigid bodies, and fine cells around these only), `--pair` (the two bodies of S2
-//! and S3 in the shear of `bench-stokes`, all cells as fine), `--unfitted` (bodies whose surfaces cut cells,
-//! with films; without it, bodies whose nodes move with them), `--tolerance T`, `--ranks N,M,...` (threads;
-//! without it, the processes of `mpirun`), `--fail-rank R` (this rank fails before the solve, to see that all
-//! end). Times, and the most memory that a process held, go to the standard error, so that equal runs print
-//! equal lines.
+//! `--help` lists the options. Times, and the most memory that a process held, go to the standard error, so that
+//! equal runs print equal lines.
+
+mod common;
 
 use std::time::Instant;
 
+use clap::Parser;
+use common::{Spread, TrafficRecord, fail, hash, on_ranks};
 use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, RigidBodies, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_parallel::{Communicator, Threads, Traffic};
+use gluey_parallel::Communicator;
 use gluey_stokes::{Conditions, Lubrication, Refinement};
 use serde::Serialize;
 
-/// Latency of a message and bytes a second of a rank, of the model.
-const LATENCY: f64 = 1e-6;
-const BANDWIDTH: f64 = 12e9;
-
-#[derive(Clone, Copy, Debug)]
+/// Flow in a box on several ranks.
+#[derive(Clone, Debug, Parser)]
 struct Options {
+    #[arg(long, default_value_t = 2)]
     dimension: usize,
+    /// `2^L` cells along an edge.
+    #[arg(long, default_value_t = 5)]
     level: u8,
+    /// Fine cells at a sphere only.
+    #[arg(long)]
     adaptive: bool,
+    /// Three rigid bodies, and fine cells around these only.
+    #[arg(long)]
     bodies: bool,
+    /// The two bodies of S2 and S3 in the shear of `bench-stokes`, all cells as fine.
+    #[arg(long)]
     pair: bool,
+    /// Bodies whose surfaces cut cells, with films; without it, bodies whose nodes move with them.
+    #[arg(long)]
     unfitted: bool,
+    #[arg(long, default_value_t = 1e-8)]
     tolerance: f64,
+    /// This rank fails before the solve, to see that all end.
+    #[arg(long)]
     fail_rank: Option<usize>,
+    /// Ranks as threads, one run for each number; without it, the processes of `mpirun`.
+    #[arg(long, value_delimiter = ',')]
+    ranks: Vec<usize>,
 }
 
 fn main() {
-    let mut options = Options {
-        dimension: 2,
-        level: 5,
-        adaptive: false,
-        bodies: false,
-        pair: false,
-        unfitted: false,
-        tolerance: 1e-8,
-        fail_rank: None,
-    };
-    let mut ranks: Option<Vec<usize>> = None;
-    let mut arguments = std::env::args().skip(1);
-    while let Some(name) = arguments.next() {
-        let switch = match name.as_str() {
-            "--adaptive" => Some(&mut options.adaptive),
-            "--bodies" => Some(&mut options.bodies),
-            "--pair" => Some(&mut options.pair),
-            "--unfitted" => Some(&mut options.unfitted),
-            _ => None,
-        };
-        if let Some(switch) = switch {
-            *switch = true;
-            continue;
-        }
-        let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
-        match name.as_str() {
-            "--dimension" => options.dimension = number(&name, &value),
-            "--level" => options.level = number(&name, &value),
-            "--tolerance" => options.tolerance = number(&name, &value),
-            "--fail-rank" => options.fail_rank = Some(number(&name, &value)),
-            "--ranks" => ranks = Some(value.split(',').map(|n| number(&name, n)).collect()),
-            _ => fail(&format!(
-                "{name} is no option: --dimension, --level, --adaptive, --bodies, --pair, --unfitted, --tolerance, --ranks, --fail-rank"
-            )),
-        }
-    }
-    let Some(ranks) = ranks else { return processes(&options) };
-    for size in ranks {
-        match Threads::run(size, |ranks| run(&options, ranks)) {
-            Ok(lines) => println!("{}", lines[0]),
-            Err(failure) => fail(&failure.to_string()),
-        }
-    }
-}
-
-fn number<T: std::str::FromStr>(name: &str, value: &str) -> T {
-    value.parse().unwrap_or_else(|_| fail(&format!("{name} {value}: a number is needed")))
-}
-
-fn fail(why: &str) -> ! {
-    eprintln!("error: {why}");
-    std::process::exit(1);
-}
-
-#[cfg(feature = "mpi")]
-fn processes(options: &Options) {
-    let ended = gluey_parallel::Processes::run(|ranks| {
-        let line = run(options, ranks);
-        if ranks.rank() == 0 {
-            println!("{line}");
-        }
-    });
-    ended.unwrap_or_else(|error| fail(&error.to_string()));
-}
-
-#[cfg(not(feature = "mpi"))]
-fn processes(_: &Options) {
-    fail("--ranks is needed: this program was built without the feature mpi");
+    let options = Options::parse();
+    on_ranks(&options.ranks, |ranks| run(&options, ranks));
 }
 
 /// The line of a run, the same on all ranks.
@@ -213,13 +160,6 @@ where
     (0..count).map(wrench).collect()
 }
 
-/// A number of each rank: the mean and the largest.
-#[derive(Serialize)]
-struct Spread {
-    mean: f64,
-    largest: u64,
-}
-
 #[derive(Serialize)]
 struct LevelRecord {
     cells: u64,
@@ -229,15 +169,6 @@ struct LevelRecord {
     ghost_nodes: f64,
     cells_of_a_rank: Spread,
     neighbours: Spread,
-}
-
-/// Of a rank, in the solve.
-#[derive(Serialize)]
-struct TrafficRecord {
-    messages: Spread,
-    bytes: Spread,
-    exchanges: u64,
-    reductions: u64,
 }
 
 #[derive(Serialize)]
@@ -257,8 +188,6 @@ struct Record {
     levels: Vec<LevelRecord>,
     setup: TrafficRecord,
     solve: TrafficRecord,
-    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if
-    /// nothing overlapped.
     modelled_communication_seconds: f64,
 }
 
@@ -272,12 +201,9 @@ impl Record {
             .iter()
             .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
         let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
-        let hashes = ranks.all_gather(&[bits.fold(FNV_OFFSET, mix)]);
+        let hashes = ranks.all_gather(&[hash(bits)]);
         let &Options { dimension, level, adaptive, bodies, pair, unfitted, tolerance, .. } = options;
         let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
-        let hops = 2.0 * (ranks.size() as f64).log2().ceil() * solve.reductions as f64;
-        let modelled_communication_seconds =
-            LATENCY * (solve.messages.largest as f64 + hops) + solve.bytes.largest as f64 / BANDWIDTH;
         Self {
             dimension,
             level,
@@ -289,22 +215,11 @@ impl Record {
             ranks: ranks.size(),
             iterations: mine.iterations,
             relative_residual: mine.relative_residual,
-            checksum: format!("{:016x}", hashes.into_iter().fold(FNV_OFFSET, mix)),
+            checksum: format!("{:016x}", hash(hashes.into_iter())),
             levels: mine.levels.iter().map(|sizes| LevelRecord::new(ranks, sizes)).collect(),
             setup: TrafficRecord::new(ranks, &mine.setup_traffic),
+            modelled_communication_seconds: solve.modelled_seconds(ranks.size()),
             solve,
-            modelled_communication_seconds,
-        }
-    }
-}
-
-impl TrafficRecord {
-    fn new(ranks: &dyn Communicator, own: &Traffic) -> Self {
-        Self {
-            messages: spread(ranks, own.messages),
-            bytes: spread(ranks, own.bytes),
-            exchanges: own.exchanges,
-            reductions: own.reductions,
         }
     }
 }
@@ -318,23 +233,8 @@ impl LevelRecord {
             nodes,
             ghost_cells: sum(own.ghost_cells) as f64 / cells as f64,
             ghost_nodes: sum(own.ghost_nodes) as f64 / nodes as f64,
-            cells_of_a_rank: spread(ranks, own.cells as u64),
-            neighbours: spread(ranks, own.neighbours as u64),
+            cells_of_a_rank: Spread::new(ranks, own.cells as u64),
+            neighbours: Spread::new(ranks, own.neighbours as u64),
         }
     }
-}
-
-fn spread(ranks: &dyn Communicator, own: u64) -> Spread {
-    let all = ranks.all_gather(&[own]);
-    let largest = all.iter().copied().max().unwrap_or(0);
-    Spread { mean: all.iter().sum::<u64>() as f64 / all.len() as f64, largest }
-}
-
-const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// Fowler, Noll and Vo's hash, byte by byte.
-fn mix(hash: u64, bits: u64) -> u64 {
-    bits.to_le_bytes()
-        .iter()
-        .fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -7,100 +7,60 @@
 //! mpirun -n 2 target/release/examples/shear_contact --dimension 3 --count 1000000
 //! ```
 //!
-//! Particles of diameter 1 in no order, `u* = (y, 0, 0)`, images that slide. Options: `--dimension 2|3`,
-//! `--count N`, `--fraction F` (of the area or volume that particles fill), `--dt T` (length of a step),
-//! `--steps N`, `--tolerance T` (residual in diameters; without it that of the default, 1e-13 of the largest
-//! displacement), `--solver auto|uzawa|accelerated|active-set`, `--exact` (gaps at the end of the step are
-//! exact), `--ranks N,M,...` (threads; without it, the processes of `mpirun`). Counts are those of the last
-//! step. Times go to the standard error, so that equal runs print equal lines: those of steps, and the
-//! processor time that each rank took for the last one, where the system counts it.
+//! Particles of diameter 1 in no order, `u* = (y, 0, 0)`, images that slide; `--help` lists the options. Counts
+//! are those of the last step. Times go to the standard error, so that equal runs print equal lines: those of
+//! steps, and the processor time that each rank took for the last one, where the system counts it.
+
+mod common;
 
 use std::time::Instant;
 
+use clap::Parser;
+use common::{TrafficRecord, fail, hash, on_ranks};
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, ContactReport, Domain, GammaUpdate, PairContact, SolverKind,
     StepGeometry, WithFixed,
 };
 use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_parallel::{Communicator, Threads, Traffic};
+use gluey_parallel::{Communicator, Traffic};
 use gluey_testkit::packing::Packing;
 use serde::Serialize;
 
-/// Latency of a message and bytes a second of a rank, of the model.
-const LATENCY: f64 = 1e-6;
-const BANDWIDTH: f64 = 12e9;
-
-#[derive(Clone, Copy, Debug, Serialize)]
+/// Contact of discs or spheres in a sheared box on several ranks.
+#[derive(Clone, Debug, Parser, Serialize)]
 struct Options {
+    #[arg(long, default_value_t = 3)]
     dimension: usize,
+    /// Particles.
+    #[arg(long, default_value_t = 1000)]
     count: usize,
+    /// Of the area or volume that particles fill.
+    #[arg(long, default_value_t = 0.4)]
     fraction: f64,
+    /// Length of a step, in units of the shear rate's inverse.
+    #[arg(long, default_value_t = 0.05)]
     dt: f64,
+    #[arg(long, default_value_t = 4)]
     steps: usize,
+    /// Residual in diameters [default: 1e-13 of the largest displacement].
+    #[arg(long)]
     tolerance: Option<f64>,
+    /// auto, uzawa, accelerated or active-set.
+    #[arg(long, default_value = "auto")]
     solver: SolverKind,
+    /// Gaps at the end of the step are exact.
+    #[arg(long)]
     exact: bool,
+    /// Ranks as threads, one run for each number; without it, the processes of `mpirun`.
+    #[arg(long, value_delimiter = ',')]
+    #[serde(skip)]
+    ranks: Vec<usize>,
 }
 
 fn main() {
-    let solver = SolverKind::default();
-    let (dimension, count, fraction, dt, steps, tolerance, exact) = (3, 1000, 0.4, 0.05, 4, None, false);
-    let mut options = Options { dimension, count, fraction, dt, steps, tolerance, solver, exact };
-    let mut ranks: Option<Vec<usize>> = None;
-    let mut arguments = std::env::args().skip(1);
-    while let Some(name) = arguments.next() {
-        if name == "--exact" {
-            options.exact = true;
-            continue;
-        }
-        let value = arguments.next().unwrap_or_else(|| fail(&format!("{name} needs a value")));
-        match name.as_str() {
-            "--dimension" => options.dimension = parsed(&name, &value),
-            "--count" => options.count = parsed(&name, &value),
-            "--fraction" => options.fraction = parsed(&name, &value),
-            "--dt" => options.dt = parsed(&name, &value),
-            "--steps" => options.steps = parsed(&name, &value),
-            "--tolerance" => options.tolerance = Some(parsed(&name, &value)),
-            "--solver" => options.solver = parsed(&name, &value),
-            "--ranks" => ranks = Some(value.split(',').map(|n| parsed(&name, n)).collect()),
-            _ => fail(&format!(
-                "{name} is no option: --dimension, --count, --fraction, --dt, --steps, --tolerance, --solver, --exact, --ranks"
-            )),
-        }
-    }
-    let Some(ranks) = ranks else { return processes(&options) };
-    for size in ranks {
-        match Threads::run(size, |ranks| run(&options, ranks)) {
-            Ok(lines) => println!("{}", lines[0]),
-            Err(failure) => fail(&failure.to_string()),
-        }
-    }
-}
-
-fn parsed<T: std::str::FromStr>(name: &str, value: &str) -> T {
-    value.parse().unwrap_or_else(|_| fail(&format!("{name} {value}: no such value")))
-}
-
-fn fail(why: &str) -> ! {
-    eprintln!("error: {why}");
-    std::process::exit(1);
-}
-
-#[cfg(feature = "mpi")]
-fn processes(options: &Options) {
-    let ended = gluey_parallel::Processes::run(|ranks| {
-        let line = run(options, ranks);
-        if ranks.rank() == 0 {
-            println!("{line}");
-        }
-    });
-    ended.unwrap_or_else(|error| fail(&error.to_string()));
-}
-
-#[cfg(not(feature = "mpi"))]
-fn processes(_: &Options) {
-    fail("--ranks is needed: this program was built without the feature mpi");
+    let options = Options::parse();
+    on_ranks(&options.ranks, |ranks| run(&options, ranks));
 }
 
 /// The line of a run, on rank zero.
@@ -209,21 +169,6 @@ fn processor_time() -> u64 {
     told.split(' ').next().and_then(|time| time.parse().ok()).unwrap_or(0)
 }
 
-/// The largest of the ranks, and the mean.
-#[derive(Serialize)]
-struct Spread {
-    mean: f64,
-    largest: u64,
-}
-
-#[derive(Serialize)]
-struct TrafficRecord {
-    messages: Spread,
-    bytes: Spread,
-    exchanges: u64,
-    reductions: u64,
-}
-
 #[derive(Serialize)]
 struct Record {
     #[serde(flatten)]
@@ -240,8 +185,6 @@ struct Record {
     /// Of the bits of all positions, forces and memory.
     checksum: String,
     traffic: TrafficRecord,
-    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums: as if
-    /// nothing overlapped.
     modelled_communication_seconds: f64,
 }
 
@@ -258,13 +201,10 @@ impl Record {
         let contacts = shear.contact.contacts();
         let of_contacts = contacts.iter().flat_map(|contact| [contact.lambda, contact.gamma]);
         let numbers = shear.positions.iter().flat_map(|x| x.iter().copied()).chain(of_contacts);
-        let hash = numbers.map(f64::to_bits).fold(FNV_OFFSET, mix);
-        let hops = 2.0 * (ranks as f64).log2().ceil() * traffic.reductions as f64;
-        let modelled_communication_seconds =
-            LATENCY * (traffic.messages.largest as f64 + hops) + traffic.bytes.largest as f64 / BANDWIDTH;
+        let hash = hash(numbers.map(f64::to_bits));
         let ContactLoad { most_pairs, shared_pair_count, .. } = shear.contact.load();
         Self {
-            options: *options,
+            options: options.clone(),
             ranks,
             iterations: report.iterations,
             passes: report.passes,
@@ -274,34 +214,8 @@ impl Record {
             most_pairs_of_a_rank: most_pairs,
             shared_pairs: shared_pair_count,
             checksum: format!("{hash:016x}"),
+            modelled_communication_seconds: traffic.modelled_seconds(ranks),
             traffic,
-            modelled_communication_seconds,
         }
     }
-}
-
-impl TrafficRecord {
-    fn new(ranks: &dyn Communicator, own: &Traffic) -> Self {
-        Self {
-            messages: spread(ranks, own.messages),
-            bytes: spread(ranks, own.bytes),
-            exchanges: own.exchanges,
-            reductions: own.reductions,
-        }
-    }
-}
-
-fn spread(ranks: &dyn Communicator, own: u64) -> Spread {
-    let all = ranks.all_gather(&[own]);
-    let largest = all.iter().copied().max().unwrap_or(0);
-    Spread { mean: all.iter().sum::<u64>() as f64 / all.len() as f64, largest }
-}
-
-const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// Fowler, Noll and Vo's hash, byte by byte.
-fn mix(hash: u64, bits: u64) -> u64 {
-    bits.to_le_bytes()
-        .iter()
-        .fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
