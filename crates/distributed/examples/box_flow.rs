@@ -6,8 +6,8 @@
 //! mpirun -n 8 target/release/examples/box_flow --dimension 3 --level 4
 //! ```
 //!
-//! `--help` lists the options. Times, and the most memory that a process held, go to the standard error, so that
-//! equal runs print equal lines.
+//! `--help` lists the options. Times, and the most memory that a process held, go to the standard error, so
+//! that equal runs print equal lines.
 
 mod common;
 

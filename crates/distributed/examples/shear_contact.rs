@@ -7,9 +7,9 @@
 //! mpirun -n 2 target/release/examples/shear_contact --dimension 3 --count 1000000
 //! ```
 //!
-//! Particles of diameter 1 in no order, `u* = (y, 0, 0)`, images that slide; `--help` lists the options. Counts
-//! are those of the last step. Times go to the standard error, so that equal runs print equal lines: those of
-//! steps, and the processor time that each rank took for the last one, where the system counts it.
+//! Particles of diameter 1 in no order, `u* = (y, 0, 0)`, images that slide; `--help` lists the options.
+//! Counts are those of the last step. Times go to the standard error, so that equal runs print equal lines:
+//! those of steps, and the processor time that each rank took for the last one, where the system counts it.
 
 mod common;
 

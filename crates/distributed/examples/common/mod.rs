@@ -8,8 +8,8 @@ use serde::Serialize;
 const LATENCY: f64 = 1e-6;
 const BANDWIDTH: f64 = 12e9;
 
-/// What `run` gives on rank zero, printed: on so many threads as each number says, or, without a number, on the
-/// processes of `mpirun`.
+/// What `run` gives on rank zero, printed: on so many threads as each number says, or, without a number, on
+/// the processes of `mpirun`.
 pub fn on_ranks(numbers: &[usize], run: impl Fn(&dyn Communicator) -> String + Sync) {
     if numbers.is_empty() {
         return on_processes(run);
@@ -77,8 +77,8 @@ impl TrafficRecord {
         }
     }
 
-    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums over `ranks`: as
-    /// if nothing overlapped.
+    /// Latency of all messages of the rank that sends most, its bytes, and the hops of all sums over `ranks`:
+    /// as if nothing overlapped.
     pub fn modelled_seconds(&self, ranks: usize) -> f64 {
         let hops = 2.0 * (ranks as f64).log2().ceil() * self.reductions as f64;
         LATENCY * (self.messages.largest as f64 + hops) + self.bytes.largest as f64 / BANDWIDTH
