@@ -1,9 +1,10 @@
 //! The command refuses every kind of bad input, and says where it is and what would be right.
 
-use std::fs;
-use std::path::Path;
+mod program;
 
-use assert_cmd::Command;
+use std::fs;
+
+use program::{fails, gluey};
 use tempfile::TempDir;
 
 /// A good case, one key a line: the tests break one line each.
@@ -38,23 +39,11 @@ rho = 1.0
 uzawa_steps = 1
 "#;
 
-/// Exit code and error output of the command.
-fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
-}
-
 /// Runs `text` and demands that it is refused with all of `expected` in the message, and nothing written.
 fn refused(text: &str, expected: &[&str]) {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("case.toml"), text).expect("a file");
-    let (code, stderr) = gluey(folder.path(), &["run", "case.toml"]);
-    assert_eq!(code, Some(1), "{stderr}");
-    for part in expected {
-        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
-    }
-    assert!(!stderr.contains("panicked"), "{stderr}");
+    fails(folder.path(), &["run", "case.toml"], expected);
     assert!(!folder.path().join("out").exists(), "output was written");
 }
 
@@ -75,7 +64,7 @@ fn refused_line(nth: usize, line: &str, expected: &[&str]) {
 fn the_good_case_runs() {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
-    let (code, stderr) = gluey(folder.path(), &["run", "case.toml"]);
+    let (code, _, stderr) = gluey(folder.path(), &["run", "case.toml"]);
     assert_eq!(code, Some(0), "{stderr}");
     let csv = fs::read_to_string(folder.path().join("out/pair-gluey.csv")).expect("a trajectory");
     assert_eq!(csv.lines().count(), 1 + 5);
@@ -130,7 +119,7 @@ fn text_that_is_not_toml() {
 #[test]
 fn files_that_cannot_be_read() {
     let folder = TempDir::new().expect("a folder");
-    let (code, stderr) = gluey(folder.path(), &["run", "nowhere.toml"]);
+    let (code, _, stderr) = gluey(folder.path(), &["run", "nowhere.toml"]);
     assert_eq!(code, Some(1));
     assert!(stderr.contains("nowhere.toml: cannot be read"), "{stderr}");
     assert!(stderr.contains("`gluey new NAME` writes one"), "{stderr}");
@@ -143,12 +132,12 @@ fn files_that_cannot_be_read() {
         (["view", "elsewhere"], "give the folder that a run wrote to"),
         (["analyse", "elsewhere"], "give the folder that a run wrote to"),
     ] {
-        let (code, stderr) = gluey(folder.path(), &arguments);
+        let (code, _, stderr) = gluey(folder.path(), &arguments);
         assert_eq!(code, Some(1));
         assert!(stderr.contains(expected), "{stderr}");
     }
     fs::write(folder.path().join("binary.toml"), [0xff, 0xfe, 0x00]).expect("a file");
-    let (code, stderr) = gluey(folder.path(), &["run", "binary.toml"]);
+    let (code, _, stderr) = gluey(folder.path(), &["run", "binary.toml"]);
     assert_eq!(code, Some(1));
     assert!(stderr.contains("binary.toml: cannot be read") && stderr.contains("UTF-8"), "{stderr}");
 }
@@ -359,11 +348,11 @@ fn output_folders_that_cannot_be_written() {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
     fs::write(folder.path().join("taken"), "a file, not a folder").expect("a file");
-    let (code, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "taken/deeper"]);
+    let (code, _, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "taken/deeper"]);
     assert_eq!(code, Some(1));
     assert!(stderr.contains("taken/deeper: cannot create the folder"), "{stderr}");
     assert!(stderr.contains("--out DIR"), "{stderr}");
-    let (code, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "/proc/gluey"]);
+    let (code, _, stderr) = gluey(folder.path(), &["run", "case.toml", "--out", "/proc/gluey"]);
     assert_eq!(code, Some(1), "{stderr}");
     assert!(stderr.contains("/proc/gluey: cannot create the folder"), "{stderr}");
 }
@@ -380,7 +369,7 @@ fn arguments_that_make_no_sense() {
         (["--vtk-compression", "10"], "10 is not in 0..=9"),
         (["--vtk-precision", "f16"], "expected `f32` or `f64`"),
     ] {
-        let (code, stderr) = gluey(folder.path(), &[["run", "case.toml"], arguments].concat());
+        let (code, _, stderr) = gluey(folder.path(), &[["run", "case.toml"], arguments].concat());
         assert_eq!(code, Some(2), "{stderr}");
         assert!(stderr.contains(expected), "{stderr}");
     }

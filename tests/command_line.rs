@@ -1,10 +1,11 @@
 //! Commands beside `gluey run`: what they tell and what they refuse.
 
+mod program;
+
 use std::fs;
 use std::path::Path;
-use std::process::Output;
 
-use assert_cmd::Command;
+use program::{fails, gluey, told};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -16,30 +17,8 @@ const SUSPENSION: &str = "name = \"s\"\ndimension = 2\ndomain = { boundary = \"s
     suspension = { volume_fraction = 0.2, count = 9 }\ntime = { step = 0.01, end = 10.0 }\n\
     contact = { strategy = \"none\" }\nflow = { formulation = \"unfitted\" }\n";
 
-fn gluey(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    command.current_dir(folder).args(arguments).output().expect("it runs")
-}
-
-/// Standard output of a command that succeeds.
-fn told(folder: &Path, arguments: &[&str]) -> String {
-    let output = gluey(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("text")
-}
-
 fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&told(folder, arguments)).expect("JSON and nothing else")
-}
-
-fn fails(folder: &Path, arguments: &[&str], expected: &[&str]) {
-    let output = gluey(folder, arguments);
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert!(output.stdout.is_empty());
-    for part in expected {
-        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
-    }
 }
 
 #[test]
@@ -88,8 +67,8 @@ fn every_command_has_examples_and_exit_codes_are_told() {
     for code in ["\n  0 ", "\n  1 ", "\n  2 ", "\n  130 "] {
         assert!(help.contains(code), "{help}");
     }
-    assert_eq!(gluey(folder, &["sail"]).status.code(), Some(2));
-    assert_eq!(gluey(folder, &[]).status.code(), Some(2));
+    assert_eq!(gluey(folder, &["sail"]).0, Some(2));
+    assert_eq!(gluey(folder, &[]).0, Some(2));
 }
 
 #[test]
@@ -101,7 +80,7 @@ fn shells_are_told_what_to_complete() {
             assert!(script.contains(part), "{shell}: `{part}` is not in:\n{script}");
         }
     }
-    assert_eq!(gluey(folder.path(), &["completions", "cmd"]).status.code(), Some(2));
+    assert_eq!(gluey(folder.path(), &["completions", "cmd"]).0, Some(2));
 }
 
 #[test]
@@ -162,7 +141,7 @@ fn new_cases_replace_nothing() {
         fails(folder, &["new", name], &["cannot be the name of a case", "letters, digits"]);
     }
     for usage in [["new", "x", "--dimension", "4"], ["new", "x", "--template", "moon"]] {
-        assert_eq!(gluey(folder, &usage).status.code(), Some(2));
+        assert_eq!(gluey(folder, &usage).0, Some(2));
     }
     assert_eq!(fs::read_dir(folder).expect("a folder").count(), 1);
 }

@@ -1,5 +1,7 @@
 //! Pictures of a run: charts of its tables, its particles, its flow.
 
+mod program;
+
 use std::fs;
 use std::io::Read;
 use std::path::Path;
@@ -11,32 +13,11 @@ use gluey_contact::Domain;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_pictures::{Rgb, color_scale};
+use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";
 const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
-
-/// Exit code, output and error output of the command.
-fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    (output.status.code(), text(output.stdout), text(output.stderr))
-}
-
-fn succeeds(folder: &Path, arguments: &[&str]) -> String {
-    let (code, stdout, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(0), "{stderr}");
-    stdout
-}
-
-fn fails(folder: &Path, arguments: &[&str], expected: &[&str]) {
-    let (code, _, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(1), "{stderr}");
-    for part in expected {
-        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
-    }
-}
 
 /// The pixels of a PNG with eight bits of red, green, blue and opacity each (W3C, Portable Network Graphics,
 /// third edition).
@@ -101,15 +82,15 @@ fn unfiltered(filter: u8, line: &[u8], above: &[u8]) -> Vec<u8> {
 /// A run with frames, in `out`.
 fn run_with_frames() -> TempDir {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE, "--xyz", "20"]);
+    told(folder.path(), &["run", CASE, "--xyz", "20"]);
     folder
 }
 
 #[test]
 fn results_are_drawn() {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE]);
-    let stdout = succeeds(folder.path(), &["plot", "out", "--width", "85"]);
+    told(folder.path(), &["run", CASE]);
+    let stdout = told(folder.path(), &["plot", "out", "--width", "85"]);
     assert_eq!(stdout.lines().count(), 4, "{stdout}");
     let svg = |name: &str| {
         fs::read_to_string(folder.path().join(format!("out/{STEM}-plots/{name}.svg"))).expect("a picture")
@@ -127,9 +108,9 @@ fn results_are_drawn() {
 #[test]
 fn results_that_are_not_complete_are_drawn() {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE]);
+    told(folder.path(), &["run", CASE]);
     let drawn = || {
-        let stdout = succeeds(folder.path(), &["plot", "out", "--format", "svg"]);
+        let stdout = told(folder.path(), &["plot", "out", "--format", "svg"]);
         let read = |picture: &str| fs::read_to_string(folder.path().join(picture)).expect("a picture");
         stdout.lines().map(read).collect::<Vec<_>>()
     };
@@ -148,8 +129,8 @@ fn results_that_are_not_complete_are_drawn() {
 #[test]
 fn the_cost_of_steps_is_drawn() {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE]);
-    let stdout = succeeds(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
+    told(folder.path(), &["run", CASE]);
+    let stdout = told(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
     let drawn = |stdout: &str| fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
     let svg = drawn(&stdout);
     assert!(svg.contains("seconds per step") && !svg.contains("iterations per step"), "{stdout}");
@@ -157,19 +138,19 @@ fn the_cost_of_steps_is_drawn() {
     let text = fs::read_to_string(&table).expect("a table");
     assert!(text.contains(",0,0,0,0,"), "{text}");
     fs::write(&table, text.replace(",0,0,0,0,", ",64,900,2,7,")).expect("a file");
-    let stdout = succeeds(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
+    let stdout = told(folder.path(), &["plot", "out", "--only", "solver", "--format", "svg"]);
     assert!(drawn(&stdout).contains("iterations per step"), "{stdout}");
 }
 
 #[test]
 fn particles_of_a_frame_are_drawn() {
     let folder = run_with_frames();
-    let stdout = succeeds(folder.path(), &["plot", "out", "--frame", "20", "--format", "svg"]);
+    let stdout = told(folder.path(), &["plot", "out", "--frame", "20", "--format", "svg"]);
     assert_eq!(stdout, format!("out/{STEM}-plots/particles-000020.svg\n"));
     let svg = fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
     assert_eq!(svg.matches("<circle").count(), 2);
     assert_eq!(svg.matches("<line").count(), 12, "the edges of the box");
-    let stdout = succeeds(folder.path(), &["plot", "out", "--frame", "last", "--only", "gaps"]);
+    let stdout = told(folder.path(), &["plot", "out", "--frame", "last", "--only", "gaps"]);
     assert_eq!(stdout.lines().count(), 4, "{stdout}");
     fails(folder.path(), &["plot", "out", "--frame", "21"], &["no frame of this step", "0, 20, ..."]);
     fs::remove_dir_all(folder.path().join(format!("out/{STEM}-xyz"))).expect("a folder");
@@ -204,7 +185,7 @@ fn results_that_are_missing_or_malformed_are_named() {
 #[test]
 fn frames_become_an_animation() {
     let folder = run_with_frames();
-    let stdout = succeeds(folder.path(), &["plot", "out", "--animation", "--pixels", "150", "--rate", "20"]);
+    let stdout = told(folder.path(), &["plot", "out", "--animation", "--pixels", "150", "--rate", "20"]);
     assert_eq!(stdout.trim(), format!("out/{STEM}-plots/particles.gif"));
     let file = fs::File::open(folder.path().join(stdout.trim())).expect("an animation");
     let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a header");
@@ -289,7 +270,7 @@ fn a_known_flow_has_its_colours() {
     let linear = run_with_flow::<2>(0.1, |y| (y, 3.0 - 2.0 * y));
     let quadratic = run_with_flow::<2>(0.1, |y| (y * y, 0.0));
     let picture = |folder: &TempDir, quantity: &str| {
-        let stdout = succeeds(folder.path(), &["plot", "out", "--flow", quantity]);
+        let stdout = told(folder.path(), &["plot", "out", "--flow", quantity]);
         assert!(
             stdout.starts_with(&format!("out/known-none-plots/flow-{quantity}-000020.svg\n")),
             "{stdout}"
@@ -333,7 +314,7 @@ fn slices_cut_boxes_and_spheres_where_they_are() {
     let picture = |slice: &str| {
         let arguments =
             ["plot", "out", "--flow", "speed", "--slice", slice, "--format", "png", "--frame", "20"];
-        let stdout = succeeds(folder.path(), &arguments);
+        let stdout = told(folder.path(), &arguments);
         assert!(stdout.contains(&format!("flow-speed-{slice}-000020.png")), "{stdout}");
         Pixels::read(&folder.path().join(stdout.trim()))
     };
@@ -361,7 +342,7 @@ fn slices_cut_boxes_and_spheres_where_they_are() {
 fn pictures_of_flows_are_the_same_for_any_number_of_threads() {
     let flows = run_with_flow::<3>(0.2, |y| (y * (1.0 - y), y));
     let particles = run_with_frames();
-    succeeds(particles.path(), &["analyse", "out"]);
+    told(particles.path(), &["analyse", "out"]);
     let bytes = |folder: &TempDir, arguments: &[&str], threads: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
         command.current_dir(folder.path()).env("RAYON_NUM_THREADS", threads).args(arguments);
@@ -388,7 +369,7 @@ fn flows_that_are_missing_or_malformed_are_named() {
     let out = folder.path().join("out");
     let flow = ["plot", "out", "--flow", "speed", "--format", "svg"];
     fails(folder.path(), &[&flow[..], &["--slice", "z=0.5"]].concat(), &["the case is plane"]);
-    succeeds(folder.path(), &["plot", "out/known-none-vtk", "--flow", "speed", "--format", "svg"]);
+    told(folder.path(), &["plot", "out/known-none-vtk", "--flow", "speed", "--format", "svg"]);
     let file = out.join("known-none-vtk/fields-000020.vtu");
     let text = fs::read_to_string(&file).expect("a file");
     fs::write(&file, text.replace("\"pressure\"", "\"depth\"")).expect("a file");
@@ -404,8 +385,8 @@ fn flows_that_are_missing_or_malformed_are_named() {
 #[test]
 fn tables_of_the_structure_are_drawn() {
     let folder = run_with_frames();
-    let summary = succeeds(folder.path(), &["analyse", "out", "--out", "tables", "--skip", "0"]);
-    let stdout = succeeds(folder.path(), &["plot", "tables", "--format", "svg"]);
+    let summary = told(folder.path(), &["analyse", "out", "--out", "tables", "--skip", "0"]);
+    let stdout = told(folder.path(), &["plot", "tables", "--format", "svg"]);
     let names = ["contacts", "correlations", "profiles", "diffusion"];
     let expected: String = names.map(|name| format!("tables/structure-plots/{name}.svg\n")).concat();
     assert_eq!(stdout, expected);
@@ -439,7 +420,7 @@ fn spheres_are_seen_from_where_it_is_asked_for() {
     let folder = run_with_frames();
     let drawn = |more: &[&str]| {
         let arguments = [&["plot", "out", "--frame", "20", "--format", "svg"], more].concat();
-        let stdout = succeeds(folder.path(), &arguments);
+        let stdout = told(folder.path(), &arguments);
         fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture")
     };
     let heights = |svg: &str| -> Vec<String> {

@@ -1,34 +1,16 @@
 //! A folder of results says what was run and how it went, and is not written over.
 
+mod program;
+
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use gluey::{Case, CheckpointSummary, RunRecord, RunState};
+use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";
 const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
-
-/// Exit code and error output of the command.
-fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
-}
-
-fn succeeds(folder: &Path, arguments: &[&str]) {
-    let (code, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(0), "{stderr}");
-}
-
-fn fails(folder: &Path, arguments: &[&str], expected: &[&str]) {
-    let (code, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(1), "{stderr}");
-    for part in expected {
-        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
-    }
-}
 
 fn read(folder: &Path, name: &str) -> Vec<u8> {
     fs::read(folder.join(format!("{name}/{STEM}.csv"))).expect("a trajectory")
@@ -38,11 +20,11 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 fn the_case_as_run_repeats_the_run() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    succeeds(folder, &["run", CASE, "--set", "time.step=0.04", "--out", "one"]);
+    told(folder, &["run", CASE, "--set", "time.step=0.04", "--out", "one"]);
     let case_file = format!("one/{STEM}-case.toml");
     let case = Case::load(folder.join(&case_file)).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(case.time.step, 0.04);
-    succeeds(folder, &["run", &case_file, "--out", "two"]);
+    told(folder, &["run", &case_file, "--out", "two"]);
     assert!(read(folder, "one") == read(folder, "two"), "another trajectory");
     let record = RunRecord::read(&folder.join(format!("one/{STEM}-run.json"))).expect("a record");
     assert_eq!((record.state, record.steps_done), (RunState::Complete, case.step_count()));
@@ -54,13 +36,13 @@ fn the_case_as_run_repeats_the_run() {
 fn results_of_other_runs_are_not_replaced() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    succeeds(folder, &["run", CASE]);
+    told(folder, &["run", CASE]);
     let before = read(folder, "out");
     fails(folder, &["run", CASE], &["complete run of this case", "--force", "--out DIR"]);
     let other = ["run", CASE, "--set", "time.step=0.02"];
     fails(folder, &other, &["a run of another case", "step = 0.05", "step = 0.02", "--force"]);
     assert!(read(folder, "out") == before);
-    succeeds(folder, &[&other[..], &["--force"]].concat());
+    told(folder, &[&other[..], &["--force"]].concat());
     assert!(read(folder, "out") != before);
     fs::remove_file(folder.join(format!("out/{STEM}-run.json"))).expect("a record");
     fails(folder, &["run", CASE], &["no record of their run"]);
@@ -71,10 +53,10 @@ fn results_of_other_runs_are_not_replaced() {
 fn frames_of_a_replaced_run_go() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    succeeds(folder, &["run", CASE, "--vtk", "10", "--xyz", "10"]);
+    told(folder, &["run", CASE, "--vtk", "10", "--xyz", "10"]);
     let vtk = folder.join(format!("out/{STEM}-vtk"));
     fs::write(vtk.join("view.pvsm"), "of a user").expect("a file");
-    succeeds(folder, &["run", CASE, "--force", "--vtk", "100"]);
+    told(folder, &["run", CASE, "--force", "--vtk", "100"]);
     let frames = |kind: &str| {
         let entries = fs::read_dir(folder.join(format!("out/{STEM}-{kind}"))).expect("a folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("text"));
@@ -102,7 +84,7 @@ fn arguments_are_named_in_errors() {
     refused("particles.7.radius=0.1", &["there is no entry 7", "0 to 1"]);
     refused("particles.1.radius=9.0", &["--set particles.1.radius=9.0", "radius"]);
     for usage in ["time.step", "=1", "time..step=1", "time.step=0.1.2"] {
-        let (code, stderr) = gluey(folder.path(), &["run", CASE, "--set", usage]);
+        let (code, _, stderr) = gluey(folder.path(), &["run", CASE, "--set", usage]);
         assert_eq!(code, Some(2), "{stderr}");
     }
     assert!(!folder.path().join("out").exists());
@@ -113,7 +95,7 @@ fn arguments_are_named_in_errors() {
 fn the_checkpoint_before_the_last_is_offered() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
-    succeeds(folder, &["run", CASE, "--checkpoint-every", "100"]);
+    told(folder, &["run", CASE, "--checkpoint-every", "100"]);
     let last = format!("out/{STEM}.checkpoint");
     let older = format!("{last}.previous");
     let step = |file: &str| CheckpointSummary::read(&folder.join(file)).expect("whole").step;
@@ -127,7 +109,7 @@ fn the_checkpoint_before_the_last_is_offered() {
         let command = "gluey resume out --previous";
         fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 200, is whole", command]);
     }
-    succeeds(folder, &["run", CASE, "--resume", &older, "--checkpoint-every", "100"]);
+    told(folder, &["run", CASE, "--resume", &older, "--checkpoint-every", "100"]);
     assert!(read(folder, "out") == before);
     assert_eq!((step(&last), step(&older)), (300, 200));
     assert!(folder.join(format!("{last}.earlier-1")).exists(), "the damaged one was kept");
@@ -139,10 +121,10 @@ fn what_cannot_be_resumed_is_said() {
     let folder = folder.path();
     fails(folder, &["resume", "nowhere"], &["nowhere: cannot be read", "--out"]);
     fails(folder, &["resume", "."], &["no run is recorded there", "--out"]);
-    succeeds(folder, &["run", CASE, "--set", "time.end=0.5"]);
+    told(folder, &["run", CASE, "--set", "time.end=0.5"]);
     fails(folder, &["resume", "out"], &["the run is complete (10 steps)"]);
     fails(folder, &["resume", "out", "--case", "trio"], &["no run `trio`", STEM, "--case"]);
-    succeeds(folder, &["run", CASE, "--set", "time.end=0.5", "--strategy", "none"]);
+    told(folder, &["run", CASE, "--set", "time.end=0.5", "--strategy", "none"]);
     fails(folder, &["resume", "out"], &["2 runs", "pair-3d-mobility-none", "--case"]);
     let record = folder.join(format!("out/{STEM}-run.json"));
     let text = fs::read_to_string(&record).expect("a record");
@@ -154,30 +136,25 @@ fn what_cannot_be_resumed_is_said() {
     fails(folder, &resume, &["not the record of a run"]);
 }
 
-/// Standard output of the command.
-fn told(folder: &Path, arguments: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
-    String::from_utf8(output.stdout).expect("text")
-}
-
 #[test]
 fn reports_are_for_people_for_programs_or_for_nobody() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
+    let said = |arguments: &[&str]| {
+        let (code, stdout, stderr) = gluey(folder, arguments);
+        assert_eq!((code, &*stderr), (Some(0), ""));
+        stdout
+    };
     let run = ["run", CASE, "--set", "time.end=0.5", "--force"];
-    assert!(told(folder, &run).contains("10 steps in"));
-    assert_eq!(told(folder, &[&run[..], &["--quiet"]].concat()), "");
-    let report = told(folder, &[&run[..], &["--json", "--quiet", "--threads", "2"]].concat());
+    assert!(said(&run).contains("10 steps in"));
+    assert_eq!(said(&[&run[..], &["--quiet"]].concat()), "");
+    let report = said(&[&run[..], &["--json", "--quiet", "--threads", "2"]].concat());
     let report: gluey::RunReport = serde_json::from_str(&report).expect("a report and nothing else");
     assert_eq!((report.case.as_str(), report.steps), ("pair-3d-mobility", 10));
     let record = RunRecord::read(&folder.join(format!("out/{STEM}-run.json"))).expect("a record");
     assert_eq!(record.threads, 2);
-    let mut failed = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let failed = failed.current_dir(folder).args(["run", CASE, "--json"]).output().expect("it runs");
-    assert!(!failed.status.success() && failed.stdout.is_empty() && !failed.stderr.is_empty());
+    let (code, stdout, stderr) = gluey(folder, &["run", CASE, "--json"]);
+    assert!(code == Some(1) && stdout.is_empty() && !stderr.is_empty(), "{stderr}");
 }
 
 #[test]
@@ -185,7 +162,7 @@ fn a_log_says_when_a_run_began_and_how_it_ended() {
     let folder = TempDir::new().expect("a folder");
     let folder = folder.path();
     let log = || fs::read_to_string(folder.join(format!("out/{STEM}.log"))).expect("a log");
-    let (code, stderr) = gluey(folder, &["run", CASE, "--set", "time.step=0.05", "--verbose"]);
+    let (code, _, stderr) = gluey(folder, &["run", CASE, "--set", "time.step=0.05", "--verbose"]);
     assert_eq!(code, Some(0), "{stderr}");
     let record = RunRecord::read(&folder.join(format!("out/{STEM}-run.json"))).expect("a record");
     let lines = |text: &str, of: &str| text.lines().filter(|line| line.contains(of)).count();
@@ -195,7 +172,7 @@ fn a_log_says_when_a_run_began_and_how_it_ended() {
     assert!(first.contains("pair-3d-mobility") && first.starts_with(&record.started[..17]), "{text}");
     assert!(last.contains(&format!("complete after {} steps in ", record.steps)), "{text}");
     // Another run begins another log.
-    succeeds(folder, &["run", CASE, "--force", "--set", "time.step=0.1"]);
+    told(folder, &["run", CASE, "--force", "--set", "time.step=0.1"]);
     assert_eq!(lines(&log(), "complete after"), 1, "{}", log());
     assert!(log().contains(&format!("complete after {} steps", record.steps.div_ceil(2))), "{}", log());
 }
@@ -235,7 +212,7 @@ fn a_case_has_streams_of_frames_with_intervals_of_their_own() {
     let text = fs::read_to_string(CASE).expect("a case") + streams;
     fs::write(folder.join("case.toml"), text).expect("a case");
     let run = ["run", "case.toml", "--set", "time.step=0.1", "--set", "time.end=12"];
-    succeeds(folder, &run);
+    told(folder, &run);
     // Steps of 0.1 get to strains of 0.25, 0.5, 0.75, 1, ... in turn.
     let of_strain = frames(folder, "xyz");
     let expected = [0, 3, 5, 8, 10, 13].map(|step| format!("particles-{step:06}.xyz"));
@@ -248,7 +225,7 @@ fn a_case_has_streams_of_frames_with_intervals_of_their_own() {
     let coarse = frames(folder, "coarse");
     assert_eq!(coarse.iter().filter(|name| name.starts_with("particles-")).count(), 3, "{coarse:?}");
     // An option takes the place of the stream in the same folder; frames of the run before are gone.
-    succeeds(folder, &[&run[..], &["--force", "--xyz", "40"]].concat());
+    told(folder, &[&run[..], &["--force", "--xyz", "40"]].concat());
     assert_eq!(frames(folder, "xyz"), [0, 40, 80, 120].map(|step| format!("particles-{step:06}.xyz")));
     assert_eq!(frames(folder, "often"), of_steps);
 }

@@ -1,11 +1,12 @@
 //! Particles that a case does not list, frames in extended XYZ, and what is made of them.
 
-use std::fs;
-use std::path::Path;
+mod program;
 
-use assert_cmd::Command;
+use std::fs;
+
 use gluey::case::Case;
 use gluey::output::xyz::{XyzFrame, read_text};
+use program::gluey;
 use tempfile::TempDir;
 
 /// A case around the table or key that says where its particles come from.
@@ -19,14 +20,6 @@ fn case(dimension: usize, boundary: &str, particles: &str) -> String {
 fn generated(keys: &str) -> String {
     // A table behind the root's keys.
     format!("suspension = {{ {keys} }}")
-}
-
-/// What the command says.
-fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    (output.status.code(), text(output.stdout), text(output.stderr))
 }
 
 #[test]

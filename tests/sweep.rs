@@ -1,28 +1,24 @@
 //! `gluey sweep`: a study of several points, complete, interrupted, failing and in the way of another.
 
+mod program;
+
 use std::fs;
 use std::path::Path;
-use std::process::{self, Output};
+use std::process;
 use std::thread;
 use std::time::Duration;
 
-use assert_cmd::Command;
 use gluey::{RunRecord, RunState};
+use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";
 const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
 
-fn gluey(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    command.current_dir(folder).args(arguments).output().expect("it runs")
-}
-
 /// Standard output and standard error of a study, which ends with this exit code.
 fn sweep(folder: &Path, arguments: &[&str], code: i32) -> (String, String) {
-    let output = gluey(folder, &[&["sweep", CASE], arguments].concat());
-    let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("text"));
-    assert_eq!(output.status.code(), Some(code), "{out}{error}");
+    let (found, out, error) = gluey(folder, &[&["sweep", CASE], arguments].concat());
+    assert_eq!(found, Some(code), "{out}{error}");
     (out, error)
 }
 
@@ -46,7 +42,7 @@ fn every_point_is_a_run_and_the_table_has_them_all() {
         "{table}"
     );
     // A point is what a run of its own gives.
-    let alone = gluey(
+    told(
         folder,
         &[
             "run",
@@ -59,7 +55,6 @@ fn every_point_is_a_run_and_the_table_has_them_all() {
             "one",
         ],
     );
-    assert!(alone.status.success());
     let read = |path: &str| fs::read(folder.join(path).join(format!("{STEM}.csv"))).expect("a trajectory");
     assert!(
         read("one") == read("study/time.step=0.2+flow.pair-mobility.gap_offset=0.01"),
@@ -73,9 +68,7 @@ fn every_point_is_a_run_and_the_table_has_them_all() {
     );
     assert_eq!(json[3]["report"]["steps"], 79);
     for command in ["info", "resume", "plot", "view", "analyse"] {
-        let refused = gluey(folder, &[command, "study"]);
-        let stderr = String::from_utf8_lossy(&refused.stderr).into_owned();
-        assert!(refused.status.code() == Some(1) && stderr.contains("of one of its points"), "{stderr}");
+        fails(folder, &[command, "study"], &["of one of its points"]);
     }
 }
 
@@ -162,11 +155,10 @@ fn studies_of_something_else_are_left_alone() {
     let other = folder.join("other.toml");
     let text = fs::read_to_string(CASE).expect("a case").replace("end = 15.75", "end = 1.0");
     fs::write(&other, text).expect("a case");
-    let output = gluey(folder, &["sweep", "other.toml", "--set", "time.step=0.1"]);
-    let error = String::from_utf8_lossy(&output.stderr);
+    let (_, _, error) = gluey(folder, &["sweep", "other.toml", "--set", "time.step=0.1"]);
     assert!(error.contains("a run of another case is there") && error.contains("--force"), "{error}");
     assert_eq!(record(folder, "sweep/time.step=0.1"), before);
-    assert!(gluey(folder, &["sweep", "other.toml", "--set", "time.step=0.1", "--force"]).status.success());
+    told(folder, &["sweep", "other.toml", "--set", "time.step=0.1", "--force"]);
     assert_eq!(record(folder, "sweep/time.step=0.1").steps, 10);
 }
 

@@ -1,43 +1,24 @@
 //! The page that shows a run in a browser, and the forces of contacts in its frames.
 
+mod program;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process;
 
 use assert_cmd::Command;
 use gluey::output::xyz::{XyzFrame, read_text};
+use program::{fails, told};
 use serde_json::Value;
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";
 const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
 
-/// Exit code, output and error output of the command.
-fn gluey(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gluey"));
-    let output = command.current_dir(folder).args(arguments).output().expect("it runs");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    (output.status.code(), text(output.stdout), text(output.stderr))
-}
-
-fn succeeds(folder: &Path, arguments: &[&str]) -> String {
-    let (code, stdout, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(0), "{stderr}");
-    stdout
-}
-
-fn fails(folder: &Path, arguments: &[&str], expected: &[&str]) {
-    let (code, _, stderr) = gluey(folder, arguments);
-    assert_eq!(code, Some(1), "{stderr}");
-    for part in expected {
-        assert!(stderr.contains(part), "`{part}` is not in:\n{stderr}");
-    }
-}
-
 /// A run with frames, in `out`.
 fn run_with_frames() -> TempDir {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE, "--xyz", "20"]);
+    told(folder.path(), &["run", CASE, "--xyz", "20"]);
     folder
 }
 
@@ -51,7 +32,7 @@ fn data(page: &str) -> Value {
 #[test]
 fn a_page_shows_the_frames_of_a_run_without_a_network() {
     let folder = run_with_frames();
-    let stdout = succeeds(folder.path(), &["view", "out"]);
+    let stdout = told(folder.path(), &["view", "out"]);
     assert!(stdout.contains("view.html: ") && stdout.contains(" frames of 2 particles"), "{stdout}");
     let page = fs::read_to_string(folder.path().join("out/view.html")).expect("a page");
     let data = data(&page);
@@ -66,7 +47,7 @@ fn a_page_shows_the_frames_of_a_run_without_a_network() {
     for outside in ["http:", "https:", " src=", "<link", "import ", "{{"] {
         assert!(!page.contains(outside), "`{outside}` in the page");
     }
-    succeeds(folder.path(), &["view", "out", "--every", "2", "--out", "pages/two.html"]);
+    told(folder.path(), &["view", "out", "--every", "2", "--out", "pages/two.html"]);
     let half = fs::read_to_string(folder.path().join("pages/two.html")).expect("a page");
     assert_eq!(self::data(&half)["frames"].as_array().map(Vec::len), Some(frames.div_ceil(2)));
 }
@@ -99,7 +80,7 @@ fn drawn(folder: &Path, page: &Path, fragment: &str) -> Option<String> {
 #[test]
 fn a_browser_draws_all_particles() {
     let folder = run_with_frames();
-    succeeds(folder.path(), &["view", "out"]);
+    told(folder.path(), &["view", "out"]);
     let page = folder.path().join("out/view.html");
     for colour in ["speed", "spin", "gap", "contact-force", "id"] {
         let Some(drawn) = drawn(folder.path(), &page, &format!("frame=3&colour={colour}")) else { return };
@@ -158,7 +139,7 @@ fn frames_have_the_forces_of_contacts() {
     }
     assert!(touching > 0, "they touch");
     let picture = ["plot", "out", "--frame", "0", "--colour", "contact-force", "--format", "svg"];
-    let stdout = succeeds(folder.path(), &picture);
+    let stdout = told(folder.path(), &picture);
     let svg = fs::read_to_string(folder.path().join(stdout.trim())).expect("a picture");
     assert!(svg.contains(">contact force / 6"), "{svg}");
 }
@@ -167,14 +148,14 @@ fn frames_have_the_forces_of_contacts() {
 #[test]
 fn frames_without_a_contact_model_say_so() {
     let folder = TempDir::new().expect("a folder");
-    succeeds(folder.path(), &["run", CASE, "--strategy", "none", "--xyz", "20"]);
+    told(folder.path(), &["run", CASE, "--strategy", "none", "--xyz", "20"]);
     let (_, frame) = frame(folder.path(), "pair-3d-mobility-none", 20);
     assert_eq!(frame.contact_forces, None);
     let expected = ["particles-000020.xyz: no column `contact_force`", "strategy = \"none\""];
     fails(folder.path(), &["plot", "out", "--frame", "20", "--colour", "contact-force"], &expected);
     let expected = ["particles-000000.xyz: no column `contact_force`"];
     fails(folder.path(), &["plot", "out", "--animation", "--colour", "contact-force"], &expected);
-    succeeds(folder.path(), &["view", "out"]);
+    told(folder.path(), &["view", "out"]);
     let page = folder.path().join("out/view.html");
     let data = data(&fs::read_to_string(&page).expect("a page"));
     assert_eq!(data["frames"][0]["forces"].as_array().map(Vec::len), Some(0));

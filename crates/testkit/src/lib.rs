@@ -1,5 +1,5 @@
-//! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings and
-//! an allocation counter.
+//! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings,
+//! an allocation counter, and programs outside this workspace.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
@@ -17,5 +17,7 @@ mod convergence;
 pub mod exact;
 pub mod packing;
 pub mod reference;
+mod stranger;
 
 pub use convergence::{convergence_order, convergence_orders};
+pub use stranger::Stranger;
