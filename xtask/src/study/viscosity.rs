@@ -1,5 +1,7 @@
 //! Relative viscosity of sheared spheres against their fraction.
 
+use std::f64::consts::PI;
+
 use gluey_suspension::statistics::{Estimate, mser};
 use gluey_verify::literature::viscosity_of_spheres;
 
@@ -9,9 +11,19 @@ use super::{Findings, Study};
 
 const FILE: &str = "viscosity.toml";
 const LUBRICATION: &str = "lubrication";
+const REPULSION: &str = "lubrication, repulsion";
 const GLUEY: &str = "gluey";
 const INELASTIC: &str = "inelastic";
-const MODELS: [&str; 3] = [LUBRICATION, GLUEY, INELASTIC];
+const MODELS: [&str; 4] = [LUBRICATION, REPULSION, GLUEY, INELASTIC];
+
+/// Spheres in the box, of volume 1.
+const COUNT: u32 = 20;
+const COUNT_IF_QUICK: u32 = 12;
+
+/// Repulsion of spheres in contact over `6 pi` viscosity, radius squared and shear rate, which is what shear
+/// pushes two spheres together with; and the gap, in radii, over which it falls to 1/e.
+const REPULSION_AT_CONTACT: f64 = 10.0;
+const RANGE: f64 = 1e-3;
 
 /// Sheared frictionless spheres, read off the figures of Sierou and Brady (2002) and Gallier et al. (2014),
 /// which spread by 15 %.
@@ -21,8 +33,9 @@ pub const STUDY: Study = Study {
     title: "Viscosity of sheared spheres",
     text: "Twenty equal spheres in a box that is sheared for ever, from a configuration of equilibrium to a strain of six: relative \
            viscosity and normal stress differences in the steady state, with 95 % intervals from block averages after the transient. \
-           Three models: lubrication forces in films thinner than the mesh and no contact; the gluey contact, and inelastic contact, \
-           both without lubrication forces, so that the flow knows of a film what the mesh resolves. The viscosity of the latter two is \
+           Four models: lubrication forces in films thinner than the mesh and no contact; the same with a repulsion of short range, \
+           without which films between smooth spheres become thinner without end; the gluey contact, and inelastic contact, both \
+           without lubrication forces, so that the flow knows of a film what the mesh resolves. The viscosity of the latter two is \
            that of the tractions plus that of the contact forces, whose metric is Stokes drag. The same box and mesh at every fraction. \
            Beside them: hard spheres in equilibrium (Riest et al. 2015, 10.1039/C4SM02816A), dilute suspensions in extension \
            (Batchelor and Green 1972: 1 + 2.5 &phi; + 7.6 &phi;&sup2;), and sheared frictionless spheres (Sierou and Brady 2002, \
@@ -33,21 +46,33 @@ pub const STUDY: Study = Study {
 
 fn points(quick: bool) -> Vec<Point> {
     let fractions = if quick { &[0.1, 0.3][..] } else { &[0.05, 0.1, 0.2, 0.3, 0.4, 0.45][..] };
+    let count = if quick { COUNT_IF_QUICK } else { COUNT };
     let mut points = Vec::new();
     for &fraction in fractions {
         for model in MODELS {
-            let point = Point::new(format!("{model}-{fraction}"), model, fraction, FILE)
-                .with("suspension.volume_fraction", fraction);
-            let point = with_model(point);
-            points.push(if quick { point.with("suspension.count", 12).with("time.end", 0.5) } else { point });
+            let point = Point::new(format!("{}-{fraction}", model.replace(", ", "-")), model, fraction, FILE)
+                .with("suspension.volume_fraction", fraction)
+                .with("suspension.count", count);
+            let point = with_model(point, radius(fraction, count));
+            points.push(if quick { point.with("time.end", 0.5) } else { point });
         }
     }
     points
 }
 
-fn with_model(point: Point) -> Point {
+/// Of spheres that fill this fraction of the unit box.
+fn radius(fraction: f64, count: u32) -> f64 {
+    (3.0 * fraction / (4.0 * PI * f64::from(count))).cbrt()
+}
+
+fn with_model(point: Point, radius: f64) -> Point {
+    let lubricated =
+        |point: Point| point.with("contact.strategy", "none").with("flow.lubrication", "deficit");
     match point.model {
-        LUBRICATION => point.with("contact.strategy", "none").with("flow.lubrication", "deficit"),
+        LUBRICATION => lubricated(point),
+        REPULSION => lubricated(point)
+            .with("repulsion.force", REPULSION_AT_CONTACT * 6.0 * PI * radius * radius)
+            .with("repulsion.range", RANGE),
         model => point.with("contact.strategy", model).with("flow.lubrication", "none"),
     }
 }
