@@ -141,7 +141,7 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         columns,
         rows,
         drawings: vec![
-            ("viscosity", draw(phi, excess, false, &series(|s| &s.0), known())),
+            ("viscosity", draw(phi, excess, true, &series(|s| &s.0), known())),
             ("first-normal-stress", first),
             ("second-normal-stress", second),
         ],
