@@ -27,8 +27,9 @@ fn main() -> Result<(), ContactError> {
 fn a_program_outside_the_workspace_runs() {
     assert!(PROGRAM.lines().count() <= 15);
     let stranger = Stranger {
+        uses: "gluey-contact",
+        default_features: false,
         packages: &["gluey-geom", "gluey-contact"],
-        dependencies: "gluey-contact = { version = \"*\", default-features = false }",
         program: PROGRAM,
         folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("published"),
     };

@@ -26,8 +26,9 @@ fn main() -> Result<(), StokesError> {
 fn a_program_outside_the_workspace_runs() {
     assert!(PROGRAM.lines().count() <= 15);
     let stranger = Stranger {
+        uses: "gluey-stokes",
+        default_features: true,
         packages: &["gluey-geom", "gluey-linalg", "gluey-levelset", "gluey-fem", "gluey-stokes"],
-        dependencies: "gluey-stokes = \"*\"",
         program: PROGRAM,
         folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("published-stokes"),
     };

@@ -8,10 +8,12 @@ use std::process::Command;
 /// The program, and what it stands on.
 #[derive(Clone, Debug)]
 pub struct Stranger<'a> {
-    /// Names of the crate that it uses and of those this depends on.
+    /// The crate that it uses, in the version of this workspace.
+    pub uses: &'a str,
+    /// Whether with the features that the crate has by default.
+    pub default_features: bool,
+    /// Names of this crate and of those it depends on.
     pub packages: &'a [&'a str],
-    /// Lines of its manifest below `[dependencies]`; the packages have the version of this workspace.
-    pub dependencies: &'a str,
     /// Its `main.rs`.
     pub program: &'a str,
     /// Folder that it has to itself, in that of built files: what was compiled there is not compiled again.
@@ -70,10 +72,11 @@ impl Stranger<'_> {
         let version = env!("CARGO_PKG_VERSION");
         let patch = |name: &&str| format!("{name} = {{ path = \"../{name}-{version}\" }}\n");
         let patches: String = self.packages.iter().map(patch).collect();
+        let Self { uses, default_features, .. } = self;
         format!(
             "[package]\nname = \"stranger\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[workspace]\n\n\
-             [dependencies]\n{}\n\n[patch.crates-io]\n{patches}",
-            self.dependencies
+             [dependencies]\n{uses} = {{ version = \"{version}\", default-features = {default_features} }}\n\n\
+             [patch.crates-io]\n{patches}"
         )
     }
 }
