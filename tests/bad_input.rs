@@ -142,6 +142,58 @@ fn files_that_cannot_be_read() {
     assert!(stderr.contains("binary.toml: cannot be read") && stderr.contains("UTF-8"), "{stderr}");
 }
 
+/// Spreadsheets begin texts with a byte order mark; what one does not see elsewhere is told.
+#[test]
+fn byte_order_marks_are_read() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let case =
+        "name = \"sheet\"\ndimension = 2\nparticles_file = \"discs.csv\"\ntime = { step = 0.1, end = 0.1 }\n";
+    let list = "x,y,radius\r\n0.3,0.4,0.05\r\n0.7,0.45,0.06\r\n";
+    let info = |case: &str, list: &str| {
+        fs::write(folder.join("sheet.toml"), case).expect("a file");
+        fs::write(folder.join("discs.csv"), list).expect("a file");
+        gluey(folder, &["info", "sheet.toml"])
+    };
+    let (code, plain, stderr) = info(case, list);
+    assert_eq!(code, Some(0), "{stderr}");
+    assert_eq!(info(&format!("\u{feff}{case}"), &format!("\u{feff}{list}")).1, plain);
+    let (code, _, stderr) = info(case, &list.replace("0.45", "\u{200b}0.45\u{a0}"));
+    assert!(code == Some(1) && stderr.contains("discs.csv:3: found `U+200B0.45`"), "{stderr}");
+    let (code, _, stderr) = info(case, &format!("\u{feff}\u{feff}{list}"));
+    assert!(code == Some(1) && stderr.contains("discs.csv:1: found `U+FEFFx,y,radius`"), "{stderr}");
+}
+
+/// Frames that are no text, and those with what one does not see in them.
+#[test]
+fn frames_that_are_no_text() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let frame = "1\nLattice=\"1 0 0 0 1 0 0 0 1\" Origin=\"0 0 0\" pbc=\"F F F\" Properties=\
+                 species:S:1:pos:R:3:radius:R:1:velo:R:3:angular_velocity:R:3 Time=0 Strain=0 Dimension=2\n\
+                 P 0.5 0.5 0 0.1 0 0 0 0 0 0\n";
+    fs::create_dir(folder.join("frames")).expect("a folder");
+    let view = |bytes: &[u8]| {
+        fs::write(folder.join("frames/particles-000000.xyz"), bytes).expect("a file");
+        gluey(folder, &["view", "frames"])
+    };
+    assert_eq!(view(frame.as_bytes()).0, Some(0));
+    assert_eq!(view(format!("\u{feff}{frame}").as_bytes()).0, Some(0));
+    let utf16: Vec<u8> = frame.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for (bytes, expected) in [
+        (utf16, "looks like UTF-16"),
+        (
+            frame.replace("P ", "\u{e9} ").encode_utf16().map(|unit| unit as u8).collect(),
+            "at line 3, column 1, byte E9",
+        ),
+        (frame.replace("0.1 ", "0.1\u{200b} ").into_bytes(), "particles-000000.xyz:3: found `0.1U+200B`"),
+    ] {
+        let (code, _, stderr) = view(&bytes);
+        assert!(code == Some(1) && stderr.contains(expected), "{stderr}");
+        assert!(stderr.contains("save it as UTF-8") || expected.contains("found"), "{stderr}");
+    }
+}
+
 #[test]
 fn dimensions_other_than_2_and_3() {
     refused_line(2, "dimension = 4", &["dimension = 4", "4 is out of range", "equal to 2 or 3"]);

@@ -5,7 +5,10 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
-use gluey::{CaseError, CheckpointError, CheckpointSummary, OutputError, ResultPaths, RowsError, RunError};
+use gluey::{
+    CaseError, CheckpointError, CheckpointSummary, NotText, OutputError, ResultPaths,
+    RowsError, RunError,
+};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -120,6 +123,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::TooLarge(_) => {
             "take fewer cells per radius (flow.mesh.cells_per_radius), a smaller band, or the multigrid solver".into()
         }
+        RunError::Case(error) if NotText::is_in(error) => NotText::HINT.into(),
         RunError::Case(CaseError::Read { path, .. }) => unread_hint(path),
         _ => return None,
     })

@@ -41,6 +41,7 @@ mod simulation;
 pub mod summary;
 pub mod sweep;
 pub mod table;
+mod text;
 mod trajectory;
 pub mod view;
 
@@ -64,6 +65,7 @@ pub use run::{
 pub use shown::shown;
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
+pub use text::NotText;
 pub use trajectory::Row;
 
 /// The example of the README.

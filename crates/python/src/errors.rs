@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
-use gluey::{CaseError, CheckpointError, ResultPaths, ResumeError, RowsError, RunError};
+use gluey::{CaseError, CheckpointError, NotText, ResultPaths, ResumeError, RowsError, RunError};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -50,7 +50,8 @@ pub fn of_case(py: Python<'_>, error: &CaseError) -> PyErr {
     let issues = match error {
         CaseError::Invalid(invalid) => invalid.issues.iter().map(|issue| told(invalid, issue)).collect(),
         CaseError::Read { .. } => {
-            vec![(String::new(), in_full(error), "give the path of a case file".to_owned())]
+            let hint = if NotText::is_in(error) { NotText::HINT } else { "give the path of a case file" };
+            vec![(String::new(), in_full(error), hint.to_owned())]
         }
     };
     let mut lines: Vec<String> =
@@ -74,6 +75,7 @@ fn told(invalid: &InvalidCase, issue: &CaseIssue) -> (String, String, String) {
             format!("{file}:{line}:{column}: {issue}")
         }
         Place::Text { .. } | Place::Value => issue.to_string(),
+        Place::List { file, line } => format!("{}:{line}: {issue}", file.display()),
         Place::Argument(argument) => {
             format!("overrides, {}: {issue}", argument.strip_prefix("--set ").unwrap_or(argument))
         }

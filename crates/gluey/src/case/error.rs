@@ -11,7 +11,8 @@ use super::VERSION;
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
-use crate::shown::shown;
+use crate::shown::{shown, shown_to};
+use crate::text::{named, visible};
 
 /// A case could not be used.
 #[derive(Debug, Error)]
@@ -67,6 +68,13 @@ pub enum Place {
         /// Bytes of the text to point at.
         span: Range<usize>,
     },
+    /// In a file that lists particles.
+    List {
+        /// The file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+    },
     /// In an argument of the command line.
     Argument(String),
     /// Nowhere: a program made it.
@@ -82,6 +90,7 @@ impl fmt::Display for InvalidCase {
             }
             match &issue.place {
                 Place::Text { line, column, .. } => write!(f, "{file}:{line}:{column}: {issue}")?,
+                Place::List { file, line } => write!(f, "{}:{line}: {issue}", file.display())?,
                 Place::Argument(argument) => write!(f, "{argument}: {issue}")?,
                 Place::Value => write!(f, "{file}: {issue}")?,
             }
@@ -97,13 +106,20 @@ impl std::error::Error for InvalidCase {}
 
 impl fmt::Display for CaseIssue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.key.is_root(), &self.value) {
+        match (self.key.is_root() || self.is_of_list(), &self.value) {
             (true, Some(value)) => write!(f, "{value}: ")?,
             (true, None) => {}
             (false, Some(value)) => write!(f, "{} = {value}: ", self.key)?,
             (false, None) => write!(f, "{}: ", self.key)?,
         }
         write!(f, "{}", self.problem)
+    }
+}
+
+impl CaseIssue {
+    /// Whether the value is a row of a list, which says more than a key of the case.
+    fn is_of_list(&self) -> bool {
+        matches!(self.place, Place::List { .. })
     }
 }
 
@@ -178,6 +194,20 @@ pub enum Problem {
         /// Message of the parser.
         message: String,
     },
+    /// A character that one does not see, where none may be.
+    #[error(
+        "line {line} {} a character that is not seen, {}",
+        if *.is_first { "begins with" } else { "has" },
+        named(*character)
+    )]
+    Unseen {
+        /// The line, from 1.
+        line: usize,
+        /// Whether the line begins with it.
+        is_first: bool,
+        /// The character.
+        character: char,
+    },
     /// A key that has no default is absent.
     #[error("missing key `{name}`")]
     MissingKey {
@@ -187,7 +217,7 @@ pub enum Problem {
         example: &'static str,
     },
     /// A key that nothing reads.
-    #[error("unknown key `{name}`")]
+    #[error("unknown key `{}`", visible(name))]
     UnknownKey {
         /// The key as written.
         name: String,
@@ -233,13 +263,13 @@ pub enum Problem {
     #[error("too many digits for a whole number")]
     TooManyDigits,
     /// NaN or infinite.
-    #[error("{found} is not a finite number")]
+    #[error("{} is not a finite number", shown(*found))]
     NotFinite {
         /// The value.
         found: f64,
     },
     /// A number outside its range.
-    #[error("{found} is out of range")]
+    #[error("{} is out of range", shown(*found))]
     OutOfRange {
         /// The value.
         found: f64,
@@ -267,7 +297,7 @@ pub enum Problem {
         dimension: usize,
     },
     /// The upper corner is not above the lower one.
-    #[error("the box is empty along {axis}: lower {lower}, upper {upper}")]
+    #[error("the box is empty along {axis}: lower {}, upper {}", shown(*lower), shown(*upper))]
     EmptyBox {
         /// Name of the axis.
         axis: char,
@@ -283,7 +313,11 @@ pub enum Problem {
         edges: Vec<f64>,
     },
     /// A particle wider than the box.
-    #[error("particle {particle} of diameter {diameter} does not fit in a box of edge {edge} along {axis}")]
+    #[error(
+        "particle {particle} of diameter {} does not fit in a box of edge {} along {axis}",
+        shown(*diameter),
+        shown(*edge)
+    )]
     TooBig {
         /// Its number, from 1.
         particle: usize,
@@ -295,7 +329,11 @@ pub enum Problem {
         axis: char,
     },
     /// A particle that another one could touch on both sides of a periodic box at once.
-    #[error("particle {particle} of diameter {diameter} is wider than half the period {period} along {axis}")]
+    #[error(
+        "particle {particle} of diameter {} is wider than half the period {} along {axis}",
+        shown(*diameter),
+        shown(*period)
+    )]
     PeriodTooShort {
         /// Its number, from 1.
         particle: usize,
@@ -340,8 +378,22 @@ pub enum Problem {
     /// No particles at all.
     #[error("no particles")]
     NoParticles,
+    /// A particle in which there is no room for a cell of the finest mesh.
+    #[error("particle {particle}: radius {} is too small for the box", shown(*radius))]
+    TooSmall {
+        /// Its number, from 1.
+        particle: usize,
+        /// Its radius.
+        radius: f64,
+        /// The smallest radius that the mesh of this box can have.
+        least: f64,
+    },
     /// A mesh finer than the tree can number.
-    #[error("{cells_per_radius} cells per radius of {radius} need level {level} of the tree")]
+    #[error(
+        "{} cells per radius of {} need level {level} of the tree",
+        shown(*cells_per_radius),
+        shown(*radius)
+    )]
     MeshTooFine {
         /// Cells asked for.
         cells_per_radius: f64,
@@ -392,6 +444,10 @@ impl Problem {
     pub fn hint(&self) -> String {
         match self {
             Self::Syntax { message } => syntax_hint(message).into(),
+            Self::Unseen { character, .. } if character.is_whitespace() => {
+                "put a plain blank in its place".into()
+            }
+            Self::Unseen { .. } => "take it out".into(),
             Self::Malformed { .. } => "see docs/case-keys.md for what is right".into(),
             Self::TooManyDigits => {
                 "a whole number has at most 18 digits; with a point or an exponent, 1e20, it may be larger"
@@ -427,7 +483,7 @@ impl Problem {
                 "list them under lines `[[particles]]`, each with `position` and `radius`".into()
             }
             Self::MeshTooFine { finest, largest, .. } => {
-                format!("the tree has {finest} levels: at most {largest:.3} cells per radius")
+                format!("the tree has {finest} levels: at most {} cells per radius", shown(*largest))
             }
             Self::CoarseTooFine { finest, .. } => format!("expected a level between 0 and {finest}"),
             Self::TooManySteps { .. } => "at most 1e9 steps: take a longer step or an earlier end".into(),
@@ -446,6 +502,10 @@ impl Problem {
             Self::UnevenBox { .. } => format!(
                 "the mesh is made of cubes: make the ratios of the edges simple, such as 3:2, and less than \
                  2^{FINEST_LEVEL}"
+            ),
+            Self::TooSmall { least, .. } => format!(
+                "the mesh of this box is for radii of {} or more: take a smaller box or larger particles",
+                shown_to(*least, 4)
             ),
             Self::TooBig { edge, .. } => format!("the radius must be less than {}", shown(0.5 * edge)),
             Self::PeriodTooShort { period, axis, .. } => {

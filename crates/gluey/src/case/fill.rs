@@ -9,6 +9,7 @@ use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 use super::error::{Key, Problem};
 use super::findings::{Findings, Violation};
 use super::particle_problem::ParticleProblem;
+use super::particles_file::ParticleList;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
 use crate::shown::shown;
 
@@ -19,8 +20,14 @@ const MOST_PARTICLES: f64 = 1e6;
 pub(super) const NEEDED: [&str; 6] =
     ["dimension", "domain", "flow", "particles", "suspension", "particles_file"];
 
-/// Makes the particles of a case whose surroundings are checked; `has_list` says whether it lists any.
-pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path, findings: &mut Findings) {
+/// Makes the particles of a case whose surroundings are checked, and gives the file that lists them, if one
+/// does; `has_list` says whether the case lists any.
+pub(super) fn fill(
+    case: &mut Case,
+    has_list: bool,
+    folder: &Path,
+    findings: &mut Findings,
+) -> Option<ParticleList> {
     let root = Key::default();
     let sources = [
         (has_list, "[[particles]]"),
@@ -32,19 +39,25 @@ pub(super) fn fill(case: &mut Case, has_list: bool, folder: &Path, findings: &mu
         [] => {
             let problem = Problem::MissingKey { name: "particles".into(), example: "[[particles]]" };
             findings.add(root.name("particles"), problem);
+            None
         }
         [first, second, ..] => {
             let key = root.name(if case.suspension.is_some() { "suspension" } else { "particles_file" });
             findings.add(key, Problem::Particles(ParticleProblem::TwoSources { first, second }));
+            None
         }
         [_] => fill_from_one(case, folder, findings),
     }
 }
 
-fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) {
+fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) -> Option<ParticleList> {
+    let mut read = None;
     if let Some(file) = &case.particles_file {
         match particles_file::read(&folder.join(file), case.dimension) {
-            Ok(particles) => (case.particles, case.particles_file) = (particles, None),
+            Ok(list) => {
+                (case.particles, case.particles_file) = (list.particles.clone(), None);
+                read = Some(list);
+            }
             Err(problems) => problems.into_iter().for_each(|problem| {
                 findings.add(Key::default().name("particles_file"), Problem::Particles(problem));
             }),
@@ -60,6 +73,7 @@ fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) {
             Err(Violation { key, problem }) => findings.add(key, problem),
         }
     }
+    read
 }
 
 fn generate(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<Vec<ParticleSpec>, Violation> {

@@ -9,8 +9,10 @@ use super::error::{CaseError, CaseIssue, InvalidCase, Key, Place, Problem};
 use super::findings::Findings;
 use super::locate::Source;
 use super::overrides::Override;
+use super::particles_file::ParticleList;
 use super::validate::{check_mutual, check_surroundings};
 use super::{Case, Formulation, VERSION, fill, form};
+use crate::text;
 
 impl Case {
     /// Reads and checks a case file.
@@ -21,8 +23,7 @@ impl Case {
     /// Reads and checks a case file of which some keys are set otherwise.
     pub fn load_with(path: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, CaseError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
+        let text = text::read(path).map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
         Self::parse_with(&text, path, overrides)
     }
 
@@ -52,8 +53,11 @@ impl Case {
             None => read(table, source.folder(), &mut findings),
         };
         match case {
-            Some(case) if findings.is_empty() => Ok(case),
-            _ => Err(source.errors(tree.get_ref(), findings, overrides)),
+            Some((case, _)) if findings.is_empty() => Ok(case),
+            case => {
+                let list = case.and_then(|(_, list)| list);
+                Err(source.errors(tree.get_ref(), (findings, list.as_ref()), overrides))
+            }
         }
     }
 
@@ -139,8 +143,9 @@ fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
     }
 }
 
-/// The case that `table` is, as far as its parts are right; what is wrong is noted.
-fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<Case> {
+/// The case that `table` is, as far as its parts are right, and the file that lists its particles; what is
+/// wrong is noted.
+fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<(Case, Option<ParticleList>)> {
     let has_list = table.contains_key("particles");
     check_choice_is_named(&table, findings);
     let whole = Value::Table(table);
@@ -163,9 +168,10 @@ fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<Ca
         }
     };
     check_surroundings(&case, findings);
-    if findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
-        fill::fill(&mut case, has_list, folder, findings);
-    }
+    let list = match findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
+        true => fill::fill(&mut case, has_list, folder, findings),
+        false => None,
+    };
     check_mutual(&case, findings);
-    Some(case)
+    Some((case, list))
 }

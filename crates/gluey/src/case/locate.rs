@@ -9,6 +9,8 @@ use toml::de::{DeTable, DeValue};
 use super::error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem};
 use super::findings::{Findings, Violation};
 use super::overrides::Override;
+use super::particles_file::ParticleList;
+use crate::text::{is_unseen, visible};
 
 /// The text that errors point into.
 pub(super) struct Source<'a> {
@@ -24,9 +26,24 @@ impl Source<'_> {
 
     /// That the text is no TOML.
     pub fn syntax_error(&self, error: &toml::de::Error) -> CaseError {
-        let problem = Problem::Syntax { message: error.message().to_owned() };
-        let place = self.place(error.span().unwrap_or(0..0));
+        let span = error.span().unwrap_or(0..0);
+        let (problem, span) = match self.unseen(&span) {
+            Some(found) => found,
+            None => (Problem::Syntax { message: error.message().to_owned() }, span),
+        };
+        let place = self.place(span);
         self.invalid(vec![CaseIssue { place, key: Key::default(), value: None, problem }], 0)
+    }
+
+    /// A character that is not seen in the first line of `span`, where it begins or behind that.
+    fn unseen(&self, span: &Range<usize>) -> Option<(Problem, Range<usize>)> {
+        let start = self.floor_boundary(span.start);
+        let line_start = self.text[..start].rfind('\n').map_or(0, |end| end + 1);
+        let line = self.text[start..].split('\n').next().unwrap_or_default().trim_end_matches('\r');
+        let (at, character) = line.char_indices().find(|&(_, c)| is_unseen(c) && c != '\t')?;
+        let at = start + at;
+        let (line, is_first) = (self.text[..at].matches('\n').count() + 1, at == line_start);
+        Some((Problem::Unseen { line, is_first, character }, at..at + character.len_utf8()))
     }
 
     /// That a number has more digits than can be read; there is no other such error in what is TOML.
@@ -39,7 +56,12 @@ impl Source<'_> {
     }
 
     /// All that was found, in the order of the text; what an override brings about comes first.
-    pub fn errors(&self, tree: &DeTable<'_>, findings: Findings, overrides: &[Override]) -> CaseError {
+    pub fn errors(
+        &self,
+        tree: &DeTable<'_>,
+        (findings, particles): (Findings, Option<&ParticleList>),
+        overrides: &[Override],
+    ) -> CaseError {
         let (list, more) = findings.into_parts();
         let locate = |violation: Violation| match overrides
             .iter()
@@ -47,10 +69,13 @@ impl Source<'_> {
             .rfind(|(_, set)| set.concerns(&violation.key))
         {
             Some((index, set)) => (index, set.issue(violation.key, violation.problem)),
-            None => {
-                let (start, issue) = self.issue(tree, violation);
-                (overrides.len() + start, issue)
-            }
+            None => match particles.and_then(|list| list.issue(&violation)) {
+                Some((line, issue)) => (overrides.len() + self.text.len() + line, issue),
+                None => {
+                    let (start, issue) = self.issue(tree, violation);
+                    (overrides.len() + start, issue)
+                }
+            },
         };
         let mut issues: Vec<(usize, CaseIssue)> = list.into_iter().map(locate).collect();
         issues.sort_by_key(|(order, _)| *order);
@@ -99,7 +124,7 @@ impl Source<'_> {
     /// The value as written, on one line and not too long.
     fn excerpt(&self, span: &Range<usize>) -> String {
         let words: Vec<&str> = self.text.get(span.clone()).unwrap_or("").split_whitespace().collect();
-        let line = words.join(" ");
+        let line = visible(&words.join(" "));
         match line.char_indices().nth(60) {
             Some((end, _)) => format!("{} ...", &line[..end]),
             None => line,

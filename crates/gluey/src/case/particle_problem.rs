@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use gluey_suspension::packing::PackingError;
 use thiserror::Error;
 
+use crate::text::{NotText, visible};
+
 /// Why particles could not be generated or read.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ParticleProblem {
@@ -42,6 +44,8 @@ pub enum ParticleProblem {
         path: PathBuf,
         /// Why.
         reason: String,
+        /// Whether it is there, but no text.
+        is_not_text: bool,
     },
     /// Something in the file of particles is wrong.
     #[error("{}:{line}: {}", path.display(), found_or_nothing(found))]
@@ -69,6 +73,7 @@ impl ParticleProblem {
             Self::RadiiKey { key, is_missing: true, .. } => format!("add `{key}`"),
             Self::RadiiKey { key, .. } => format!("leave out `{key}`"),
             Self::Packing(error) => packing_hint(error).into(),
+            Self::Unreadable { is_not_text: true, .. } => NotText::HINT.into(),
             Self::Unreadable { .. } => {
                 "name a text file with the columns x,y[,z],radius; its path begins in the folder of the case file".into()
             }
@@ -79,7 +84,7 @@ impl ParticleProblem {
 }
 
 fn found_or_nothing(found: &str) -> String {
-    if found.is_empty() { "nothing is there".to_owned() } else { format!("found `{found}`") }
+    if found.is_empty() { "nothing is there".to_owned() } else { format!("found `{}`", visible(found)) }
 }
 
 fn packing_hint(error: &PackingError) -> &'static str {

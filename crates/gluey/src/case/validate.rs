@@ -321,9 +321,20 @@ fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
     else {
         return;
     };
+    let cells = f64::from(1u32 << finest) / root_size;
+    let radii = case.particles.iter().map(|particle| particle.radius).enumerate();
+    let small: Vec<(usize, f64)> = radii.filter(|(_, radius)| radius * cells < 1.0).collect();
+    if !small.is_empty() {
+        let least = (1.0 + 1e-3) / cells;
+        let key = Key::default().name("particles");
+        return small.into_iter().for_each(|(index, radius)| {
+            let problem = Problem::TooSmall { particle: index + 1, radius, least };
+            findings.add(key.index(index).name("radius"), problem);
+        });
+    }
     if level > f64::from(finest) {
         let (radius, cells_per_radius) = (case.smallest_radius(), case.cells_per_radius());
-        let largest = radius / root_size * f64::from(1u32 << finest);
+        let largest = radius * cells;
         let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest, largest };
         return findings.add(key.name("cells_per_radius"), problem);
     }

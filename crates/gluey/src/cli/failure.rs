@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gluey::{CaseError, RunError};
+use gluey::{CaseError, NotText, RunError};
 
 use crate::diagnostic::Diagnosed;
 
@@ -28,6 +28,7 @@ impl Failure {
     /// A failure to show the results in `folder`, which may be none.
     pub fn of_results(error: impl std::error::Error + Send + Sync + 'static, folder: &Path) -> Self {
         let hint = match (folder.is_dir(), folder.join("sweep.csv").exists()) {
+            _ if NotText::is_in(&error) => Some(NotText::HINT),
             (false, _) => Some("give the folder that a run wrote to, the DIR of its --out"),
             (true, true) => Some("this is the folder of a study: give that of one of its points"),
             (true, false) => None,

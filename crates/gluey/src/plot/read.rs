@@ -163,7 +163,7 @@ fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
 }
 
 fn text(path: &Path) -> Result<String, PlotError> {
-    std::fs::read_to_string(path).map_err(|source| PlotError::Read { path: path.to_owned(), source })
+    crate::text::read(path).map_err(|source| PlotError::Read { path: path.to_owned(), source })
 }
 
 fn read(path: PathBuf) -> Result<Source, PlotError> {

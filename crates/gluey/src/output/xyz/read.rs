@@ -9,6 +9,7 @@ use gluey_suspension::Container;
 use thiserror::Error;
 
 use super::{PROPERTIES, WITH_FORCES, XyzFrame};
+use crate::text::{decoded, visible};
 
 /// Numbers in the line of a particle, without and with the force of its contacts.
 const NUMBER_COUNT: usize = 10;
@@ -26,7 +27,7 @@ pub enum XyzError {
         source: io::Error,
     },
     /// It is not what `gluey run --xyz` writes.
-    #[error("{}:{line}: found `{found}`, expected {wanted}", path.display())]
+    #[error("{}:{line}: found `{}`, expected {wanted}", path.display(), visible(found))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -43,12 +44,12 @@ pub enum XyzError {
 pub fn read_text(path: &Path) -> Result<String, XyzError> {
     let read = || {
         let bytes = std::fs::read(path)?;
-        let mut text = String::new();
+        let mut unpacked = Vec::new();
         match path.extension().is_some_and(|extension| extension == "gz") {
-            true => GzDecoder::new(&*bytes).read_to_string(&mut text)?,
-            false => (&*bytes).read_to_string(&mut text)?,
-        };
-        Ok(text)
+            true => GzDecoder::new(&*bytes).read_to_end(&mut unpacked).map(drop)?,
+            false => unpacked = bytes,
+        }
+        decoded(unpacked)
     };
     read().map_err(|source| XyzError::Read { path: path.to_owned(), source })
 }
