@@ -28,6 +28,7 @@ mod forces;
 mod form;
 mod given;
 mod given_stress;
+mod idle;
 mod keys;
 mod load;
 mod locate;
@@ -50,6 +51,7 @@ pub use error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem}
 pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec, RigidDofsSpec};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
+pub use idle::IdleKey;
 pub use keys::CaseKey;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{
@@ -149,15 +151,18 @@ pub struct Case {
     /// Flow.
     #[serde(default)]
     pub flow: FlowSpec,
-    /// Rheology, in a box that is sheared for ever.
-    #[serde(default)]
-    pub rheology: RheologySpec,
+    /// Rheology, in a box that is sheared for ever, whose particles are free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rheology: Option<RheologySpec>,
     /// Streams of frames to write, for ParaView, OVITO and others.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub output: Vec<OutputSpec>,
     /// Seed of the particles that were generated; no key of a case file.
     #[serde(skip)]
     pub seed: Option<u64>,
+    /// Keys that did nothing for the particles that were generated; no key of a case file.
+    #[serde(skip)]
+    pub idle_in_suspension: Vec<IdleKey>,
 }
 
 /// Rheology.
@@ -263,6 +268,11 @@ impl Case {
     /// are free. What acts on others from outside is no stress of the suspension.
     pub fn has_rheology(&self) -> bool {
         self.is_sheared() && self.shear_rate != 0.0 && !self.gives_motions()
+    }
+
+    /// Steps from one at which the stress is computed to the next.
+    pub fn stress_every(&self) -> usize {
+        self.rheology.clone().unwrap_or_default().every
     }
 
     /// Surroundings of the particles: walls below and above (y), which move along themselves, and the

@@ -2,7 +2,11 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
+use crate::case::{Case, IdleKey};
 use crate::output::solver_log::SolverRow;
 
 /// Where a run is.
@@ -58,6 +62,13 @@ pub trait Progress: Sync {
 /// Something a run came upon that is no error but should be known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
+    /// Keys of the case are set and do nothing.
+    NoEffect {
+        /// The keys, with their tables.
+        keys: Vec<String>,
+        /// What makes them idle, as a case says it.
+        why: String,
+    },
     /// Earlier runs left rows of results that they did not complete.
     EarlierDrafts {
         /// The files; they are left as they are.
@@ -92,16 +103,49 @@ pub enum Notice {
     },
 }
 
+impl Notice {
+    /// Keys of a case that do nothing, those together that are idle for the same reason.
+    pub fn of_idle_keys(case: &Case) -> Vec<Self> {
+        let mut notices: Vec<Self> = Vec::new();
+        for IdleKey { key, why } in case.idle_keys() {
+            match notices.last_mut() {
+                Some(Self::NoEffect { keys, why: last }) if *last == why => keys.push(key),
+                _ => notices.push(Self::NoEffect { keys: vec![key], why }),
+            }
+        }
+        notices
+    }
+}
+
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::EarlierDrafts { drafts } => {
-                write!(f, "left by earlier runs, and kept as they are:")?;
+            Self::NoEffect { keys, why } => write!(f, "without effect: {} ({why})", keys.join(", ")),
+            Self::EarlierDrafts { drafts, folder } => {
+                write!(
+                    f,
+                    "rows of earlier runs that did not come to their end stay as they are, beside those of this run:"
+                )?;
                 drafts.iter().try_for_each(|draft| write!(f, " {}", draft.display()))?;
-                write!(f, " (`gluey resume` goes on with the one that the checkpoint belongs to)")
+                match folder {
+                    Some(folder) => {
+                        write!(
+                            f,
+                            "; to go on with them instead, stop this run and take gluey resume {}",
+                            folder.display()
+                        )?;
+                    }
+                    None => write!(f, "; there is no checkpoint to go on with them")?,
+                }
+                write!(f, "; --force takes them away")
             }
             Self::CheckpointSetAside { from, to } => {
-                write!(f, "{}: the checkpoint of an earlier run is now {}", from.display(), to.display())
+                write!(
+                    f,
+                    "{}: the checkpoint of an earlier run is now {1}; to go on with that run: gluey run CASE --resume {1}",
+                    from.display(),
+                    to.display()
+                )
             }
             Self::NotLocked { lock } => write!(
                 f,

@@ -85,6 +85,9 @@ fn logged(
     work: impl FnOnce(&Log<'_>) -> Result<RunReport, RunError>,
 ) -> Result<RunReport, RunError> {
     let log = Log::begin(case, options, progress)?;
+    if options.resume.is_none() {
+        Notice::of_idle_keys(case).iter().for_each(|notice| log.notice(notice));
+    }
     let outcome = work(&log);
     log.end(&outcome);
     outcome
@@ -467,7 +470,7 @@ where
     let simulation = simulation.sheared(Sliding {
         rate: case.shear_rate,
         height: case.upper()[1] - case.lower()[1],
-        stress_every: case.rheology.every,
+        stress_every: case.stress_every(),
     });
     if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
 }

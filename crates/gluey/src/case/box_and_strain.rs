@@ -38,7 +38,7 @@ impl Case {
     }
 
     /// Steps of the first so many in which the shear is reversed.
-    fn reversed_steps(&self, steps: usize) -> usize {
+    pub(super) fn reversed_steps(&self, steps: usize) -> usize {
         if let Some(cycle) = self.cycle_length() {
             let (half, rest) = (cycle / 2, steps % cycle);
             return steps / cycle * half + rest.saturating_sub(half / 2).min(half);

@@ -8,6 +8,7 @@ use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
 use super::error::{Key, Problem};
 use super::findings::{Findings, Violation};
+use super::idle::idle_in_suspension;
 use super::particle_problem::ParticleProblem;
 use super::particles_file::ParticleList;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
@@ -64,11 +65,11 @@ fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) -> Opt
         }
     }
     if let Some(suspension) = &case.suspension {
-        let seed = suspension.seed;
+        let (seed, idle) = (suspension.seed, idle_in_suspension(suspension));
         match generate(case, suspension, &Key::default().name("suspension")) {
             Ok(particles) => {
                 (case.particles, case.suspension) = (particles, None);
-                case.seed = Some(seed);
+                (case.seed, case.idle_in_suspension) = (Some(seed), idle);
             }
             Err(Violation { key, problem }) => findings.add(key, problem),
         }

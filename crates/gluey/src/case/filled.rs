@@ -9,6 +9,7 @@ impl Case {
         let mut case = self.clone();
         case.domain.lower = Some(self.lower());
         case.domain.upper = Some(self.upper());
+        case.rheology = self.has_rheology().then(|| self.rheology.clone().unwrap_or_default());
         case.flow.lubrication = Some(self.lubrication());
         case.flow.mesh.cells_per_radius = Some(self.cells_per_radius());
         case.flow.rigid_dofs.offset = Some(self.rigid_offset());

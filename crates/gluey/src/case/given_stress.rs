@@ -1,4 +1,4 @@
-//! What goes with a shear stress that is given instead of a shear rate.
+//! What goes with a shear stress: one that is given instead of a shear rate, and the one that is written.
 
 use super::error::{Key, Problem};
 use super::findings::Findings;
@@ -19,6 +19,30 @@ pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut Finding
     if !case.is_sheared() {
         let needs = format!("domain.boundary = \"{}\"", Boundary::Sheared);
         unfit(&needs, format!("\"{}\"", case.domain.boundary));
+    }
+}
+
+/// Notes a table of the rheology in a box that has none.
+pub(super) fn check_rheology(case: &Case, key: Key, findings: &mut Findings) {
+    if case.rheology.is_none() {
+        return;
+    }
+    let (needs, found) = match (case.is_sheared(), case.shear_rate == 0.0) {
+        (false, _) => {
+            (format!("domain.boundary = \"{}\"", Boundary::Sheared), format!("\"{}\"", case.domain.boundary))
+        }
+        (true, true) => ("a shear rate that is not 0".to_owned(), "shear_rate = 0".to_owned()),
+        (true, false) => return,
+    };
+    findings.add(key, Problem::Unfit { choice: "`[rheology]`".to_owned(), needs, found });
+}
+
+/// Notes the same where what holds or drives particles makes the stress none of the suspension.
+pub(super) fn check_stress_of_free(case: &Case, key: Key, findings: &mut Findings) {
+    if case.rheology.is_some() && case.gives_motions() {
+        let (choice, needs) = ("`[rheology]`".to_owned(), "free particles".to_owned());
+        let found = "a particle that is held or driven".to_owned();
+        findings.add(key, Problem::Unfit { choice, needs, found });
     }
 }
 

@@ -4,7 +4,7 @@ use super::comparable::{Mismatch, mismatch};
 use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::given::{check_force_density, check_motion};
-use super::given_stress::{check_shear_stress, check_stress_alone};
+use super::given_stress::{check_rheology, check_shear_stress, check_stress_alone, check_stress_of_free};
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
 use super::neighbours::{Neighbours, nearer_than};
 use super::particle_problem::ParticleProblem;
@@ -21,6 +21,9 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     check_name(&case.name, root.name("name"), findings);
     if findings.are_good(&["flow"]) {
         check_force(&case.gravity, case, &root.name("gravity"), findings);
+        if case.repulsion.force > 0.0 {
+            check_answered(case, &root.name("repulsion").name("force"), findings);
+        }
         if let Some(force) = &case.body_force {
             check_coordinates(force, case.dimension, root.name("body_force"), findings);
         }
@@ -33,6 +36,7 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     }
     if findings.are_good(&["domain", "flow", "shear_rate", "shear_stress"]) {
         check_shear_stress(case, &root, findings);
+        check_rheology(case, root.name("rheology"), findings);
     }
     if findings.are_good(&["time"]) {
         check_time(case, &root.name("time"), findings);
@@ -50,6 +54,7 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
     }
     if findings.are_good(&fill::NEEDED) {
         check_stress_alone(case, &root, findings);
+        check_stress_of_free(case, root.name("rheology"), findings);
     }
     if findings.are_good(&fill::NEEDED) && findings.are_good(&["body_force"]) {
         check_force_density(case, &root.name("body_force"), findings);

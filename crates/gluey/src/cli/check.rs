@@ -9,6 +9,7 @@ use clap::Args;
 use gluey::case::Override;
 use gluey::flow::MeshSize;
 use gluey::memory::size;
+use gluey::output::solver_log::SolverRow;
 use gluey::progress::duration;
 use gluey::{Case, CaseSummary, Notice, Progress, ProgressState, RunError, RunOptions, memory};
 use serde::Serialize;
@@ -93,6 +94,9 @@ impl CheckArguments {
         let case = Case::load_with(&self.case, &self.set)?;
         let refused = |error: RunError| Failure::of_run(error, &self.case);
         memory::check_within(&case, self.manner.memory_limit()).map_err(|error| refused(error.into()))?;
+        let reporter = self.manner.reporter(&case.name);
+        Notice::of_idle_keys(&case).iter().for_each(|notice| reporter.notice(notice));
+        reporter.finish();
         let size = MeshSize::of(&case).map_err(|error| refused(RunError::Flow(error.into())))?;
         let available = memory::available();
         let trial = (!self.no_trial).then(|| self.trial(&case)).transpose()?;
@@ -117,7 +121,7 @@ impl CheckArguments {
         let mut short = case.clone();
         short.time.end = case.time.step * steps as f64;
         (short.time.reverse_at, short.time.strain_amplitude, short.reference) = (None, None, None);
-        let reporter = Reporter::new("trial steps", self.manner.is_quiet());
+        let reporter = self.manner.reporter("trial steps");
         let clock = Clock { reporter, times: Mutex::default() };
         let options = RunOptions::csv(folder.path().join("trial.csv"));
         let outcome = gluey::run(&short, &options, &clock);
@@ -166,8 +170,15 @@ impl Progress for Clock {
         self.reporter.report(state);
     }
 
+    fn step(&self, row: &SolverRow<'_>) {
+        self.reporter.step(row);
+    }
+
     fn notice(&self, notice: &Notice) {
-        self.reporter.notice(notice);
+        // That of the whole case is told; the trial is of a part of it.
+        if !matches!(notice, Notice::NoEffect { .. }) {
+            self.reporter.notice(notice);
+        }
     }
 }
 

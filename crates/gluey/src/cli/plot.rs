@@ -14,6 +14,7 @@ use crate::terminal;
 /// Arguments of `gluey plot`.
 #[derive(Clone, Debug, Args)]
 #[command(
+    group = clap::ArgGroup::new("frames").multiple(true),
     after_help = "Example:\n  gluey run suspension.toml --out out --xyz 5\n  gluey plot out --width 85\n  gluey plot out --animation\n  gluey run suspension.toml --out out --vtk 5 --xyz 5\n  gluey plot out --flow speed\n  gluey analyse out && gluey plot out"
 )]
 pub struct PlotArguments {
@@ -25,7 +26,7 @@ pub struct PlotArguments {
     only: Vec<Figure>,
     /// Draw the particles of a frame that was written with --xyz (its flow with --flow): last, or the number
     /// of a step.
-    #[arg(long, value_name = "STEP")]
+    #[arg(long, value_name = "STEP", group = "frames")]
     frame: Option<FrameChoice>,
     /// Draw the flow of a frame that was written with --vtk, the last unless --frame names one: speed,
     /// pressure, strain-rate, vorticity.
@@ -35,16 +36,22 @@ pub struct PlotArguments {
     #[arg(long, value_name = "AXIS=PLACE", requires = "flow")]
     slice: Option<SliceChoice>,
     /// From where spheres are seen, in degrees: around the vertical from the front to the right, and above.
-    #[arg(long, value_name = "AZIMUTH,ELEVATION", default_value = "31.5,20", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION",
+        default_value = "31.5,20",
+        allow_hyphen_values = true,
+        requires = "frames"
+    )]
     view: Viewpoint,
     /// Colours of particles in frames and animations: speed, spin, gap (the smallest), or contact-force.
-    #[arg(long, value_name = "WHAT", default_value = "speed")]
+    #[arg(long, value_name = "WHAT", default_value = "speed", requires = "frames")]
     colour: Coloring,
     /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.
-    #[arg(long, value_name = "GAP", value_parser = reach, allow_negative_numbers = true)]
+    #[arg(long, value_name = "GAP", value_parser = reach, allow_negative_numbers = true, requires = "frames")]
     contacts: Option<f64>,
     /// Animate the particles of all frames that were written with --xyz, as a GIF.
-    #[arg(long)]
+    #[arg(long, group = "frames")]
     animation: bool,
     /// Pixels across of an animation.
     #[arg(long, value_name = "N", default_value_t = 720, requires = "animation")]
