@@ -1,7 +1,8 @@
 //! Runs that are killed, told to stop or started twice lose no row that was written.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
+mod stopped;
+
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -9,6 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use stopped::{DISCS, numbers, results, rows, same_results};
 use tempfile::TempDir;
 
 const STEM: &str = "out/pair-3d-mobility-gluey";
@@ -129,32 +131,8 @@ fn a_failing_start_leaves_the_rows_of_a_killed_run() {
     fresh.kill().expect("killed");
     let output = fresh.wait_with_output().expect("it ends");
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(stderr.contains("left by earlier runs") && stderr.contains(".csv.partial-1"), "{stderr}");
+    assert!(stderr.contains("rows of earlier runs") && stderr.contains(".csv.partial-1"), "{stderr}");
     assert!(fs::read(&draft).expect("rows") == rows, "rows were lost");
-}
-
-/// Whole lines of all files of rows in a folder.
-fn rows(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let entries = fs::read_dir(folder.join("out")).into_iter().flatten();
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    let is_of_rows = |path: &PathBuf| {
-        let name = path.to_string_lossy();
-        name.contains(".csv") && !name.ends_with(".lock")
-    };
-    let whole = |path: PathBuf| {
-        let mut bytes = fs::read(&path).expect("rows");
-        bytes.truncate(bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |place| place + 1));
-        (path, bytes)
-    };
-    paths.filter(is_of_rows).map(whole).collect()
-}
-
-/// Numbers below `most`, in no order.
-fn numbers(mut state: u64) -> impl FnMut(u64) -> u64 {
-    move |most| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) % most
-    }
 }
 
 /// `kill -9` at twenty moments, each followed by another start, anew or from the last checkpoint.
@@ -166,7 +144,7 @@ fn no_row_is_lost_to_twenty_kills() {
     let mut next = numbers(7);
     let mut resumed = 0;
     for _ in 0..20 {
-        let before = rows(folder);
+        let before = rows(&folder.join("out"));
         let resume = folder.join(&checkpoint).exists() && next(3) > 0;
         let arguments = ["--checkpoint-every", "1000", "--resume", &checkpoint];
         let mut command = gluey(folder, &arguments[..if resume { 4 } else { 2 }]);
@@ -175,7 +153,7 @@ fn no_row_is_lost_to_twenty_kills() {
         run.kill().expect("killed");
         run.wait().expect("it ends");
         resumed += usize::from(resume);
-        let after = rows(folder);
+        let after = rows(&folder.join("out"));
         for (path, lines) in &before {
             let complete = path.with_extension("");
             let kept = [path, &complete].into_iter().filter_map(|path| after.get(path));
@@ -195,40 +173,6 @@ fn no_row_is_lost_to_twenty_kills() {
         fs::read(folder.join(folder_name).join("pair-3d-mobility-gluey.csv")).expect("a trajectory")
     };
     assert!(read("out") == read("whole"), "the run that was killed ends otherwise");
-}
-
-/// The file, or where it tells of what steps cost the columns that are the same on every run.
-fn without_seconds(path: &Path) -> Vec<u8> {
-    let bytes = fs::read(path).expect("a file");
-    if !path.to_string_lossy().ends_with("-solver.csv") {
-        return bytes;
-    }
-    let text = String::from_utf8(bytes).expect("text");
-    let kept = text.lines().next().expect("a header").split(',').filter(|name| !name.ends_with("_s")).count();
-    let lines = text.lines().map(|line| line.split(',').take(kept).collect::<Vec<_>>().join(","));
-    lines.collect::<Vec<_>>().join("\n").into_bytes()
-}
-
-/// All results of a run, by name, but those that tell of times and what a kill cut short.
-fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let is_left_out = |path: &Path| {
-        let name = path.to_string_lossy();
-        let parts = ["-run.json", ".log", ".checkpoint", ".lock", ".partial-"];
-        parts.iter().any(|part| name.contains(part))
-    };
-    let mut folders = vec![PathBuf::new()];
-    let mut found = BTreeMap::new();
-    while let Some(inside) = folders.pop() {
-        for entry in fs::read_dir(folder.join(&inside)).expect("a folder") {
-            let path = inside.join(entry.expect("an entry").file_name());
-            match folder.join(&path) {
-                full if full.is_dir() => folders.push(path),
-                _ if is_left_out(&path) => {}
-                full => drop(found.insert(path, without_seconds(&full))),
-            }
-        }
-    }
-    found
 }
 
 /// With the options of the run: frames for ParaView and in extended XYZ are those of a run without a stop.
@@ -271,13 +215,6 @@ fn a_killed_run_is_resumed_by_its_folder() {
 fn kill_count() -> usize {
     std::env::var("GLUEY_KILLS").map_or(6, |text| text.parse().expect("GLUEY_KILLS is a whole number"))
 }
-
-/// The case of `a_killed_run_ends_as_one_that_was_not`: twelve discs, which list near pairs and have a
-/// rheology.
-const DISCS: &str = "name = \"discs\"\ndimension = 2\ndomain = { boundary = \"sheared\" }\n\
-    suspension = { volume_fraction = 0.2, count = 12, seed = 3, min_gap = 0.05 }\n\
-    contact = { strategy = \"gluey\" }\ntime = { step = 0.05, end = 2.0 }\n\
-    [flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 2.0\ncoarsest_level = 2\n";
 
 /// Killed again and again, with a checkpoint and frames at every step, so that these are often cut short.
 /// Trajectory, gaps, rheology, cost of the steps (but for the seconds) and frames are those of a run that
@@ -322,20 +259,5 @@ fn a_killed_run_ends_as_one_that_was_not() {
         let last = command(&["resume", "out"]).output().expect("it runs");
         assert!(last.status.success(), "{}", String::from_utf8_lossy(&last.stderr));
         same_results(&out, &folder.join("whole"));
-    }
-}
-
-/// The same files with the same bytes, and no half file but for rows of starts before the first checkpoint.
-fn same_results(killed: &Path, whole: &Path) {
-    let (killed_files, whole_files) = (results(killed), results(whole));
-    assert_eq!(killed_files.keys().collect::<Vec<_>>(), whole_files.keys().collect::<Vec<_>>());
-    for (path, bytes) in &whole_files {
-        assert!(killed_files[path] == *bytes, "{} differs", path.display());
-    }
-    for kind in ["", "discs-gluey-unfitted-vtk", "discs-gluey-unfitted-xyz"] {
-        for entry in fs::read_dir(killed.join(kind)).expect("a folder") {
-            let name = entry.expect("an entry").file_name().into_string().expect("text");
-            assert!(!name.contains(".partial-") || name.contains(".csv.partial-"), "{name} is left");
-        }
     }
 }

@@ -58,8 +58,8 @@ pub use report::RunReport;
 #[cfg(feature = "ranks")]
 pub use run::run_shared;
 pub use run::{
-    FolderError, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions, ResultPaths,
-    ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
+    Ended, FolderError, LastSteps, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions,
+    ResultPaths, ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
 pub use shown::shown;

@@ -88,6 +88,17 @@ pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
     list().map_err(|error| OutputError::new(folder_of(path), "list the folder", error))
 }
 
+/// Makes sure that all drafts of these files outlive a power failure.
+pub(crate) fn sync_drafts(paths: &[PathBuf]) -> Result<(), OutputError> {
+    for path in paths {
+        for draft in drafts(path)? {
+            let synced = File::options().write(true).open(&draft).and_then(|file| file.sync_data());
+            synced.map_err(|error| OutputError::new(&draft, "write the file", error))?;
+        }
+    }
+    Ok(())
+}
+
 /// Where the rows of `path` are: in the complete file or, where there is none, in the last draft of it.
 pub(crate) fn rows_of(path: &Path) -> Option<PathBuf> {
     if path.exists() {

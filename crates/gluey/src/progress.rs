@@ -73,6 +73,8 @@ pub enum Notice {
     EarlierDrafts {
         /// The files; they are left as they are.
         drafts: Vec<PathBuf>,
+        /// The folder that a run could go on from, where a checkpoint of theirs is there.
+        folder: Option<PathBuf>,
     },
     /// The checkpoint of an earlier run was renamed, for a run whose drafts are still there may want to go on
     /// from it.
@@ -162,6 +164,82 @@ impl fmt::Display for Notice {
     }
 }
 
+/// Says every so often where something is, in a thread of its own: also while it is busy with one thing for
+/// long and reports nothing.
+#[derive(Debug)]
+pub struct Ticker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    place: Mutex<Place>,
+    ended: Condvar,
+}
+
+/// What was reported last.
+#[derive(Debug, Default)]
+struct Place {
+    has_ended: bool,
+    is_known: bool,
+    numbers: (usize, usize, f64, f64, Option<f64>),
+    phase: String,
+}
+
+impl Ticker {
+    /// Calls `say` every `interval` with what was reported last. Where there is no thread to be had, it is
+    /// silent.
+    pub fn new(interval: Duration, say: impl Fn(&ProgressState<'_>) + Send + 'static) -> Self {
+        let shared = Arc::<Shared>::default();
+        let of_thread = shared.clone();
+        let thread = std::thread::Builder::new().name("ticker".to_owned());
+        let thread = thread.spawn(move || of_thread.tick(interval, say)).ok();
+        Self { shared, thread }
+    }
+
+    /// Takes note of where it is.
+    pub fn report(&self, state: &ProgressState<'_>) {
+        let mut place = self.shared.place();
+        place.is_known = true;
+        place.numbers = (state.step, state.steps, state.time, state.wall_s, state.left_s);
+        place.phase.clear();
+        place.phase.push_str(state.phase);
+    }
+}
+
+impl Shared {
+    fn place(&self) -> MutexGuard<'_, Place> {
+        self.place.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tick(&self, interval: Duration, say: impl Fn(&ProgressState<'_>)) {
+        let mut next = Instant::now() + interval;
+        let mut place = self.place();
+        while !place.has_ended {
+            let left = next.saturating_duration_since(Instant::now());
+            place = self.ended.wait_timeout(place, left).unwrap_or_else(PoisonError::into_inner).0;
+            if place.has_ended || Instant::now() < next {
+                continue;
+            }
+            next += interval;
+            let (step, steps, time, wall_s, left_s) = place.numbers;
+            if place.is_known {
+                say(&ProgressState { step, steps, time, phase: &place.phase, wall_s, left_s });
+            }
+        }
+    }
+}
+
+impl Drop for Ticker {
+    fn drop(&mut self) {
+        self.shared.place().has_ended = true;
+        self.shared.ended.notify_all();
+        // It says no more; how it ended does not matter.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
 /// Takes no note of anything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
@@ -173,6 +251,26 @@ impl Progress for Silent {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A flow that takes long is told of as such, not as what comes behind it.
+    #[test]
+    fn a_long_phase_is_told_while_it_lasts() {
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let list = told.clone();
+        let ticker = Ticker::new(Duration::from_millis(2), move |state| {
+            list.lock().expect("a list").push(state.phase.to_owned());
+        });
+        let state = ProgressState { step: 3, steps: 9, time: 0.3, phase: "flow", wall_s: 1.0, left_s: None };
+        ticker.report(&state);
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while told.lock().expect("a list").len() < 3 {
+            assert!(Instant::now() < deadline, "it is silent");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        drop(ticker);
+        let told = told.lock().expect("a list").clone();
+        assert!(told.iter().all(|phase| phase == "flow"), "{told:?}");
+    }
 
     #[test]
     fn times_are_given_in_units_one_can_wait_in() {

@@ -8,6 +8,8 @@ mod error;
 #[cfg(feature = "ranks")]
 mod flow_pieces;
 mod frames;
+mod last_step;
+mod last_steps;
 mod leftovers;
 mod log;
 mod occupied;
@@ -28,11 +30,13 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
 use gluey_geom::{Dim, Particle, Space, Vector};
 
 pub use error::RunError;
+pub use last_steps::{Ended, LastSteps};
 pub use occupied::OccupiedError;
 pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
 pub use paths::ResultPaths;
@@ -57,6 +61,8 @@ use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
 use contacts::Contacts;
 use frames::{Frames, Others, StreamOptions};
+use last_step::LastStep;
+use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
 use tables::{TableMarks, Tables};
@@ -142,12 +148,9 @@ where
     tables: Tables,
     solver: SolverLog,
     frames: Frames<'a, D>,
-    checkpoints: Option<CheckpointFile<'a>>,
-    recorder: Option<Recorder>,
-    /// Ranks that share the flow, 0 where it is not to be shared.
-    ranks: usize,
-    /// The run before the step that is being done, where checkpoints are written.
-    last_good: Option<Checkpoint<D>>,
+    last: Arc<Mutex<LastStep<D>>>,
+    /// The ranks that share the flow.
+    others: Option<&'a dyn Others>,
     started: Instant,
     saved: Instant,
     first_step: usize,
@@ -174,11 +177,14 @@ where
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
         drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
         let ranks = others.map_or(0, Others::rank_count);
-        let checkpoints = CheckpointFile::new(options, !drafts.is_empty(), others);
+        let file = CheckpointFile::new(options, !drafts.is_empty());
         let (csv, tables, solver) = match &options.resume {
             None => {
                 if !drafts.is_empty() {
-                    progress.notice(&Notice::EarlierDrafts { drafts });
+                    let has_checkpoint = options.checkpoint.as_ref().is_some_and(|file| file.exists());
+                    let folder =
+                        has_checkpoint.then(|| ResultPaths::of_csv(&options.csv).folder().to_owned());
+                    progress.notice(&Notice::EarlierDrafts { drafts, folder });
                 }
                 let csv = CsvWriter::create(&options.csv, case.particles.len())?;
                 (csv, Tables::create::<D>(case, &options.csv)?, SolverLog::create(&options.csv)?)
@@ -195,8 +201,22 @@ where
         };
         let first_step = simulation.step_index();
         let frames = Frames::create(case, options, first_step, others)?;
-        let recorder = Recorder::begin(case, options, first_step)?;
-        let (started, last_good) = (Instant::now(), None);
+        let saved = file.as_ref().filter(|file| file.is_own()).map(|_| first_step);
+        let last = Arc::new(Mutex::new(LastStep {
+            case: case.clone(),
+            paths: ResultPaths::of_csv(&options.csv),
+            file,
+            recorder: Recorder::begin(case, options, first_step, csv.path())?,
+            frames: frames.on_their_way(),
+            checkpoint: None,
+            saved,
+            is_ending: false,
+        }));
+        if let (Some(list), None) = (&options.last_steps, others) {
+            let last: Arc<dyn OfRun> = last.clone();
+            list.add(&last);
+        }
+        let started = Instant::now();
         Ok(Self {
             case,
             options,
@@ -207,10 +227,8 @@ where
             tables,
             solver,
             frames,
-            checkpoints,
-            recorder,
-            ranks,
-            last_good,
+            last,
+            others,
             started,
             saved: started,
             first_step,
@@ -221,11 +239,28 @@ where
     /// Runs to the end.
     fn finish(mut self) -> Result<RunReport, RunError> {
         let outcome = self.steps_or_panic().map_err(|error| self.keep_last_good(error));
-        let Some(recorder) = self.recorder.take() else { return outcome.and_then(|()| self.complete()) };
-        let done = self.last_good.as_ref().map(|checkpoint| checkpoint.state.step);
-        let step = done.unwrap_or(self.simulation.step_index());
+        if outcome.is_ok() {
+            self.keep_for_a_later_end();
+        }
+        // Until the record says how it ended, the run is there.
+        let _last = self.last.clone();
+        let (recorder, step) = {
+            let mut last = self.last();
+            last.is_ending = true;
+            (last.recorder.take(), last.step().unwrap_or(self.simulation.step_index()))
+        };
+        let Some(recorder) = recorder else { return outcome.and_then(|()| self.complete()) };
         let progress = self.progress;
         recorder.close(step, outcome.and_then(|()| self.complete()), progress)
+    }
+
+    /// Leaves a checkpoint of the last step, from which the run can go on to a later end. That there is no
+    /// room for one is no reason for a complete run to fail.
+    fn keep_for_a_later_end(&mut self) {
+        if let Err(error) = self.save() {
+            let (path, reason) = (error.path, error.source.to_string());
+            self.progress.notice(&Notice::NoCheckpoint { path, reason });
+        }
     }
 
     /// Gives all files their names.
@@ -356,33 +391,35 @@ where
     /// Keeps the run as it is between two steps: a step that fails has already changed what the next would
     /// start from.
     fn remember(&mut self) -> Result<(), RunError> {
-        if self.checkpoints.is_some() {
-            let TableMarks { rheology, forces } = self.tables.marks();
-            self.last_good = Some(Checkpoint {
-                state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
-                output: self.csv.marks(),
-                rheology,
-                forces,
-                solver: self.solver.mark(),
-                phases: self.simulation.phases().clone(),
-                wall_s: self.wall_s(),
-                ranks: self.ranks,
-                pieces: None,
-            });
+        if self.options.checkpoint.is_none() {
+            return Ok(());
         }
+        let TableMarks { rheology, forces } = self.tables.marks();
+        let checkpoint = Checkpoint {
+            state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
+            output: self.csv.marks(),
+            rheology,
+            forces,
+            solver: self.solver.mark(),
+            phases: self.simulation.phases().clone(),
+            wall_s: self.wall_s(),
+            ranks: self.others.map_or(0, Others::rank_count),
+            pieces: None,
+        };
+        self.last().checkpoint = Some(checkpoint);
         Ok(())
+    }
+
+    fn last(&self) -> MutexGuard<'_, LastStep<D>> {
+        locked(&self.last)
     }
 
     /// Writes what was remembered, after what it counts on.
     fn save(&mut self) -> Result<(), OutputError> {
-        let (Some(file), Some(checkpoint)) = (&mut self.checkpoints, &self.last_good) else { return Ok(()) };
-        self.csv.sync()?;
-        self.tables.sync()?;
-        self.solver.sync()?;
         self.frames.flush()?;
-        file.write(checkpoint, self.case, self.progress)?;
-        let step = checkpoint.state.step;
-        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.reached(step))
+        let notices = self.last().save(self.others)?;
+        notices.iter().for_each(|notice| self.progress.notice(notice));
+        Ok(())
     }
 
     /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good
@@ -392,7 +429,7 @@ where
             error,
             RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_) | RunError::Panicked { .. }
         );
-        let step = self.last_good.as_ref().map_or(0, |checkpoint| checkpoint.state.step);
+        let step = self.last().step().unwrap_or(0);
         let Some(path) = self.options.checkpoint.clone().filter(|_| is_curable && step > 0) else {
             return error;
         };

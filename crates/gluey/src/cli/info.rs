@@ -69,8 +69,12 @@ struct RunInfo {
     /// `running`, `complete`, `interrupted`, `failed`, or `killed`: it was running, and no process writes its
     /// results now.
     state: String,
-    /// Time at the last step recorded; absent where the case as run cannot be read.
+    /// Steps done: those that rows on disk tell of where the run is going on or was killed.
+    steps_done: usize,
+    /// Time after them; absent where the case as run cannot be read.
     time: Option<f64>,
+    /// The file of its rows, and how many whole ones are in it.
+    rows: Option<(PathBuf, usize)>,
     case: Option<CaseSummary>,
     record: RunRecord,
     checkpoints: Vec<CheckpointState>,
@@ -153,13 +157,20 @@ impl RunInfo {
         let record = RunRecord::read(&paths.record())?;
         let case = Case::load(paths.case_file()).ok();
         let files = [paths.checkpoint(), paths.previous_checkpoint()];
+        let rows = record.rows_on_disk(paths);
+        let steps_done = match (record.state, &rows) {
+            (RunState::Running, Some((_, count))) => record.steps_done.max(count.saturating_sub(1)),
+            _ => record.steps_done,
+        };
         Ok(Self {
             name: paths.stem(),
             state: match record.state {
                 RunState::Running if !paths.are_being_written() => "killed".into(),
                 state => state.to_string(),
             },
-            time: case.as_ref().map(|case| record.steps_done as f64 * case.time.step),
+            steps_done,
+            time: case.as_ref().map(|case| steps_done as f64 * case.time.step),
+            rows,
             case: case.as_ref().map(CaseSummary::of),
             record,
             checkpoints: files.into_iter().filter(|file| file.exists()).map(CheckpointState::of).collect(),
@@ -171,8 +182,10 @@ impl RunInfo {
         let time = self.time.map_or(String::new(), |time| format!(", t = {}", shown(time)));
         let mut lines = vec![
             ("run", self.name.clone()),
-            ("state", format!("{}, {} of {} steps done{time}", self.state, record.steps_done, record.steps)),
+            ("state", format!("{}, {} of {} steps done{time}", self.state, self.steps_done, record.steps)),
         ];
+        lines
+            .extend(self.rows.iter().map(|(file, count)| ("rows", format!("{count} in {}", file.display()))));
         lines.extend(record.error.iter().map(|error| ("error", error.clone())));
         let ended = record.ended.as_ref().map_or(String::new(), |ended| format!(", ended {ended}"));
         lines.push(("started", format!("{}{ended}, resumed {} times", record.started, record.resumed)));
@@ -186,6 +199,9 @@ impl RunInfo {
         ));
         lines.push(("written by", format!("gluey {}", record.gluey)));
         lines.extend(self.checkpoints.iter().map(|checkpoint| ("checkpoint", checkpoint.line())));
+        if self.checkpoints.is_empty() && record.state != RunState::Complete {
+            lines.push(("checkpoint", "none".to_owned()));
+        }
         // The record has the number of steps.
         lines.extend(self.case.iter().flat_map(CaseSummary::lines).filter(|(key, _)| *key != "run"));
         lines

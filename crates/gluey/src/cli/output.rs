@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use gluey::case::UnknownName;
 use gluey::output::vtk::{Precision, VtkEncoding};
 use gluey::{RecordOptions, ResultPaths, RunOptions, VtkOptions, XyzOptions};
+
+use super::interrupt::Requests;
 
 /// What a run writes beside its trajectory.
 #[derive(Debug, Args)]
@@ -17,11 +17,12 @@ pub struct OutputArguments {
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     vtk: Option<usize>,
     /// Compression of the files for ParaView, from 0 (none) over 1 (fast) to 9 (small).
-    #[arg(long, value_name = "LEVEL", default_value_t = 1)]
+    #[arg(long, value_name = "LEVEL", default_value_t = 1, requires = "vtk")]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=9))]
     vtk_compression: u32,
     /// Precision of the files for ParaView: f64 (as computed), f32 (half the size).
-    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double, value_parser = by_name::<Precision>)]
+    #[arg(long, value_name = "PRECISION", default_value_t = Precision::Double, requires = "vtk")]
+    #[arg(value_parser = by_name::<Precision>)]
     vtk_precision: Precision,
     /// Write particles in extended XYZ, which OVITO and ASE read, every N steps.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
@@ -45,9 +46,9 @@ impl OutputArguments {
         paths: &ResultPaths,
         force: bool,
         resume: Option<PathBuf>,
-        interrupt: Arc<AtomicBool>,
+        requests: &Requests,
     ) -> RunOptions {
-        RunOptions {
+        requests.heeded_by(RunOptions {
             csv: paths.csv(),
             vtk: self.vtk.map(|every| VtkOptions {
                 folder: paths.vtk(),
@@ -60,9 +61,8 @@ impl OutputArguments {
             checkpoint_minutes: self.checkpoint_minutes,
             record: Some(RecordOptions { force }),
             resume,
-            interrupt: Some(interrupt),
             ..RunOptions::default()
-        }
+        })
     }
 }
 

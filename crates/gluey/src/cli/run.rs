@@ -9,10 +9,10 @@ use gluey::{Case, Formulation, ResultPaths, RunOptions, Strategy};
 use gluey_parallel::Communicator;
 
 use super::failure::Failure;
-use super::interrupt::interrupt_flag;
+use super::interrupt::Requests;
 use super::manner::Manner;
 use super::output::{OutputArguments, by_name};
-use crate::terminal::print_report;
+use crate::terminal::{print_report, say};
 
 /// Arguments of `gluey run`.
 #[derive(Debug, Args)]
@@ -88,7 +88,7 @@ impl RunArguments {
         if let Some(rank) = unread.iter().position(|&failed| failed > 0) {
             return Err(Failure::new(UnreadElsewhere { rank }, None));
         }
-        let options = self.options(&case);
+        let options = self.options(&case, &Requests::listen_on_ranks());
         if let Some(report) = self.manner.run_on(ranks, &case, &options, &self.case)? {
             self.manner.tell(&report, |report| print_report(report, &options.csv));
         }
@@ -98,7 +98,7 @@ impl RunArguments {
     fn run_alone(&self) -> Result<(), Failure> {
         self.manner.set_threads()?;
         let case = self.case()?;
-        let options = self.options(&case);
+        let options = self.options(&case, &Requests::listen(&self.case));
         let report = self.manner.run(&case, &options, &self.case)?;
         self.manner.tell(&report, |report| print_report(report, &options.csv));
         Ok(())
@@ -114,8 +114,11 @@ impl RunArguments {
         Case::load_with(&self.case, &overrides)
     }
 
-    fn options(&self, case: &Case) -> RunOptions {
+    fn options(&self, case: &Case, requests: &Requests) -> RunOptions {
         let paths = ResultPaths::new(&self.out, case.file_stem());
-        self.output.options(&paths, self.force, self.resume.clone(), interrupt_flag())
+        if self.force && self.resume.is_some() {
+            say("without effect: --force (--resume goes on with what is there)");
+        }
+        self.output.options(&paths, self.force, self.resume.clone(), requests)
     }
 }

@@ -1,9 +1,8 @@
 //! `gluey sweep`: a study, one run for every combination of values of some keys.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use clap::Args;
@@ -13,7 +12,7 @@ use gluey::{RunError, RunOptions, RunReport};
 use thiserror::Error;
 
 use super::failure::{Failure, INTERRUPTED};
-use super::interrupt::interrupt_flag;
+use super::interrupt::Requests;
 use super::manner::Manner;
 use super::output::{OutputArguments, at_least_one};
 use crate::terminal::{print_table, say};
@@ -64,8 +63,8 @@ impl SweepArguments {
         let points = points(&self.case, &self.set, &self.out).map_err(refused)?;
         let study = Study::new(&self.out, self.set.iter().map(|axis| axis.key.clone()).collect());
         let states = study.open(&points, self.force).map_err(refused)?;
-        let interrupt = interrupt_flag();
-        let results = self.run_all(&points, &states, &interrupt);
+        let requests = Requests::listen_in_study();
+        let results = self.run_all(&points, &states, &requests);
         let rows = table(&self.set, &results);
         study.write_table(&rows).map_err(|error| refused(error.into()))?;
         self.manner.tell(&results, |_| print_table(&rows));
@@ -73,19 +72,14 @@ impl SweepArguments {
     }
 
     /// Runs points, the next whenever a job is free, and gives their results in their own order.
-    fn run_all(
-        &self,
-        points: &[Point],
-        states: &[PointState],
-        interrupt: &Arc<AtomicBool>,
-    ) -> Vec<PointResult> {
+    fn run_all(&self, points: &[Point], states: &[PointState], requests: &Requests) -> Vec<PointResult> {
         let next = AtomicUsize::new(0);
         let results: Vec<Mutex<Option<PointResult>>> = points.iter().map(|_| Mutex::new(None)).collect();
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some(point) = points.get(index) else { break };
-                let result = self.run_one(point, &states[index], interrupt);
+                let result = self.run_one(point, &states[index], requests);
                 self.tell(index, points.len(), &result);
                 if let Ok(mut place) = results[index].lock() {
                     *place = Some(result);
@@ -105,7 +99,7 @@ impl SweepArguments {
         taken.collect()
     }
 
-    fn run_one(&self, point: &Point, state: &PointState, interrupt: &Arc<AtomicBool>) -> PointResult {
+    fn run_one(&self, point: &Point, state: &PointState, requests: &Requests) -> PointResult {
         let resume = match state {
             PointState::Complete(report) => {
                 return PointResult {
@@ -116,13 +110,13 @@ impl SweepArguments {
             PointState::Interrupted(checkpoint) => Some(checkpoint.clone()),
             PointState::Fresh | PointState::OtherCase => None,
         };
-        if interrupt.load(Ordering::Relaxed) {
+        if requests.is_there() {
             return self.result(point, "not run", None);
         }
         let force = *state == PointState::OtherCase;
         let options = RunOptions {
             memory_limit: self.manner.memory_limit(),
-            ..self.output.options(&point.paths, force, resume, interrupt.clone())
+            ..self.output.options(&point.paths, force, resume, requests)
         };
         let reporter = match self.jobs {
             1 => self.manner.reporter(&point.name),

@@ -103,15 +103,14 @@ where
         Ok(smallest)
     }
 
+    /// The file of the rows until it is complete.
+    pub(crate) fn path(&self) -> &Path {
+        self.rows.path()
+    }
+
     /// How far the files have come.
     pub(crate) fn marks(&self) -> CsvMarks {
         CsvMarks { rows: self.rows.mark(), gaps: self.gaps.as_ref().map(Draft::mark) }
-    }
-
-    /// Makes sure that what the files hold outlives a power failure.
-    pub(crate) fn sync(&self) -> Result<(), OutputError> {
-        self.rows.sync()?;
-        self.gaps.as_ref().map_or(Ok(()), Draft::sync)
     }
 
     /// Gives the complete files their names.

@@ -203,15 +203,15 @@ impl Draft {
         }
     }
 
+    /// Where it is until it is complete.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// How far the file has come.
     pub fn mark(&self) -> Mark {
         let digest = *self.hasher.finalize().as_bytes();
         Mark { draft: self.number, bytes: self.bytes, lines: self.lines, digest, is_last: false }
-    }
-
-    /// Makes sure that what was written outlives a power failure.
-    pub fn sync(&self) -> Result<(), OutputError> {
-        self.file.sync_data().map_err(|error| OutputError::new(&self.path, "write the file", error))
     }
 
     /// Gives the complete file its name. Where an earlier run had come further than this one goes, its rows

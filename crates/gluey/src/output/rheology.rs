@@ -72,11 +72,6 @@ impl RheologyWriter {
         self.0.mark()
     }
 
-    /// Makes sure that what the file holds outlives a power failure.
-    pub(crate) fn sync(&self) -> Result<(), OutputError> {
-        self.0.sync()
-    }
-
     /// Gives the complete file its name.
     pub fn finish(self) -> Result<(), OutputError> {
         self.0.finish()

@@ -94,11 +94,6 @@ impl SolverLog {
         self.draft.mark()
     }
 
-    /// Makes sure that what the file holds outlives a power failure.
-    pub(crate) fn sync(&self) -> Result<(), OutputError> {
-        self.draft.sync()
-    }
-
     /// Gives the complete file its name.
     pub fn finish(self) -> Result<(), OutputError> {
         self.draft.finish()

@@ -30,7 +30,7 @@ use gluey_motion::Fields;
 use super::{OutputError, prepare_folder_of, pvd, remove_stale};
 
 pub use crate::case::Precision;
-pub(crate) use background::FrameWriter;
+pub(crate) use background::{FrameWriter, OnTheirWay};
 use grid::{FIELDS, fields_piece, in_space, scalars, vectors};
 pub use pieces::write_piece;
 pub use read::{VtkReadError, read_fields, read_particles};

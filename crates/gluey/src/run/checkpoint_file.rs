@@ -13,7 +13,7 @@ use super::paths::ResultPaths;
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
 use crate::output::{OutputError, set_aside};
-use crate::progress::{Notice, Progress};
+use crate::progress::Notice;
 
 /// Checkpoints that are there at a time.
 const GENERATIONS: usize = 2;
@@ -32,18 +32,17 @@ enum Found {
 }
 
 /// The checkpoint of a run, and the one before it.
-pub(super) struct CheckpointFile<'a> {
+#[derive(Debug)]
+pub(super) struct CheckpointFile {
     path: PathBuf,
     found: Found,
-    /// The ranks that share the flow.
-    others: Option<&'a dyn Others>,
     /// Pieces of the flow of the last checkpoint and of the one before.
     pieces: VecDeque<Option<FlowPieces>>,
 }
 
-impl<'a> CheckpointFile<'a> {
+impl CheckpointFile {
     /// Where `options` say; `has_drafts` tells whether earlier runs left rows.
-    pub fn new(options: &RunOptions, has_drafts: bool, others: Option<&'a dyn Others>) -> Option<Self> {
+    pub fn new(options: &RunOptions, has_drafts: bool) -> Option<Self> {
         let path = options.checkpoint.clone()?;
         let full = |path: &Path| path.canonicalize().ok();
         let resumes = |path: &Path| options.resume.as_deref().is_some_and(|file| full(file) == full(path));
@@ -59,27 +58,43 @@ impl<'a> CheckpointFile<'a> {
             Found::OwnPrevious => [pieces_of(&ResultPaths::previous(&path))].into(),
             _ => [pieces_of(&ResultPaths::previous(&path)), pieces_of(&path)].into(),
         };
-        Some(Self { path, found, others, pieces })
+        Some(Self { path, found, pieces })
     }
 
-    /// Writes a checkpoint. There is a whole one under one of the two names at every moment.
+    /// Whether what is there is the run's own, of the step that it goes on from.
+    pub fn is_own(&self) -> bool {
+        self.found == Found::Own
+    }
+
+    /// Whether what is there may be wanted by somebody else.
+    pub fn is_wanted(&self) -> bool {
+        self.found == Found::Wanted
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a checkpoint, with the flow of the ranks that share it, and gives what should be known of files
+    /// that were in its way. There is a whole one under one of the two names at every moment.
     pub fn write<const D: usize>(
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
-        progress: &dyn Progress,
-    ) -> Result<(), OutputError>
+        others: Option<&dyn Others>,
+    ) -> Result<Vec<Notice>, OutputError>
     where
         Dim<D>: Space<D>,
     {
-        let Some(others) = self.others else { return self.write_alone(checkpoint, case, progress) };
+        let Some(others) = others else { return self.write_alone(checkpoint, case) };
         let encode = |error| OutputError::new(&self.path, "encode the checkpoint", io::Error::other(error));
         let digest = blake3::hash(&postcard::to_stdvec(&checkpoint.state).map_err(encode)?);
         let name = digest.as_bytes()[..8].iter().fold(0, |name, &byte| name << 8 | u64::from(byte));
         let pieces = others.write_flow(&self.path, name)?;
-        self.write_alone(&Checkpoint { pieces: pieces.clone(), ..checkpoint.clone() }, case, progress)?;
+        let notices = self.write_alone(&Checkpoint { pieces: pieces.clone(), ..checkpoint.clone() }, case)?;
         self.pieces.push_back(pieces);
-        self.remove_old_pieces()
+        self.remove_old_pieces().map(|()| notices)
     }
 
     /// Removes pieces of checkpoints that are not there any more.
@@ -102,8 +117,7 @@ impl<'a> CheckpointFile<'a> {
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
-        progress: &dyn Progress,
-    ) -> Result<(), OutputError>
+    ) -> Result<Vec<Notice>, OutputError>
     where
         Dim<D>: Space<D>,
     {
@@ -121,12 +135,13 @@ impl<'a> CheckpointFile<'a> {
                 &[]
             }
         };
+        let mut notices = Vec::new();
         for from in away {
             if let Some(to) = set_aside(from)? {
-                progress.notice(&Notice::CheckpointSetAside { from: (*from).clone(), to });
+                notices.push(Notice::CheckpointSetAside { from: (*from).clone(), to });
             }
         }
-        checkpoint.write(case, &self.path)
+        checkpoint.write(case, &self.path).map(|()| notices)
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::last_steps::Ended;
 use super::occupied::OccupiedError;
 use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
@@ -100,6 +101,12 @@ pub enum RunError {
         #[source]
         cause: Box<RunError>,
     },
+}
+
+impl From<Ended> for RunError {
+    fn from(Ended { step, steps, time, checkpoint }: Ended) -> Self {
+        Self::Interrupted { step, steps, time, checkpoint }
+    }
 }
 
 impl From<ClaimError> for RunError {

@@ -13,7 +13,7 @@ use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
 use crate::checkpoint::FlowPieces;
 use crate::output::OutputError;
-use crate::output::vtk::{Frame, FrameWriter, ShownBox, VtkEncoding, VtkWriter};
+use crate::output::vtk::{Frame, FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::simulation::{Simulation, StepError};
 
@@ -93,6 +93,7 @@ where
 {
     streams: Vec<(Interval, Stream<D>)>,
     others: Option<&'a dyn Others>,
+    on_their_way: OnTheirWay,
 }
 
 enum Stream<const D: usize>
@@ -114,6 +115,7 @@ where
         step: usize,
         others: Option<&'a dyn Others>,
     ) -> Result<Self, OutputError> {
+        let on_their_way = OnTheirWay::default();
         let stream = |stream: StreamOptions| {
             let StreamOptions { folder, interval, format } = stream;
             let opened = match format {
@@ -124,13 +126,18 @@ where
                         Some(others) => writer.in_pieces(others.rank_count()),
                         None => writer,
                     };
-                    Stream::Vtk { writer: FrameWriter::new(writer)?, with_fields }
+                    Stream::Vtk { writer: FrameWriter::new(writer, on_their_way.clone())?, with_fields }
                 }
             };
             Ok((interval, opened))
         };
         let streams = StreamOptions::of_run(case, options).into_iter().map(stream);
-        Ok(Self { streams: streams.collect::<Result<_, _>>()?, others })
+        Ok(Self { streams: streams.collect::<Result<_, _>>()?, others, on_their_way })
+    }
+
+    /// The frames that are not on disk yet.
+    pub fn on_their_way(&self) -> OnTheirWay {
+        self.on_their_way.clone()
     }
 
     /// Writes what is due of the simulation as it is.

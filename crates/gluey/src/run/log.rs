@@ -4,10 +4,11 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::Path;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use super::error::RunError;
+use super::last_steps::locked;
 use super::options::RunOptions;
 use super::paths::ResultPaths;
 use super::record::{in_full, now};
@@ -15,7 +16,7 @@ use crate::case::Case;
 use crate::memory;
 use crate::output::OutputError;
 use crate::output::solver_log::SolverRow;
-use crate::progress::{Notice, Progress, ProgressState};
+use crate::progress::{Notice, Progress, ProgressState, Ticker};
 use crate::report::RunReport;
 
 /// Time between two lines about where a run is.
@@ -24,12 +25,13 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// Hands on what a run tells, and writes it down.
 pub(super) struct Log<'a> {
     listener: &'a dyn Progress,
-    file: Option<Mutex<Lines>>,
+    file: Option<Arc<Mutex<Lines>>>,
+    /// Writes where the run is.
+    ticker: Option<Ticker>,
 }
 
 struct Lines {
     file: File,
-    told: Instant,
 }
 
 impl Lines {
@@ -43,7 +45,7 @@ impl<'a> Log<'a> {
     /// Begins the log of a run that leaves a record, or goes on with that of the run that is resumed.
     pub fn begin(case: &Case, options: &RunOptions, listener: &'a dyn Progress) -> Result<Self, OutputError> {
         if options.record.is_none() {
-            return Ok(Self { listener, file: None });
+            return Ok(Self { listener, file: None, ticker: None });
         }
         let path = ResultPaths::of_csv(&options.csv).log();
         let mut open = OpenOptions::new();
@@ -52,9 +54,14 @@ impl<'a> Log<'a> {
             None => open.create(true).write(true).truncate(true).open(&path),
         };
         let file = opened.map_err(|error| OutputError::new(&path, "begin the log", error))?;
-        let mut lines = Lines { file, told: Instant::now() };
+        let mut lines = Lines { file };
         lines.add(&beginning(case, options.resume.as_deref()));
-        Ok(Self { listener, file: Some(Mutex::new(lines)) })
+        let lines = Arc::new(Mutex::new(lines));
+        let of_ticker = lines.clone();
+        let ticker = Ticker::new(INTERVAL, move |state| {
+            locked(&of_ticker).add(&format!("step {}/{}, {state}", state.step, state.steps));
+        });
+        Ok(Self { listener, file: Some(lines), ticker: Some(ticker) })
     }
 
     /// Writes what came out, and how the run ended.
@@ -70,8 +77,8 @@ impl<'a> Log<'a> {
     }
 
     fn add(&self, line: &str) {
-        if let Some(Ok(mut lines)) = self.file.as_ref().map(Mutex::lock) {
-            lines.add(line);
+        if let Some(lines) = &self.file {
+            locked(lines).add(line);
         }
     }
 }
@@ -79,10 +86,8 @@ impl<'a> Log<'a> {
 impl Progress for Log<'_> {
     fn report(&self, state: &ProgressState<'_>) {
         self.listener.report(state);
-        let Some(Ok(mut lines)) = self.file.as_ref().map(Mutex::lock) else { return };
-        if lines.told.elapsed() >= INTERVAL {
-            lines.told = Instant::now();
-            lines.add(&format!("step {}/{}, {state}", state.step, state.steps));
+        if let Some(ticker) = &self.ticker {
+            ticker.report(state);
         }
     }
 
@@ -93,6 +98,13 @@ impl Progress for Log<'_> {
     fn notice(&self, notice: &Notice) {
         self.listener.notice(notice);
         self.add(&notice.to_string());
+    }
+}
+
+/// Adds a line to the log of a run, where there is one.
+pub(super) fn note(paths: &ResultPaths, line: &str) {
+    if let Ok(file) = OpenOptions::new().append(true).open(paths.log()) {
+        Lines { file }.add(line);
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::last_steps::LastSteps;
 use crate::output::vtk::VtkEncoding;
 
 /// Output of a run, and its places.
@@ -29,6 +30,8 @@ pub struct RunOptions {
     pub resume: Option<PathBuf>,
     /// Set from outside to stop after the current step.
     pub interrupt: Option<Arc<AtomicBool>>,
+    /// Where the run keeps its last whole step for others to save.
+    pub last_steps: Option<LastSteps>,
     /// The most bytes that the case may be expected to take, beside what there is.
     pub memory_limit: Option<u64>,
 }

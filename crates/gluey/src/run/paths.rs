@@ -68,6 +68,13 @@ impl ResultPaths {
         self.with(".csv")
     }
 
+    /// All files of rows that a run may have, the trajectory first.
+    pub fn tables(&self) -> Vec<PathBuf> {
+        ["", "-gaps", "-rheology", "-forces", "-solver"]
+            .map(|table| self.with(&format!("{table}.csv")))
+            .to_vec()
+    }
+
     /// The case as it was run.
     pub fn case_file(&self) -> PathBuf {
         self.with("-case.toml")

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::options::{RunOptions, VtkOptions, XyzOptions};
+use super::paths::ResultPaths;
 use crate::output::{OutputError, write_atomically};
 use crate::report::RunReport;
 
@@ -45,8 +46,11 @@ pub struct RunRecord {
     pub error: Option<String>,
     /// Steps in all.
     pub steps: usize,
-    /// Steps done when this was written.
+    /// Steps done when this was written; [`RunRecord::rows_on_disk`] knows of more.
     pub steps_done: usize,
+    /// Name of the file that its rows are in until it is complete.
+    #[serde(default)]
+    pub rows: Option<String>,
     /// Output that was asked for.
     pub options: RecordedOptions,
     /// What came out, once the run is complete.
@@ -149,6 +153,7 @@ impl RunRecord {
             error: None,
             steps: 0,
             steps_done: 0,
+            rows: None,
             options: RecordedOptions::of(options),
             report: None,
         }
@@ -170,6 +175,16 @@ impl RunRecord {
             Some(found) if found != u64::from(LAYOUT) => Err(RecordError::Layout { path, found }),
             _ => serde_json::from_value(value).map_err(foreign),
         }
+    }
+
+    /// The file beside this record, of the run `paths`, that its rows are in now, and how many whole rows
+    /// that are: one for each step done, and one for the step that it is at, or was when it ended.
+    pub fn rows_on_disk(&self, paths: &ResultPaths) -> Option<(PathBuf, usize)> {
+        let draft = self.rows.as_ref().map(|name| paths.csv().with_file_name(name));
+        let file = draft.filter(|draft| draft.exists()).unwrap_or(paths.csv());
+        let text = fs::read(&file).ok()?;
+        let lines = text.iter().filter(|&&byte| byte == b'\n').count();
+        Some((file, lines.saturating_sub(1)))
     }
 
     /// Writes it, all or nothing.

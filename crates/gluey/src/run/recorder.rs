@@ -1,7 +1,7 @@
 //! Keeps the record of a run.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::error::RunError;
 use super::options::RunOptions;
@@ -13,15 +13,21 @@ use crate::progress::{Notice, Progress};
 use crate::report::RunReport;
 
 /// The record of a run in progress.
+#[derive(Debug)]
 pub(super) struct Recorder {
     path: PathBuf,
     record: RunRecord,
 }
 
 impl Recorder {
-    /// Writes the case as it is run and the record of a run that begins after `step` steps, if `options` ask
-    /// for them.
-    pub fn begin(case: &Case, options: &RunOptions, step: usize) -> Result<Option<Self>, OutputError> {
+    /// Writes the case as it is run and the record of a run that begins after `step` steps and has its rows
+    /// in the file `rows`, if `options` ask for them.
+    pub fn begin(
+        case: &Case,
+        options: &RunOptions,
+        step: usize,
+        rows: &Path,
+    ) -> Result<Option<Self>, OutputError> {
         if options.record.is_none() {
             return Ok(None);
         }
@@ -36,6 +42,7 @@ impl Recorder {
             record.seed = record.seed.or(before.seed);
         }
         (record.steps, record.steps_done) = (case.step_count(), step);
+        record.rows = rows.file_name().map(|name| name.to_string_lossy().into_owned());
         write_case(case, &record, &paths)?;
         let recorder = Self { path: paths.record(), record };
         recorder.record.write(&recorder.path)?;
@@ -46,6 +53,18 @@ impl Recorder {
     pub fn reached(&mut self, step: usize) -> Result<(), OutputError> {
         self.record.steps_done = step;
         self.record.write(&self.path)
+    }
+
+    /// Notes that the run was asked to stop after `step` steps; gives what should be known if it cannot be
+    /// noted.
+    pub fn interrupted(&mut self, step: usize) -> Option<Notice> {
+        self.record.end(RunState::Interrupted, step);
+        self.write_or_tell()
+    }
+
+    fn write_or_tell(&self) -> Option<Notice> {
+        let failed = self.record.write(&self.path).err();
+        failed.map(|error| Notice::NoRecord { path: error.path, reason: error.source.to_string() })
     }
 
     /// Notes how the run ended after `step` steps, and hands that on. That a run failed is told even where it
@@ -59,17 +78,14 @@ impl Recorder {
         match &outcome {
             Ok(report) => {
                 self.record.end(RunState::Complete, report.steps);
-                self.record.report = Some(report.clone());
+                (self.record.report, self.record.rows) = (Some(report.clone()), None);
                 self.record.write(&self.path)?;
             }
             Err(error) => {
                 let interrupted = matches!(error, RunError::Interrupted { .. });
                 self.record.end(if interrupted { RunState::Interrupted } else { RunState::Failed }, step);
                 self.record.error = (!interrupted).then(|| in_full(error));
-                if let Err(error) = self.record.write(&self.path) {
-                    let (path, reason) = (error.path, error.source.to_string());
-                    progress.notice(&Notice::NoRecord { path, reason });
-                }
+                self.write_or_tell().iter().for_each(|notice| progress.notice(notice));
             }
         }
         outcome

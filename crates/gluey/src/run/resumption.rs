@@ -16,6 +16,8 @@ pub struct Resumption {
     pub case_file: PathBuf,
     /// The options of the run, with the checkpoint to go on from.
     pub options: RunOptions,
+    /// Its steps, where it is complete: it can go on to a later end only.
+    pub complete: Option<usize>,
 }
 
 /// There is nothing to resume.
@@ -52,6 +54,8 @@ pub enum ResumeError {
         record: PathBuf,
         /// Steps in all.
         steps: usize,
+        /// Whether it left a checkpoint, from which it can go on to a later end.
+        has_checkpoint: bool,
     },
     /// There is no checkpoint, as when the run ended before its first one.
     #[error("{}: there is no such checkpoint", checkpoint.display())]
@@ -72,18 +76,43 @@ impl Resumption {
     /// # Errors
     /// [`ResumeError`] if there is no such run or checkpoint, or nothing left to do.
     pub fn find(folder: &Path, name: Option<&str>, previous: bool) -> Result<Self, ResumeError> {
+        Self::find_to_prolong(folder, name, previous)?.to_end_at(0)
+    }
+
+    /// The same, but for runs that are complete, too: [`Resumption::to_end_at`] tells whether anything is left
+    /// to do.
+    ///
+    /// # Errors
+    /// [`ResumeError`] if there is no such run or checkpoint.
+    pub fn find_to_prolong(folder: &Path, name: Option<&str>, previous: bool) -> Result<Self, ResumeError> {
         let paths = choose(folder, name)?;
         let record = RunRecord::read(&paths.record())?;
-        if record.state == RunState::Complete {
-            return Err(ResumeError::Complete { record: paths.record(), steps: record.steps });
-        }
+        let complete = (record.state == RunState::Complete).then_some(record.steps);
         let (last, before) = (paths.checkpoint(), paths.previous_checkpoint());
         let (checkpoint, other) = if previous { (before, last) } else { (last, before) };
+        if let (Some(steps), false) = (complete, checkpoint.exists()) {
+            let record = paths.record();
+            return Err(ResumeError::Complete { record, steps, has_checkpoint: false });
+        }
         if !checkpoint.exists() {
             let (has_other, case_file) = (other.exists(), paths.case_file());
             return Err(ResumeError::NoCheckpoint { checkpoint, has_other, case_file });
         }
-        Ok(Self { case_file: paths.case_file(), options: options(&paths, record, checkpoint) })
+        Ok(Self { case_file: paths.case_file(), options: options(&paths, record, checkpoint), complete })
+    }
+
+    /// This, if the run does not end before so many steps.
+    ///
+    /// # Errors
+    /// [`ResumeError::Complete`] if nothing is left to do.
+    pub fn to_end_at(self, steps: usize) -> Result<Self, ResumeError> {
+        match self.complete {
+            Some(done) if steps <= done => {
+                let record = ResultPaths::of_csv(&self.options.csv).record();
+                Err(ResumeError::Complete { record, steps: done, has_checkpoint: true })
+            }
+            _ => Ok(self),
+        }
     }
 }
 

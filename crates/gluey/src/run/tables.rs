@@ -101,12 +101,6 @@ impl Tables {
         }
     }
 
-    /// Makes sure that what they hold outlives a power failure.
-    pub fn sync(&self) -> Result<(), OutputError> {
-        self.rheology.as_ref().map_or(Ok(()), RheologyWriter::sync)?;
-        self.forces.as_ref().map_or(Ok(()), ForcesWriter::sync)
-    }
-
     /// Gives the complete files their names.
     pub fn finish(self) -> Result<(), OutputError> {
         self.rheology.map_or(Ok(()), RheologyWriter::finish)?;

@@ -4,8 +4,11 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use gluey_contact::{Contact, Domain};
 use gluey_geom::{Dim, Particle, Space, Twist};
@@ -16,6 +19,33 @@ use crate::output::OutputError;
 
 /// Frames that may wait.
 const QUEUE: usize = 1;
+
+/// Counts frames that are on their way to the disk.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OnTheirWay(Arc<AtomicUsize>);
+
+impl OnTheirWay {
+    /// Returns when there is none, from any thread.
+    pub fn wait(&self) {
+        while self.0.load(Ordering::Acquire) > 0 {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn begin(&self) -> Passage {
+        self.0.fetch_add(1, Ordering::AcqRel);
+        Passage(self.clone())
+    }
+}
+
+/// A frame that is on its way.
+struct Passage(OnTheirWay);
+
+impl Drop for Passage {
+    fn drop(&mut self) {
+        self.0.0.fetch_sub(1, Ordering::AcqRel);
+    }
+}
 
 /// A frame that outlives its step.
 struct Kept<const D: usize>
@@ -30,6 +60,8 @@ where
     domain: Domain<D>,
     in_box: Option<ShownBox<D>>,
     fields: Option<Fields<D>>,
+    /// Ends when the frame is on disk, or given up.
+    _passage: Passage,
 }
 
 enum Message<const D: usize>
@@ -48,6 +80,7 @@ where
     Dim<D>: Space<D>,
 {
     folder: PathBuf,
+    on_their_way: OnTheirWay,
     queue: Option<SyncSender<Message<D>>>,
     thread: Option<JoinHandle<Result<(), OutputError>>>,
 }
@@ -56,14 +89,14 @@ impl<const D: usize> FrameWriter<D>
 where
     Dim<D>: Space<D>,
 {
-    /// Starts the thread.
-    pub fn new(writer: VtkWriter) -> Result<Self, OutputError> {
+    /// Starts the thread; `on_their_way` counts its frames.
+    pub fn new(writer: VtkWriter, on_their_way: OnTheirWay) -> Result<Self, OutputError> {
         let folder = writer.folder.clone();
         let (queue, messages) = sync_channel(QUEUE);
         let thread = thread::Builder::new().name("frames".to_owned()).spawn(move || serve(writer, messages));
         let thread =
             thread.map_err(|error| OutputError::new(&folder, "start a thread for the folder", error))?;
-        Ok(Self { folder, queue: Some(queue), thread: Some(thread) })
+        Ok(Self { folder, on_their_way, queue: Some(queue), thread: Some(thread) })
     }
 
     /// Has a frame written; waits while two others are on their way.
@@ -77,6 +110,7 @@ where
             domain: frame.domain.clone(),
             in_box: frame.in_box,
             fields,
+            _passage: self.on_their_way.begin(),
         })))
     }
 
@@ -165,11 +199,13 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let domain = Domain::default();
         let mut frames =
-            FrameWriter::new(VtkWriter::create(folder.path(), &[]).expect("a folder")).expect("a thread");
+            FrameWriter::new(VtkWriter::create(folder.path(), &[]).expect("a folder"), OnTheirWay::default())
+                .expect("a thread");
         for step in 0..5 {
             frames.write(&frame(step, &[], &domain), None).expect("a frame");
         }
         frames.flush().expect("on disk");
+        frames.on_their_way.wait();
         let list = std::fs::read_to_string(folder.path().join("particles.pvd")).expect("a collection");
         let places: Vec<_> = (0..5).map(|step| list.find(&format!("particles-00000{step}.vtu"))).collect();
         assert!(places.is_sorted() && places[0].is_some(), "{list}");
@@ -183,12 +219,13 @@ mod tests {
         // Where a file should be there is a folder.
         std::fs::create_dir(folder.path().join("particles-000001.vtu")).expect("a folder");
         let writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-        let mut frames = FrameWriter::new(writer).expect("a thread");
+        let mut frames = FrameWriter::new(writer, OnTheirWay::default()).expect("a thread");
         frames.write(&frame(0, &[], &domain), None).expect("a frame");
         frames.write(&frame(1, &[], &domain), None).expect("not known yet");
         let error = frames.flush().expect_err("a frame is missing");
         assert!(error.path.ends_with("particles-000001.vtu"), "{error}");
         assert!(frames.flush().is_err(), "the frame is still missing");
+        frames.on_their_way.wait();
         assert!(frames.write(&frame(2, &[], &domain), None).is_err());
     }
 }

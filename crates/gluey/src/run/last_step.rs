@@ -1,0 +1,108 @@
+//! The last whole step of a run: what a checkpoint holds. It can be saved at any moment, also from another
+//! thread than that of the run, which may be busy for long.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use gluey_geom::{Dim, Space};
+
+use super::checkpoint_file::CheckpointFile;
+use super::error::RunError;
+use super::frames::Others;
+use super::last_steps::{Ended, OfRun, locked};
+use super::log;
+use super::paths::ResultPaths;
+use super::recorder::Recorder;
+use crate::case::Case;
+use crate::checkpoint::Checkpoint;
+use crate::output::vtk::OnTheirWay;
+use crate::output::{OutputError, sync_drafts};
+use crate::progress::Notice;
+
+/// The last whole step of a run, and the files that tell of it.
+#[derive(Debug)]
+pub(super) struct LastStep<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub case: Case,
+    pub paths: ResultPaths,
+    /// Where it is saved, if it is to be.
+    pub file: Option<CheckpointFile>,
+    pub recorder: Option<Recorder>,
+    pub frames: OnTheirWay,
+    /// The run before the step that is being done, where there is a file for it.
+    pub checkpoint: Option<Checkpoint<D>>,
+    /// The step that was saved last.
+    pub saved: Option<usize>,
+    /// Whether the run comes to its end without another step.
+    pub is_ending: bool,
+}
+
+impl<const D: usize> LastStep<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Steps done at the last whole step, where it is kept.
+    pub fn step(&self) -> Option<usize> {
+        self.checkpoint.as_ref().map(|checkpoint| checkpoint.state.step)
+    }
+
+    /// Writes a checkpoint after what it counts on, if that was not done, and gives what should be known.
+    pub fn save(&mut self, others: Option<&dyn Others>) -> Result<Vec<Notice>, OutputError> {
+        let (Some(file), Some(checkpoint)) = (&mut self.file, &self.checkpoint) else {
+            return Ok(Vec::new());
+        };
+        let step = checkpoint.state.step;
+        // Before the first step there is nothing to lose that is worth more than another run's checkpoint.
+        if self.saved == Some(step) || (step == 0 && file.is_wanted()) {
+            return Ok(Vec::new());
+        }
+        sync_drafts(&self.paths.tables())?;
+        self.frames.wait();
+        let notices = file.write(checkpoint, &self.case, others)?;
+        self.saved = Some(step);
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.reached(step)).map(|()| notices)
+    }
+
+    /// The same where a failure is told and no more.
+    fn save_or_tell(&mut self) -> Vec<Notice> {
+        let path = self.file.as_ref().map_or(PathBuf::new(), |file| file.path().to_owned());
+        self.save(None).unwrap_or_else(|error| {
+            let reason = error.source.to_string();
+            vec![Notice::NoCheckpoint { path, reason }]
+        })
+    }
+
+    /// That the run ended at this step.
+    fn ended(&self) -> Ended {
+        let step = self.step().unwrap_or(0);
+        let time = step as f64 * self.case.time.step;
+        let checkpoint = self.saved.and(self.file.as_ref()).map(|file| file.path().to_owned());
+        Ended { step, steps: self.case.step_count(), time, checkpoint }
+    }
+}
+
+impl<const D: usize> OfRun for Mutex<LastStep<D>>
+where
+    Dim<D>: Space<D>,
+{
+    fn save(&self) -> Vec<Notice> {
+        let mut last = locked(self);
+        if last.is_ending { Vec::new() } else { last.save_or_tell() }
+    }
+
+    fn end(&self) -> Option<(Ended, Vec<Notice>)> {
+        let mut last = locked(self);
+        if last.is_ending {
+            return None;
+        }
+        let mut notices = last.save_or_tell();
+        let ended = last.ended();
+        log::note(&last.paths, &RunError::from(ended.clone()).to_string());
+        notices.extend(last.recorder.as_mut().and_then(|recorder| recorder.interrupted(ended.step)));
+        // The run waits for this lock before it writes anything else of its state.
+        std::mem::forget(last);
+        Some((ended, notices))
+    }
+}
