@@ -3,7 +3,7 @@
 mod program;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gluey::{Case, CheckpointSummary, RunRecord, RunState};
 use program::{fails, gluey, told};
@@ -68,8 +68,144 @@ fn frames_of_a_replaced_run_go() {
         frames("vtk").into_iter().filter(|name| name.starts_with("particles-")).collect();
     let expected = [0, 100, 200, 300].map(|step| format!("particles-{step:06}.vtu"));
     assert_eq!(particles, expected);
-    assert!(frames("xyz").is_empty(), "{:?}", frames("xyz"));
+    assert!(!folder.join(format!("out/{STEM}-xyz")).exists(), "an empty folder is left");
     assert!(vtk.join("view.pvsm").exists(), "a file of the user went");
+}
+
+/// All files in a folder and below it, but for what `kept` names.
+fn files(folder: &Path, kept: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        match path.is_dir() {
+            true => found.extend(files(&path, kept)),
+            false if kept.iter().any(|name| path.ends_with(name)) => {}
+            false => found.push(path),
+        }
+    }
+    found.sort();
+    found
+}
+
+/// With `--force` nothing is left of the run that is replaced, nor of what was made of it: pictures, films,
+/// pages, tables, checkpoints, rows of runs that were killed. What gluey did not write stays.
+#[test]
+fn nothing_is_left_of_a_run_that_is_replaced() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let case = "name = \"pair\"\ndimension = 2\nparticles = [{ position = [0.4, 0.53], radius = 0.05 }, \
+                { position = [0.6, 0.47], radius = 0.05 }]\ntime = { step = 0.1, end = 0.4 }\n\
+                contact = { strategy = \"none\" }\nflow = { mesh = { cells_per_radius = 2.0 } }\n\
+                [[output]]\nkind = \"xyz\"\nlabel = \"often\"\nevery = 1\n";
+    fs::write(folder.join("pair.toml"), case).expect("a case");
+    let set = ["--set", "time.end=0.2", "--set", "output.0.label=seldom"];
+    told(folder, &[&["run", "pair.toml", "--out", "alone"][..], &set].concat());
+    told(folder, &["run", "pair.toml", "--xyz", "1", "--vtk", "1", "--checkpoint-every", "1"]);
+    told(folder, &["plot", "out", "--frame", "last", "--animation"]);
+    for of_frames in ["out/pair-none-unfitted-xyz", "out/pair-none-unfitted-often"] {
+        told(folder, &["analyse", of_frames]);
+        told(folder, &["view", of_frames]);
+        told(folder, &["plot", of_frames, "--animation"]);
+    }
+    for command in ["analyse", "plot", "view"] {
+        told(folder, &[command, "out"]);
+    }
+    let own = ["notes.txt", "pair-none-unfitted-plots/mine.svg", "structure-plots/mine.png", "report.html"];
+    for name in own {
+        fs::write(folder.join("out").join(name), "of a user").expect("a file");
+    }
+    fs::write(folder.join("out/pair-none-unfitted.csv.partial-3"), "t\n").expect("a file");
+    told(folder, &[&["run", "pair.toml", "--force"][..], &set].concat());
+    let names = |run: &str, kept: &[&str]| -> Vec<PathBuf> {
+        let root = folder.join(run);
+        files(&root, kept).iter().map(|file| file.strip_prefix(&root).expect("inside").to_owned()).collect()
+    };
+    assert_eq!(names("out", &own), names("alone", &[]));
+    assert!(own.iter().all(|name| folder.join("out").join(name).exists()), "a file of the user went");
+    assert!(!folder.join("out/pair-none-unfitted-xyz").exists(), "an empty folder is left");
+}
+
+/// Tables and pages of a folder are those of the run in it that has frames: another one that is replaced
+/// leaves them, and its neighbours alone, also those whose names begin with its own.
+#[test]
+fn what_belongs_to_other_runs_stays() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let run = ["run", CASE, "--set", "time.end=0.5"];
+    told(folder, &[&run[..], &["--xyz", "1"]].concat());
+    for command in ["analyse", "plot", "view"] {
+        told(folder, &[command, "out"]);
+    }
+    let other = [&run[..], &["--strategy", "none"]].concat();
+    told(folder, &other);
+    told(folder, &["plot", "out"]);
+    let of_first = || {
+        let all = files(&folder.join("out"), &[]).into_iter();
+        all.filter(|path| !path.to_string_lossy().contains("mobility-none")).collect::<Vec<_>>()
+    };
+    let before = of_first();
+    told(folder, &[&other[..], &["--force"]].concat());
+    assert_eq!(of_first(), before);
+    assert!(!folder.join("out/pair-3d-mobility-none-plots").exists(), "pictures of the run that went");
+    assert!(folder.join("out/series.csv").exists() && folder.join("out/view.html").exists());
+}
+
+/// A complete run goes on to a later end, to the bits of one that was that long, and says how.
+#[test]
+fn a_complete_run_goes_on_to_a_later_end() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    told(folder, &["run", CASE, "--out", "long", "--xyz", "20"]);
+    told(folder, &["run", CASE, "--set", "time.end=5", "--xyz", "20"]);
+    let longer = "gluey resume out --set time.end=15.75";
+    fails(folder, &["run", CASE], &["a complete run of this case is there", longer, "--out DIR", "--force"]);
+    fails(folder, &["resume", "out"], &["the run is complete (100 steps)", "--set time.end=T"]);
+    fails(folder, &["resume", "out", "--set", "time.end=4"], &["the run is complete (100 steps)"]);
+    fails(
+        folder,
+        &["resume", "out", "--set", "time.end=9", "--set", "time.step=0.02"],
+        &["another case", "only its end"],
+    );
+    assert!(read(folder, "out").len() < read(folder, "long").len(), "what was refused changed rows");
+    told(folder, &["resume", "out", "--set", "time.end=15.75"]);
+    assert!(read(folder, "out") == read(folder, "long"), "another trajectory");
+    let frames = |run: &str| files(&folder.join(format!("{run}/{STEM}-xyz")), &[]).len();
+    assert_eq!(frames("out"), frames("long"));
+    let info = told(folder, &["info", "out"]);
+    assert!(info.contains("complete, 315 of 315 steps done"), "{info}");
+    // An end that is not later has nothing to go on to.
+    fails(folder, &["run", CASE, "--set", "time.end=5"], &["a complete run of this case", "--force"]);
+}
+
+/// Keys that do nothing for what other keys say are told, once, and by `gluey check`, too.
+#[test]
+fn keys_without_effect_are_told() {
+    let folder = TempDir::new().expect("a folder");
+    let folder = folder.path();
+    let set = ["--set", "contact.threshold=0.01", "--set", "flow.tolerance=1e-3", "--set", "time.end=0.5"];
+    let expected =
+        ["without effect: flow.tolerance (flow.hydrodynamics = \"pair-mobility\")", "contact.threshold"];
+    for command in
+        [&["run", CASE][..], &["check", CASE], &["check", CASE, "--no-trial"], &["run", CASE, "--force"]]
+    {
+        let (code, _, stderr) = gluey(folder, &[command, &set].concat());
+        assert_eq!(code, Some(0), "{stderr}");
+        for part in expected {
+            assert_eq!(stderr.matches(part).count(), 1, "{command:?}: {stderr}");
+        }
+    }
+    let log = fs::read_to_string(folder.join(format!("out/{STEM}.log"))).expect("a log");
+    assert!(log.contains(expected[0]), "{log}");
+    for options in [
+        &["run", CASE, "--vtk-precision", "f32"][..],
+        &["run", CASE, "--vtk-compression", "0"],
+        &["plot", "out", "--view", "0,0"],
+        &["plot", "out", "--colour", "gap"],
+        &["plot", "out", "--contacts", "0.1"],
+    ] {
+        let (code, _, stderr) = gluey(folder, options);
+        assert_eq!(code, Some(2), "{options:?}: {stderr}");
+    }
 }
 
 #[test]
@@ -99,7 +235,7 @@ fn the_checkpoint_before_the_last_is_offered() {
     let last = format!("out/{STEM}.checkpoint");
     let older = format!("{last}.previous");
     let step = |file: &str| CheckpointSummary::read(&folder.join(file)).expect("whole").step;
-    assert_eq!((step(&last), step(&older)), (300, 200));
+    assert_eq!((step(&last), step(&older)), (315, 300));
     let whole = fs::read(folder.join(&last)).expect("a checkpoint");
     let before = read(folder, "out");
     for (bytes, reason) in
@@ -107,11 +243,11 @@ fn the_checkpoint_before_the_last_is_offered() {
     {
         fs::write(folder.join(&last), bytes).expect("a file");
         let command = "gluey resume out --previous";
-        fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 200, is whole", command]);
+        fails(folder, &["run", CASE, "--resume", &last], &[reason, "after step 300, is whole", command]);
     }
     told(folder, &["run", CASE, "--resume", &older, "--checkpoint-every", "100"]);
     assert!(read(folder, "out") == before);
-    assert_eq!((step(&last), step(&older)), (300, 200));
+    assert_eq!((step(&last), step(&older)), (315, 300));
     assert!(folder.join(format!("{last}.earlier-1")).exists(), "the damaged one was kept");
 }
 
@@ -129,6 +265,7 @@ fn what_cannot_be_resumed_is_said() {
     let record = folder.join(format!("out/{STEM}-run.json"));
     let text = fs::read_to_string(&record).expect("a record");
     fs::write(&record, text.replace("\"complete\"", "\"running\"")).expect("a record");
+    fs::remove_file(folder.join(format!("out/{STEM}.checkpoint"))).expect("a checkpoint");
     let resume = ["resume", "out", "--case", STEM];
     let anew = format!("start again: gluey run out/{STEM}-case.toml --out out");
     fails(folder, &resume, &["there is no such checkpoint", &anew]);

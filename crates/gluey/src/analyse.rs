@@ -32,6 +32,19 @@ use crate::output::{OutputError, prepare_folder_of, write_atomically};
 use frames::{dimension, frame_files, read_frames};
 use observe::{Distributions, Instant};
 
+/// Whether a file has the name of a table that is written here, or of the summary.
+pub(crate) fn is_table(name: &str) -> bool {
+    let tables = [
+        "series.csv",
+        "g_of_theta.csv",
+        "structure_factor.csv",
+        "profile_y.csv",
+        "diffusion.csv",
+        "summary.txt",
+    ];
+    tables.contains(&name) || (name.starts_with("g_of_r") && name.ends_with(".csv"))
+}
+
 /// What to analyse, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnalyseOptions {
@@ -120,6 +133,7 @@ where
 
 fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), OutputError> {
     files.iter().try_for_each(|(name, text)| {
+        debug_assert!(is_table(name), "{name} is not known as a table");
         let path = folder.join(name);
         prepare_folder_of(&path)?;
         write_atomically(&path, text.as_bytes())

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
 use gluey::{
-    CaseError, CheckpointError, CheckpointSummary, NotText, OutputError, ResultPaths,
+    CaseError, CheckpointError, CheckpointSummary, NotText, OccupiedError, OutputError, ResultPaths,
     RowsError, RunError,
 };
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
@@ -105,10 +105,13 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         }
         RunError::Rows(error) => rows_hint(error),
         RunError::Checkpoint(CheckpointError::OtherCase { .. }) => {
-            "resume with the case file, strategy and formulation of the interrupted run".into()
+            "resume with the case file, strategy and formulation of that run; only its end may be another".into()
         }
         RunError::Checkpoint(error) => checkpoint_hint(error, case),
         RunError::NotShared { .. } => "take that out of the case, or run it on one machine without mpirun".into(),
+        RunError::Occupied(OccupiedError::Complete { go_on: Some(command), .. }) => {
+            format!("to go on with it to this end: {command}; or write elsewhere with --out DIR; --force computes it anew")
+        }
         RunError::Occupied(_) => {
             "write elsewhere with --out DIR, or replace those results with --force".into()
         }

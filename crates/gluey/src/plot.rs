@@ -185,3 +185,30 @@ fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf
     }
     Ok(paths)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::is_picture;
+
+    /// A run that replaces another one takes its pictures away, by their names.
+    #[test]
+    fn pictures_are_known_by_their_names() {
+        for figure in Figure::ALL {
+            for format in [Format::Svg, Format::Png] {
+                assert!(is_picture(&format!("{}.{}", figure.as_str(), format.extension())), "{figure:?}");
+            }
+        }
+        for name in [
+            "particles-000012.png",
+            "flow-speed-000100.svg",
+            "flow-pressure-z=0.5-0000100.png",
+            "particles.gif",
+        ] {
+            assert!(is_picture(name), "{name}");
+        }
+        for name in ["notes.txt", "mine.png", "gaps.pdf", "gaps-2.svg", "particles-final.png", "flow.svg"] {
+            assert!(!is_picture(name), "{name}");
+        }
+    }
+}

@@ -20,6 +20,7 @@ mod pieces;
 mod record;
 mod recorded;
 mod recorder;
+mod replaced;
 mod resumption;
 #[cfg(feature = "ranks")]
 mod shared;
@@ -43,6 +44,8 @@ pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 pub(crate) use recorded::TABLE_OF_STUDY;
 pub use recorded::{FolderError, recorded_runs};
+#[cfg(test)]
+pub(crate) use replaced::is_picture;
 pub use resumption::{ResumeError, Resumption};
 #[cfg(feature = "ranks")]
 pub use shared::run_shared;

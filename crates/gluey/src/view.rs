@@ -18,6 +18,14 @@ use crate::output::{OutputError, prepare_folder_of, write_atomically};
 const PAGE: &str = include_str!("view/viewer.html");
 const SCRIPTS: [&str; 2] = [include_str!("view/viewer.js"), include_str!("view/controls.js")];
 
+/// Name of a page that is given none.
+pub(crate) const PAGE_NAME: &str = "view.html";
+
+/// Whether a text is that of a page, whatever run is in it.
+pub(crate) fn is_page(text: &[u8]) -> bool {
+    PAGE.split("{{title}}").next().is_some_and(|head| text.starts_with(head.as_bytes()))
+}
+
 /// What to show, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewOptions {
@@ -62,7 +70,7 @@ pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
         2 => Run::of(title, &read_frames::<2>(&files)?),
         _ => Run::of(title, &read_frames::<3>(&files)?),
     };
-    let page = options.out.clone().unwrap_or_else(|| options.folder.join("view.html"));
+    let page = options.out.clone().unwrap_or_else(|| options.folder.join(PAGE_NAME));
     let text = run.page();
     prepare_folder_of(&page)?;
     write_atomically(&page, text.as_bytes())?;

@@ -1,6 +1,6 @@
 //! Keeps runs from writing over each other's results.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -26,6 +26,8 @@ pub enum OccupiedError {
         steps: usize,
         /// When it ended.
         ended: Option<String>,
+        /// The command that goes on with it to the end that is given now, where that is later.
+        go_on: Option<String>,
     },
     /// Those of another case of the same name.
     #[error("{}: a run of another case is there, {state}; {difference}", case_file.display())]
@@ -76,10 +78,23 @@ pub(super) fn check_free(case: &Case, options: &RunOptions) -> Result<(), Occupi
     match record.state {
         RunState::Complete => {
             let RunRecord { steps, ended, .. } = record;
-            Err(OccupiedError::Complete { record: paths.record(), steps, ended })
+            let is_longer = case.step_count() > steps && paths.checkpoint().exists();
+            let go_on = is_longer.then(|| resume_to(&paths, case.time.end));
+            Err(OccupiedError::Complete { record: paths.record(), steps, ended, go_on })
         }
         _ => Ok(()),
     }
+}
+
+/// The command that goes on with the run at `paths` to another end.
+fn resume_to(paths: &ResultPaths, end: f64) -> String {
+    let folder = match paths.folder() {
+        folder if folder == Path::new("") => Path::new("."),
+        folder => folder,
+    };
+    let is_alone = ResultPaths::in_folder(folder).is_ok_and(|runs| runs.len() == 1);
+    let which = if is_alone { String::new() } else { format!(" --case {}", paths.stem()) };
+    format!("gluey resume {}{which} --set time.end={end}", folder.display())
 }
 
 /// The first line, but for its end, in which `case` differs from the one that was run.
