@@ -302,8 +302,9 @@ where
     fn observe(&mut self) -> Result<(), RunError> {
         self.tell("flow");
         self.simulation.predict().map_err(StepError::widen)?;
-        self.tell("contact");
+        self.tell("motion");
         self.simulation.open_films().map_err(StepError::widen)?;
+        self.tell("contact");
         self.simulation.correct().map_err(StepError::widen)?;
         self.tell("output");
         let start = Instant::now();

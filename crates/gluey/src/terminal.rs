@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use gluey::analyse::Summary;
 use gluey::output::solver_log::SolverRow;
+use gluey::progress::Ticker;
 use gluey::view::Viewed;
 use gluey::{Notice, Progress, ProgressState, ResultPaths, RunReport};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -27,8 +28,8 @@ pub struct Reporter {
 enum Surface {
     /// A terminal.
     Bar(ProgressBar),
-    /// A file or pipe, with the time of the last line.
-    Log(Mutex<Instant>),
+    /// A file or pipe, with what writes a line every so often.
+    Log(Ticker),
     /// Nothing: only what should be known is told, not where the run is.
     Nothing,
 }
@@ -50,7 +51,13 @@ impl Reporter {
 
     /// Lines, whatever there is to draw on.
     pub fn log(name: &str, quiet: bool) -> Self {
-        let surface = if quiet { Surface::Nothing } else { Surface::Log(Mutex::new(Instant::now())) };
+        let of_lines = name.to_owned();
+        let ticker = || {
+            Ticker::new(LOG_INTERVAL, move |state| {
+                say(&format!("{of_lines}: step {}/{}, {state}", state.step, state.steps));
+            })
+        };
+        let surface = if quiet { Surface::Nothing } else { Surface::Log(ticker()) };
         Self { name: name.to_owned(), surface, steps: None }
     }
 
@@ -84,13 +91,7 @@ impl Progress for Reporter {
                 bar.set_message(state.to_string());
             }
             Surface::Nothing => {}
-            Surface::Log(last) => {
-                let Ok(mut last) = last.lock() else { return };
-                if last.elapsed() >= LOG_INTERVAL {
-                    *last = Instant::now();
-                    self.line(&format!("step {}/{}, {state}", state.step, state.steps));
-                }
-            }
+            Surface::Log(ticker) => ticker.report(state),
         }
     }
 
