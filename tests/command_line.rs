@@ -31,14 +31,14 @@ fn cases_runs_and_checkpoints_say_what_they_are() {
     told(folder, &["run", CASE, "--quiet", "--checkpoint-every", "100"]);
     let run = &json(folder, &["info", "out", "--json"])["runs"][0];
     assert_eq!((&run["name"], &run["state"]), (&STEM.into(), &"complete".into()));
-    assert_eq!((&run["checkpoints"][0]["step"], &run["checkpoints"][1]["step"]), (&300.into(), &200.into()));
+    assert_eq!((&run["checkpoints"][0]["step"], &run["checkpoints"][1]["step"]), (&315.into(), &300.into()));
     let record = format!("out/{STEM}-run.json");
     assert_eq!(json(folder, &["info", &record, "--json"])["runs"][0], *run);
     let last = format!("out/{STEM}.checkpoint");
     let checkpoint = json(folder, &["info", &last, "--json"]);
-    assert_eq!((&checkpoint["kind"], &checkpoint["step"]), (&"checkpoint".into(), &300.into()));
+    assert_eq!((&checkpoint["kind"], &checkpoint["step"]), (&"checkpoint".into(), &315.into()));
     assert_eq!(checkpoint["case"]["name"], "pair-3d-mobility");
-    assert!(told(folder, &["info", &last]).contains("after step 300, t = 15,"));
+    assert!(told(folder, &["info", &last]).contains("after step 315, t = 15.75,"));
     // A record that says `running` of a run that no process does any more.
     let record = folder.join(record);
     let text = fs::read_to_string(&record).expect("a record");
