@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use gluey::{Case, RunOptions, Silent, run_shared};
+use gluey::{Case, RunOptions, Silent, VtkOptions, run_shared};
 use gluey_parallel::Threads;
+use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 use tempfile::TempDir;
 
 #[path = "runs/mod.rs"]
@@ -96,6 +97,59 @@ fn held_and_driven_particles_are_carried_by_the_same_forces() {
     ranks_are_as_one_process("driven spheres", &solid, &tables, 1.4e-10);
 }
 
+/// A line of discs that nearly touch, each faster than the next one.
+fn line_of_discs(end: f64) -> Case {
+    let disc = |k: usize| {
+        let (x, y) = (0.2 + 0.098 * k as f64, 0.55 - 0.02 * k as f64);
+        format!("{{ position = [{x}, {y}], radius = 0.05 }}")
+    };
+    let discs: Vec<String> = (0..6).map(disc).collect();
+    case(&format!(
+        "name = \"r\"\ndimension = 2\nparticles = [{}]\ndomain = {{ boundary = \"periodic\" }}\n\
+         time = {{ step = 0.05, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
+         [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-10\n\
+         [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\n",
+        discs.join(", ")
+    ))
+}
+
+/// What comes of two steps with contact, frames of the fields and a checkpoint after each when a rank is told
+/// to fail, on each rank, with the number of agreements.
+fn with_a_fault(fault: (usize, usize)) -> Vec<(Result<(), String>, usize)> {
+    let folder = TempDir::new().expect("a folder");
+    let vtk = VtkOptions::new(folder.path().join("vtk"), 1);
+    let options = RunOptions { vtk: Some(vtk), ..with_checkpoints(folder.path()) };
+    let case = line_of_discs(0.1);
+    let done = Threads::run(3, |ranks| {
+        let ranks = Failing::new(ranks, fault);
+        let said = run_shared(&case, &options, &Silent, &ranks).map(|_| ());
+        (said.map_err(|error| whole(&error)), ranks.agreements())
+    });
+    done.expect("no rank panics")
+}
+
+/// With all that it says of its causes.
+fn whole(error: &dyn std::error::Error) -> String {
+    let cause = error.source().map_or(String::new(), |cause| format!(": {}", whole(cause)));
+    format!("{error}{cause}")
+}
+
+/// Wherever a rank fails all end, and rank zero says why: in flows, contact, fields and checkpoints.
+#[test]
+fn a_rank_that_fails_anywhere_in_a_run_ends_all() {
+    let sound = within_a_minute("a run", || with_a_fault((0, usize::MAX)));
+    assert!(sound.iter().all(|(said, _)| said.is_ok()), "{sound:?}");
+    let count = sound[0].1;
+    println!("{count} agreements");
+    // Too many for a test: every fifth, on one rank after the other.
+    for at in (0..count).step_by(5) {
+        let fault = (at % 3, at);
+        let ends = within_a_minute("a run with a fault", move || with_a_fault(fault));
+        let first = ends[0].0.as_ref().expect_err("the run fails");
+        assert!(first.contains(TOLD), "rank and agreement {fault:?}: {first}");
+    }
+}
+
 /// A force on the fluid drives a channel with free particles, one of them across its border.
 #[test]
 fn a_channel_is_driven_by_the_same_flow() {
@@ -125,21 +179,7 @@ fn at_a_given_stress_the_rate_is_the_same() {
 /// process, the bits the same run after run, and a checkpoint goes on with another number of ranks.
 #[test]
 fn contacts_are_shared_too() {
-    // A line of discs that nearly touch, each faster than the next one.
-    let disc = |k: usize| {
-        let (x, y) = (0.2 + 0.098 * k as f64, 0.55 - 0.02 * k as f64);
-        format!("{{ position = [{x}, {y}], radius = 0.05 }}")
-    };
-    let discs: Vec<String> = (0..6).map(disc).collect();
-    let until = |end: f64| {
-        case(&format!(
-            "name = \"r\"\ndimension = 2\nparticles = [{}]\ndomain = {{ boundary = \"periodic\" }}\n\
-             time = {{ step = 0.05, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
-             [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-10\n\
-             [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\n",
-            discs.join(", ")
-        ))
-    };
+    let until = line_of_discs;
     let long = until(0.15);
     ranks_are_as_one_process("contacts", &long, &[""], 1.3e-7);
     let [whole, again, stopped] = [(); 3].map(|()| TempDir::new().expect("a folder"));

@@ -153,6 +153,12 @@ pub enum ContactError {
         /// The period.
         period: f64,
     },
+    /// Another rank of those that share the contacts failed.
+    #[error("{message} (on another rank)")]
+    Elsewhere {
+        /// What it says.
+        message: String,
+    },
     /// Contacts that no velocities can satisfy, such as a particle between walls that are too near.
     #[error("no velocities keep these contacts from overlapping: {}", Names(pairs))]
     Infeasible {

@@ -11,7 +11,7 @@ use crate::islands::{Island, Islands, Slot};
 use crate::parallel;
 use crate::projection::{self, Effort, Failure, LinearProblem, Linearised, Tuning};
 use crate::rows::{GROUND, Row};
-use crate::solver::{Factor, SolveFailure, SolveReport};
+use crate::solver::{Factor, SolveFailure, SolveReport, defect};
 use crate::{ContactParams, Mobility};
 
 /// Context of the solves of a step: what is the same for all islands.
@@ -303,7 +303,7 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
     }
 
     /// The row whose gap at the end of the step is farthest from what it should be, beyond the tolerance,
-    /// that gap, and how far it is off.
+    /// that gap, and how far it is off: infinitely far if it is not a number.
     fn farthest_off(&self, tolerance: f64) -> Option<(usize, f64, f64)> {
         let mut farthest = None;
         let mut largest = 2.0 * tolerance;
@@ -311,7 +311,7 @@ impl<'a, const D: usize> IslandSlice<'a, D> {
             let gap = self.gap(k, &Vector::zeros());
             let compliance = self.scaled_rows[k].compliance(self.weights);
             let slack = compliance * self.scales[k] * (self.forces[k] - self.floors[k]);
-            let off = gap.min(slack).abs();
+            let off = defect(gap, slack);
             if off > largest {
                 (farthest, largest) = (Some((k, gap, off)), off);
             }

@@ -85,6 +85,9 @@ impl<R: JacobianRow, C: Response<R>> LinearProblem<'_, R, C> {
             // One contact has a closed form.
             [row] if !C::IS_COUPLED => {
                 let free_force = -self.free_gaps[0] / row.compliance(self.weights);
+                if free_force.is_nan() {
+                    return Err(SolveFailure::not_a_number());
+                }
                 self.forces[0] = free_force.max(self.floors[0]);
                 SolveReport { iterations: 1, residual: 0.0 }
             }

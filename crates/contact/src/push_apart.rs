@@ -51,8 +51,9 @@ pub(crate) fn push_apart<const D: usize>(
         worst = (0, 0.0);
         for (k, (row, force)) in rows.iter().zip(&mut *forces).enumerate() {
             let shortfall = push(row, pushed, force, params.threshold);
-            if shortfall > worst.1 {
-                worst = (k, shortfall);
+            // What is not a number is farthest from where it should be.
+            if shortfall > worst.1 || shortfall.is_nan() {
+                worst = (k, if shortfall.is_nan() { f64::INFINITY } else { shortfall });
             }
         }
         if sweep.is_power_of_two() {

@@ -1,27 +1,20 @@
 //! What all ranks have to know before they go on: whether one of them failed, and lists of any length.
+//!
+//! An error of a part is a [`PartError`], which no `?` makes a [`FlowError`]: that is one of all ranks, and
+//! comes of [`agreed`], or of numbers that are the same on all.
 
 use gluey_parallel::Communicator;
-use gluey_stokes::StokesError;
 
-use crate::flow::FlowError;
+use crate::flow::{FlowError, PartError};
 
-/// Bytes of a message that others pass on, at most.
-const LONGEST_MESSAGE: usize = 400;
-
-/// A failure of one rank is one of all, which say what it was.
-pub fn agreed<T>(ranks: &dyn Communicator, outcome: Result<T, StokesError>) -> Result<T, FlowError> {
-    let message = outcome.as_ref().err().map(ToString::to_string);
-    let failed = ranks.all_gather(&[u64::from(message.is_some())]);
-    let Some(rank) = failed.iter().position(|&failed| failed == 1) else { return Ok(outcome?) };
-    let mut bytes = vec![0.0; LONGEST_MESSAGE];
-    if let Some(text) = message.filter(|_| rank == ranks.rank()) {
-        bytes.iter_mut().zip(text.bytes()).for_each(|(number, byte)| *number = f64::from(byte));
-    }
-    ranks.sum(&mut bytes);
-    let bytes: Vec<u8> = bytes.into_iter().map(|byte| byte as u8).take_while(|&byte| byte != 0).collect();
-    match outcome {
-        Err(error) => Err(error.into()),
-        Ok(_) => Err(FlowError::Elsewhere { rank, message: String::from_utf8_lossy(&bytes).into_owned() }),
+/// A failure of one rank is one of all, who say what the first of them said. All ranks call this.
+pub fn agreed<T>(ranks: &dyn Communicator, outcome: Result<T, impl Into<PartError>>) -> Result<T, FlowError> {
+    let outcome = outcome.map_err(Into::into);
+    let own = outcome.as_ref().err().map(ToString::to_string);
+    match (ranks.first_failure(own.clone()), outcome) {
+        (None, outcome) => outcome.map_err(FlowError::Part),
+        (Some(first), Err(error)) if own.as_ref() == Some(&first.message) => Err(FlowError::Part(error)),
+        (Some(first), _) => Err(FlowError::Elsewhere { rank: first.rank, message: first.message }),
     }
 }
 

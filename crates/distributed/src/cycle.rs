@@ -3,6 +3,7 @@
 
 use gluey_fem::ImplicitTree;
 
+use crate::agreement::agreed;
 use crate::bodies::Shared;
 use crate::coarse::CoarseFactor;
 use crate::flow::FlowError;
@@ -63,13 +64,8 @@ impl<'a, const D: usize> VCycle<'a, D> {
             pairs.map(|pair| Transfer::new(&pair[0].operator.space, &pair[1].operator.space)).collect();
         let coarse = (ranks.rank() == 0)
             .then(|| CoarseFactor::new(&levels[0].operator.space, viscosity, around.is_some()));
-        // All ranks learn of it.
-        let mut failures = [f64::from(u8::from(matches!(coarse, Some(Err(_)))))];
-        ranks.sum(&mut failures);
-        match coarse.transpose() {
-            Ok(_) if failures[0] > 0.0 => Err(FlowError::CoarseElsewhere),
-            coarse => Ok(Self { levels, transfers, coarse: coarse?, smooths: around.is_none() }),
-        }
+        let coarse = agreed(ranks, coarse.transpose())?;
+        Ok(Self { levels, transfers, coarse, smooths: around.is_none() })
     }
 
     /// `z = V b` on the finest level.

@@ -54,33 +54,41 @@ where
     pub wrenches: &'a [Wrench<D>],
 }
 
-/// Why there is no flow.
+/// What goes wrong in the part of a rank. None of it turns into a [`FlowError`] by itself: ranks agree first.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FlowError {
-    /// The iterations did not converge.
-    #[error(transparent)]
-    Krylov(#[from] KrylovError),
-    /// A velocity has no equation.
+pub enum PartError {
+    /// A velocity or pressure has no equation.
     #[error(transparent)]
     Diagonal(#[from] BadDiagonal),
     /// The matrix of the coarsest level has no factor: the box has no wall.
     #[error("coarsest level: {0}")]
     Coarse(#[from] DirectError),
-    /// The same, on rank zero, which has that matrix and says more.
-    #[error("coarsest level: no factor on rank 0")]
-    CoarseElsewhere,
     /// The motion of a body has no equation.
-    #[error("body {body}: {source}")]
+    #[error("body {}: {source}", body + 1)]
     Body {
-        /// Which.
+        /// Index of the body, from 0; messages count from 1.
         body: usize,
         /// Its rows.
         source: BlockError,
     },
     /// What the serial solver says: of small matrices of pressures, in a gap or of the box, and of surfaces.
     #[error(transparent)]
-    Part(#[from] StokesError),
-    /// The same, of the part of another rank.
+    Stokes(#[from] StokesError),
+    /// A matrix of pressures is too large.
+    #[error(transparent)]
+    Sparse(#[from] SparseError),
+}
+
+/// Why there is no flow, on all ranks.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FlowError {
+    /// The iterations did not converge.
+    #[error(transparent)]
+    Krylov(KrylovError),
+    /// What goes wrong in the part of this rank, or the same in the part of each.
+    #[error(transparent)]
+    Part(PartError),
+    /// What goes wrong in the part of another rank.
     #[error("{message} (on rank {rank})")]
     Elsewhere {
         /// Which rank, the first of them.
@@ -102,9 +110,6 @@ pub enum FlowError {
         /// How often penalties were raised.
         rounds: usize,
     },
-    /// A matrix of pressures is too large.
-    #[error(transparent)]
-    Sparse(#[from] SparseError),
     /// A mean flow is taken away around held bodies in a box without walls only, and the stress is not known
     /// then.
     #[error("flows without mean flow are those around held bodies in boxes without walls, without a stress")]
@@ -117,6 +122,13 @@ pub enum FlowError {
         /// Bodies.
         bodies: usize,
     },
+}
+
+impl FlowError {
+    /// What goes wrong in the same way on each rank, for it follows from what all know.
+    pub(crate) fn of_all(error: StokesError) -> Self {
+        Self::Part(error.into())
+    }
 }
 
 /// What one rank holds of one level.
@@ -269,7 +281,8 @@ impl BoxFlow {
         let b = right_hand_side(&mut operator, bodies, &lift);
         let setup_traffic = ranks.traffic().since(start);
         let mut x = vec![0.0; b.len()];
-        let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x)?;
+        let report =
+            self.krylov(&mut operator, &mut preconditioner, &b, &mut x).map_err(FlowError::Krylov)?;
         let solve_traffic = ranks.traffic().since(start).since(setup_traffic);
         let velocity_dim = operator.velocity_dim();
         operator.pressures.remove_mean(ranks, &mut x[velocity_dim..]);
@@ -359,7 +372,7 @@ fn check_resolved<const D: usize>(
     match balls.get(first as usize) {
         Some(ball) => {
             let (body, radius) = (first as usize, ball.bounding_radius());
-            Err(StokesError::Unresolved { body, radius, cell_size }.into())
+            Err(FlowError::of_all(StokesError::Unresolved { body, radius, cell_size }))
         }
         None => Ok(()),
     }

@@ -9,8 +9,9 @@ use gluey_linalg::{
 use gluey_parallel::{Communicator, GhostPlan};
 use gluey_stokes::part::cell_lambda_max;
 
+use crate::agreement::agreed;
 use crate::bodies::{Shared, rigid, rows};
-use crate::flow::FlowError;
+use crate::flow::{FlowError, PartError};
 use crate::near_bodies::NearBodies;
 use crate::space::{LevelSpace, Plans};
 
@@ -216,19 +217,28 @@ impl<const D: usize> LevelOperator<'_, D> {
         self.fill_diagonal(viscosity);
         self.gather(&mut nodal);
         nodal.truncate(self.space.owned_nodal_dim());
+        let inverted = self.invert(&mut nodal);
+        let blocks = self.blocks(viscosity);
+        let blocks = agreed(self.ranks, inverted.map_err(PartError::from).and(blocks))?;
+        Ok(BlockDiagonal { nodal, blocks, rigid: rigid::<D>() })
+    }
+
+    /// Inverts the diagonal at owned nodes, whose entry is zero where nothing is unknown.
+    fn invert(&self, nodal: &mut [f32]) -> Result<(), BadDiagonal> {
         let first = self.space.velocity.owned.start;
         for (row, entry) in nodal.iter_mut().enumerate() {
             *entry = match self.space.is_free(first + row / D) {
                 true if *entry > 0.0 => 1.0 / *entry,
-                true => return Err(BadDiagonal { row, value: f64::from(*entry) }.into()),
+                true => return Err(BadDiagonal { row, value: f64::from(*entry) }),
                 false => 0.0,
             };
         }
-        Ok(BlockDiagonal { nodal, blocks: self.blocks(viscosity)?, rigid: rigid::<D>() })
+        Ok(())
     }
 
-    /// Inverses of `R^T A R` for the owned bodies, zero for those that are not rigid here or held.
-    fn blocks(&self, viscosity: f64) -> Result<Vec<f32>, FlowError> {
+    /// Inverses of `R^T A R` for the owned bodies, zero for those that are not rigid here or held. All ranks
+    /// call this.
+    fn blocks(&self, viscosity: f64) -> Result<Vec<f32>, PartError> {
         let (bodies, map) = (&self.space.bodies, &self.space.velocity.map);
         let (n, size) = (rigid::<D>(), rigid::<D>() * rigid::<D>());
         let viscous = self.space.reference().viscous;
@@ -261,7 +271,7 @@ impl<const D: usize> LevelOperator<'_, D> {
         for (body, block) in blocks.chunks_exact_mut(size).enumerate() {
             match bodies.is_active(body) && !bodies.is_held(body) {
                 true => invert_spd(n, block)
-                    .map_err(|source| FlowError::Body { body: bodies.ids[body] as usize, source })?,
+                    .map_err(|source| PartError::Body { body: bodies.ids[body] as usize, source })?,
                 false => block.fill(0.0),
             }
         }

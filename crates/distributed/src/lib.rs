@@ -53,7 +53,7 @@ mod warm_start;
 
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
-pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, RigidBodies};
+pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError, RigidBodies};
 pub use moving::{
     Follower, FrameName, Memory, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
     ask_to_keep,

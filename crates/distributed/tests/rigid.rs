@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
-use gluey_distributed::{BoxFlow, FlowError, MyFlow, RigidBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, FlowError, MyFlow, PartError, RigidBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -214,7 +214,7 @@ fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
 fn all_ranks_refuse_what_cannot_be_computed() {
     let tiny = Example { bodies: &[([0.4, 0.5, 0.5], 0.2), ([0.81, 0.3, 0.5], 0.05)], ..PAIR };
     let (radius, cell_size) = (0.05, 0.125);
-    let refused = FlowError::Part(StokesError::Unresolved { body: 1, radius, cell_size });
+    let refused = FlowError::Part(PartError::Stokes(StokesError::Unresolved { body: 1, radius, cell_size }));
     assert_eq!(errors(tiny, &[]), vec![refused; 3]);
     let one = [Wrench::default()];
     assert_eq!(errors(PAIR, &one), vec![FlowError::Count { found: 1, bodies: 2 }; 3]);

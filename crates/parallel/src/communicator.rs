@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 
+use crate::failure::RankFailure;
 use crate::number::{read_all, write_all};
 
 /// Bytes for a rank, or from it.
@@ -78,7 +79,7 @@ pub trait Communicator {
     }
 
     /// Adds up `sums` like [`Communicator::sum`], and replaces `largest` by the largest of all ranks, in the
-    /// same messages.
+    /// same messages. What is not a number is largest.
     fn reduce(&self, sums: &mut [f64], largest: &mut [f64]) {
         count(self.counter(), |traffic| traffic.reductions += 1);
         let mut values = [&*sums, &*largest].concat();
@@ -88,7 +89,7 @@ pub trait Communicator {
                 Step::From(rank) => {
                     let bytes = receive(self, rank, length);
                     for (k, (value, other)) in values.iter_mut().zip(read_all::<f64>(&bytes)).enumerate() {
-                        *value = if k < sums.len() { *value + other } else { value.max(other) };
+                        *value = if k < sums.len() { *value + other } else { larger(*value, other) };
                     }
                 }
                 Step::To(rank) => {
@@ -102,6 +103,22 @@ pub trait Communicator {
         let (of_sums, of_largest) = values.split_at(sums.len());
         sums.copy_from_slice(of_sums);
         largest.copy_from_slice(of_largest);
+    }
+
+    /// The failure of the first rank that has one, by its text, on all of them; nothing if none has.
+    ///
+    /// The one place where ranks agree on failures. What can fail on one of them is brought here before the
+    /// next message: a rank that returned alone would leave the others waiting.
+    fn first_failure(&self, own: Option<String>) -> Option<RankFailure> {
+        let lengths = self.all_gather(&[own.as_ref().map_or(0, |text| 1 + text.len() as u64)]);
+        let rank = lengths.iter().position(|&length| length > 0)?;
+        let mut bytes = vec![0.0; lengths[rank] as usize - 1];
+        if let Some(text) = own.filter(|_| rank == self.rank()) {
+            bytes.iter_mut().zip(text.bytes()).for_each(|(number, byte)| *number = f64::from(byte));
+        }
+        self.sum(&mut bytes);
+        let bytes: Vec<u8> = bytes.into_iter().map(|byte| byte as u8).collect();
+        Some(RankFailure { rank, size: self.size(), message: String::from_utf8_lossy(&bytes).into_owned() })
     }
 
     /// Replaces `values`, of which all ranks have as many, by those of rank zero.
@@ -131,6 +148,11 @@ pub trait Communicator {
         broadcast(self, &mut gathered);
         read_all(&gathered).collect()
     }
+}
+
+/// The larger of two numbers; one that is not a number is larger than all.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }
 
 /// A message of this rank in a tree.

@@ -18,12 +18,14 @@
 //! ```
 //!
 //! A rank that dies ends all: threads unwind and [`Threads::run`] says which was the first; processes are
-//! aborted.
+//! aborted. One that fails and lives brings its error to [`Communicator::first_failure`], which makes it that
+//! of all.
 //!
 //! Not for tasks that move between ranks: who owns what is decided before.
 
 mod alone;
 mod communicator;
+mod failure;
 mod ghosts;
 mod number;
 #[cfg(feature = "mpi")]
@@ -32,11 +34,12 @@ mod threads;
 
 pub use alone::Alone;
 pub use communicator::{Communicator, Message, Traffic};
+pub use failure::RankFailure;
 pub use ghosts::{GhostPlan, Wanted, route};
 pub use number::Number;
 #[cfg(feature = "mpi")]
 pub use processes::{Processes, StartError};
-pub use threads::{RankFailure, Threads};
+pub use threads::Threads;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use crate::communicator::{Communicator, Message, Traffic};
+use crate::failure::RankFailure;
 
 /// A rank that is a thread.
 #[derive(Debug)]
@@ -17,25 +18,6 @@ pub struct Threads {
     from: Vec<Receiver<Vec<u8>>>,
     traffic: Cell<Traffic>,
 }
-
-/// A rank that did not finish.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RankFailure {
-    /// The first rank, by number, that failed of itself.
-    pub rank: usize,
-    /// Number of ranks.
-    pub size: usize,
-    /// What it said.
-    pub message: String,
-}
-
-impl std::fmt::Display for RankFailure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "rank {} of {} failed: {}", self.rank, self.size, self.message)
-    }
-}
-
-impl std::error::Error for RankFailure {}
 
 /// Why a rank ended that waited for another one, which ended before.
 struct Lost {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
-use gluey_parallel::{Alone, Communicator, GhostPlan, Message, Threads, Wanted, route};
+use gluey_parallel::{Alone, Communicator, GhostPlan, Message, RankFailure, Threads, Wanted, route};
 
 const SIZES: [usize; 7] = [1, 2, 3, 4, 5, 8, 13];
 
@@ -141,6 +141,37 @@ fn a_rank_that_dies_ends_all_and_is_named() {
         assert_eq!((failure.rank, failure.size), (1, size));
         let text = failure.to_string();
         assert_eq!(text, format!("rank 1 of {size} failed: no memory left in round 3"));
+    }
+}
+
+#[test]
+fn the_failure_of_a_rank_is_that_of_all() {
+    let told = "körper 7: no equation ".repeat(50);
+    for size in SIZES {
+        let failing = [size / 2, size - 1];
+        let outcomes = Threads::run(size, |ranks| {
+            let text = failing.contains(&ranks.rank()).then(|| format!("{told}{}", ranks.rank()));
+            [None, text, Some(String::new())].map(|own| ranks.first_failure(own))
+        });
+        let says = |rank: usize, message: &str| Some(RankFailure { rank, size, message: message.to_owned() });
+        let expected = [None, says(size / 2, &format!("{told}{}", size / 2)), says(0, "")];
+        assert!(outcomes.unwrap().iter().all(|found| found == &expected), "{size} ranks");
+    }
+}
+
+#[test]
+fn what_is_not_a_number_is_largest_on_any_rank() {
+    for size in SIZES {
+        for lost in 0..size {
+            let found = Threads::run(size, |ranks| {
+                let own = if ranks.rank() == lost { f64::NAN } else { 1.0 };
+                let mut largest = [own, ranks.rank() as f64, -1.0];
+                ranks.reduce(&mut [], &mut largest);
+                largest
+            });
+            let is_right = |found: &[f64; 3]| found[0].is_nan() && found[1..] == [size as f64 - 1.0, -1.0];
+            assert!(found.unwrap().iter().all(is_right), "{size} ranks, {lost}");
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings,
-//! an allocation counter, and programs outside this workspace.
+//! an allocation counter, ranks that are told to fail, and programs outside this workspace.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
@@ -15,6 +15,7 @@
 pub mod allocation;
 mod convergence;
 pub mod exact;
+pub mod failing;
 pub mod packing;
 pub mod reference;
 mod stranger;

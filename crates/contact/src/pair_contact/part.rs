@@ -364,7 +364,8 @@ where
             Failure::Gap { contact, .. } => *contact == ELSEWHERE,
         };
         if is_elsewhere {
-            return PartFailure::Elsewhere;
+            let message = "contacts of other ranks cannot be satisfied".to_owned();
+            return PartFailure::Elsewhere { message };
         }
         let neighbours = &self.contact.neighbours;
         let key =
@@ -378,11 +379,10 @@ fn agree<const D: usize>(
     partners: &dyn Partners<D>,
     outcome: Result<(), ContactError>,
 ) -> Result<(), PartFailure> {
-    let mut any = [f64::from(u8::from(outcome.is_err()))];
-    partners.complete(&mut [], &mut any);
-    match outcome {
-        Err(error) => Err(PartFailure::Here(error)),
-        Ok(()) if any[0] > 0.0 => Err(PartFailure::Elsewhere),
-        Ok(()) => Ok(()),
+    let own = outcome.as_ref().err().map(ToString::to_string);
+    match (partners.first_failure(own), outcome) {
+        (_, Err(error)) => Err(PartFailure::Here(error)),
+        (Some(message), Ok(())) => Err(PartFailure::Elsewhere { message }),
+        (None, Ok(())) => Ok(()),
     }
 }

@@ -67,10 +67,14 @@ impl PartFailure {
     }
 
     /// The error of ranks that failed together, from the words of each: contacts that are infeasible are
-    /// those of all, another error is that of the first. `None` if nobody says what it was.
-    pub fn merged(failures: &[Vec<u64>]) -> Option<ContactError> {
+    /// those of all, another error is that of the first. Where nobody has words for it, what is known of it
+    /// here.
+    pub fn of_all(self, failures: &[Vec<u64>]) -> ContactError {
         let mut errors = failures.iter().filter_map(|words| error_of(words));
-        let mut first = errors.next()?;
+        let mut first = errors.next().unwrap_or_else(|| match self {
+            Self::Here(error) => error,
+            Self::Elsewhere { message } => ContactError::Elsewhere { message },
+        });
         if let ContactError::Infeasible { pairs } = &mut first {
             for error in errors {
                 if let ContactError::Infeasible { pairs: more } = error {
@@ -80,7 +84,7 @@ impl PartFailure {
             pairs.sort_unstable();
             pairs.dedup();
         }
-        Some(first)
+        first
     }
 }
 
@@ -132,13 +136,19 @@ mod tests {
         ];
         for error in errors {
             let words = PartFailure::Here(error.clone()).words();
-            let mut expected = error;
+            let mut expected = error.clone();
             if let ContactError::Infeasible { pairs } = &mut expected {
                 pairs.sort_unstable();
             }
             let others = [Vec::new(), words.clone(), Vec::new(), words];
-            assert_eq!(PartFailure::merged(&others), Some(expected));
+            let here = PartFailure::Elsewhere { message: error.to_string() };
+            assert_eq!(here.of_all(&others), expected);
         }
-        assert_eq!(PartFailure::merged(&[PartFailure::Elsewhere.words()]), None);
+        let message = "no memory".to_owned();
+        let elsewhere = PartFailure::Elsewhere { message: message.clone() };
+        let unnamed = PartFailure::Here(ContactError::BadStep { velocity_weight: 0.0, dt: 0.0 });
+        let all = [&elsewhere, &unnamed].map(PartFailure::words);
+        assert_eq!(elsewhere.of_all(&all), ContactError::Elsewhere { message });
+        assert!(matches!(unnamed.of_all(&all), ContactError::BadStep { .. }));
     }
 }

@@ -33,6 +33,9 @@ pub trait Partners<const D: usize> {
     /// `largest` by the largest over all ranks.
     fn complete(&self, sums: &mut [f64], largest: &mut [f64]);
 
+    /// What the first rank that failed says of it, on all ranks; nothing if none failed.
+    fn first_failure(&self, own: Option<String>) -> Option<String>;
+
     /// The words of all ranks in their order, on rank zero.
     fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>>;
 
@@ -137,8 +140,11 @@ pub struct PartOutcome {
 pub enum PartFailure {
     /// The failure is one of contacts of this rank. Of contacts that are infeasible it names those here.
     Here(ContactError),
-    /// Other ranks know what it is.
-    Elsewhere,
+    /// Other ranks know what it is, and say so.
+    Elsewhere {
+        /// What they say.
+        message: String,
+    },
 }
 
 #[cfg(test)]

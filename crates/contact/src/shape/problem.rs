@@ -15,6 +15,7 @@ use super::{Shape, displaced};
 use crate::delassus::JacobianRow;
 use crate::memory::GammaRule;
 use crate::projection::{self, Effort, Tuning};
+use crate::solver::defect;
 use crate::{Contact, ContactError, ContactParams, ContactReport, ContactState, PairKey, PairState};
 
 /// Points of contact nearer than this many summed roundings are the same, and follow the bodies; fewer in
@@ -231,7 +232,7 @@ where
             let compliance = self.row(point).compliance(&self.bodies.weights);
             compliance * (point.force - pair.floor)
         };
-        gap.min(self.points.get(pair.main).map_or(f64::INFINITY, slack)).abs()
+        defect(gap, self.points.get(pair.main).map_or(f64::INFINITY, slack))
     }
 
     /// Takes the normals of where the bodies are now; those between round bodies stay, as in

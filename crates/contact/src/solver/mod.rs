@@ -129,6 +129,15 @@ pub struct SolveFailure {
     pub infeasible: Option<Vec<usize>>,
 }
 
+impl SolveFailure {
+    /// That of one contact whose gap is not a number.
+    pub(crate) fn not_a_number() -> Self {
+        let report = SolveReport { iterations: 1, residual: f64::INFINITY };
+        let history = ResidualHistory { entries: vec![(1, report.residual)] };
+        Self { report, history, worst: 0, infeasible: None }
+    }
+}
+
 /// Residuals at iterations 1, 2, 4, 8, ... and at the last one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResidualHistory {
@@ -233,14 +242,17 @@ impl<const N: usize> Measures<N> {
     }
 }
 
-/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual. NaN counts as
-/// largest.
+/// `|min(gap, slack)|`, how far a contact is from being open without a force or closed with one. What is not
+/// a number is infinitely far.
+pub(crate) fn defect(gap: f64, slack: f64) -> f64 {
+    if gap.is_nan() || slack.is_nan() { f64::INFINITY } else { gap.min(slack).abs() }
+}
+
+/// Contact with the largest residual `|min(w, norm (lambda - floor))|`, and that residual.
 fn residual(gaps: &[f64], forces: &[f64], floors: &[f64], norm: f64) -> (usize, f64) {
     let mut worst = (0, 0.0);
     for (k, ((gap, force), floor)) in gaps.iter().zip(forces).zip(floors).enumerate() {
-        let slack = norm * (force - floor);
-        let here = gap.min(slack).abs();
-        let here = if gap.is_nan() { f64::INFINITY } else { here };
+        let here = defect(*gap, norm * (force - floor));
         if here > worst.1 {
             worst = (k, here);
         }
@@ -280,4 +292,21 @@ fn split<const N: usize>(scratch: &mut [f64], count: usize) -> [&mut [f64]; N] {
         rest = others;
         first
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_is_the_largest_residual() {
+        let (gaps, forces, floors) = ([0.0, 0.5, 0.0], [1.0, 0.0, 2.0], [0.0; 3]);
+        assert_eq!(residual(&gaps, &forces, &floors, 2.0), (0, 0.0));
+        let far = |(worst, off): (usize, f64)| (worst, off == f64::INFINITY);
+        assert_eq!(far(residual(&[0.0, f64::NAN, 0.0], &forces, &floors, 2.0)), (1, true));
+        assert_eq!(far(residual(&gaps, &[1.0, 0.0, f64::NAN], &floors, 2.0)), (2, true));
+        assert_eq!(far(residual(&gaps, &forces, &floors, f64::NAN)), (0, true));
+        // Contacts that must stay closed have all forces.
+        assert_eq!(residual(&gaps, &forces, &[f64::NEG_INFINITY; 3], 2.0), (1, 0.5));
+    }
 }

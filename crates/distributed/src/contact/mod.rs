@@ -9,7 +9,7 @@ mod words;
 
 use std::rc::Rc;
 
-use gluey_contact::part::{Dealt, Lead, PartContact, PartFailure, PartFrame};
+use gluey_contact::part::{Dealt, Lead, PartContact, PartFrame};
 use gluey_contact::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
     Domain, MemoryError, PairContact, StepGeometry, WithFixed,
@@ -126,9 +126,7 @@ where
         }
         Err(failure) => {
             let all = collect(ranks, &failure.words())?;
-            // Some rank knows.
-            let error = PartFailure::merged(&all).unwrap_or(ContactError::Infeasible { pairs: Vec::new() });
-            Some(Told::Failed(error))
+            Some(Told::Failed(failure.of_all(&all)))
         }
     }
 }

@@ -81,6 +81,10 @@ impl<const D: usize> Partners<D> for Sharers<'_, D> {
         self.ranks.reduce(sums, largest);
     }
 
+    fn first_failure(&self, own: Option<String>) -> Option<String> {
+        self.ranks.first_failure(own).map(|failure| failure.message)
+    }
+
     fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
         collect(self.ranks, words)
     }

@@ -9,6 +9,8 @@ use gluey_linalg::{LinOp, Pattern, SellMatrix, SparseError, SparseMatrix};
 use gluey_parallel::{Communicator, GhostPlan, Wanted, route};
 use rustc_hash::FxHashMap;
 
+use crate::agreement::agreed;
+use crate::flow::FlowError;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
 
@@ -84,7 +86,7 @@ impl<'a> SharedMass<'a> {
         pressures: &SharedPressures,
         (viscosity, masses): (f64, &Masses<'_>),
         weights: &[f64],
-    ) -> Result<Self, SparseError> {
+    ) -> Result<Self, FlowError> {
         let mut columns = Columns::new(space, pressures);
         let cells = Cells { space, pressures, masses };
         let received = cells.rows_of_others(ranks, &columns);
@@ -93,23 +95,8 @@ impl<'a> SharedMass<'a> {
         let first = space.pressure.owned.start as u32;
         columns.plan = GhostPlan::new(ranks, columns.ghosts.clone(), |key| find(key).map(|q| q - first));
 
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        masses(&mut |cell, _| groups.push(cells.group(cell, &columns)));
-        groups.extend(received.iter().map(|entry| vec![entry.0, entry.1]));
-        let mut matrix = SparseMatrix::zeros(Arc::new(Pattern::from_groups(columns.len(), &groups)?));
-        drop(groups);
+        let mut matrix = agreed(ranks, cells.matrix(&columns, &received))?;
         let owned = columns.owned;
-        let mut failed = Ok(());
-        cells.for_each_entry(&columns, |row, column, value| {
-            if row < owned {
-                failed = failed.and(matrix.add(row, column, value));
-            }
-        });
-        failed?;
-        received.iter().try_for_each(|&(row, column, value)| matrix.add(row, column, value))?;
-        for q in (0..owned).filter(|&q| !pressures.is_free[q]) {
-            matrix.add(q, q, 2.0)?;
-        }
         let mut roots: Vec<f64> = weights.iter().map(|w| w.sqrt()).collect();
         roots.resize(columns.len(), 1.0);
         columns.plan.update::<f64, 1>(ranks, &mut roots);
@@ -215,6 +202,32 @@ impl<const D: usize> Cells<'_, D> {
                 }
             }
         });
+    }
+
+    /// The rows of the owned pressures, with twos on the diagonal where nothing is unknown: what own cells and
+    /// those of others add to them.
+    fn matrix(
+        &self,
+        columns: &Columns,
+        received: &[(usize, usize, f64)],
+    ) -> Result<SparseMatrix, SparseError> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        (self.masses)(&mut |cell, _| groups.push(self.group(cell, columns)));
+        groups.extend(received.iter().map(|entry| vec![entry.0, entry.1]));
+        let mut matrix = SparseMatrix::zeros(Arc::new(Pattern::from_groups(columns.len(), &groups)?));
+        drop(groups);
+        let (owned, mut failed) = (columns.owned, Ok(()));
+        self.for_each_entry(columns, |row, column, value| {
+            if row < owned {
+                failed = failed.and(matrix.add(row, column, value));
+            }
+        });
+        failed?;
+        received.iter().try_for_each(|&(row, column, value)| matrix.add(row, column, value))?;
+        for q in (0..owned).filter(|&q| !self.pressures.is_free[q]) {
+            matrix.add(q, q, 2.0)?;
+        }
+        Ok(matrix)
     }
 
     /// Sends what own cells add to rows of others, and returns what others add to own ones: keys of row and

@@ -86,13 +86,13 @@ where
         let (ranks, PressureCells { viscosity, flowing, masses }) = (shared.ranks, *cells);
         let weights = weights::weights(ranks, space, pressures, flowing, viscosity);
         let mut mass = SharedMass::new(ranks, space, pressures, (viscosity, masses), &weights)?;
-        let gaps = Gaps::new(tree, shared, space, nodes, pressures, &mass);
-        let gaps = agreed(ranks, gaps)?;
+        let gaps = agreed(ranks, Gaps::new(tree, shared, space, nodes, pressures, &mass))?;
         let whole_box = agreed(ranks, WholeBox::new(tree, ranks, space, pressures, viscosity))?;
-        let mut jacobi = Jacobi::new(&mass.diagonal())?;
+        let mut jacobi = agreed(ranks, Jacobi::new(&mass.diagonal()))?;
         let start = space.pressure.owned.clone().zip(&pressures.is_free);
         let start: Vec<f32> = start.map(|(q, &is_free)| pseudo_random(space, q, is_free)).collect();
-        let largest = estimate_lambda_max_from(start, &mut mass, &mut jacobi, LANCZOS_STEPS)?;
+        let largest = estimate_lambda_max_from(start, &mut mass, &mut jacobi, LANCZOS_STEPS);
+        let largest = largest.map_err(FlowError::Krylov)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
         let chebyshev = Chebyshev::new(space.pressure.owned.len(), steps(interval), interval);
         // Entries of the diagonal were needed for the gaps.
@@ -126,3 +126,7 @@ fn steps(interval: SpectralInterval) -> usize {
     let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
     (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+mod tests;

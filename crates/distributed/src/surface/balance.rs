@@ -46,7 +46,7 @@ impl BoxFlow {
         }
         let Some(inverse) = permeability.try_inverse() else {
             let what = "flows without mean flow around bodies that let nothing through";
-            return Err(StokesError::Unsupported { what }.into());
+            return Err(FlowError::of_all(StokesError::Unsupported { what }));
         };
         let mean = flow.mean_velocity.unwrap_or_else(Vector::zeros);
         flow.mean_force = -(inverse * mean);

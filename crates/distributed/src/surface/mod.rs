@@ -126,7 +126,7 @@ impl BoxFlow {
         let is_small = |ball: &Ball<D>| ball.bounding_radius() < cell_size;
         if let Some(body) = around.balls.iter().position(is_small) {
             let radius = around.balls[body].bounding_radius();
-            return Err(StokesError::Unresolved { body, radius, cell_size }.into());
+            return Err(FlowError::of_all(StokesError::Unresolved { body, radius, cell_size }));
         }
         let start = ranks.traffic();
         let bodies = BallTree::new(around.balls);
@@ -219,7 +219,7 @@ where
                 return self.finished((tree, &problem), attempt, [rounds, wasted], before);
             };
             if rounds == MOST_ROUNDS {
-                attempt.report?;
+                attempt.report.map_err(FlowError::Krylov)?;
                 let (body, share) = (body as usize, f64::from_bits(share));
                 return Err(FlowError::WeakSurface { body, share, rounds });
             }
@@ -386,7 +386,8 @@ where
             _ if self.shared.held.is_empty() => Given::Wrenches(&wrenches),
             _ => Given::Each(&self.given),
         };
-        let (lift, mut whole) = problem.data_under(&Conditions { bodies, ..*self.conditions })?;
+        let data = problem.data_under(&Conditions { bodies, ..*self.conditions });
+        let (lift, mut whole) = agreed(self.shared.ranks, self.named(data))?;
         let mut b = vec![0.0; operator.space.dim()];
         operator.space.gather(&mut whole, &mut b);
         Ok((lift, [whole, b]))
@@ -449,7 +450,7 @@ where
         before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let Attempt { space, velocity, pressure, deviation, sizes, report, .. } = attempt;
-        let (report, level) = (report?, &self.level);
+        let (report, level) = (report.map_err(FlowError::Krylov)?, &self.level);
         let here = (tree, &self.shared);
         let kept = deviation.map(|last| WarmStart::new(here, level, &self.bodies, last, before).into());
         let (points, nodal) = (&level.velocity, level.nodal_dim());

@@ -8,6 +8,7 @@ use gluey_stokes::{Given, Problem, Stress};
 
 use super::Setting;
 use super::space::SurfaceSpace;
+use crate::agreement::agreed;
 use crate::bodies::rigid;
 use crate::flow::FlowError;
 
@@ -57,7 +58,8 @@ where
             Given::Wrenches(given) => return Ok(given.to_vec()),
             _ => {}
         }
-        let (own, n) = (problem.own_wrenches(self.conditions, velocity, whole)?, rigid::<D>());
+        let own = self.named(problem.own_wrenches(self.conditions, velocity, whole));
+        let (own, n) = (agreed(self.shared.ranks, own)?, rigid::<D>());
         let mut numbers = vec![0.0; all * n];
         for (&id, wrench) in self.bodies.ids.iter().zip(&own) {
             let sums = &mut numbers[id as usize * n..][..n];
@@ -85,7 +87,8 @@ where
         fields: [&[f64]; 2],
         whole: &[f64],
     ) -> Result<Stress<D>, FlowError> {
-        let own = problem.own_stress(&self.conditions.strain, fields, whole)?;
+        let own = self.named(problem.own_stress(&self.conditions.strain, fields, whole));
+        let own = agreed(self.shared.ranks, own)?;
         let (all, n) = (self.shared.bodies.balls().len(), D * D);
         let mut numbers = vec![0.0; 2 * all * n];
         for (half, moments) in [&own.moments, &own.of_films].into_iter().enumerate() {

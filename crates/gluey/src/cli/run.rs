@@ -6,7 +6,7 @@ use clap::Args;
 use gluey::case::Override;
 use gluey::{Case, Formulation, ResultPaths, RunOptions, Strategy};
 #[cfg(feature = "mpi")]
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, RankFailure};
 
 use super::failure::Failure;
 use super::interrupt::Requests;
@@ -47,12 +47,13 @@ pub struct RunArguments {
     manner: Manner,
 }
 
-/// A case that not all ranks can read.
+/// A case that not all ranks can begin with.
 #[cfg(feature = "mpi")]
 #[derive(Debug, thiserror::Error)]
-#[error("rank {rank} cannot read the case, which this one can: is the file there on all machines?")]
-struct UnreadElsewhere {
+#[error("rank {rank} cannot begin, which this one can: {message}; is the case file there on all machines?")]
+struct StoppedElsewhere {
     rank: usize,
+    message: String,
 }
 
 impl RunArguments {
@@ -81,12 +82,11 @@ impl RunArguments {
 
     #[cfg(feature = "mpi")]
     fn share(&self, ranks: &dyn Communicator) -> Result<(), Failure> {
-        self.manner.set_threads()?;
-        let case = self.case();
-        let unread = ranks.all_gather(&[u64::from(case.is_err())]);
+        let case = self.manner.set_threads().and_then(|()| Ok(self.case()?));
+        let failure = ranks.first_failure(case.as_ref().err().map(|failure| failure.diagnostic.to_string()));
         let case = case?;
-        if let Some(rank) = unread.iter().position(|&failed| failed > 0) {
-            return Err(Failure::new(UnreadElsewhere { rank }, None));
+        if let Some(RankFailure { rank, message, .. }) = failure {
+            return Err(Failure::new(StoppedElsewhere { rank, message }, None));
         }
         let options = self.options(&case, &Requests::listen_on_ranks());
         if let Some(report) = self.manner.run_on(ranks, &case, &options, &self.case)? {

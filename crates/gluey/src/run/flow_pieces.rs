@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gluey_distributed::{Memory, SavedPiece, Suspension};
 use gluey_geom::{Dim, Space};
-use gluey_parallel::{Communicator, Message};
+use gluey_parallel::Communicator;
 
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
@@ -79,21 +79,11 @@ fn agreed(
     ranks: &dyn Communicator,
     outcome: Result<(), CheckpointError>,
 ) -> Result<(), CheckpointError> {
-    let text = outcome.as_ref().err().map_or(String::new(), |error| {
+    let text = outcome.as_ref().err().map(|error| {
         let cause = std::error::Error::source(error).map_or(String::new(), |cause| format!(": {cause}"));
         format!("{error}{cause}")
     });
-    let lengths = ranks.all_gather(&[text.len() as u64]);
-    let Some(failed) = lengths.iter().position(|&length| length > 0) else { return outcome };
-    let (mut told, mut heard) = (Vec::new(), Vec::new());
-    if ranks.rank() == failed {
-        let others = (0..ranks.size()).filter(|&rank| rank != failed);
-        told.extend(others.map(|rank| Message { rank, bytes: text.clone().into_bytes() }));
-    } else {
-        heard.push(Message { rank: failed, bytes: vec![0; lengths[failed] as usize] });
-    }
-    ranks.exchange(&told, &mut heard);
-    let Some(message) = heard.pop() else { return outcome };
-    let message = format!("{}, on rank {failed}", String::from_utf8_lossy(&message.bytes));
+    let Some(failure) = ranks.first_failure(text) else { return outcome };
+    let message = format!("{}, on rank {}", failure.message, failure.rank);
     outcome.and(Err(CheckpointError::Piece { path: checkpoint.to_owned(), message }))
 }

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use gluey_distributed::{Follower, FrameName, Memory, SavedPiece, ask_for_fields, ask_to_keep};
 use gluey_geom::{Dim, Space};
 use gluey_motion::Fields;
-use gluey_parallel::{Communicator, Message};
+use gluey_parallel::{Communicator, RankFailure};
 
 use super::flow_pieces;
 use super::frames::{Others, StreamOptions};
@@ -44,8 +44,9 @@ where
         }
         ask_to_keep(self.ranks, name);
         let own = flow_pieces::write(checkpoint, name, &self.memory.saved());
-        first_failure(self.ranks, None)?;
-        own
+        let all = first_failure(self.ranks, own.as_ref().err());
+        let own = own?;
+        all.map(|()| own)
     }
 }
 
@@ -67,7 +68,7 @@ where
     fn keep(&mut self, name: u64, pieces: Vec<SavedPiece>) {
         let checkpoint = self.checkpoint.as_deref().unwrap_or(Path::new(""));
         // What went wrong is told by rank zero.
-        let _ = first_failure(self.ranks, flow_pieces::write(checkpoint, name, &pieces).err());
+        let _ = first_failure(self.ranks, flow_pieces::write(checkpoint, name, &pieces).err().as_ref());
     }
 }
 
@@ -91,43 +92,29 @@ fn write_piece<const D: usize>(
         }
     };
     // What went wrong is told by rank zero.
-    let _ = first_failure(ranks, written.err());
+    let _ = first_failure(ranks, written.err().as_ref());
 }
 
-/// The failure of the first rank that has one, on rank zero, which has none of its own.
-fn first_failure(ranks: &dyn Communicator, own: Option<OutputError>) -> Result<(), OutputError> {
-    let told = own.map_or(Vec::new(), |error| encoded(&error));
-    let lengths = ranks.all_gather(&[told.len() as u64]);
-    let Some(failed) = lengths.iter().position(|&length| length > 0) else { return Ok(()) };
-    let (mut told_here, mut heard) = (Vec::new(), Vec::new());
-    if ranks.rank() == failed {
-        told_here.push(Message { rank: 0, bytes: told });
-    } else if ranks.rank() == 0 {
-        heard.push(Message { rank: failed, bytes: vec![0; lengths[failed] as usize] });
-    }
-    ranks.exchange(&told_here, &mut heard);
-    match heard.pop() {
-        Some(message) => Err(decoded(&message)),
-        None => Ok(()),
-    }
+/// The failure of the first rank that has one, on all ranks.
+fn first_failure(ranks: &dyn Communicator, own: Option<&OutputError>) -> Result<(), OutputError> {
+    ranks.first_failure(own.map(encoded)).map_or(Ok(()), |failure| Err(decoded(&failure)))
 }
 
 /// The file, the number of the system's error, 0 for another one, and what it says: parted by zeros, which no
 /// path has.
-fn encoded(error: &OutputError) -> Vec<u8> {
+fn encoded(error: &OutputError) -> String {
     let number = error.source.raw_os_error().unwrap_or(0);
-    format!("{}\0{number}\0{}", error.path.display(), error.source).into_bytes()
+    format!("{}\0{number}\0{}", error.path.display(), error.source)
 }
 
-fn decoded(message: &Message) -> OutputError {
-    let text = String::from_utf8_lossy(&message.bytes);
-    let mut words = text.splitn(3, '\0');
+fn decoded(failure: &RankFailure) -> OutputError {
+    let mut words = failure.message.splitn(3, '\0');
     let mut next = || words.next().unwrap_or_default();
     let (path, number, reason) = (PathBuf::from(next()), next(), next());
     let kind = match number.parse() {
         Ok(number) if number > 0 => io::Error::from_raw_os_error(number).kind(),
         _ => io::ErrorKind::Other,
     };
-    let source = io::Error::new(kind, format!("{reason}, on rank {}", message.rank));
+    let source = io::Error::new(kind, format!("{reason}, on rank {}", failure.rank));
     OutputError::new(&path, "write the file", source)
 }

@@ -1,0 +1,52 @@
+//! Matrices of pressures that one rank cannot invert.
+
+use gluey_fem::ImplicitTree;
+use gluey_geom::{Aabb, Vector};
+use gluey_levelset::{Ball, BallTree};
+use gluey_parallel::{Communicator, Threads};
+use gluey_testkit::failing::within_a_minute;
+
+use super::{Flowing, PressureCells, SchurInverse};
+use crate::bodies::Shared;
+use crate::cuts::equal_cuts;
+use crate::cycle::VCycle;
+use crate::pressures::SharedPressures;
+
+/// What ranks say of masses that one of them multiplies by `factor`.
+fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
+    let run = move || {
+        Threads::run(3, |ranks| {
+            let wants = |_: &Vector<2>, _: f64, _: u8| true;
+            let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], 4, &wants).unwrap();
+            let cuts = equal_cuts(&tree, ranks);
+            let none: [Ball<2>; 0] = [];
+            let bodies = BallTree::new(&none);
+            let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, offset: 0.0, held: &[] };
+            let cycle = VCycle::new(&mut tree, &shared, 1.0).unwrap();
+            let top = &cycle.levels[cycle.levels.len() - 1].operator;
+            let space = top.space.clone();
+            let pressures = SharedPressures::new(&mut tree, &shared, &space);
+            let scale = if ranks.rank() == 1 { factor } else { 1.0 };
+            let unit = gluey_fem::ReferenceMatrices::<2>::new().pressure_mass;
+            let matrix: Vec<f64> = unit.iter().map(|entry| scale * entry).collect();
+            let masses = |visit: &mut dyn FnMut(usize, &[f64])| {
+                space.own_cells().for_each(|cell| visit(cell, &matrix));
+            };
+            let flowing = Flowing::around_rigid_nodes(&space);
+            let cells = PressureCells { viscosity: 1.0, flowing: &flowing, masses: &masses };
+            let around = (&top.plans.nodes, &pressures);
+            let made = SchurInverse::of_cells(&mut tree, &shared, &space, around, &cells);
+            made.err().map(|error| error.to_string())
+        })
+    };
+    within_a_minute("masses", run).unwrap()
+}
+
+#[test]
+fn masses_that_one_rank_cannot_invert_are_an_error_of_all() {
+    assert_eq!(with_masses_of_one_rank(1.0), [None, None, None]);
+    for factor in [-1.0, f64::NAN] {
+        let said = with_masses_of_one_rank(factor);
+        assert!(said.iter().all(Option::is_some), "{factor}: {said:?}");
+    }
+}

@@ -1,0 +1,133 @@
+//! A rank that fails, wherever it is: all ranks end, and say the same.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+use std::sync::Arc;
+
+use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
+use gluey_distributed::{BoxFlow, ContactFollower, FlowError, SharedContact, Suspension, SuspensionError};
+use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_parallel::{Communicator, Threads};
+use gluey_stokes::{CutCellPressures, Formulation, Lubrication, Refinement};
+use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
+
+const RIGID_DOFS: Formulation =
+    Formulation::RigidDofs { offset: 0.0, cut_cell_pressures: CutCellPressures::Aggregate };
+const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
+const RANKS: usize = 3;
+/// Agreements of one computation; nothing here takes as many.
+const MANY: usize = 100;
+
+/// What ranks say when one of them fails, at each of their agreements in turn, by the numbers of these.
+fn fail_in_turn(
+    what: &'static str,
+    fewest: usize,
+    work: impl Fn(&dyn Communicator) -> Option<String> + Send + Sync + 'static,
+) {
+    let work = Arc::new(work);
+    let on_ranks = |fault: (usize, usize)| {
+        let work = work.clone();
+        let run = move || {
+            Threads::run(RANKS, |ranks| {
+                let ranks = Failing::new(ranks, fault);
+                (work(&ranks), ranks.agreements())
+            })
+            .unwrap()
+        };
+        within_a_minute(what, run)
+    };
+    let sound = on_ranks((0, usize::MAX));
+    let count = sound[0].1;
+    println!("{what}: {count} agreements");
+    assert!(sound.iter().all(|end| end == &(None, count)), "{what}: {sound:?}");
+    assert!((fewest..MANY).contains(&count), "{what}: {count} agreements");
+    for fault in (0..count).map(|at| (at % RANKS, at)) {
+        let ends = on_ranks(fault);
+        let said = |end: &(Option<String>, usize)| end.0.as_ref().is_some_and(|text| text.contains(TOLD));
+        assert!(ends.iter().all(said), "{what}, rank and agreement {fault:?}: {ends:?}");
+        assert!(ends.iter().all(|end| end.0 == ends[0].0), "{what}, {fault:?}: {ends:?}");
+        assert!(ends.iter().all(|end| end.1 == fault.1 + 1), "{what}, {fault:?}: nobody goes on, {ends:?}");
+    }
+}
+
+/// Two particles, between walls or in a box that is sheared for ever.
+fn suspension<const D: usize>(formulation: Formulation, is_sheared: bool) -> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    Suspension {
+        flow: BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 },
+        domain: Aabb::unit(),
+        roots: [1; D],
+        periods: std::array::from_fn(|d| (is_sheared || d == 0).then_some(1.0)),
+        refinement: Refinement { coarsest: 3, surface: 4, band: 2.0, gap_fraction: 0.0, gap_levels: 0 },
+        formulation,
+        radii: vec![0.14; 2],
+        wrenches: vec![Wrench::default(); 2],
+        given: Vec::new(),
+        force_density: None,
+        shear_rate: 1.0,
+        shear_stress: None,
+    }
+}
+
+fn a_flow_fails_as_one<const D: usize>(what: &'static str, fewest: usize, of: Suspension<D>)
+where
+    Dim<D>: Space<D>,
+{
+    let places: Vec<Vector<D>> =
+        [[0.3, 0.55], [0.7, 0.45]].iter().map(|x| Vector::from_fn(|d, _| [x[0], x[1], 0.5][d])).collect();
+    fail_in_turn(what, fewest, move |ranks| {
+        of.solve(ranks, &places, &of.wrenches, 1.0).err().map(|error| error.to_string())
+    });
+}
+
+/// Levels, matrices of pressures, surfaces, data, what is measured of the flow.
+#[test]
+fn a_rank_that_fails_anywhere_in_a_flow_ends_all() {
+    a_flow_fails_as_one("rigid-dofs", 6, suspension::<2>(RIGID_DOFS, false));
+    a_flow_fails_as_one("between walls", 10, suspension::<2>(UNFITTED, false));
+    a_flow_fails_as_one("spheres", 10, suspension::<3>(UNFITTED, false));
+    let stressed = Suspension { shear_stress: Some(1.0), ..suspension::<2>(UNFITTED, true) };
+    a_flow_fails_as_one("at a given stress", 11, stressed);
+    let held = vec![Some(Twist::default()), None];
+    a_flow_fails_as_one("held", 33, Suspension { given: held, ..suspension::<2>(UNFITTED, true) });
+}
+
+/// A line of discs that are pressed together.
+#[test]
+fn a_rank_that_fails_anywhere_in_contact_ends_all() {
+    let positions: Vec<Vector<2>> =
+        (0..30).map(|k| Vector::<2>::new(f64::from(k), 0.01 * f64::from(k).sin())).collect();
+    fail_in_turn("contact", 3, move |ranks| {
+        if ranks.rank() > 0 {
+            return ContactFollower::<2>::default().step(ranks).err().map(|failure| failure.to_string());
+        }
+        let contact = PairContact::with_mobility(ContactParams::default(), WithFixed::new([]));
+        let mut shared = SharedContact::new(contact.within(Domain::default()), ranks);
+        let (radii, drift) = (vec![0.5; 30], vec![Vector::zeros(); 30]);
+        let toward = |x: &Vector<2>| Twist { velocity: -x * 0.1, ..Twist::default() };
+        let mut twists: Vec<Twist<2>> = positions.iter().map(toward).collect();
+        let step = StepGeometry {
+            positions: &positions,
+            radii: &radii,
+            drift: &drift,
+            velocity_weight: 0.05,
+            dt: 0.05,
+        };
+        shared.correct(&step, &mut twists).err().map(|error| error.to_string())
+    });
+}
+
+/// What follows from what all know is the same error on all.
+#[test]
+fn bodies_that_are_too_small_are_so_on_all_ranks() {
+    let small = Suspension { radii: vec![0.001; 2], ..suspension::<2>(UNFITTED, false) };
+    let run = move || {
+        let places = [Vector::<2>::new(0.3, 0.5), Vector::<2>::new(0.7, 0.5)];
+        Threads::run(RANKS, |ranks| small.solve(ranks, &places, &small.wrenches, 1.0).unwrap_err()).unwrap()
+    };
+    let errors = within_a_minute("small bodies", run);
+    assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
+    assert!(matches!(errors[0], SuspensionError::Flow(FlowError::Part(_))), "{errors:?}");
+}

@@ -1,0 +1,68 @@
+//! Ranks of which one is told to fail.
+
+use std::cell::Cell;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use gluey_parallel::{Communicator, Message, RankFailure, Threads, Traffic};
+
+/// What the rank says that is told to fail.
+pub const TOLD: &str = "this rank was told to fail";
+
+/// A rank that may say, where ranks agree on failures for the `n`-th time, that it failed.
+pub struct Failing<'a> {
+    ranks: &'a Threads,
+    fails_at: Option<usize>,
+    agreements: Cell<usize>,
+}
+
+impl<'a> Failing<'a> {
+    /// Fails at the agreement `at`, counted from 0, if it is the rank `rank`.
+    pub fn new(ranks: &'a Threads, (rank, at): (usize, usize)) -> Self {
+        let fails_at = Some(at).filter(|_| ranks.rank() == rank);
+        Self { ranks, fails_at, agreements: Cell::new(0) }
+    }
+
+    /// How often ranks have agreed.
+    pub fn agreements(&self) -> usize {
+        self.agreements.get()
+    }
+}
+
+impl Communicator for Failing<'_> {
+    fn rank(&self) -> usize {
+        self.ranks.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.ranks.size()
+    }
+
+    fn transfer(&self, send: &[Message], receive: &mut [Message]) {
+        self.ranks.transfer(send, receive);
+    }
+
+    fn counter(&self) -> &Cell<Traffic> {
+        self.ranks.counter()
+    }
+
+    fn first_failure(&self, own: Option<String>) -> Option<RankFailure> {
+        let now = self.agreements.replace(self.agreements.get() + 1);
+        let told = || (self.fails_at == Some(now)).then(|| TOLD.to_owned());
+        self.ranks.first_failure(own.or_else(told))
+    }
+}
+
+/// What `work` returns.
+///
+/// # Panics
+/// If it takes longer than a minute: somebody waits for ever.
+pub fn within_a_minute<T: Send + 'static>(what: &str, work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (sender, ended) = channel();
+    std::thread::spawn(move || sender.send(work()));
+    match ended.recv_timeout(Duration::from_secs(60)) {
+        Ok(outcome) => outcome,
+        Err(RecvTimeoutError::Timeout) => panic!("{what}: not done after a minute"),
+        Err(RecvTimeoutError::Disconnected) => panic!("{what}: it panicked"),
+    }
+}
