@@ -38,7 +38,8 @@ pub struct RunReport {
     pub end_gap_over_a: Option<f64>,
     /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of particles 1 and 2, with `t*` the last time when
     /// their line of centres is at 90 degrees to the flow; `None` where that mirror time is not in the run,
-    /// where they touch at it, and with a reversal of the shear.
+    /// where they touch at it, with a reversal of the shear, and where there are others: only the encounter of
+    /// two is its own mirror image.
     pub reversibility_error: Option<f64>,
     /// Name of the reference solution.
     pub reference: Option<String>,
@@ -61,6 +62,7 @@ impl RunReport {
     ) -> Self {
         let (a, pair) = (measures.mean_radius(), measures.pair());
         let deviation = measures.deviation();
+        let is_mirrored = case.particles.len() == 2 && !case.turns_round();
         Self {
             case: case.name.clone(),
             strategy: case.contact.strategy,
@@ -71,7 +73,7 @@ impl RunReport {
             dofs: flow.dof_count,
             min_gap_over_a: measures.smallest_gap_over_a(),
             end_gap_over_a: pair.end_gap().map(|gap| gap / a),
-            reversibility_error: (!case.turns_round()).then(|| reversibility_error(pair, a)).flatten(),
+            reversibility_error: is_mirrored.then(|| reversibility_error(pair, a)).flatten(),
             reference: case.reference.clone(),
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),

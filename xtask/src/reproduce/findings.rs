@@ -98,7 +98,6 @@ fn measures_of(figure: FigureName) -> Vec<(&'static str, Measure)> {
         ],
         FigureName::Fig10 | FigureName::Fig11 => vec![
             ("largest distance from the exact position / a, to t = 6", |v| off_exact(v, 6.0)),
-            ("the same, to t = 12", |v| off_exact(v, 12.0)),
             ("largest distance from gluey contact / a", |v| {
                 let gluey = RunKey { case: CaseName::Trio2d, approach: Approach::Gluey };
                 Some(center_deviation(v.run, v.evidence.data.runs.get(&gluey)?, f64::INFINITY)? / RADIUS)

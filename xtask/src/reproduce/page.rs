@@ -192,8 +192,10 @@ fn write_group(out: &mut String, group: &Group, rows: &[&Row]) -> std::fmt::Resu
             number(row.value),
             escape(&row.wanted)
         )?;
-        if let Some(reason) = row.reason {
+        if let Some(reason) = row.reason() {
             writeln!(out, "<tr><td class=\"t reason\" colspan=\"6\">Why not: {}</td></tr>", escape(reason))?;
+        } else if let Some(failure) = row.failure() {
+            writeln!(out, "<tr><td class=\"t bad\" colspan=\"6\">This row {}.</td></tr>", escape(&failure))?;
         }
     }
     writeln!(out, "</table>")

@@ -3,7 +3,7 @@
 use gluey_verify::{Outcome, Wanted};
 use serde::Serialize;
 
-use super::known::{self, Mode};
+use super::known::{self, Missed, Mode};
 use super::plan::FigureName;
 
 /// Why a row is there.
@@ -60,7 +60,7 @@ impl Claim {
             value,
             wanted: self.wanted.to_string(),
             outcome,
-            reason: known::reason(self.id, mode).filter(|_| outcome == Outcome::No),
+            known: known::missed(self.id, mode),
         }
     }
 }
@@ -86,24 +86,34 @@ pub struct Row {
     pub wanted: String,
     /// Whether it is.
     pub outcome: Outcome,
-    /// For a known disagreement, the reason.
-    pub reason: Option<&'static str>,
+    /// What is known of it, if it is a known disagreement.
+    pub known: Option<Missed>,
 }
 
 impl Row {
-    /// Whether the reproduction fails because of this row: it does not hold and is no known disagreement, or
-    /// it could not be measured at all.
-    pub fn is_failure(&self) -> bool {
-        match self.outcome {
-            Outcome::Yes => false,
-            Outcome::No => self.reason.is_none(),
-            Outcome::NotMeasured => true,
+    /// Why the reproduction fails because of this row; `None` if it does not.
+    pub fn failure(&self) -> Option<String> {
+        match (self.outcome, self.known) {
+            (Outcome::NotMeasured, _) => Some("was not measured".to_owned()),
+            (Outcome::No, None) => Some("does not hold and is no known disagreement".to_owned()),
+            (Outcome::No, Some(known)) if !known.has(self.value) => {
+                let (least, most) = known.between;
+                let value = self.value.unwrap_or(f64::NAN);
+                Some(format!("is {value:.4e}, known to disagree by {least:e} to {most:e}"))
+            }
+            (Outcome::Yes, Some(_)) => Some("holds, and is listed as a known disagreement".to_owned()),
+            (Outcome::Yes, None) | (Outcome::No, Some(_)) => None,
         }
     }
 
-    /// Whether it is a known disagreement.
-    pub fn is_known(&self) -> bool {
-        self.outcome == Outcome::No && self.reason.is_some()
+    /// Whether the reproduction fails because of this row.
+    pub fn is_failure(&self) -> bool {
+        self.failure().is_some()
+    }
+
+    /// For a known disagreement, the reason.
+    pub fn reason(&self) -> Option<&'static str> {
+        self.known.filter(|_| self.outcome == Outcome::No && !self.is_failure()).map(|known| known.why)
     }
 }
 
@@ -157,11 +167,18 @@ mod tests {
     #[test]
     fn known_disagreements_are_no_failures_but_stay_counted_as_no() {
         let listed = known::KNOWN.iter().find(|known| known.full.is_some()).expect("there are some");
-        let row = Claim { id: listed.id, ..claim(Some(2.0), Wanted::AtMost(1.0)) };
-        let row = row.judge(FigureName::Fig5, Mode::Full);
-        assert!(row.is_known() && !row.is_failure());
+        let (least, most) = listed.full.expect("this one is").between;
+        let of = |value| Claim { id: listed.id, ..claim(value, Wanted::AtMost(0.5 * least)) };
+        let judged = |value| of(value).judge(FigureName::Fig5, Mode::Full);
+        let row = judged(Some(0.5 * (least + most)));
+        assert!(row.reason().is_some() && !row.is_failure());
         assert_eq!(count(&[row], Kind::Paper), (0, 1));
-        let missing = Claim { id: listed.id, ..claim(None, Wanted::AtMost(1.0)) };
-        assert!(missing.judge(FigureName::Fig5, Mode::Full).is_failure());
+        assert!(judged(None).is_failure());
+        // Another number than the known one, and one that is as the paper says.
+        for value in [1.01 * most, 0.99 * least, 0.0] {
+            let row = judged(Some(value));
+            assert!(row.is_failure() && row.reason().is_none(), "{value}: {row:?}");
+        }
+        assert!(judged(Some(0.0)).failure().is_some_and(|text| text.starts_with("holds")));
     }
 }

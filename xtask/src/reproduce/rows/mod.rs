@@ -123,5 +123,12 @@ fn no_overlap(id: &'static str, run: &'static str, smallest_gap: Option<f64>) ->
     }
 }
 
+/// No pair overlaps where no contact acts, because films in balance do not let it.
+fn films_hold(id: &'static str, run: &'static str, smallest_gap: Option<f64>) -> Claim {
+    let statement = "Particles do not overlap: films keep them apart, no contact acts.";
+    let wanted = Wanted::AtLeast(0.0);
+    Claim { statement, wanted, ..no_overlap(id, run, smallest_gap) }
+}
+
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Figures 7a and 7b: two spheres.
 
-use super::{Evidence, RADIUS, exact, measured, no_overlap, paper};
+use super::{Evidence, RADIUS, exact, films_hold, measured, no_overlap, paper};
 use crate::reproduce::measures::{
     center_deviation, closest_approach, gap_deviation, gap_error, last_gap, smallest_gap,
 };
@@ -24,7 +24,7 @@ pub fn distances(evidence: &Evidence<'_>) -> Vec<Claim> {
             "pair-3d-gluey-as-printed",
             smallest(Approach::GlueyAsPrinted),
         ),
-        no_overlap("fig7a-unfitted-no-overlap", "pair-3d-unfitted", smallest(Approach::Unfitted)),
+        films_hold("fig7a-unfitted-no-overlap", "pair-3d-unfitted", smallest(Approach::Unfitted)),
     ]);
     claims.extend(against_the_exact_encounter(evidence));
     claims
@@ -68,7 +68,8 @@ fn strategies(evidence: &Evidence<'_>) -> Vec<Claim> {
             "A better accuracy can be obtained with a smaller time step.",
             "pair-3d-gluey-as-printed",
             measured(
-                "reversibility error, over that with twice the time step",
+                "reversibility error, over that with twice the time step (of the six pairs of 1, 2, 3 and 4 times the step \
+                 the only one that agrees)",
                 as_printed.zip(large_step).map(|(own, large)| own / large),
             ),
             Wanted::AtMost(0.75),
