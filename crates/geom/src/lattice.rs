@@ -87,9 +87,9 @@ impl<const D: usize> Lattice<D> {
         shift
     }
 
-    /// The image of a displacement within half a period of zero along each axis, and which one it is: the
-    /// result is the displacement plus [`Lattice::shift`]. It is the shortest wherever that is shorter than
-    /// half of every period.
+    /// The shortest image of a displacement, and which one it is: the result is the displacement plus
+    /// [`Lattice::shift`]. Of images as short as each other it is the first of the nearest row of images in
+    /// `y`, of that on the other side, of the next row.
     pub fn nearest(&self, arm: &Vector<D>) -> (Vector<D>, [i32; D]) {
         let (mut nearest, mut image) = (*arm, [0; D]);
         for d in (0..D).rev() {
@@ -101,7 +101,71 @@ impl<const D: usize> Lattice<D> {
                 nearest[0] += f64::from(count) * self.tilt;
             }
         }
-        (nearest, image)
+        let (nearest, further) = self.nearest_of_rows(&nearest);
+        (nearest, std::array::from_fn(|d| image[d] + further[d]))
+    }
+
+    /// The same for a displacement within half a period of zero along each axis: in a tilted lattice an image
+    /// in another row may be shorter, since rows are elsewhere along `x`. A row is looked at where `y` alone
+    /// is shorter than what was found.
+    pub fn nearest_of_rows(&self, arm: &Vector<D>) -> (Vector<D>, [i32; D]) {
+        let mut best = (*arm, [0; D]);
+        let [Some(length), Some(height)] = [self.periods[0], self.periods[1]] else { return best };
+        if self.tilt == 0.0 {
+            return best;
+        }
+        let other_side = -1f64.copysign(arm[1]);
+        for rows in 1..i32::MAX {
+            for up in [other_side, -other_side].map(|side| side * f64::from(rows)) {
+                let mut image = *arm;
+                image[1] += up * height;
+                let across = image.norm_squared() - image[0] * image[0];
+                if across >= best.0.norm_squared() {
+                    return best;
+                }
+                let (along, count) = shortest(image[0] + up * self.tilt, length);
+                image[0] = along;
+                if image.norm_squared() < best.0.norm_squared() {
+                    let found =
+                        std::array::from_fn(|d| if d == 0 { count } else { (up as i32) * i32::from(d == 1) });
+                    best = (image, found);
+                }
+            }
+        }
+        best
+    }
+
+    /// Calls `visit(image, arm)` for all images of a displacement that are no longer than `farthest`, by their
+    /// numbers along the last axis, then along those before.
+    pub fn for_each_within(
+        &self,
+        arm: &Vector<D>,
+        farthest: f64,
+        mut visit: impl FnMut(&[i32; D], &Vector<D>),
+    ) {
+        let bounds = |d: usize, place: f64| match self.periods[d] {
+            Some(period) => {
+                let [from, to] = [-farthest, farthest].map(|end| (end - place) / period);
+                [from.floor() as i32, to.ceil() as i32]
+            }
+            None => [0, 0],
+        };
+        // Those along x depend on the row.
+        let ranges: [[i32; 2]; D] = std::array::from_fn(|d| if d == 0 { [0, 0] } else { bounds(d, arm[d]) });
+        let mut image: [i32; D] = std::array::from_fn(|d| ranges[d][0]);
+        loop {
+            let [from, to] = bounds(0, arm[0] + f64::from(image[1]) * self.tilt);
+            for along in from..=to {
+                image[0] = along;
+                let found = arm + self.shift(&image);
+                if found.norm() <= farthest {
+                    visit(&image, &found);
+                }
+            }
+            let Some(d) = (1..D).find(|&d| image[d] < ranges[d][1]) else { return };
+            image[d] += 1;
+            (1..d).for_each(|lower| image[lower] = ranges[lower][0]);
+        }
     }
 
     /// The place of a point in the box without tilt that shears into this one, with `y = origin` at rest.
@@ -149,15 +213,89 @@ mod stored_periods {
 mod tests {
     use super::*;
 
+    /// Numbers from -1 to 1 that are not in order.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut state = 12345_u64;
+        move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 10) as f64 / (1_u64 << 53) as f64 - 1.0
+        }
+    }
+
+    /// Boxes from flat to high, tilts beyond the period and none at all, with and without a period in `z`.
+    fn lattices<const D: usize>() -> Vec<(Lattice<D>, Vector<D>)> {
+        let mut next = numbers();
+        let lattice = |n: usize| {
+            let edges: [f64; D] = std::array::from_fn(|d| if d == 1 { 1.0 } else { 8f64.powf(next()) });
+            let periods = std::array::from_fn(|d| (d < 2 || n % 3 > 0).then_some(edges[d]));
+            let tilt = [0.0, 0.5 * edges[0], 0.5 * next() * edges[0], 3.0 * next() * edges[0]][n % 4];
+            let arm = Vector::from_fn(|d, _| 2.0 * next() * edges[d]);
+            (Lattice::new(periods).tilted(tilt), arm)
+        };
+        (0..200).map(lattice).collect()
+    }
+
+    /// All images of a displacement up to many periods away, by their numbers from the last axis on.
+    fn all_images<const D: usize>(lattice: &Lattice<D>, arm: &Vector<D>) -> Vec<([i32; D], Vector<D>)> {
+        let count = |d: usize| lattice.periods()[d].map_or(0, |_| [45, 12, 24][d]);
+        let mut images = vec![[0; D]];
+        for d in 0..D {
+            let along = |k: i32| {
+                images.iter().map(move |image| std::array::from_fn(|e| if e == d { k } else { image[e] }))
+            };
+            images = (-count(d)..=count(d)).flat_map(along).collect();
+        }
+        images.into_iter().map(|image| (image, arm + lattice.shift(&image))).collect()
+    }
+
+    fn nearest_is_the_shortest_of_all<const D: usize>() {
+        for (lattice, arm) in lattices::<D>() {
+            let (nearest, image) = lattice.nearest(&arm);
+            assert!((nearest - arm - lattice.shift(&image)).norm() < 1e-13);
+            let all = all_images(&lattice, &nearest);
+            let shortest = all.iter().map(|(_, arm)| arm.norm()).fold(f64::INFINITY, f64::min);
+            assert!(
+                (nearest.norm() - shortest).abs() < 1e-13,
+                "{lattice:?} {arm:?}: {nearest:?}, {shortest}"
+            );
+            let (back, _) = lattice.nearest(&-arm);
+            assert!((back.norm() - shortest).abs() < 1e-13);
+            let (same, _) = lattice.reduced().nearest(&arm);
+            assert!((same.norm() - shortest).abs() < 1e-13);
+        }
+    }
+
     #[test]
     fn nearest_is_a_translation_of_the_lattice_and_the_shortest() {
-        let lattice = Lattice::<3>::new([Some(1.0), Some(1.5), None]).tilted(3.4);
-        let arm = Vector::<3>::new(0.9, -2.9, 7.0);
-        let (nearest, image) = lattice.nearest(&arm);
-        assert!((nearest - arm - lattice.shift(&image)).norm() < 1e-14);
-        assert!(nearest[0].abs() <= 0.5 && nearest[1].abs() <= 0.75 && nearest[2] == 7.0);
-        let (same, _) = lattice.reduced().nearest(&arm);
-        assert!((same - nearest).norm() < 1e-14 && lattice.reduced().tilt().abs() <= 0.5);
+        nearest_is_the_shortest_of_all::<2>();
+        nearest_is_the_shortest_of_all::<3>();
+    }
+
+    fn images_within_are_those_of_a_loop<const D: usize>() {
+        for (n, (lattice, arm)) in lattices::<D>().into_iter().enumerate() {
+            let (lattice, arm) = (lattice.reduced(), lattice.nearest(&arm).0);
+            let farthest = [0.4, 1.0, 2.5][n % 3];
+            let mut found = Vec::new();
+            lattice.for_each_within(&arm, farthest, |image, arm| found.push((*image, *arm)));
+            let mut expected = all_images(&lattice, &arm);
+            expected.retain(|(_, arm)| arm.norm() <= farthest);
+            assert_eq!(found, expected, "{lattice:?} {arm:?}");
+        }
+    }
+
+    #[test]
+    fn all_images_within_a_distance_are_found() {
+        images_within_are_those_of_a_loop::<2>();
+        images_within_are_those_of_a_loop::<3>();
+    }
+
+    /// Where two images are as short as each other the choice is one of the displacement.
+    #[test]
+    fn of_equal_images_it_is_always_the_same() {
+        let lattice = Lattice::<2>::new([Some(4.0), Some(1.0)]).tilted(2.0);
+        let (nearest, image) = lattice.nearest(&Vector::<2>::new(1.0, 0.5));
+        assert_eq!((nearest, image), (Vector::<2>::new(-1.0, -0.5), [0, -1]));
+        assert_eq!(lattice.nearest(&Vector::<2>::new(-1.0, -0.5)).0, -nearest);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::trajectory::Row;
 /// Room for rounding in the search, relative to lengths.
 const SLACK: f64 = 1e-9;
 
-/// Two particles and the gap between their nearest images.
+/// Two particles and the smallest gap between their images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairGap {
     /// Index of the first particle, from 0.
@@ -93,15 +93,20 @@ where
         }
     }
 
-    /// Images of all balls so far, one period up or down an axis: as far as nearest images are from the
-    /// period.
+    /// Images of all balls so far, as many periods up or down an axis as come within the margin, or as the
+    /// nearest ones can be.
     fn add_images(&mut self, axis: usize, period: f64, margin: f64, lattice: &Lattice<D>) {
+        let is_tilted = axis < 2 && lattice.tilt() != 0.0;
+        let across = if is_tilted { &lattice.periods()[..2] } else { &lattice.periods()[axis..=axis] };
+        let farthest = 0.5 * across.iter().flatten().copied().fold(0.0, f64::hypot);
+        let margin = margin.min(farthest * (1.0 + SLACK));
+        let most = (margin / period).ceil() as i32;
         for ball in 0..self.centers.len() {
-            for sign in [-1.0, 1.0] {
+            for up in (-most..=most).filter(|&up| up != 0).map(f64::from) {
                 let mut image = self.centers[ball];
-                image[axis] += sign * period;
+                image[axis] += up * period;
                 if axis == 1 && lattice.tilt() != 0.0 {
-                    image[0] += sign * lattice.tilt();
+                    image[0] += up * lattice.tilt();
                     image = wrapped_along(0, image, lattice);
                 }
                 if image[axis] >= -margin && image[axis] <= period + margin {
@@ -185,7 +190,10 @@ mod tests {
         let [mut tilted, mut sheared] = [periodic.clone(), periodic.clone()];
         tilted.set_sliding(0.5, 0.0);
         sheared.set_sliding(-3.3, 0.0);
-        for domain in [&open, &channel, &periodic, &tilted, &sheared] {
+        // Flat, so that the nearest image may be in a row far up or down.
+        let mut flat = Domain::periodic(&Vector::from_fn(|d, _| [1.6, 0.2, 0.4][d]));
+        flat.set_sliding(0.53, 0.0);
+        for domain in [&open, &channel, &periodic, &tilted, &sheared, &flat] {
             // Dense, sparse, far apart, and far from the first period.
             for (count, radius, spread) in [
                 (60, 0.1, 1.0),

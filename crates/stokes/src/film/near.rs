@@ -1,6 +1,6 @@
 //! Which bodies are near to each other or to a wall.
 
-use gluey_geom::{Aabb, Lattice, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, BallTree, Body};
 
 use super::deficit::FilmShape;
@@ -176,26 +176,26 @@ pub fn films<const D: usize>(bodies: &[Ball<D>], domain: &Aabb<D>, reach: f64) -
         partners.sort_unstable();
         films.extend(at_walls(body, index, domain).filter(|film| film.gap < reach));
         for other in partners {
-            films.extend(between(bodies, [index, other]).filter(|film| film.gap < reach));
+            films.extend(between(bodies, [index, other], reach));
         }
     }
     films
 }
 
-/// The films between a body and all images of another around it.
-fn between<const D: usize>(
-    bodies: &[Ball<D>],
-    [body, other]: [usize; 2],
-) -> impl Iterator<Item = Film<D>> + '_ {
+/// The films thinner than `reach` between a body and all images of another.
+fn between<const D: usize>(bodies: &[Ball<D>], [body, other]: [usize; 2], reach: f64) -> Vec<Film<D>> {
     let (first, second) = (&bodies[body], &bodies[other]);
+    let radii = [first, second].map(Body::bounding_radius);
+    let mut arms: Vec<([i32; D], Vector<D>)> = Vec::new();
     let nearest = first.arm(second.center());
-    let lattice = first.lattice().reduced();
-    // Of the images of the body itself one of each pair.
-    let is_wanted =
-        move |image: &[i32; D]| body != other || image.iter().find(|k| **k != 0).is_some_and(|k| *k > 0);
-    images(&lattice).into_iter().filter(is_wanted).map(move |image| {
-        let arm = nearest + lattice.shift(&image);
-        let radii = [first, second].map(Body::bounding_radius);
+    first.lattice().reduced().for_each_within(&nearest, radii[0] + radii[1] + reach, |image, arm| {
+        // Of the images of the body itself one of each pair.
+        if body != other || image.iter().find(|k| **k != 0).is_some_and(|k| *k > 0) {
+            arms.push((*image, *arm));
+        }
+    });
+    arms.sort_by_key(|(image, _)| order(image));
+    let film = |(_, arm): ([i32; D], Vector<D>)| {
         let distance = arm.norm();
         Film {
             body: body as u32,
@@ -205,24 +205,16 @@ fn between<const D: usize>(
             radii,
             center: *first.center(),
         }
-    })
+    };
+    arms.into_iter().map(film).filter(|film| film.gap < reach).collect()
 }
 
-/// The images next to a body, and itself first.
-fn images<const D: usize>(lattice: &Lattice<D>) -> Vec<[i32; D]> {
-    let mut images = vec![[0; D]];
-    for axis in (0..D).filter(|&axis| lattice.periods()[axis].is_some()) {
-        let shifted = |by: i32| {
-            move |image: &[i32; D]| {
-                let mut image = *image;
-                image[axis] += by;
-                image
-            }
-        };
-        let sides: Vec<_> = images.iter().map(shifted(-1)).chain(images.iter().map(shifted(1))).collect();
-        images.extend(sides);
-    }
-    images
+/// Images in the order 0, -1, 1, -2, ... of their numbers along the last axis, then along those before.
+fn order<const D: usize>(image: &[i32; D]) -> [i32; D] {
+    std::array::from_fn(|d| {
+        let k = image[D - 1 - d];
+        2 * k.abs() - i32::from(k < 0)
+    })
 }
 
 /// The films between a body and the walls.
