@@ -37,6 +37,10 @@ const CUT_CELL: [f64; 2] = [40e3, 55e3];
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
 
+/// Cells that only touch one of their children's size in a ball are as many as this much more of its radius
+/// meets, in their size: a square of twice the edge has 8 R in place of 4 R in the formula above.
+const TOUCHING: f64 = 0.7;
+
 /// Expected size of the first mesh of a case, and of its solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshEstimate {
@@ -186,7 +190,7 @@ impl Tree {
         // Neighbouring leaves differ by one level: the balls of the finest refined level, with a cell more
         // for every level above.
         let balance = self.refinement.band * 0.5 * self.size(finest) + (size - self.size(finest));
-        let beyond = (self.refinement.band * 0.5 * size).max(balance);
+        let beyond = (self.refinement.band * 0.5 * size).max(balance).max(TOUCHING * size);
         let met = |radius: f64| cells_met(self.dimension, (radius + beyond) / size);
         case.particles.iter().map(|particle| met(particle.radius)).sum::<f64>().min(most)
     }

@@ -14,8 +14,9 @@ pub struct Refinement {
     pub coarsest: u8,
     /// Level of the cells at the surfaces.
     pub surface: u8,
-    /// Cells of each level are kept to this many cell sizes outside a body, and everywhere inside it: what a
-    /// coarse interior would save is little, see `docs/decisions/0018-band.md`.
+    /// Cells of each level are kept to this many cell sizes outside a body, everywhere inside it (what a coarse
+    /// interior would save is little, see `docs/decisions/0018-band.md`), and where they touch one that meets
+    /// it.
     pub band: f64,
     /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for
     /// none.
@@ -71,17 +72,20 @@ impl Refinement {
             || (level >= self.surface && self.is_in_gap(&center, h, bodies))
     }
 
-    /// Whether a cell of size `h` comes closer to a body than the band of its children.
+    /// Whether a cell of size `h` comes closer to a body than the band of its children, or one of their size
+    /// that touches it meets a body: surfaces meet cells of one size, however cells lean in a tilted box.
     fn is_near_surface<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
         let band = self.band * 0.5 * h;
         let shear = shear_of(bodies);
-        bodies.any_within(center, ENOUGH * (band + half_diagonal::<D>(h, shear)), |body| {
+        let farthest = (band + half_diagonal::<D>(h, shear)).max(half_diagonal::<D>(2.0 * h, shear));
+        bodies.any_within(center, ENOUGH * farthest, |body| {
             let body = &bodies.balls()[body];
             let half = |d: usize| 0.5 * h * if d == 0 { 1.0 + shear.abs() } else { 1.0 };
             let mut is_near = false;
-            body.for_each_image(center, ENOUGH * (band + half_diagonal::<D>(h, shear)), |arm| {
+            body.for_each_image(center, ENOUGH * farthest, |arm| {
                 let outside = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half(d)).max(0.0)).norm();
-                is_near |= outside < body.bounding_radius() + band;
+                is_near |= outside < body.bounding_radius() + band
+                    || distance_from_cell(arm, h, shear) < body.bounding_radius();
             });
             is_near
         })
@@ -112,6 +116,19 @@ impl Refinement {
     }
 }
 
+/// Distance in space of a point from a cell of a sheared mesh that extends by `half` along each edge from its
+/// centre, which is at `arm` from the point.
+fn distance_from_cell<const D: usize>(arm: &Vector<D>, half: f64, shear: f64) -> f64 {
+    let beyond = |length: f64| (length.abs() - half).max(0.0);
+    // At the height `up` over the centre the cell is displaced by `shear up`. The squared distance is convex
+    // in `up`: least at the height of the point, or where one of the slanted sides is nearest to it.
+    let at = |up: f64| beyond(arm[0] + shear * up).hypot(arm[1] + up);
+    let beside = |side: f64| -(arm[1] + shear * (arm[0] + side)) / (1.0 + shear * shear);
+    let heights = [-arm[1], beside(half), beside(-half)];
+    let in_plane = heights.map(|up| at(up.clamp(-half, half))).into_iter().fold(f64::INFINITY, f64::min);
+    (2..D).fold(in_plane, |distance, d| distance.hypot(beyond(arm[d])))
+}
+
 /// Shear of the box that bodies are in.
 fn shear_of<const D: usize>(bodies: &BallTree<'_, D>) -> f64 {
     bodies.balls().first().map_or(0.0, |body| body.lattice().shear())
@@ -119,6 +136,8 @@ fn shear_of<const D: usize>(bodies: &BallTree<'_, D>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use gluey_geom::Lattice;
+
     use super::*;
 
     /// Cells at most `band` of their size from a body are of the finest level, inside it as deep as it goes;
@@ -140,6 +159,64 @@ mod tests {
             assert!(!far || cell.level < 5, "level {} at {alpha}", cell.level);
         }
         assert!(deepest > 0.17 && mesh.cells().iter().any(|cell| cell.level < 4));
+    }
+
+    /// No cell that touches one that meets a body is coarser, in flat and high boxes at any tilt, with one to
+    /// six cells in a radius and with any band.
+    fn surfaces_meet_cells_of_one_size<const D: usize>() {
+        for trial in 0..60u32 {
+            let number = |k: u32| f64::from((trial * 7919 + k * 104_729) % 1000) / 1000.0;
+            let aspect = [1, 2, 4, 8, 3][trial as usize % 5];
+            let roots = std::array::from_fn(|d| if d == 0 { aspect } else { 1 });
+            let edges = Vector::<D>::from_fn(|d, _| f64::from(roots[d]));
+            let domain = Aabb { lower: Vector::zeros(), upper: edges };
+            let lattice = Lattice::new(std::array::from_fn(|d| Some(edges[d])));
+            let lattice = lattice.tilted((number(1) - 0.5) * edges[0]);
+            let radius = 0.1 + 0.15 * number(2);
+            let ball = Ball::in_space(&edges.map(|edge| edge * number(3)), radius, &lattice, 0.0);
+            let surface = [3, 4, 5][trial as usize % 3] - D as u8 / 3;
+            let band = [2.0, 0.0, 0.7, 4.0][trial as usize % 4];
+            let refinement = Refinement { coarsest: 1, surface, band, gap_fraction: 0.0, gap_levels: 0 };
+            let mesh = refinement.mesh(domain, roots, [true; D], &[ball]).expect("a mesh");
+            let h = mesh.size(surface);
+            for cell in mesh.cells() {
+                let center = mesh.lower_corner(cell) + Vector::repeat(0.5 * mesh.size(cell.level));
+                let mut meets = false;
+                ball.for_each_image(&center, mesh.half_diagonal(mesh.size(cell.level)), |arm| {
+                    let half = 0.5 * mesh.size(cell.level);
+                    meets |= distance_from_cell(arm, half, mesh.shear()) < radius * (1.0 - 1e-9);
+                });
+                assert!(!meets || cell.level == surface, "{lattice:?}");
+                let offsets =
+                    (0..3i32.pow(D as u32)).map(|k| std::array::from_fn(|d| k / 3i32.pow(d as u32) % 3 - 1));
+                let around = offsets.filter_map(|offset| mesh.neighbour(cell, &offset));
+                let is_alone = !meets || around.map(|cell| mesh.find(&cell)).all(|found| found.is_some());
+                assert!(is_alone, "{lattice:?}, {radius} in cells of {h}, a band of {band}");
+            }
+        }
+    }
+
+    #[test]
+    fn surfaces_meet_cells_of_one_size_at_any_tilt() {
+        surfaces_meet_cells_of_one_size::<2>();
+        surfaces_meet_cells_of_one_size::<3>();
+    }
+
+    /// The distance from a leaning cell is the least of many of its points.
+    #[test]
+    fn distances_from_cells_are_those_of_their_points() {
+        for trial in 0..200u32 {
+            let number = |k: u32| f64::from((trial * 7919 + k * 104_729) % 1000) / 500.0 - 1.0;
+            let (shear, half) = (4.0 * number(1), 0.3);
+            let arm = Vector::<2>::new(3.0 * number(2), number(3));
+            let places = || (0..=200).map(|k| half * (f64::from(k) / 100.0 - 1.0));
+            let points = places().flat_map(|y| places().map(move |x| Vector::<2>::new(x + shear * y, y)));
+            let least = points.map(|point| (arm + point).norm()).fold(f64::INFINITY, f64::min);
+            let found = distance_from_cell(&arm, half, shear);
+            assert!(found < least + 1e-14 && least < found + 0.01, "{found} {least}");
+            let deep = Vector::<3>::new(arm[0], arm[1], 0.7);
+            assert!((distance_from_cell(&deep, half, shear) - found.hypot(0.4)).abs() < 1e-14);
+        }
     }
 
     #[test]
