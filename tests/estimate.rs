@@ -68,7 +68,7 @@ fn random_case(seed: u64) -> Case {
         }
     }
     case.flow.mesh.cells_per_radius = Some(random.random_range(2.0..if dimension == 2 { 12.0 } else { 4.0 }));
-    case.flow.mesh.coarsest_level = random.random_range(0..4);
+    case.flow.mesh.coarsest_level = Some(random.random_range(0..4));
     case.flow.mesh.band = random.random_range(0.0..4.0);
     if random.random_range(0..2) == 0 {
         case.flow.formulation = Formulation::RigidDofs;
@@ -92,7 +92,7 @@ fn meshes_that_do_not_fit_are_refused_before_they_are_built() {
     spheres.flow.mesh.cells_per_radius = Some(5000.0);
     let mut uniform = case("pair-2d");
     uniform.flow.mesh.cells_per_radius = Some(13_000.0);
-    uniform.flow.mesh.coarsest_level = 18;
+    uniform.flow.mesh.coarsest_level = Some(18);
     for mut case in [spheres, uniform] {
         case.reference = None;
         let folder = tempfile::TempDir::new().expect("a folder");

@@ -97,7 +97,7 @@ fn case<const D: usize>(seed: u64) -> Case {
          domain.boundary = \"{boundary}\"\n\
          time = {{ step = {STEP}, end = {} }}\n\
          contact.strategy = \"none\"\n\
-         flow = {{ formulation = \"unfitted\", mesh.cells_per_radius = {cells} }}\n",
+         flow = {{ formulation = \"unfitted\", mesh = {{ cells_per_radius = {cells}, root_cells = 1 }} }}\n",
         particles[0].1,
         STEP * STEPS as f64
     );

@@ -16,7 +16,7 @@ use runs::{beside, case, centers, column, failure, ran, rms_distance, vectors};
 fn unfitted(dimension: usize, cells_per_radius: f64, rest: &str) -> Case {
     case(&format!(
         "name = \"h\"\ndimension = {dimension}\ncontact = {{ strategy = \"none\" }}\n{rest}\n\
-         flow = {{ formulation = \"unfitted\", mesh = {{ cells_per_radius = {cells_per_radius:?} }} }}\n"
+         flow = {{ formulation = \"unfitted\", mesh = {{ cells_per_radius = {cells_per_radius:?}, root_cells = 1 }} }}\n"
     ))
 }
 

@@ -36,6 +36,7 @@ solver = "multigrid"
 tolerance = 1e-11
 [flow.mesh]
 cells_per_radius = {cells}
+root_cells = 1
 coarsest_level = 2
 band = 1
 [[output]]

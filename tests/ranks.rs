@@ -18,7 +18,7 @@ fn in_steps(dimension: usize, rest: &str) -> Case {
     case(&format!(
         "name = \"r\"\ndimension = {dimension}\n{rest}\ncontact = {{ strategy = \"none\" }}\n\
          [flow]\nsolver = \"multigrid\"\ntolerance = 1e-11\n\
-         [flow.mesh]\ncells_per_radius = {}\ncoarsest_level = 2\n",
+         [flow.mesh]\ncells_per_radius = {}\nroot_cells = 1\ncoarsest_level = 2\n",
         if dimension == 2 { 3.2 } else { 1.6 }
     ))
 }

@@ -16,7 +16,7 @@ fn case(dimension: usize, rest: &str) -> Case {
         "name = \"s\"\ndimension = {dimension}\ndomain = {{ boundary = \"sheared\" }}\n\
          suspension = {{ volume_fraction = {fraction}, count = {count}, seed = 3, min_gap = 0.05 }}\n\
          contact = {{ strategy = \"none\" }}\n{rest}\n\
-         [flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 2.0\ncoarsest_level = 2\n"
+         [flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 2.0\nroot_cells = 1\ncoarsest_level = 2\n"
     );
     runs::case(&text)
 }

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 fn case(dimension: usize, boundary: &str, particles: &str) -> String {
     format!(
         "name = \"s\"\ndimension = {dimension}\n{particles}\n[domain]\nboundary = \"{boundary}\"\n[time]\n\
-         step = 0.05\nend = 0.2\n[flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 1.6\n"
+         step = 0.05\nend = 0.2\n[flow]\nformulation = \"unfitted\"\n[flow.mesh]\ncells_per_radius = 1.6\nroot_cells = 1\n"
     )
 }
 

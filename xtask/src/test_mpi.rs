@@ -50,6 +50,7 @@ tolerance = 1e-11
 
 [flow.mesh]
 cells_per_radius = 1.6
+root_cells = 1
 band = 1
 "#;
 /// Its trajectory.
@@ -78,6 +79,7 @@ solver = "multigrid"
 
 [flow.mesh]
 cells_per_radius = 1.6
+root_cells = 1
 
 [rheology]
 every = 1
@@ -110,6 +112,7 @@ solver = "multigrid"
 
 [flow.mesh]
 cells_per_radius = 1.6
+root_cells = 1
 "#;
 /// Its tables.
 const TABLES_OF_DRIVEN: [&str; 2] = ["driven-none-unfitted.csv", "driven-none-unfitted-forces.csv"];

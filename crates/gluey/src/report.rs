@@ -32,6 +32,9 @@ pub struct RunReport {
     pub cells: usize,
     /// Velocity and pressure unknowns of the last mesh.
     pub dofs: usize,
+    /// Cells per radius of the smallest particle at the surfaces, as the mesh had them; `None` where the flow
+    /// has no mesh.
+    pub cells_per_radius: Option<f64>,
     /// Smallest gap of any pair at any time; `None` for a single particle.
     pub min_gap_over_a: Option<f64>,
     /// Gap of particles 1 and 2 at the end; `None` for a single particle.
@@ -71,6 +74,7 @@ impl RunReport {
             wall_s,
             cells: flow.cell_count,
             dofs: flow.dof_count,
+            cells_per_radius: case.cells_per_radius_as_built(),
             min_gap_over_a: measures.smallest_gap_over_a(),
             end_gap_over_a: pair.end_gap().map(|gap| gap / a),
             reversibility_error: is_mirrored.then(|| reversibility_error(pair, a)).flatten(),
@@ -107,7 +111,10 @@ impl fmt::Display for RunReport {
             self.case, self.strategy, self.formulation, self.steps, self.wall_s
         )?;
         if self.cells > 0 {
-            writeln!(f, "  mesh: {} cells, {} unknowns", self.cells, self.dofs)?;
+            write!(f, "  mesh: {} cells, {} unknowns", self.cells, self.dofs)?;
+            let cells =
+                self.cells_per_radius.map(|cells| format!(", {} cells per radius", shown_to(cells, 4)));
+            writeln!(f, "{}", cells.unwrap_or_default())?;
         }
         write_number(f, "smallest gap / a", self.min_gap_over_a)?;
         write_number(f, "gap of 1 and 2 at the end / a", self.end_gap_over_a)?;

@@ -4,7 +4,7 @@ use gluey_suspension::ball_volume;
 use serde::Serialize;
 
 use crate::case::Case;
-use crate::shown::shown;
+use crate::shown::{shown, shown_to};
 
 /// What a case is, in a few numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -21,6 +21,9 @@ pub struct CaseSummary {
     pub strategy: String,
     /// How rigidity enters the flow, or the name of the model that replaces the flow.
     pub formulation: String,
+    /// Cells per radius of the smallest particle at the surfaces, as asked for and as the mesh has them;
+    /// absent where the flow has none.
+    pub cells_per_radius: Option<[f64; 2]>,
     /// Time step.
     pub time_step: f64,
     /// Time at the end of the run; absent in checkpoints, whose runs may end at any time.
@@ -46,6 +49,7 @@ impl CaseSummary {
             volume_fraction: volume_fraction(case),
             strategy: case.contact.strategy.to_string(),
             formulation: case.flow_name().to_owned(),
+            cells_per_radius: case.cells_per_radius_as_built().map(|built| [case.cells_per_radius(), built]),
             time_step: case.time.step,
             end: None,
             steps: None,
@@ -63,6 +67,10 @@ impl CaseSummary {
             ),
             ("model", format!("{}, contact {}", self.formulation, self.strategy)),
         ];
+        if let Some([asked, built]) = self.cells_per_radius {
+            let cells = format!("{} as built, at least {} asked for", shown_to(built, 4), shown(asked));
+            lines.push(("cells per radius", cells));
+        }
         if let (Some(steps), Some(end)) = (self.steps, self.end) {
             lines.push(("run", format!("{steps} steps of {} to t = {}", shown(self.time_step), shown(end))));
         }

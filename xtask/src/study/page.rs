@@ -13,12 +13,17 @@ pub struct Effort {
     run_count: usize,
     run_s: f64,
     wall_s: f64,
+    /// Cells per radius as built, of the coarsest mesh and of the finest.
+    cells: [f64; 2],
 }
 
 impl Effort {
     /// Of these runs; earlier runs count with the time that they took then.
     pub fn of(done: &[Done], wall_s: f64) -> Self {
-        Self { run_count: done.len(), run_s: done.iter().map(|done| done.report.wall_s).sum(), wall_s }
+        let run_s = done.iter().map(|done| done.report.wall_s).sum();
+        let built = || done.iter().filter_map(|done| done.report.cells_per_radius);
+        let cells = [built().fold(f64::INFINITY, f64::min), built().fold(0.0, f64::max)];
+        Self { run_count: done.len(), run_s, wall_s, cells }
     }
 }
 
@@ -39,7 +44,12 @@ pub fn html(
 ) -> String {
     let mut body = String::new();
     write_body(&mut body, study, findings, failures, quick).expect("writing to a String cannot fail");
-    let Effort { run_count, run_s, wall_s } = effort;
+    let Effort { run_count, run_s, wall_s, cells: [least, most] } = effort;
+    if least <= most {
+        body += &format!(
+            "<p>Cells per radius of the smallest particle, as built: {least:.2} to {most:.2}.</p>\n"
+        );
+    }
     body += &format!(
         "<p>{run_count} runs of {} in all; this command took {}. gluey {}.</p>\n",
         duration(*run_s),

@@ -3,7 +3,7 @@
 use super::{Case, mesh::FINEST_LEVEL};
 
 impl Case {
-    /// This case with all defaults that follow from others stated: corners of the box, cells per radius, what
+    /// This case with all defaults that follow from others stated: corners of the box, the tree of the mesh, what
     /// acts in films, the numbers of `rigid-dofs`. It runs bit for bit as this one does.
     pub fn filled(&self) -> Self {
         let mut case = self.clone();
@@ -12,6 +12,8 @@ impl Case {
         case.rheology = self.has_rheology().then(|| self.rheology.clone().unwrap_or_default());
         case.flow.lubrication = Some(self.lubrication());
         case.flow.mesh.cells_per_radius = Some(self.cells_per_radius());
+        case.flow.mesh.root_cells = self.root_cells().and_then(|roots| roots.into_iter().min());
+        case.flow.mesh.coarsest_level = Some(self.coarsest_level());
         case.flow.rigid_dofs.offset = Some(self.rigid_offset());
         case.flow.rigid_dofs.gap_levels = Some(self.gap_levels().min(self.levels_left()));
         case

@@ -43,16 +43,17 @@ pub struct MeshSpec {
     #[schemars(range(min = 1))]
     pub cells_per_radius: Option<f64>,
     /// Root cells of the tree along the shortest edge of the box, at least. Cells are halves of halves of
-    /// these: with 3 instead of 1 they may have 2/3 of the size. Unit: cells. Default: 1.
+    /// these: with 3 instead of 1 they may have 2/3 of the size. Unit: cells. Default: in 2D 1; in 3D what of
+    /// 1, 3 and 5 makes the largest cells that `cells_per_radius` allows, up to 125 root cells in the box.
     #[schemars(range(min = 1, max = 16))]
-    pub root_cells: u32,
+    pub root_cells: Option<u32>,
     /// Cells are at most `2^-coarsest_level` of a root cell; at most the level of the cells at the surfaces.
-    /// Unit: levels. Default: 3.
+    /// Unit: levels. Default: 3, or the level of the cells at the surfaces where that is less.
     #[schemars(range(max = 18))]
-    pub coarsest_level: u32,
+    pub coarsest_level: Option<u32>,
     /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
-    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
-    /// Unit: cells. Default: 2.
+    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities. Cells
+    /// that touch one with a surface in it are as fine whatever this is. Unit: cells. Default: 2.
     #[schemars(range(min = 0, max = 1000))]
     pub band: f64,
 }
@@ -125,7 +126,7 @@ impl Default for FlowSpec {
 
 impl Default for MeshSpec {
     fn default() -> Self {
-        Self { cells_per_radius: None, root_cells: 1, coarsest_level: 3, band: 2.0 }
+        Self { cells_per_radius: None, root_cells: None, coarsest_level: None, band: 2.0 }
     }
 }
 

@@ -2,10 +2,20 @@
 
 use gluey_stokes::default_offset;
 
-use super::{Case, Formulation};
+use super::{Case, Formulation, Hydrodynamics};
 
 /// Largest number of root cells along the shortest edge of the box.
 pub(super) const MOST_ROOTS: u32 = 16;
+
+/// Multiples of the fewest root cells that are chosen from: the coarsest level is solved for by a factor whose
+/// cost grows faster than all the rest with the number of roots.
+const FACTORS: [u32; 3] = [1, 3, 5];
+
+/// Largest number of root cells in the box that are chosen where a case does not state them.
+const MOST_CHOSEN: u32 = 125;
+
+/// The coarsest level of the mesh where a case does not state it and cells at the surfaces are no coarser.
+const COARSEST_LEVEL: u32 = 3;
 
 /// A mesh has at most `2^18` cells along an axis: [`gluey_fem::TreeMesh`] refuses more.
 pub(super) const FINEST_LEVEL: u32 = 18;
@@ -29,10 +39,33 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 }
 
 impl Case {
-    /// Numbers of equal cubes that fill the box along each axis, as few as possible but no fewer than
-    /// [`super::MeshSpec::root_cells`] along the shortest edge: the root cells of the mesh. `None` if it
-    /// takes more than 16 of them there, or more than a tree can number along the longest.
+    /// Numbers of equal cubes that fill the box along each axis: the root cells of the mesh. They are as few as
+    /// possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge; where that is not
+    /// given, what of once, three and five times the fewest comes nearest to [`Case::cells_per_radius`] in 3D.
+    /// `None` if it takes more than 16 of them along that edge, or more than a tree can number along the
+    /// longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
+        let fewest = self.cubes(self.flow.mesh.root_cells.unwrap_or(1))?;
+        if self.flow.mesh.root_cells.is_some() || self.dimension == 2 {
+            return Some(fewest);
+        }
+        let of = |factor: u32| fewest.iter().map(|count| count * factor).collect::<Vec<u32>>();
+        // Along the longest edge; halves of halves of the roots.
+        let cells = |factor: u32| {
+            let roots = of(factor);
+            let level = self.level_of(&roots);
+            let along = roots.iter().copied().max()?;
+            let is_cheap = roots.iter().product::<u32>() <= MOST_CHOSEN;
+            let least = f64::from(self.flow.mesh.coarsest_level.unwrap_or(0)).max(1.0);
+            (factor == 1 || (is_cheap && level >= least)).then(|| f64::from(along) * level.exp2())
+        };
+        let counts = FACTORS.into_iter().filter_map(|factor| Some((factor, cells(factor)?)));
+        let (factor, _) = counts.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
+        Some(of(factor))
+    }
+
+    /// Numbers of equal cubes along each axis, as few as possible but no fewer than these along the shortest.
+    fn cubes(&self, least: u32) -> Option<Vec<u32>> {
         let edges = self.edges();
         let shortest = edges.iter().copied().fold(f64::INFINITY, f64::min);
         let counts = |along_shortest: u32| -> Option<Vec<u32>> {
@@ -41,12 +74,17 @@ impl Case {
             let whole = |count: f64| (count - count.round()).abs() <= 1e-9 * count && count <= most;
             exact.map(|count| whole(count).then(|| count.round() as u32)).collect()
         };
-        (self.flow.mesh.root_cells..=MOST_ROOTS).find_map(counts)
+        (least..=MOST_ROOTS).find_map(counts)
     }
 
     /// Edge of the root cells; `None` for a box that is not made of cubes.
     pub(crate) fn root_size(&self) -> Option<f64> {
-        Some(self.edges()[0] / f64::from(self.root_cells()?[0]))
+        Some(self.size_of(&self.root_cells()?))
+    }
+
+    /// Edge of these root cells.
+    fn size_of(&self, roots: &[u32]) -> f64 {
+        self.edges()[0] / f64::from(roots[0])
     }
 
     /// The finest level of the tree over this box; `None` for a box that is not made of cubes.
@@ -58,8 +96,27 @@ impl Case {
     /// The coarsest level whose cells fit [`Case::cells_per_radius`] times into the smallest radius, whether
     /// the tree has it or not; `None` for a box that is not made of cubes.
     pub(crate) fn surface_level(&self) -> Option<f64> {
-        let cells = self.cells_per_radius() * self.root_size()? / self.smallest_radius();
-        Some((cells * (1.0 - ROUNDING)).log2().ceil().max(0.0))
+        Some(self.level_of(&self.root_cells()?))
+    }
+
+    /// The same for these root cells.
+    fn level_of(&self, roots: &[u32]) -> f64 {
+        let cells = self.cells_per_radius() * self.size_of(roots) / self.smallest_radius();
+        (cells * (1.0 - ROUNDING)).log2().ceil().max(0.0)
+    }
+
+    /// The level that all cells have at least, as stated or by default.
+    pub fn coarsest_level(&self) -> u32 {
+        let surface = || self.surface_level().map_or(COARSEST_LEVEL, |level| level as u32);
+        self.flow.mesh.coarsest_level.unwrap_or_else(|| COARSEST_LEVEL.min(surface()))
+    }
+
+    /// Cells per radius of the smallest particle as the mesh has them at the surfaces, no fewer than
+    /// [`Case::cells_per_radius`]; `None` where the flow has no mesh.
+    pub fn cells_per_radius_as_built(&self) -> Option<f64> {
+        let (roots, level) = (self.root_cells()?, self.surface_level()?);
+        let has_mesh = self.flow.hydrodynamics == Hydrodynamics::Stokes && !self.particles.is_empty();
+        has_mesh.then(|| self.smallest_radius() / self.size_of(&roots) * level.exp2())
     }
 
     /// Cells per radius at the surfaces, as stated or by default.
@@ -90,6 +147,48 @@ mod tests {
     use gluey_geom::Aabb;
 
     use super::*;
+
+    fn case(dimension: usize, upper: &str, radius: f64, mesh: &str) -> Case {
+        let text = format!(
+            "name = \"x\"\ndimension = {dimension}\ndomain = {{ upper = {upper}, boundary = \"sheared\" }}\n\
+             particles = [{{ position = {:?}, radius = {radius:?} }}]\n\
+             time = {{ step = 0.1, end = 1.0 }}\nflow = {{ formulation = \"unfitted\", mesh = {{ {mesh} }} }}\n",
+            vec![0.5; dimension]
+        );
+        Case::parse(&text, "x.toml").unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn roots_come_near_to_the_cells_that_are_asked_for() {
+        for (upper, radius, mesh, roots, built) in [
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 1.6", [1; 3], 1.6),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0", [5; 3], 2.0),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.1", [3; 3], 2.4),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.5", [1; 3], 3.2),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.1, root_cells = 1", [1; 3], 3.2),
+            // Roots as many as that would cost more than they save.
+            ("[4.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0", [12, 3, 3], 2.4),
+            ("[8.0, 1.0, 2.0]", 0.1, "cells_per_radius = 2.0", [8, 1, 2], 3.2),
+            // There are as many levels as were asked for.
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.1, coarsest_level = 3", [3; 3], 2.4),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0, coarsest_level = 2", [5; 3], 2.0),
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0, coarsest_level = 4", [1; 3], 3.2),
+        ] {
+            let case = case(3, upper, radius, mesh);
+            assert_eq!(case.root_cells().as_deref(), Some(&roots[..]), "{upper} {mesh}");
+            let found = case.cells_per_radius_as_built().expect("a mesh");
+            assert!((found - built).abs() < 1e-9, "{upper} {mesh}: {found}");
+        }
+        let disc = case(2, "[1.0, 1.0]", 0.1, "cells_per_radius = 2.0");
+        assert_eq!(disc.root_cells(), Some(vec![1, 1]));
+    }
+
+    #[test]
+    fn roots_of_a_small_box_need_no_levels() {
+        let disc = case(2, "[1.0, 1.0]", 0.24, "cells_per_radius = 1.0, root_cells = 3");
+        assert_eq!((disc.coarsest_level(), disc.surface_level()), (1, Some(1.0)));
+        assert_eq!(disc.filled().flow.mesh.coarsest_level, Some(1));
+    }
 
     #[test]
     fn the_finest_level_is_that_of_the_tree() {

@@ -345,8 +345,8 @@ fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
     }
     let level = level as u32;
     let (mesh, left) = (&case.flow.mesh, finest - level);
-    if mesh.coarsest_level > level {
-        let problem = Problem::CoarseTooFine { found: mesh.coarsest_level, finest: level };
+    if let Some(found) = mesh.coarsest_level.filter(|&found| found > level) {
+        let problem = Problem::CoarseTooFine { found, finest: level };
         findings.add(key.name("coarsest_level"), problem);
     }
     if let Some(levels) = case.flow.rigid_dofs.gap_levels.filter(|&levels| levels > left) {

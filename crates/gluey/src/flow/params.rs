@@ -20,7 +20,7 @@ pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
     let rigid = case.flow.formulation == Formulation::RigidDofs;
     let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
     Refinement {
-        coarsest: mesh.coarsest_level.min(u32::from(surface)) as u8,
+        coarsest: case.coarsest_level().min(u32::from(surface)) as u8,
         surface,
         band: mesh.band,
         gap_fraction: if rigid { rigid_dofs.gap_fraction } else { 0.0 },
