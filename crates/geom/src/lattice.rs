@@ -135,8 +135,8 @@ impl<const D: usize> Lattice<D> {
         best
     }
 
-    /// Calls `visit(image, arm)` for all images of a displacement that are no longer than `farthest`, by their
-    /// numbers along the last axis, then along those before.
+    /// Calls `visit(image, arm)` for all images of a displacement that are no longer than `farthest`, by
+    /// their numbers along the last axis, then along those before.
     pub fn for_each_within(
         &self,
         arm: &Vector<D>,

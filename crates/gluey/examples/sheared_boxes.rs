@@ -1,5 +1,5 @@
-//! Sixty boxes from high to long that are sheared to a strain of 2.5, with one to six particles and one to six
-//! cells in a radius: whether each runs, and whether its gaps are those of a search over all images.
+//! Sixty boxes from high to long that are sheared to a strain of 2.5, with one to six particles and one to
+//! six cells in a radius: whether each runs, and whether its gaps are those of a search over all images.
 //!
 //! `cargo run --release -p gluey --example sheared_boxes [first] [last]`
 

@@ -3,8 +3,8 @@
 use super::{Case, mesh::FINEST_LEVEL};
 
 impl Case {
-    /// This case with all defaults that follow from others stated: corners of the box, the tree of the mesh, what
-    /// acts in films, the numbers of `rigid-dofs`. It runs bit for bit as this one does.
+    /// This case with all defaults that follow from others stated: corners of the box, the tree of the mesh,
+    /// what acts in films, the numbers of `rigid-dofs`. It runs bit for bit as this one does.
     pub fn filled(&self) -> Self {
         let mut case = self.clone();
         case.domain.lower = Some(self.lower());

@@ -52,8 +52,8 @@ pub struct MeshSpec {
     #[schemars(range(max = 18))]
     pub coarsest_level: Option<u32>,
     /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside
-    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities. Cells
-    /// that touch one with a surface in it are as fine whatever this is. Unit: cells. Default: 2.
+    /// save little and, in `paper`, where the interior carries strain and multiplier, change velocities.
+    /// Cells that touch one with a surface in it are as fine whatever this is. Unit: cells. Default: 2.
     #[schemars(range(min = 0, max = 1000))]
     pub band: f64,
 }

@@ -7,8 +7,8 @@ use super::{Case, Formulation, Hydrodynamics};
 /// Largest number of root cells along the shortest edge of the box.
 pub(super) const MOST_ROOTS: u32 = 16;
 
-/// Multiples of the fewest root cells that are chosen from: the coarsest level is solved for by a factor whose
-/// cost grows faster than all the rest with the number of roots.
+/// Multiples of the fewest root cells that are chosen from: the coarsest level is solved for by a factor
+/// whose cost grows faster than all the rest with the number of roots.
 const FACTORS: [u32; 3] = [1, 3, 5];
 
 /// Largest number of root cells in the box that are chosen where a case does not state them.
@@ -39,11 +39,11 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 }
 
 impl Case {
-    /// Numbers of equal cubes that fill the box along each axis: the root cells of the mesh. They are as few as
-    /// possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge; where that is not
-    /// given, what of once, three and five times the fewest comes nearest to [`Case::cells_per_radius`] in 3D.
-    /// `None` if it takes more than 16 of them along that edge, or more than a tree can number along the
-    /// longest.
+    /// Numbers of equal cubes that fill the box along each axis: the root cells of the mesh. They are as few
+    /// as possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge; where that is
+    /// not given, what of once, three and five times the fewest comes nearest to [`Case::cells_per_radius`]
+    /// in 3D. `None` if it takes more than 16 of them along that edge, or more than a tree can number along
+    /// the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let fewest = self.cubes(self.flow.mesh.root_cells.unwrap_or(1))?;
         if self.flow.mesh.root_cells.is_some() || self.dimension == 2 {

@@ -37,8 +37,8 @@ const CUT_CELL: [f64; 2] = [40e3, 55e3];
 /// Cells across a gap that are refined because of it, those inside the particles included.
 const GAP_THICKNESS: f64 = 2.6;
 
-/// Cells that only touch one of their children's size in a ball are as many as this much more of its radius
-/// meets, in their size: a square of twice the edge has 8 R in place of 4 R in the formula above.
+/// A cell is refined, too, where one of its children's size that touches it meets a ball: as many do as meet
+/// a ball this much larger (squares of twice the edge: `pi R^2 + 8 R + 4`). Unit: cells.
 const TOUCHING: f64 = 0.7;
 
 /// Expected size of the first mesh of a case, and of its solver.

@@ -14,9 +14,9 @@ pub struct Refinement {
     pub coarsest: u8,
     /// Level of the cells at the surfaces.
     pub surface: u8,
-    /// Cells of each level are kept to this many cell sizes outside a body, everywhere inside it (what a coarse
-    /// interior would save is little, see `docs/decisions/0018-band.md`), and where they touch one that meets
-    /// it.
+    /// Cells of each level are kept to this many cell sizes outside a body, everywhere inside it (what a
+    /// coarse interior would save is little, see `docs/decisions/0018-band.md`), and where they touch one
+    /// that meets it.
     pub band: f64,
     /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for
     /// none.
