@@ -29,6 +29,7 @@ mod form;
 mod given;
 mod given_stress;
 mod idle;
+mod key;
 mod keys;
 mod load;
 mod locate;

@@ -24,6 +24,7 @@ mod replaced;
 mod resumption;
 #[cfg(feature = "ranks")]
 mod shared;
+mod start;
 mod stress;
 mod tables;
 
@@ -34,7 +35,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Dim, Space};
 
 pub use error::RunError;
 pub use last_steps::{Ended, LastSteps};
@@ -59,7 +60,7 @@ use crate::output::solver_log::{self, SolverLog, SolverRow};
 use crate::output::{Claim, OutputError};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
-use crate::simulation::{RestoreError, Simulation, Sliding, StepError};
+use crate::simulation::{RestoreError, Simulation, StepError};
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
 use contacts::Contacts;
@@ -68,6 +69,7 @@ use last_step::LastStep;
 use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
+use start::simulation;
 use tables::{TableMarks, Tables};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
@@ -485,42 +487,4 @@ where
     restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
     let count = simulation.particles().len();
     Ok(CsvWriter::resume(csv, &output, count, |row| measures.add(row))?)
-}
-
-/// A case at time 0.
-fn simulation<'a, const D: usize, H>(
-    case: &Case,
-    hydrodynamics: H,
-    contact: Contacts<'a, D>,
-) -> Simulation<D, H, Contacts<'a, D>>
-where
-    Dim<D>: Space<D>,
-    H: gluey_motion::Hydrodynamics<D>,
-{
-    let (scheme, dt) = (case.time.scheme, case.time.step);
-    let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
-    if case.has_forces() {
-        simulation = simulation.under_forces();
-    }
-    if let Some(law) = case.repulsion() {
-        simulation = simulation.repelling(law, case.surroundings());
-    }
-    if !case.is_sheared() {
-        return simulation;
-    }
-    let simulation = simulation.sheared(Sliding {
-        rate: case.shear_rate,
-        height: case.upper()[1] - case.lower()[1],
-        stress_every: case.stress_every(),
-    });
-    if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
-}
-
-/// The particles of a checked case.
-fn particles<const D: usize>(case: &Case) -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
-    let position = |coordinates: &[f64]| Vector::<D>::from_fn(|axis, _| coordinates[axis]);
-    case.particles.iter().map(|spec| Particle::new(position(&spec.position), spec.radius)).collect()
 }

@@ -1,0 +1,45 @@
+//! The simulation that a case is.
+
+use gluey_geom::{Dim, Particle, Space, Vector};
+
+use super::contacts::Contacts;
+use crate::case::Case;
+use crate::simulation::{Simulation, Sliding};
+
+/// A case at time 0.
+pub(super) fn simulation<'a, const D: usize, H>(
+    case: &Case,
+    hydrodynamics: H,
+    contact: Contacts<'a, D>,
+) -> Simulation<D, H, Contacts<'a, D>>
+where
+    Dim<D>: Space<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+{
+    let (scheme, dt) = (case.time.scheme, case.time.step);
+    let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    if case.has_forces() {
+        simulation = simulation.under_forces();
+    }
+    if let Some(law) = case.repulsion() {
+        simulation = simulation.repelling(law, case.surroundings());
+    }
+    if !case.is_sheared() {
+        return simulation;
+    }
+    let simulation = simulation.sheared(Sliding {
+        rate: case.shear_rate,
+        height: case.upper()[1] - case.lower()[1],
+        stress_every: case.stress_every(),
+    });
+    if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
+}
+
+/// The particles of a checked case.
+fn particles<const D: usize>(case: &Case) -> Vec<Particle<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let position = |coordinates: &[f64]| Vector::<D>::from_fn(|axis, _| coordinates[axis]);
+    case.particles.iter().map(|spec| Particle::new(position(&spec.position), spec.radius)).collect()
+}
