@@ -236,6 +236,12 @@ where
         Ok(self.solver.solve_under(mesh, balls, &conditions)?)
     }
 
+    /// Power of the forces and torques of the case in the last flow, beside the shear.
+    fn work_of_forces(&self) -> f64 {
+        let twists = self.last.iter().flat_map(|flow| &flow.twists);
+        self.wrenches.iter().zip(twists).map(|(wrench, twist)| wrench.power(twist)).sum()
+    }
+
     /// Velocity of the image at a film beyond that of its particle.
     fn slide(&self, film: &gluey_stokes::Film<D>) -> Vector<D> {
         let mut slide = Vector::zeros();
@@ -334,6 +340,7 @@ where
             of_contacts: None,
             of_repulsion: Matrix::zeros(),
             dissipation: stress.dissipation / volume,
+            work_of_forces: self.work_of_forces() / volume,
         })
     }
 

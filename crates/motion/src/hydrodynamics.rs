@@ -168,6 +168,9 @@ pub struct MeanStress<const D: usize> {
     pub of_repulsion: Matrix<D>,
     /// Power dissipated by fluid and films.
     pub dissipation: f64,
+    /// Power of the forces and torques that act on the particles from outside, such as their weight, on
+    /// motions beside the undisturbed ones: what is dissipated without the shear having done it.
+    pub work_of_forces: f64,
 }
 
 impl<const D: usize> MeanStress<D> {
@@ -196,9 +199,16 @@ impl<const D: usize> MeanStress<D> {
         self.over_rate(self.of_films[(0, 1)])
     }
 
-    /// The relative viscosity from the power that is dissipated.
-    pub fn viscosity_by_dissipation(&self) -> f64 {
-        self.dissipation / (self.viscosity * self.rate * self.rate)
+    /// The relative viscosity from the power of the shear: that which is dissipated, less that of forces from
+    /// outside, as `<sigma>:E = Phi / V - sum (F.U' + T.Omega') / V` with motions beside the undisturbed ones
+    /// and no mean velocity.
+    ///
+    /// `None` where these forces do more than the shear, which is then a small difference of numbers that are
+    /// known to the error of the mesh.
+    pub fn viscosity_by_dissipation(&self) -> Option<f64> {
+        let of_shear = self.dissipation - self.work_of_forces;
+        let has_meaning = self.work_of_forces.abs() <= of_shear;
+        has_meaning.then(|| of_shear / (self.viscosity * self.rate * self.rate))
     }
 
     /// `N_1 = sigma_xx - sigma_yy` and `N_2 = sigma_yy - sigma_zz` over viscosity and size of the shear rate;

@@ -68,6 +68,14 @@ impl<const D: usize> SharedHydrodynamics<'_, D>
 where
     Dim<D>: Space<D>,
 {
+    /// Power of the forces and torques of the case in the last flow, beside the shear.
+    fn work_of_forces(&self) -> f64 {
+        let undisturbed = self.suspension.undisturbed_twist(self.told.shear_factor);
+        let twists = self.last.iter().flat_map(|flow| &flow.twists).zip(&self.told.positions);
+        let beside = twists.map(|(twist, place)| *twist - undisturbed(place));
+        self.suspension.wrenches.iter().zip(beside).map(|(wrench, twist)| wrench.power(&twist)).sum()
+    }
+
     /// Velocity of the image at a film beyond that of its particle.
     fn slide(&self, film: &gluey_stokes::Film<D>) -> Vector<D> {
         let mut slide = Vector::zeros();
@@ -157,6 +165,7 @@ where
             of_contacts: None,
             of_repulsion: Matrix::zeros(),
             dissipation: stress.dissipation / volume,
+            work_of_forces: self.work_of_forces() / volume,
         })
     }
 

@@ -224,15 +224,9 @@ where
     /// what acts on them is balanced by a uniform force on all of the box; forces between them have no sum.
     /// Where some are held, these carry all of it.
     fn sheared(&self, told: &Told<D>, solve: &mut Solve<'_, D>) -> Result<MyFlow<D>, FlowError> {
-        let (mut gradient, shear) = (Matrix::<D>::zeros(), self.undisturbed(told.shear_factor));
+        let (mut gradient, undisturbed) = (Matrix::<D>::zeros(), self.undisturbed_twist(told.shear_factor));
         gradient[(0, 1)] = self.shear_rate * told.shear_factor;
-        let undisturbed = |place: &Vector<D>| {
-            let mut twist = Twist { velocity: shear(place), ..Twist::default() };
-            // About z, the only axis in 2D and the last one in 3D.
-            twist.spin[Dim::<D>::ROT - 1] = -0.5 * gradient[(0, 1)];
-            twist
-        };
-        let given = self.given_bodies(told, undisturbed);
+        let given = self.given_bodies(told, &undisturbed);
         let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
         let back = match given[..] {
             [] => -total / self.domain.extent().product(),
@@ -289,6 +283,17 @@ where
     fn undisturbed(&self, shear_factor: f64) -> impl Fn(&Vector<D>) -> Vector<D> + use<D> {
         let (middle, rate) = (self.domain.center()[1], shear_factor * self.shear_rate);
         move |x| Vector::from_fn(|d, _| if d == 0 { rate * (x[1] - middle) } else { 0.0 })
+    }
+
+    /// The motion with the undisturbed velocity at a point and its spin.
+    fn undisturbed_twist(&self, shear_factor: f64) -> impl Fn(&Vector<D>) -> Twist<D> + use<D> {
+        let (velocity, rate) = (self.undisturbed(shear_factor), shear_factor * self.shear_rate);
+        move |x| {
+            let mut twist = Twist { velocity: velocity(x), ..Twist::default() };
+            // About z, the only axis in 2D and the last one in 3D.
+            twist.spin[Dim::<D>::ROT - 1] = -0.5 * rate;
+            twist
+        }
     }
 
     fn balls(&self, told: &Told<D>) -> Vec<Ball<D>> {

@@ -13,6 +13,8 @@ use crate::reference::Reference;
 
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
+/// Smallest and largest size of a shear rate.
+const RATES: (f64, f64) = (1e-100, 1e100);
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Notes what does not fit together before there are particles.
@@ -34,6 +36,7 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     if findings.are_good(&["domain", "flow"]) {
         check_boundary(case, &root.name("domain"), findings);
     }
+    check_size(case.shear_rate, root.name("shear_rate"), findings);
     if findings.are_good(&["domain", "flow", "shear_rate", "shear_stress"]) {
         check_shear_stress(case, &root, findings);
         check_rheology(case, root.name("rheology"), findings);
@@ -43,6 +46,14 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     }
     if findings.are_good(&["output", "shear_rate"]) {
         check_output(case, &root.name("output"), findings);
+    }
+}
+
+/// The square of a shear rate, which powers are made of, is a number.
+fn check_size(rate: f64, key: Key, findings: &mut Findings) {
+    let (least, most) = RATES;
+    if rate != 0.0 && !(least..=most).contains(&rate.abs()) && findings.are_good(&["shear_rate"]) {
+        findings.out_of_range(key, rate, &format!("of a size from {least:e} to {most:e}, or 0"));
     }
 }
 

@@ -2,8 +2,9 @@
 //!
 //! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate.
 //! `viscosity` is by the stresslets of the particles and by the forces between them,
-//! `viscosity_by_dissipation` by the power that fluid and films dissipate: without such forces their
-//! difference is an error of discretisation. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and
+//! `viscosity_by_dissipation` by the power that fluid and films dissipate, less that of weight and other forces
+//! of the case: without forces between particles the difference is an error of discretisation. It is empty
+//! where these forces do more than the shear. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and
 //! `viscosity_of_repulsion` are the shares of films too thin for the mesh, of contacts and of repulsion in
 //! the first. `particle_pressure` is `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
@@ -101,20 +102,17 @@ pub fn header<const D: usize>() -> String {
 pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
     let stress = row.stress;
     let [n1, n2] = stress.normal_stress_differences();
-    let first = [
-        row.time,
-        row.strain,
-        stress.relative_viscosity(),
-        stress.viscosity_by_dissipation(),
-        stress.viscosity_of_films(),
-    ];
-    let contacts = stress.viscosity_of_contacts();
-    let shares = contacts.into_iter().chain([stress.viscosity_of_repulsion()]);
-    let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]);
-    let numbers = first.into_iter().chain(shares).chain(normal).map(|number| format!("{number:.16e}"));
-    let gap = row.smallest_gap_over_a.map_or(String::new(), |gap| format!("{gap:.16e}"));
-    let more = row.time_and_rate.into_iter().flatten().map(|number| format!("{number:.16e}"));
-    let cells: Vec<String> = numbers.chain([gap]).chain(more).collect();
+    let first = [Some(row.time), Some(row.strain), Some(stress.relative_viscosity())];
+    let others = [stress.viscosity_by_dissipation(), Some(stress.viscosity_of_films())];
+    // What there is in 3D only has no cell in 2D; what has no number has an empty one.
+    let contacts = stress.viscosity_of_contacts().map(Some);
+    let shares = contacts.into_iter().chain([Some(stress.viscosity_of_repulsion())]);
+    let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]).map(Some);
+    let more = row.time_and_rate.into_iter().flatten().map(Some);
+    let numbers = first.into_iter().chain(others).chain(shares).chain(normal);
+    let numbers = numbers.chain([row.smallest_gap_over_a]).chain(more);
+    let cells: Vec<String> =
+        numbers.map(|number| number.map_or(String::new(), |number| format!("{number:.16e}"))).collect();
     format!("{}\n", cells.join(","))
 }
 
@@ -136,7 +134,8 @@ mod tests {
             of_films: of_bodies * 0.1,
             of_contacts: Some(of_bodies * 0.5),
             of_repulsion: of_bodies * 0.5,
-            dissipation: 1.25,
+            dissipation: 1.75,
+            work_of_forces: 0.5,
         };
         let row = Rheology {
             time: 1.0,
@@ -152,5 +151,8 @@ mod tests {
         assert!(numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{numbers:?}");
         assert_eq!(numbers.len(), header::<3>().split(',').count());
         assert_eq!(header::<2>().split(',').count(), numbers.len() - 2);
+        let stress = MeanStress { work_of_forces: 1.0, ..stress };
+        let line = self::line(&Rheology { stress: &stress, ..row });
+        assert_eq!(line.split(',').nth(3), Some(""), "forces do more than the shear");
     }
 }
