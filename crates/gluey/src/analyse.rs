@@ -7,14 +7,17 @@
 //! structure_factor.csv   S(k), where there is a period
 //! profile_y.csv          volume fraction and velocity across the shear
 //! diffusion.csv          mean squares of the displacements beside the shear, by lag
-//! summary.txt            means with confidence intervals, diffusivities
+//! summary.txt            means with confidence intervals, diffusivities, rheology
 //! ```
 //!
 //! Lengths are in mean radii. Means and distributions leave out the transient, which is that of the median
-//! gap by the rule MSER-5 unless it is given.
+//! gap by the rule MSER-5 unless it is given. The rheology that a sheared run wrote beside its frames has a
+//! transient of its own, that of its viscosity.
 
 pub(crate) mod frames;
+mod mean;
 mod observe;
+mod rheology;
 mod summary;
 mod tables;
 
@@ -26,9 +29,11 @@ use gluey_suspension::statistics::mser;
 use thiserror::Error;
 
 pub use frames::FramesError;
+pub use mean::Mean;
+pub use rheology::{RheologyError, RheologyMeans};
 pub use summary::Summary;
 
-use crate::output::{OutputError, prepare_folder_of, write_atomically};
+use crate::output::{OutputError, prepare_folder_of, rows_of, write_atomically};
 use frames::{dimension, frame_files, read_frames};
 use observe::{Distributions, Instant};
 
@@ -87,6 +92,9 @@ pub enum AnalyseError {
         /// Frames to be left out.
         skip: usize,
     },
+    /// The rheology of the run could not be read.
+    #[error(transparent)]
+    Rheology(#[from] RheologyError),
     /// Contacts make no sense.
     #[error(transparent)]
     Contact(#[from] ContactError),
@@ -124,11 +132,22 @@ where
         return Err(AnalyseError::AllSkipped { folder, count, skip });
     };
     let distributions = Distributions::of(kept);
-    let summary = Summary::of(&series, skip, &distributions);
+    let begin = options.skip.map(|_| kept[0].time);
+    let rheology = rheology_beside(&files[0]).map(|table| RheologyMeans::read(&table, begin)).transpose()?;
+    let summary = Summary::of(&series, skip, &distributions, rheology.flatten());
     let out = options.out.as_deref().unwrap_or(&options.folder);
     write(out, &tables::all(&series, &distributions))?;
     write(out, &[("summary.txt", summary.to_string())])?;
     Ok(summary)
+}
+
+/// Where a run whose frames are in `<name>-<label>` has its rheology, if it has any.
+fn rheology_beside(frame: &Path) -> Option<PathBuf> {
+    let folder = std::path::absolute(frame).ok()?.parent()?.to_owned();
+    let name = folder.file_name()?.to_str()?;
+    let runs = name.rmatch_indices('-').map(|(end, _)| &name[..end]);
+    let tables = runs.map(|run| folder.with_file_name(format!("{run}-rheology.csv")));
+    tables.into_iter().find(|table| rows_of(table).is_some())
 }
 
 fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), OutputError> {

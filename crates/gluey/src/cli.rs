@@ -116,20 +116,26 @@ pub struct AnalyseArguments {
     /// Frames to leave out at the beginning, instead of the transient that is found.
     #[arg(long, value_name = "N")]
     skip: Option<usize>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl AnalyseArguments {
     fn run(&self) -> Result<(), Failure> {
         let summary = gluey::analyse::analyse(&self.options())
             .map_err(|error| Failure::of_results(error, &self.folder))?;
-        terminal::print_summary(&summary);
+        match self.json {
+            true => terminal::print_json(&summary),
+            false => terminal::print_summary(&summary),
+        }
         let tables = self.out.as_ref().unwrap_or(&self.folder).display();
         terminal::say(&format!("tables: {tables}/series.csv and beside it; pictures: gluey plot {tables}"));
         Ok(())
     }
 
     fn options(&self) -> AnalyseOptions {
-        let Self { folder, out, reach, skip } = self.clone();
+        let Self { folder, out, reach, skip, .. } = self.clone();
         AnalyseOptions { folder, out, reach_over_a: reach, skip }
     }
 }

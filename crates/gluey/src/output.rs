@@ -5,6 +5,7 @@ mod claim;
 pub mod csv;
 mod draft;
 pub mod forces;
+mod pair_forces;
 mod pvd;
 pub mod rheology;
 pub mod solver_log;
@@ -21,6 +22,7 @@ use thiserror::Error;
 pub use claim::ClaimError;
 pub(crate) use claim::{Claim, is_claimed};
 pub use draft::{Mark, RowsError};
+pub use pair_forces::PairForces;
 
 /// A file could not be written.
 #[derive(Debug, Error)]
@@ -106,6 +108,15 @@ pub(crate) fn rows_of(path: &Path) -> Option<PathBuf> {
     }
     let number = |draft: &PathBuf| draft.to_str()?.rsplit_once('-')?.1.parse::<u32>().ok();
     drafts(path).ok()?.into_iter().max_by_key(number)
+}
+
+/// The text of a table up to its last whole line: that of a run that goes on, or was killed, may be half.
+pub(crate) fn whole_lines(path: &Path) -> io::Result<String> {
+    let mut text = crate::text::read(path)?;
+    if path.to_str().is_some_and(|name| undrafted(name).is_some()) {
+        text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
+    }
+    Ok(text)
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -41,7 +41,7 @@ pub enum TableError {
 
 impl Table {
     /// Reads comma-separated numbers under a header of names; empty lines and those that start with `#` do
-    /// not count. A text without a header is a table without columns.
+    /// not count, and an empty cell is no number (NaN). A text without a header is a table without columns.
     pub fn parse(text: &str) -> Result<Self, TableError> {
         let lines = text.lines().enumerate();
         let mut lines = lines.filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty());
@@ -49,7 +49,7 @@ impl Table {
         let names: Vec<String> = header.into_iter().flatten().collect();
         let mut columns = vec![Vec::new(); names.len()];
         for (index, line) in lines {
-            let row: Option<Vec<f64>> = line.split(',').map(|cell| cell.trim().parse().ok()).collect();
+            let row: Option<Vec<f64>> = line.split(',').map(|cell| number(cell.trim())).collect();
             let Some(row) = row.filter(|row| row.len() == names.len()) else {
                 return Err(TableError::Row { line: index + 1, expected: names.len() });
             };
@@ -77,9 +77,21 @@ impl Table {
     }
 }
 
+/// The number in a cell; an empty one has none.
+fn number(cell: &str) -> Option<f64> {
+    if cell.is_empty() { Some(f64::NAN) } else { cell.parse().ok() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn empty_cells_are_no_numbers() {
+        let table = Table::parse("t,x,y\n0,,2\n1,3,\n").expect("a table");
+        let [x, y] = ["x", "y"].map(|name| table.column(name).expect("a column"));
+        assert!(x[0].is_nan() && x[1] == 3.0 && y[0] == 2.0 && y[1].is_nan());
+    }
 
     #[test]
     fn columns_are_found_by_name_and_comments_skipped() {

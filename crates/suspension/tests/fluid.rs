@@ -69,7 +69,7 @@ fn near_pairs_are_as_many_as_the_contact_value_says() {
     let most = 8.0 * phi * (1.025f64.powi(3) - 1.0) * contact_value::<3>(phi);
     let found = network.coordination().expect("known").mean;
     assert!((0.8 * most..1.1 * most).contains(&found), "{found} {most}");
-    let fabric = network.fabric();
+    let fabric = network.fabric().expect("pairs");
     assert!((0..3).all(|d| (fabric[(d, d)] - 1.0 / 3.0).abs() < 0.06), "{fabric}");
     let gaps = GapStatistics::of(&container, &fluid.positions, &fluid.radii).expect("neighbours");
     assert!(0.0 <= gaps.smallest && gaps.smallest < gaps.percentile && gaps.percentile < gaps.median);

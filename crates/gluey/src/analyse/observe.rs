@@ -21,6 +21,8 @@ const SHELL: f64 = 1.1;
 const ANGLE_COUNT: usize = 36;
 /// Largest wave number times the mean radius.
 const WAVE_RANGE: f64 = 10.0;
+/// Most radii of which pairs are told apart.
+const MOST_SIZES: usize = 3;
 /// Slabs of the profile per mean radius.
 const SLABS_PER_RADIUS: f64 = 2.0;
 
@@ -37,7 +39,8 @@ pub(super) struct Instant<const D: usize> {
     pub largest_cluster: f64,
     /// Along which axes a cluster is endless.
     pub percolates: [bool; D],
-    pub fabric: Matrix<D>,
+    /// Nothing without a contact between particles.
+    pub fabric: Option<Matrix<D>>,
 }
 
 impl<const D: usize> Instant<D>
@@ -74,6 +77,20 @@ fn mean_radius(radii: &[f64]) -> f64 {
     radii.iter().sum::<f64>() / radii.len().max(1) as f64
 }
 
+/// The radii that there are, the smallest first.
+fn sizes(radii: &[f64]) -> Vec<f64> {
+    let mut sizes = radii.to_vec();
+    sizes.sort_unstable_by(f64::total_cmp);
+    sizes.dedup();
+    sizes
+}
+
+/// All pairs of two or three sizes; none of one size, and of so many that each is rare.
+fn pairs_of(sizes: usize) -> impl Iterator<Item = [usize; 2]> {
+    let few = if (2..=MOST_SIZES).contains(&sizes) { sizes } else { 0 };
+    (0..few).flat_map(move |one| (one..few).map(move |other| [one, other]))
+}
+
 /// Distributions over frames.
 #[derive(Debug)]
 pub(super) struct Distributions<const D: usize> {
@@ -84,6 +101,8 @@ pub(super) struct Distributions<const D: usize> {
     /// Volume of the particles over that of the box.
     pub fraction: f64,
     pub radial: RadialDistribution<D>,
+    /// The same between particles of two radii, which count from the smallest.
+    pub partial: Vec<([usize; 2], RadialDistribution<D>)>,
     pub angular: AngularDistribution<D>,
     pub waves: Option<StructureFactor<D>>,
     pub profile: Profile<D>,
@@ -109,11 +128,13 @@ where
             let width = TAU / edges.max();
             StructureFactor::new(WAVE_RANGE / a, width.max(WAVE_RANGE / a / 200.0))
         });
+        let radial = RadialDistribution::new(container, range, (range / (RADIAL_WIDTH * a)).ceil() as usize);
         let mut all = Self {
             a,
             particle_count: first.radii.len(),
             fraction: volume / container.volume(),
-            radial: RadialDistribution::new(container, range, (range / (RADIAL_WIDTH * a)).ceil() as usize),
+            partial: pairs_of(sizes(&first.radii).len()).map(|pair| (pair, radial.clone())).collect(),
+            radial,
             angular: AngularDistribution::new(SHELL, ANGLE_COUNT),
             waves,
             profile: Profile::new(container, 1, (SLABS_PER_RADIUS * edges[1] / a).ceil() as usize),
@@ -129,6 +150,12 @@ where
     fn add(&mut self, frame: &XyzFrame<D>, rate: f64) {
         let XyzFrame { container, positions, radii, velocities, strain, .. } = frame;
         self.radial.add(container, positions, self.a);
+        let sizes = sizes(radii);
+        let size_of = |particle: usize| sizes.partition_point(|size| *size < radii[particle]);
+        for (pair, radial) in &mut self.partial {
+            let margin = 0.5 * (sizes[pair[0]] + sizes[pair[1]]);
+            radial.add_between(container, positions, size_of, *pair, margin);
+        }
         self.angular.add(container, positions, radii);
         if let Some(waves) = &mut self.waves {
             waves.add(container, positions);

@@ -3,13 +3,15 @@
 use std::fmt;
 
 use gluey_geom::{Dim, Space};
-use gluey_suspension::statistics::Estimate;
+use serde::{Serialize, Serializer};
 
+use super::mean::Mean;
 use super::observe::{Distributions, Instant};
+use super::rheology::RheologyMeans;
 use crate::shown::shown_to;
 
 /// Means over the frames behind the transient.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Number of particles.
     pub particle_count: usize,
@@ -19,13 +21,16 @@ pub struct Summary {
     pub frame_count: usize,
     /// Frames left out at the beginning.
     pub skipped: usize,
-    /// Names and means; nothing for fewer than two frames.
-    pub means: Vec<(&'static str, Option<Estimate>)>,
+    /// Names and means; nothing for what no frame has.
+    #[serde(serialize_with = "by_name")]
+    pub means: Vec<(&'static str, Option<Mean>)>,
     /// Self-diffusivities along each axis beside the shear with their standard errors, over the mean radius
     /// squared, per unit of strain, or of time without shear.
     pub diffusivities: Vec<(f64, f64)>,
     /// Whether these are per unit of strain.
     pub is_sheared: bool,
+    /// Of a run that is sheared for ever.
+    pub rheology: Option<RheologyMeans>,
 }
 
 impl Summary {
@@ -33,6 +38,7 @@ impl Summary {
         series: &[Instant<D>],
         skipped: usize,
         distributions: &Distributions<D>,
+        rheology: Option<RheologyMeans>,
     ) -> Self
     where
         Dim<D>: Space<D>,
@@ -40,7 +46,7 @@ impl Summary {
         let kept = &series[skipped..];
         let mean = |value: &dyn Fn(&Instant<D>) -> Option<f64>| {
             let values: Vec<f64> = kept.iter().filter_map(value).collect();
-            Estimate::of(&values)
+            Mean::of(&values)
         };
         let percolates = |axis: usize| mean(&|one| Some(f64::from(u8::from(one.percolates[axis]))));
         let names = ["percolates along x", "percolates along y", "percolates along z"];
@@ -50,8 +56,8 @@ impl Summary {
             ("median gap / a", mean(&|one| one.gaps.map(|gaps| gaps.median))),
             ("contacts per particle", mean(&|one| Some(one.contacts))),
             ("largest cluster", mean(&|one| Some(one.largest_cluster))),
-            ("fabric xx - yy", mean(&|one| Some(one.fabric[(0, 0)] - one.fabric[(1, 1)]))),
-            ("fabric xy", mean(&|one| Some(one.fabric[(0, 1)]))),
+            ("fabric xx - yy", mean(&|one| one.fabric.map(|fabric| fabric[(0, 0)] - fabric[(1, 1)]))),
+            ("fabric xy", mean(&|one| one.fabric.map(|fabric| fabric[(0, 1)]))),
         ];
         means.extend((0..D).map(|axis| (names[axis], percolates(axis))));
         let is_sheared = distributions.rate != 0.0;
@@ -65,16 +71,21 @@ impl Summary {
             means,
             diffusivities: diffusivities.map(|d| (d.value / unit, d.standard_error / unit)).collect(),
             is_sheared,
+            rheology,
         }
     }
 }
 
-fn number(value: f64) -> String {
-    format!("{:>12}", shown_to(value, 6))
+fn by_name<S: Serializer>(means: &[(&'static str, Option<Mean>)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(means.iter().copied())
 }
 
-fn error(value: f64) -> String {
-    shown_to(value, 2)
+/// A mean; "none" for what no frame has, and for what is 0 in all of them.
+fn told(mean: Option<Mean>) -> String {
+    match mean {
+        Some(mean) if mean.mean != 0.0 || mean.half_width != Some(0.0) => mean.to_string(),
+        _ => format!("{:>12}", "none"),
+    }
 }
 
 impl fmt::Display for Summary {
@@ -82,17 +93,18 @@ impl fmt::Display for Summary {
         let Self { particle_count, fraction, frame_count, skipped, .. } = self;
         writeln!(f, "{particle_count} particles at the fraction {fraction:.4}")?;
         writeln!(f, "{frame_count} frames, the first {skipped} left out; intervals hold 95 %")?;
-        for (name, estimate) in &self.means {
-            if let Some(Estimate { mean, half_width, is_resolved, .. }) = estimate {
-                let remark = if *is_resolved { "" } else { "   (too short a series for this interval)" };
-                writeln!(f, "  {name:<22} {} +- {}{remark}", number(*mean), error(*half_width))?;
-            }
+        for (name, mean) in &self.means {
+            writeln!(f, "  {name:<22} {}", told(*mean))?;
         }
         let unit = if self.is_sheared { "a^2 |rate|" } else { "a^2 per unit of time" };
+        if self.diffusivities.is_empty() {
+            writeln!(f, "  {:<22} {}", "self-diffusivity", told(None))?;
+        }
         for (axis, (value, deviation)) in ["x", "y", "z"].into_iter().zip(&self.diffusivities) {
             let name = format!("self-diffusivity {axis}");
-            writeln!(f, "  {name:<22} {} +- {} {unit}", number(*value), error(2.0 * deviation))?;
+            let [value, width] = [shown_to(*value, 6), shown_to(2.0 * deviation, 2)];
+            writeln!(f, "  {name:<22} {value:>12} +- {width} {unit}")?;
         }
-        Ok(())
+        self.rheology.iter().try_for_each(|rheology| write!(f, "{rheology}"))
     }
 }

@@ -1,8 +1,9 @@
-//! The tables, as comma-separated values; lengths in mean radii.
+//! The tables, as comma-separated values; lengths in mean radii. A cell without a number is empty.
 
 use std::fmt::Write as _;
 
 use gluey_geom::{Dim, Space};
+use gluey_suspension::structure::GapStatistics;
 
 use super::observe::{Distributions, Instant};
 
@@ -35,11 +36,14 @@ impl Table {
         Self(format!("{header}\n"))
     }
 
-    fn row(&mut self, numbers: impl IntoIterator<Item = f64>) {
+    fn row(&mut self, numbers: impl IntoIterator<Item = Option<f64>>) {
         let mut separator = "";
         for number in numbers {
-            // Writing to a string cannot fail.
-            let _ = write!(self.0, "{separator}{number:.9e}");
+            self.0.push_str(separator);
+            if let Some(number) = number {
+                // Writing to a string cannot fail.
+                let _ = write!(self.0, "{number:.9e}");
+            }
             separator = ",";
         }
         self.0.push('\n');
@@ -59,14 +63,16 @@ fn of_series<const D: usize>(series: &[Instant<D>]) -> String {
         vector::<D>("percolates")
     ));
     for instant in series {
-        let gaps = instant.gaps.map_or([f64::NAN; 3], |gaps| [gaps.smallest, gaps.percentile, gaps.median]);
-        let fabric = (0..D).flat_map(|i| (i..D).map(move |j| instant.fabric[(i, j)]));
+        let gaps = |of: fn(&GapStatistics) -> f64| instant.gaps.as_ref().map(of);
+        let gaps = [gaps(|gaps| gaps.smallest), gaps(|gaps| gaps.percentile), gaps(|gaps| gaps.median)];
+        let of_fabric = |i, j| instant.fabric.map(|fabric| fabric[(i, j)]);
+        let fabric = (0..D).flat_map(|i| (i..D).map(move |j| of_fabric(i, j)));
         table.row(
-            [instant.time, instant.strain]
+            [Some(instant.time), Some(instant.strain)]
                 .into_iter()
                 .chain(gaps)
-                .chain([instant.contacts, instant.largest_cluster])
-                .chain(instant.percolates.map(|is| f64::from(u8::from(is))))
+                .chain([Some(instant.contacts), Some(instant.largest_cluster)])
+                .chain(instant.percolates.map(|is| Some(f64::from(u8::from(is)))))
                 .chain(fabric),
         );
     }
@@ -74,23 +80,27 @@ fn of_series<const D: usize>(series: &[Instant<D>]) -> String {
 }
 
 fn radial<const D: usize>(distributions: &Distributions<D>) -> String {
-    let mut table = Table::new("r_over_a,g,pairs");
-    for bin in distributions.radial.bins() {
-        table.row([bin.distance / distributions.a, bin.g, bin.pair_count as f64]);
+    let name = |[one, other]: [usize; 2]| format!(",g_{}{}", one + 1, other + 1);
+    let names: String = distributions.partial.iter().map(|(pair, _)| name(*pair)).collect();
+    let mut table = Table::new(&format!("r_over_a,g,pairs{names}"));
+    let partial: Vec<_> = distributions.partial.iter().map(|(_, radial)| radial.bins()).collect();
+    for (row, bin) in distributions.radial.bins().into_iter().enumerate() {
+        let whole = [Some(bin.distance / distributions.a), bin.g, Some(bin.pair_count as f64)];
+        table.row(whole.into_iter().chain(partial.iter().map(|bins| bins[row].g)));
     }
     table.0
 }
 
 fn angular<const D: usize>(distributions: &Distributions<D>) -> String {
-    let mut table = Table::new("theta,g");
-    distributions.angular.bins().into_iter().for_each(|(theta, g)| table.row([theta, g]));
+    let mut table = Table::new("theta_rad,g");
+    distributions.angular.bins().into_iter().for_each(|(theta, g)| table.row([Some(theta), g]));
     table.0
 }
 
 fn waves<const D: usize>(distributions: &Distributions<D>) -> Option<String> {
     let mut table = Table::new("k_a,s,vectors");
     for bin in distributions.waves.as_ref()?.bins() {
-        table.row([bin.wave_number * distributions.a, bin.s, bin.vector_count as f64]);
+        table.row([bin.wave_number * distributions.a, bin.s, bin.vector_count as f64].map(Some));
     }
     Some(table.0)
 }
@@ -98,19 +108,20 @@ fn waves<const D: usize>(distributions: &Distributions<D>) -> Option<String> {
 fn profile<const D: usize>(distributions: &Distributions<D>) -> String {
     let mut table = Table::new(&format!("y,fraction{}", vector::<D>("velocity")));
     for slab in distributions.profile.slabs() {
-        table.row([slab.middle, slab.fraction].into_iter().chain(slab.velocity.iter().copied()));
+        let velocity = (0..D).map(|d| slab.velocity.map(|velocity| velocity[d]));
+        table.row([Some(slab.middle), Some(slab.fraction)].into_iter().chain(velocity));
     }
     table.0
 }
 
 fn diffusion<const D: usize>(distributions: &Distributions<D>) -> String {
     let mut table = Table::new(&format!("lag_t,lag_strain{}", vector::<D>("mean_square_over_a2")));
-    let interval = distributions.interval.unwrap_or(f64::NAN);
     for lag in 1..=distributions.longest_lag() {
         let Some(squares) = distributions.displacements.mean_square(lag) else { continue };
-        let time = lag as f64 * interval;
+        let time = distributions.interval.map(|interval| lag as f64 * interval);
+        let strain = time.map(|time| time * distributions.rate.abs());
         let squares = squares / distributions.a.powi(2);
-        table.row([time, time * distributions.rate.abs()].into_iter().chain(squares.iter().copied()));
+        table.row([time, strain].into_iter().chain(squares.iter().copied().map(Some)));
     }
     table.0
 }

@@ -4,9 +4,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use gluey_pictures::Curve;
+
 use super::error::PlotError;
 use super::figure::Figure;
-use crate::output::{rows_of, undrafted};
+use super::snapshot::{EDGE, PERIODIC};
+use crate::case::{Case, Hydrodynamics};
+use crate::output::{rows_of, undrafted, whole_lines};
 use crate::run::ResultPaths;
 use crate::table::Table;
 
@@ -86,6 +90,16 @@ impl Results {
         }
     }
 
+    /// The box of the case as it was run, where its file is there and space has an end.
+    pub fn borders(&self) -> Option<Borders> {
+        let case = Case::load(self.paths.case_file()).ok()?;
+        if case.flow.hydrodynamics != Hydrodynamics::Stokes {
+            return None;
+        }
+        let is_periodic = (0..case.dimension).map(|axis| case.period(axis).is_some()).collect();
+        Some(Borders { lower: case.lower(), upper: case.upper(), is_periodic })
+    }
+
     /// The trajectory.
     pub fn csv(&self) -> PathBuf {
         self.paths.csv()
@@ -93,6 +107,28 @@ impl Results {
 
     fn beside(&self, suffix: &str) -> PathBuf {
         self.paths.folder().join(format!("{}{suffix}", self.paths.stem()))
+    }
+}
+
+/// The borders of a box.
+pub struct Borders {
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    is_periodic: Vec<bool>,
+}
+
+impl Borders {
+    /// Those across x and across another axis, seen along the third.
+    pub fn curves(&self, axis: usize) -> Vec<Curve> {
+        let [left, right] = [self.lower[0], self.upper[0]];
+        let [low, high] = [self.lower[axis], self.upper[axis]];
+        let across_x = vec![vec![(left, low), (left, high)], vec![(right, low), (right, high)]];
+        let across_axis = vec![vec![(left, low), (right, low)], vec![(left, high), (right, high)]];
+        let curve = |pieces, of: usize| {
+            let stroke = if self.is_periodic[of] { PERIODIC } else { EDGE };
+            Curve { label: None, stroke, pieces }
+        };
+        vec![curve(across_x, 0), curve(across_axis, axis)]
     }
 }
 
@@ -162,29 +198,19 @@ fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
     begins().map_err(|source| PlotError::Read { path: path.to_owned(), source })
 }
 
-fn text(path: &Path) -> Result<String, PlotError> {
-    crate::text::read(path).map_err(|source| PlotError::Read { path: path.to_owned(), source })
-}
-
 fn read(path: PathBuf) -> Result<Source, PlotError> {
-    let mut text = text(&path)?;
-    if path.extension().is_some_and(|extension| extension != "csv") {
-        // The last line of a run that goes on, or was killed, may be half a line.
-        text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
-    }
+    let text = whole_lines(&path).map_err(|source| PlotError::Read { path: path.clone(), source })?;
     match Table::parse(&numbers(&text)) {
         Ok(table) => Ok(Source { path, table }),
         Err(source) => Err(PlotError::Table { path, source }),
     }
 }
 
-/// The text with numbers for words in its last column: 1 for walls, 0 for other partners of a gap, no number
-/// for an empty cell.
+/// The text with numbers for words in its last column: 1 for walls, 0 for other partners of a gap.
 fn numbers(text: &str) -> String {
     let lines = text.lines().map(|line| match line.rsplit_once(',') {
         Some((numbers, "particle" | "image")) => format!("{numbers},0"),
         Some((numbers, "wall")) => format!("{numbers},1"),
-        Some((numbers, "")) => format!("{numbers},NaN"),
         _ => line.to_owned(),
     });
     lines.collect::<Vec<_>>().join("\n")
@@ -195,12 +221,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn partners_have_numbers_and_empty_last_cells_none() {
+    fn partners_have_numbers() {
         let table = Table::parse(&numbers("t,i,partner\n0,1,wall\n0,2,image\n")).expect("numbers");
         assert_eq!(table.column("partner"), Ok(&[1.0, 0.0][..]));
-        let table = Table::parse(&numbers("t,gap\n0,\n1,2\n")).expect("numbers");
-        let gaps = table.column("gap").expect("a column");
-        assert!(gaps[0].is_nan() && gaps[1] == 2.0);
         assert!(Table::parse(&numbers("t,i,partner\n0,1,ghost\n")).is_err(), "an unknown partner");
     }
 }

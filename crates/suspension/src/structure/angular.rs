@@ -45,10 +45,10 @@ impl<const D: usize> AngularDistribution<D> {
         self.expected += shell * band / (container.volume() * self.counts.len() as f64);
     }
 
-    /// The middle of each bin of angles and the correlation there.
-    pub fn bins(&self) -> Vec<(f64, f64)> {
+    /// The middle of each bin of angles and the correlation there; none where there are no pairs at random.
+    pub fn bins(&self) -> Vec<(f64, Option<f64>)> {
         let width = PI / self.counts.len() as f64;
-        let g = |count: u64| if self.expected > 0.0 { count as f64 / self.expected } else { 0.0 };
+        let g = |count: u64| (self.expected > 0.0).then(|| count as f64 / self.expected);
         self.counts.iter().enumerate().map(|(bin, &count)| ((bin as f64 + 0.5) * width, g(count))).collect()
     }
 }

@@ -78,8 +78,8 @@ impl<const D: usize> Displacements<D> {
     }
 
     /// Self-diffusivities along each axis: half the slope of the line that fits the mean squares best over
-    /// the lags, which are multiples of the time `interval`. `None` for fewer than two lags, or longer ones
-    /// than were seen.
+    /// the lags, which are multiples of the time `interval`. `None` for fewer than two lags, longer ones than
+    /// were seen, or one particle, of which there are no groups to tell an error by.
     pub fn diffusivity(&self, lags: RangeInclusive<usize>, interval: f64) -> Option<[Diffusivity; D]> {
         let particles = self.frames.last()?.len();
         let slopes = |first: usize, step: usize| -> Option<Vector<D>> {
@@ -88,6 +88,9 @@ impl<const D: usize> Displacements<D> {
             Some(slope(&squares?)? / (2.0 * interval))
         };
         let groups = GROUP_COUNT.min(particles);
+        if groups < 2 {
+            return None;
+        }
         let parts: Option<Vec<_>> = (0..groups).map(|group| slopes(group, groups)).collect();
         let (whole, parts) = (slopes(0, 1)?, parts?);
         Some(std::array::from_fn(|d| {
@@ -98,7 +101,7 @@ impl<const D: usize> Displacements<D> {
     }
 }
 
-/// Standard error of the mean of independent values; not a number for one.
+/// Standard error of the mean of independent values, of which there are two at least.
 fn spread(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -130,6 +133,14 @@ mod tests {
         }
         assert!(displacements.mean_square(4).expect("frames").norm() < 1e-28);
         assert_eq!(displacements.mean_square(5), None);
+    }
+
+    #[test]
+    fn one_particle_has_no_diffusivity() {
+        let mut displacements = Displacements::<2>::new(0.0);
+        (0..9).for_each(|frame| displacements.push(0.0, &[Vector::repeat(f64::from(frame))]));
+        assert_eq!(displacements.diffusivity(1..=4, 1.0), None);
+        assert!(displacements.mean_square(4).is_some());
     }
 
     /// Steps at random of the variance `s^2` diffuse with `s^2 / (2 interval)`, also in shear.

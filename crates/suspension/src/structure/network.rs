@@ -15,7 +15,7 @@ use crate::{Container, for_each_pair};
 /// let network = ProximityNetwork::new(&container, &[Vector::zeros()], &[1.0], 1e-9);
 /// assert_eq!(network.coordination()?.mean, 2.0);
 /// assert_eq!(network.clusters()?.clusters[0].percolates, [true, false]);
-/// assert_eq!(network.fabric()[(0, 0)], 1.0);
+/// assert_eq!(network.fabric().map(|fabric| fabric[(0, 0)]), Some(1.0));
 /// # Ok::<(), gluey_contact::ContactError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -78,10 +78,10 @@ impl<const D: usize> ProximityNetwork<D> {
     }
 
     /// Fabric tensor `<n (x) n>` over the pairs, of trace 1 (Oda 1982, DOI 10.3208/sandf1972.22.4_96);
-    /// `1 / D` on the diagonal without a preferred direction, 0 without pairs. Walls do not count.
-    pub fn fabric(&self) -> Matrix<D> {
+    /// `1 / D` on the diagonal without a preferred direction; none without pairs. Walls do not count.
+    pub fn fabric(&self) -> Option<Matrix<D>> {
         let sum: Matrix<D> = self.normals.iter().map(|n| n * n.transpose()).sum();
-        sum / self.normals.len().max(1) as f64
+        (!self.normals.is_empty()).then(|| sum / self.normals.len() as f64)
     }
 
     /// Number of pairs of particles.
@@ -139,7 +139,8 @@ mod tests {
             assert_eq!(network.coordination().expect("known").mean, 12.0);
             let clusters = network.clusters().expect("known");
             assert_eq!((clusters.clusters.len(), clusters.clusters[0].percolates), (1, [true; 3]));
-            assert!((network.fabric() - Matrix::<3>::identity() / 3.0).norm() < 1e-12);
+            let fabric = network.fabric().expect("pairs");
+            assert!((fabric - Matrix::<3>::identity() / 3.0).norm() < 1e-12);
         }
     }
 

@@ -13,8 +13,8 @@ pub struct Slab<const D: usize> {
     pub middle: f64,
     /// Volume of the particles over that of the slab.
     pub fraction: f64,
-    /// Mean velocity of the centres of the particles, weighted by their volumes in the slab; 0 without any.
-    pub velocity: Vector<D>,
+    /// Mean velocity of the centres of the particles, weighted by their volumes in the slab; none without any.
+    pub velocity: Option<Vector<D>>,
 }
 
 /// Volume fraction and velocity in slabs across an axis. The volumes of balls in slabs are exact.
@@ -83,7 +83,7 @@ impl<const D: usize> Profile<D> {
         let slab = |(slab, (volume, moved)): (usize, &(f64, Vector<D>))| Slab {
             middle: self.lower + (slab as f64 + 0.5) * self.width,
             fraction: if slab_volume > 0.0 { volume / slab_volume } else { 0.0 },
-            velocity: if *volume > 0.0 { moved / *volume } else { Vector::zeros() },
+            velocity: (*volume > 0.0).then(|| moved / *volume),
         };
         self.sums.iter().enumerate().map(slab).collect()
     }
@@ -118,7 +118,9 @@ mod tests {
             let fraction = slabs.iter().map(|slab| slab.fraction).sum::<f64>() / 7.0;
             let volume = ball_volume::<D>(0.1) + ball_volume::<D>(0.2);
             assert!((fraction - volume).abs() < 1e-14, "{D}D: {fraction}");
-            assert_eq!((slabs[2].velocity[0], slabs[5].velocity[0]), (1.0, 3.0));
+            let velocity = |slab: usize| slabs[slab].velocity.map(|velocity| velocity[0]);
+            assert_eq!((velocity(2), velocity(5)), (Some(1.0), Some(3.0)));
+            assert_eq!(velocity(1).is_none(), !is_periodic, "{slabs:?}");
             assert_eq!(slabs[0].fraction > 0.0, is_periodic);
         }
     }
@@ -138,7 +140,7 @@ mod tests {
         let velocities = positions.map(|x| Vector::<2>::new(2.0 * x[1], 0.0));
         profile.add(&container, &positions, &[0.05; 4], &velocities, &Vector::<2>::new(2.0, 0.0));
         let slabs = profile.slabs();
-        let middle = |slab: usize| slabs[slab].velocity[0];
+        let middle = |slab: usize| slabs[slab].velocity.expect("particles")[0];
         assert!((middle(1) - 0.6).abs() < 1e-12 && (middle(2) - 1.2).abs() < 1e-12, "{slabs:?}");
         // The last one reaches into the first slab, where its image below is.
         let upper = volume_below::<2>(0.02, 0.05) / ball_volume::<2>(0.05);

@@ -9,8 +9,8 @@ use crate::{Container, ball_volume, for_each_pair};
 pub struct RadialBin {
     /// Middle of the bin.
     pub distance: f64,
-    /// Pairs found over those of particles at random.
-    pub g: f64,
+    /// Pairs found over those of particles at random; none where there would be none of these.
+    pub g: Option<f64>,
     /// Number of pairs found.
     pub pair_count: u64,
 }
@@ -39,19 +39,36 @@ impl<const D: usize> RadialDistribution<D> {
 
     /// Adds one configuration. `margin` is how far centres keep from walls, usually the radius.
     pub fn add(&mut self, container: &Container<D>, positions: &[Vector<D>], margin: f64) {
+        self.add_between(container, positions, |_| 0, [0, 0], margin);
+    }
+
+    /// Adds the pairs of one configuration of which one particle is of one species and the other of another,
+    /// or of the same; `species` has that of each particle.
+    pub fn add_between(
+        &mut self,
+        container: &Container<D>,
+        positions: &[Vector<D>],
+        species: impl Fn(usize) -> usize,
+        [one, other]: [usize; 2],
+        margin: f64,
+    ) {
         let width = self.width();
         let (counts, last) = (&mut self.counts, self.expected.len() - 1);
         for_each_pair(container, positions, self.range, |pair| {
-            if pair.first != pair.second {
+            let found = [pair.first, pair.second].map(&species);
+            let is_wanted = found == [one, other] || found == [other, one];
+            if is_wanted && pair.first != pair.second {
                 counts[((pair.arm.norm() / width) as usize).min(last)] += 1;
             }
         });
         let rooms = container.bounds().extent().map(|edge| edge - 2.0 * margin);
-        let count = positions.len() as f64;
+        let count = |of: usize| (0..positions.len()).filter(|&k| species(k) == of).count() as f64;
+        let pairs =
+            if one == other { 0.5 * count(one) * (count(one) - 1.0) } else { count(one) * count(other) };
         let room: f64 = (0..D)
             .map(|d| if container.is_walled(d) { rooms[d] } else { container.bounds().extent()[d] })
             .product();
-        let density = 0.5 * count * (count - 1.0) / room;
+        let density = pairs / room;
         for (bin, expected) in self.expected.iter_mut().enumerate() {
             *expected += density * seen(container, &rooms, (bin as f64 + 0.5) * width);
         }
@@ -61,13 +78,13 @@ impl<const D: usize> RadialDistribution<D> {
         self.range / self.expected.len() as f64
     }
 
-    /// The correlation, averaged over all configurations; 0 where none was added.
+    /// The correlation, averaged over all configurations.
     pub fn bins(&self) -> Vec<RadialBin> {
         let width = self.width();
         let bin = |(bin, (&pair_count, &expected)): (usize, (&u64, &f64))| {
             let [inner, outer] = [bin as f64 * width, (bin + 1) as f64 * width];
             let wanted = expected * (ball_volume::<D>(outer) - ball_volume::<D>(inner));
-            let g = if wanted > 0.0 { pair_count as f64 / wanted } else { 0.0 };
+            let g = (wanted > 0.0).then(|| pair_count as f64 / wanted);
             RadialBin { distance: 0.5 * (inner + outer), g, pair_count }
         };
         self.counts.iter().zip(&self.expected).enumerate().map(bin).collect()
@@ -82,8 +99,9 @@ impl<const D: usize> RadialDistribution<D> {
             let is_outside = bin.distance - half >= diameter * (1.0 - 1e-9);
             is_outside && bin.distance <= 1.25 * diameter && bin.pair_count > 0
         };
-        let point = |bin: &RadialBin| [bin.distance / diameter - 1.0, bin.g.ln(), bin.pair_count as f64];
-        let points: Vec<[f64; 3]> = bins.iter().filter(is_near).map(point).collect();
+        let point =
+            |bin: &RadialBin| Some([bin.distance / diameter - 1.0, bin.g?.ln(), bin.pair_count as f64]);
+        let points: Vec<[f64; 3]> = bins.iter().filter(is_near).filter_map(point).collect();
         (points.len() >= 4).then(|| parabola_at_zero(&points).exp())
     }
 }
@@ -143,8 +161,11 @@ mod tests {
             (0..20).for_each(|seed| radial.add(&container, &ideal(400, seed), 0.0));
             for bin in radial.bins() {
                 let error = 4.0 / (bin.pair_count as f64).sqrt() + 0.004;
-                assert!((bin.g - 1.0).abs() < error, "{D}D {walls:?}: {bin:?}");
+                assert!((bin.g.expect("pairs") - 1.0).abs() < error, "{D}D {walls:?}: {bin:?}");
             }
+            radial = RadialDistribution::new(&container, 0.45, 9);
+            radial.add(&container, &ideal(1, 0), 0.0);
+            assert!(radial.bins().iter().all(|bin| bin.g.is_none()), "one particle has no pairs");
         }
     }
 
@@ -152,6 +173,27 @@ mod tests {
     fn an_ideal_gas_has_no_correlation() {
         check::<2>();
         check::<3>();
+    }
+
+    /// In a lattice of two species in turn, nearest neighbours are unlike, the next ones alike.
+    #[test]
+    fn partial_correlations_tell_species_apart() {
+        let container = Container::<2>::periodic(&Vector::repeat(10.0));
+        let site = |i: usize| Vector::<2>::new((i % 10) as f64, (i / 10) as f64);
+        let positions: Vec<_> = (0..100).map(site).collect();
+        let species = |i: usize| (i % 10 + i / 10) % 2;
+        let mut whole = RadialDistribution::new(&container, 4.5, 45);
+        whole.add(&container, &positions, 0.5);
+        let pair_counts = |pair: [usize; 2]| {
+            let mut radial = RadialDistribution::new(&container, 4.5, 45);
+            radial.add_between(&container, &positions, species, pair, 0.5);
+            radial.bins().iter().map(|bin| bin.pair_count).collect::<Vec<u64>>()
+        };
+        let [alike, unlike, others] = [[0, 0], [0, 1], [1, 1]].map(pair_counts);
+        assert_eq!((alike[10], unlike[10], alike[14], unlike[14]), (0, 200, 100, 0));
+        assert_eq!((&alike, pair_counts([1, 0])), (&others, unlike.clone()));
+        let sum = |k: usize| alike[k] + unlike[k] + others[k];
+        assert!(whole.bins().iter().enumerate().all(|(k, bin)| bin.pair_count == sum(k)));
     }
 
     #[test]

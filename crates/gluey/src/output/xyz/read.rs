@@ -26,6 +26,14 @@ pub enum XyzError {
         /// Why.
         source: io::Error,
     },
+    /// It has no particles.
+    #[error("{}:{line}: no particles", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1, that says how many there are.
+        line: usize,
+    },
     /// It is not what `gluey run --xyz` writes.
     #[error("{}:{line}: found `{}`, expected {wanted}", path.display(), visible(found))]
     Malformed {
@@ -75,6 +83,9 @@ where
             .trim()
             .parse()
             .map_err(|_| lines.fault(0, lines.line(0), "the number of particles"))?;
+        if count == 0 {
+            return Err(XyzError::Empty { path: path.to_owned(), line: 1 });
+        }
         let container = lines.container::<D>()?;
         let number_count = match lines.value("Properties")? {
             PROPERTIES => NUMBER_COUNT,
