@@ -1,14 +1,16 @@
-//! One chart: styled curves over linear or logarithmic axes, drawn by kuva, with a legend above the frame.
+//! One chart: styled curves over linear or logarithmic axes, drawn by kuva, with its legend above the frame.
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::LinePlot;
 use kuva::plot::line::LineStyle;
-use kuva::render::layout::{Layout, TickFormat};
+use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::render_multiple;
-use std::sync::Arc;
 
+use crate::axis::{Axis, TICK_SIZE, scaled, tenth};
 use crate::canvas::{Canvas, FONT_FAMILY};
+use crate::legend::{Legend, shared_entries};
+use crate::text;
 
 /// Width of a figure, in SVG pixels.
 pub const WIDTH: f64 = 600.0;
@@ -16,8 +18,16 @@ const MARGIN_LEFT: f64 = 66.0;
 const MARGIN_RIGHT: f64 = 18.0;
 const MARGIN_BOTTOM: f64 = 48.0;
 const MARGIN_TOP: f64 = 8.0;
-const LEGEND_ROW: f64 = 19.0;
-const LEGEND_SAMPLE: f64 = 40.0;
+/// Beside the labels of ticks at an upright axis: room to the frame, and for the label of the axis.
+const BESIDE_LABELS: f64 = 40.0;
+const LABEL_SIZE: f64 = 17.0;
+/// Height and width of a power of ten set apart.
+const POWER_ROW: f64 = 17.0;
+const POWER_WIDTH: f64 = 52.0;
+/// Over all.
+const GAP: f64 = 6.0;
+/// Radius of points without neighbours.
+const POINT: f64 = 2.0;
 
 /// How a curve is drawn; one style means the same thing in every figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,21 +49,6 @@ pub struct Curve {
     pub stroke: Stroke,
     /// Pieces of points `(x, y)`.
     pub pieces: Vec<Vec<(f64, f64)>>,
-}
-
-/// One axis.
-#[derive(Clone, Debug)]
-pub struct Axis {
-    /// Label with the markup of the [crate].
-    pub label: String,
-    /// Smallest value shown.
-    pub min: f64,
-    /// Largest value shown.
-    pub max: f64,
-    /// Distance of ticks (ignored on a logarithmic axis).
-    pub tick: f64,
-    /// Logarithmic (base 10).
-    pub log: bool,
 }
 
 /// A chart: curves over a pair of axes.
@@ -80,140 +75,175 @@ pub struct Mark {
     pub label: String,
 }
 
-impl Axis {
-    /// A logarithmic axis around these values, from a whole power of ten to a whole power of ten.
-    pub fn decades(label: &str, low: f64, high: f64) -> Self {
-        let (first, last) = ((low.log10() + 1e-9).floor(), (high.log10() - 1e-9).ceil());
-        let decade = |exponent: f64| 10f64.powf(exponent);
-        let max = decade(last.max(first + 1.0));
-        Self { label: label.to_owned(), min: decade(first), max, tick: 1.0, log: true }
-    }
-
-    /// A linear axis around these values, with ticks at round numbers; without finite values from 0 to 1.
-    pub fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
-        let finite = values.into_iter().filter(|value| value.is_finite());
-        let ends = finite.fold(None, |ends: Option<(f64, f64)>, value| match ends {
-            None => Some((value, value)),
-            Some((low, high)) => Some((low.min(value), high.max(value))),
-        });
-        let (low, high) = ends.unwrap_or((0.0, 1.0));
-        // A constant has room around it.
-        let room = if high - low > 1e-9 * high.abs().max(low.abs()) {
-            0.0
-        } else {
-            0.5 * high.abs().max(f64::MIN_POSITIVE.sqrt())
-        };
-        let (low, high) = (low - room, high + room);
-        let tick = round_step((high - low) / 5.0);
-        let half = 0.5 * tick;
-        let (min, max) = ((low / half + 1e-6).floor() * half, (high / half - 1e-6).ceil() * half);
-        Self { label: label.to_owned(), min, max, tick, log: false }
-    }
-
-    /// Whether a value lies between the ends, which [`Axis::around`] rounds a little.
-    fn shows(&self, value: f64) -> bool {
-        let slack = if self.log { 0.0 } else { 1e-6 * (self.max - self.min) };
-        (self.min - slack..=self.max + slack).contains(&value)
-    }
-
-    /// Where a value lies, from 0 at the smallest value shown to 1 at the largest.
-    fn fraction(&self, value: f64) -> f64 {
-        let scale = |x: f64| if self.log { x.log10() } else { x };
-        (scale(value) - scale(self.min)) / (scale(self.max) - scale(self.min))
-    }
-}
-
-/// The smallest of 1, 2, 5, 10, ... times a power of ten that is not below `step`.
-fn round_step(step: f64) -> f64 {
-    let decade = 10f64.powf(step.log10().floor());
-    [1.0, 2.0, 5.0]
-        .map(|digit| digit * decade)
-        .into_iter()
-        .find(|round| *round >= 0.999 * step)
-        .unwrap_or(10.0 * decade)
-}
-
-/// Stacks charts of the usual width, the legend of all of them on top, into one SVG canvas.
+/// Stacks charts of the usual width into one SVG canvas, each under its legend; what all of them share is on
+/// top.
 pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
-    stack_to_width(charts, WIDTH, frame_height)
+    stack_to_width(charts, WIDTH, |chart, _| frame_height(chart))
 }
 
-/// Stacks charts of this width, the legend of all of them on top, into one SVG canvas.
-pub fn stack_to_width(charts: &[Chart], width: f64, frame_height: impl Fn(&Chart) -> f64) -> Canvas {
-    let entries = legend_entries(charts);
-    let notes: Vec<&String> = charts.iter().flat_map(|chart| &chart.notes).collect();
-    let rows = entries.len().div_ceil(legend_columns(width)) + notes.len();
-    let mut y = 6.0 + LEGEND_ROW * rows as f64;
-    let heights: Vec<f64> = charts.iter().map(|c| frame_height(c) + MARGIN_TOP + c.margin_bottom()).collect();
-    let mut canvas = Canvas::new(width, y + heights.iter().sum::<f64>());
-    draw_legend(&mut canvas, width, &entries, &notes);
-    for (chart, height) in charts.iter().zip(heights) {
-        canvas.embed(&chart.svg(width, height), 0.0, y);
-        chart.draw_marks(&mut canvas, y + MARGIN_TOP, (width, frame_height(chart)));
-        y += height;
+/// Stacks charts of this width, whose frames are as high as is said for their width.
+pub fn stack_to_width(charts: &[Chart], width: f64, frame_height: impl Fn(&Chart, f64) -> f64) -> Canvas {
+    let sides = Sides::around(charts);
+    let frame_width = sides.frame_width(width);
+    let shared = if charts.len() > 1 { shared_entries(charts) } else { Vec::new() };
+    let of_all = Legend { entries: shared, notes: &[] };
+    let legends: Vec<Legend<'_>> = charts.iter().map(|chart| chart.legend(&of_all.entries)).collect();
+    let frame = |chart: &Chart| {
+        let height = frame_height(chart, frame_width);
+        chart.margin_top() + height + chart.margin_bottom(frame_width)
+    };
+    let height = |(chart, legend): (&Chart, &Legend<'_>)| legend.height(frame_width) + frame(chart);
+    let heights = charts.iter().zip(&legends).map(height).sum::<f64>();
+    let mut y = GAP + of_all.height(frame_width);
+    let mut canvas = Canvas::new(width, y + heights);
+    of_all.draw(&mut canvas, (sides.left, GAP), frame_width);
+    for (chart, legend) in charts.iter().zip(&legends) {
+        legend.draw(&mut canvas, (sides.left, y), frame_width);
+        y += legend.height(frame_width);
+        canvas.embed(&chart.svg_between(&sides, width, frame(chart)), 0.0, y);
+        let size = (frame_width, frame_height(chart, frame_width));
+        chart.draw_points(&mut canvas, (sides.left, y + chart.margin_top()), size);
+        y += frame(chart);
     }
     canvas
 }
 
-/// Height of the frame that gives both axes of `chart` the same scale.
+/// Height of the frame that gives both axes of a chart the same scale, alone on a canvas of the usual width.
 pub fn equal_aspect_height(chart: &Chart) -> f64 {
-    let width = WIDTH - MARGIN_LEFT - MARGIN_RIGHT;
-    width * (chart.y.max - chart.y.min) / (chart.x.max - chart.x.min)
+    chart.equal_aspect(Sides::around(std::slice::from_ref(chart)).frame_width(WIDTH))
+}
+
+/// Room beside frames, for the labels at their sides.
+struct Sides {
+    left: f64,
+    right: f64,
+}
+
+impl Sides {
+    /// The same for charts that stand one over the other.
+    fn around(charts: &[Chart]) -> Self {
+        let mut sides = Self { left: MARGIN_LEFT, right: MARGIN_RIGHT };
+        for chart in charts {
+            let widest = |axis: &Axis| match axis.set_apart() {
+                Some((_, shown)) => shown.widest_label(),
+                None => axis.widest_label(),
+            };
+            sides.left = sides.left.max(widest(&chart.y) + BESIDE_LABELS);
+            sides.right = sides.right.max(0.5 * widest(&chart.x) + 4.0);
+        }
+        sides
+    }
+
+    fn frame_width(&self, width: f64) -> f64 {
+        width - self.left - self.right
+    }
 }
 
 impl Chart {
     /// The chart alone, of this size with its margins.
     pub fn svg(&self, width: f64, height: f64) -> String {
-        let plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve)).collect();
-        let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
+        self.svg_between(&Sides::around(std::slice::from_ref(self)), width, height)
+    }
+
+    /// The chart of this size with this room beside its frame.
+    fn svg_between(&self, sides: &Sides, width: f64, height: f64) -> String {
+        let (frame_width, bottom) = (sides.frame_width(width), self.margin_bottom(sides.frame_width(width)));
+        let frame_height = height - self.margin_top() - bottom;
+        let apart = [&self.x, &self.y].map(Axis::set_apart);
+        let powers = apart.each_ref().map(|apart| apart.as_ref().map(|(power, _)| *power));
+        let [x, y] = apart.map(|apart| apart.map(|(_, axis)| axis));
+        let x = x.unwrap_or_else(|| self.x.clone()).with_room(frame_width, false);
+        let y = y.unwrap_or_else(|| self.y.clone()).with_room(frame_height, true);
+        let plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve, powers)).collect();
+        let mut layout = Layout::new((x.min, x.max), (y.min, y.max))
             .with_width(width)
             .with_height(height)
-            .with_force_margins(MARGIN_LEFT, MARGIN_RIGHT)
-            .with_force_margins_y(MARGIN_TOP, self.margin_bottom())
-            .with_x_axis_min(self.x.min)
-            .with_x_axis_max(self.x.max)
-            .with_y_axis_min(self.y.min)
-            .with_y_axis_max(self.y.max)
-            .with_x_label(&*self.x.label)
-            .with_y_label(&*self.y.label)
+            .with_force_margins(sides.left, sides.right)
+            .with_force_margins_y(self.margin_top(), bottom)
+            .with_x_axis_min(x.min)
+            .with_x_axis_max(x.max)
+            .with_y_axis_min(y.min)
+            .with_y_axis_max(y.max)
+            .with_x_label(&*x.label)
+            .with_y_label(&*y.label)
             .with_font_family(FONT_FAMILY)
-            .with_label_size(17)
-            .with_tick_size(14)
+            .with_label_size(LABEL_SIZE as u32)
+            .with_tick_size(TICK_SIZE as u32)
             .with_show_grid(false)
             .with_box_axes()
             .with_tick_align("inside")
             .with_tick_pos("both")
-            .with_x_tick_format(if few_decades(&self.x) { plain() } else { tick_format(&self.x) })
-            .with_y_tick_format(tick_format(&self.y));
-        layout = if self.x.log { layout.with_log_x() } else { layout.with_x_tick_step(self.x.tick) };
-        layout = if self.y.log { layout.with_log_y() } else { layout.with_y_tick_step(self.y.tick) };
-        SvgBackend::new().render_scene(&render_multiple(plots, layout))
+            .with_x_tick_format(x.tick_format(false))
+            .with_y_tick_format(y.tick_format(true));
+        layout = if x.log { layout.with_log_x() } else { layout.with_x_tick_step(x.tick) };
+        layout = if y.log { layout.with_log_y() } else { layout.with_y_tick_step(y.tick) };
+        let svg = SvgBackend::new().render_scene(&render_multiple(plots, layout));
+        let under = height - if self.is_crowded_below(frame_width) { LABEL_SIZE + 5.0 } else { 9.0 };
+        let places = [(width - sides.right, under, "end"), (sides.left, self.margin_top() - 5.0, "start")];
+        let texts: String =
+            powers.iter().zip(places).filter_map(|(power, at)| power_text((*power)?, at)).collect();
+        svg.replacen("</svg>", &format!("{texts}</svg>"), 1)
     }
 
-    /// Room for tick labels and, if there is one, the axis label.
-    fn margin_bottom(&self) -> f64 {
-        if self.x.label.is_empty() { 0.5 * MARGIN_BOTTOM } else { MARGIN_BOTTOM }
+    /// Room over the frame, also for a power of ten.
+    fn margin_top(&self) -> f64 {
+        if self.y.set_apart().is_some() { MARGIN_TOP + POWER_ROW } else { MARGIN_TOP }
+    }
+
+    /// Room for tick labels and, if there is one, the axis label, and a power of ten beside it or above.
+    fn margin_bottom(&self, frame_width: f64) -> f64 {
+        match (self.x.label.is_empty(), self.x.set_apart().is_some()) {
+            (true, false) => 0.5 * MARGIN_BOTTOM,
+            _ if self.is_crowded_below(frame_width) => MARGIN_BOTTOM + POWER_ROW,
+            _ => MARGIN_BOTTOM,
+        }
+    }
+
+    /// Whether the axis label leaves no room for a power of ten beside it.
+    fn is_crowded_below(&self, frame_width: f64) -> bool {
+        let half = 0.5 * text::width(&self.x.label, LABEL_SIZE);
+        self.x.set_apart().is_some() && half + POWER_WIDTH > 0.5 * frame_width
+    }
+
+    /// Height of a frame of this width in which both axes have the same scale.
+    pub fn equal_aspect(&self, frame_width: f64) -> f64 {
+        frame_width * (self.y.max - self.y.min) / (self.x.max - self.x.min)
     }
 
     /// Where a point lies on a canvas of this height that has only this chart, with equal scales.
     pub fn point_in_stack(&self, canvas_height: f64, at: (f64, f64)) -> (f64, f64) {
-        let frame_height = equal_aspect_height(self);
-        self.point(canvas_height - self.margin_bottom() - frame_height, (WIDTH, frame_height), at)
+        let sides = Sides::around(std::slice::from_ref(self));
+        let size = (sides.frame_width(WIDTH), equal_aspect_height(self));
+        let top = canvas_height - self.margin_bottom(size.0) - size.1;
+        self.point((sides.left, top), size, at)
     }
 
-    /// A point in a frame of this height whose upper edge is at `top`, on a canvas of this width.
-    fn point(&self, top: f64, (width, frame_height): (f64, f64), at: (f64, f64)) -> (f64, f64) {
-        let frame_width = width - MARGIN_LEFT - MARGIN_RIGHT;
-        let x = MARGIN_LEFT + frame_width * self.x.fraction(at.0);
-        (x, top + frame_height * (1.0 - self.y.fraction(at.1)))
+    /// A point in a frame with this upper left corner and size.
+    fn point(&self, corner: (f64, f64), size: (f64, f64), at: (f64, f64)) -> (f64, f64) {
+        let x = corner.0 + size.0 * self.x.fraction(at.0);
+        (x, corner.1 + size.1 * (1.0 - self.y.fraction(at.1)))
     }
 
-    /// Draws the marks over a frame whose upper edge is at `top`, their labels where curves leave room.
-    fn draw_marks(&self, canvas: &mut Canvas, top: f64, size: (f64, f64)) {
+    /// Draws the marks over a frame, their labels where curves leave room, and points of curves that have no
+    /// neighbour to be joined with.
+    fn draw_points(&self, canvas: &mut Canvas, corner: (f64, f64), size: (f64, f64)) {
+        for Curve { stroke, pieces, .. } in &self.curves {
+            for at in pieces.iter().filter(|piece| piece.len() == 1).map(|piece| piece[0]) {
+                if self.x.shows(at.0) && self.y.shows(at.1) {
+                    let radius = POINT.max(1.2 * stroke.width);
+                    canvas.circle(
+                        self.point(corner, size, at),
+                        radius,
+                        stroke.color,
+                        Stroke { width: 0.0, ..*stroke },
+                    );
+                }
+            }
+        }
         let on_curves = self.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
-        let taken = on_curves.map(|at| self.point(top, size, *at)).collect::<Vec<_>>();
+        let taken = on_curves.map(|at| self.point(corner, size, *at)).collect::<Vec<_>>();
         for Mark { at, label } in &self.marks {
-            let dot = self.point(top, size, *at);
+            let dot = self.point(corner, size, *at);
             canvas.circle(dot, 3.0, "black", Stroke { color: "black", width: 0.0, dashes: None });
             if label.is_empty() {
                 continue;
@@ -223,13 +253,21 @@ impl Chart {
         }
     }
 
-    fn plots(&self, curve: &Curve) -> Vec<Plot> {
+    /// The lines of a curve over powers of ten.
+    fn plots(&self, curve: &Curve, [x, y]: [Option<i32>; 2]) -> Vec<Plot> {
         let style = curve.stroke.dashes.map_or(LineStyle::Solid, |d| LineStyle::Custom(d.to_owned()));
         let line = LinePlot::new()
             .with_color(curve.stroke.color)
             .with_stroke_width(curve.stroke.width)
             .with_line_style(style);
-        self.inside(&curve.pieces).into_iter().map(|piece| line.clone().with_data(piece).into()).collect()
+        let over = |value: f64, power: Option<i32>| power.map_or(value, |power| scaled(value, power));
+        let shown = |piece: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+            piece.into_iter().map(|at| (over(at.0, x), over(at.1, y))).collect()
+        };
+        self.inside(&curve.pieces)
+            .into_iter()
+            .map(|piece| line.clone().with_data(shown(piece)).into())
+            .collect()
     }
 
     /// The parts of the pieces that lie within the axes.
@@ -240,9 +278,12 @@ impl Chart {
     }
 }
 
-/// Columns of the legend of a figure of this width.
-fn legend_columns(width: f64) -> usize {
-    if width < 0.9 * WIDTH { 1 } else { 2 }
+/// A power of ten at the end of an axis.
+fn power_text(power: i32, (x, y, anchor): (f64, f64, &str)) -> Option<String> {
+    let label = format!("\u{d7} {}", tenth(power));
+    Some(format!(
+        r#"<text x="{x:.2}" y="{y:.2}" font-size="{TICK_SIZE}" text-anchor="{anchor}" fill="black">{label}</text>"#
+    ))
 }
 
 /// Size of the labels of dots.
@@ -267,81 +308,9 @@ fn place_of_label(dot: (f64, f64), taken: &[(f64, f64)]) -> (f64, f64) {
     best.0
 }
 
-/// Label and stroke of every curve to be named, once each.
-fn legend_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
-    let mut entries: Vec<(&str, Stroke)> = Vec::new();
-    for curve in charts.iter().flat_map(|chart| &chart.curves) {
-        if let Some(label) = &curve.label
-            && !entries.iter().any(|(name, _)| *name == label)
-        {
-            entries.push((label, curve.stroke));
-        }
-    }
-    entries
-}
-
-fn draw_legend(canvas: &mut Canvas, width: f64, entries: &[(&str, Stroke)], notes: &[&String]) {
-    let columns = legend_columns(width);
-    let column_width = (width - MARGIN_LEFT - MARGIN_RIGHT) / columns as f64;
-    for (i, (label, stroke)) in entries.iter().enumerate() {
-        let x = MARGIN_LEFT + column_width * (i % columns) as f64;
-        let y = 6.0 + LEGEND_ROW * ((i / columns) as f64 + 0.5);
-        canvas.line((x, y), (x + LEGEND_SAMPLE, y), *stroke);
-        canvas.text(x + LEGEND_SAMPLE + 8.0, y + 5.0, 15.0, "start", label);
-    }
-    let rows = entries.len().div_ceil(columns);
-    for (i, note) in notes.iter().enumerate() {
-        let y = 6.0 + LEGEND_ROW * ((rows + i) as f64 + 0.5);
-        canvas.text(MARGIN_LEFT, y + 5.0, 13.0, "start", note);
-    }
-}
-
-/// `10^{n}` for whole powers, nothing for ticks between them.
-fn power_of_ten(value: f64) -> String {
-    let exponent = value.log10();
-    if (exponent - exponent.round()).abs() > 1e-6 {
-        return String::new();
-    }
-    format!("10^{{{}}}", format!("{exponent:.0}").replace("-0", "0").replace('-', "\u{2212}"))
-}
-
-/// Whether an axis is logarithmic and so short that its ticks between powers of ten have room for a number.
-fn few_decades(axis: &Axis) -> bool {
-    axis.log && axis.min > 0.9e-3 && axis.max < 1.1e3 && axis.max < 1.1e3 * axis.min
-}
-
-/// Ticks as decimals with as many digits as they have.
-fn plain() -> TickFormat {
-    TickFormat::Custom(Arc::new(|value| format!("{}", (value * 1e6).round() / 1e6)))
-}
-
-/// Ticks: decimals as the step needs on a linear axis, powers of ten on a logarithmic one.
-fn tick_format(axis: &Axis) -> TickFormat {
-    if axis.log {
-        return TickFormat::Custom(Arc::new(power_of_ten));
-    }
-    let decimals = (0..6).find(|d| (axis.tick * 10f64.powi(*d)).fract().abs() < 1e-9).unwrap_or(6);
-    TickFormat::Fixed(usize::try_from(decimals).unwrap_or(0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn axes_around_values_end_at_round_numbers() {
-        let ends = |values: &[f64]| {
-            let axis = Axis::around("", values.iter().copied());
-            (axis.min, axis.max, axis.tick)
-        };
-        assert_eq!(ends(&[0.0, 10.0]), (0.0, 10.0, 2.0));
-        assert_eq!(ends(&[-3.0, 41.0, f64::NAN]), (-5.0, 45.0, 10.0));
-        assert_eq!(ends(&[]), (0.0, 1.0, 0.2));
-        let (min, max, _) = ends(&[2.0, 2.0]);
-        assert!(min < 2.0 && max > 2.0, "a constant has room around it");
-        let (min, max, tick) = ends(&[0.0]);
-        assert!(min < 0.0 && max > 0.0 && tick > 0.0);
-    }
 
     #[test]
     fn labels_keep_away_from_curves() {

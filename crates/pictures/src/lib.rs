@@ -8,18 +8,21 @@
 //! Not for interactive charts.
 
 mod animation;
+mod axis;
 mod ball;
 mod canvas;
 mod chart;
 mod color;
+mod legend;
 mod palette;
 mod raster;
 mod text;
 
 pub use animation::{Animation, Still};
+pub use axis::Axis;
 pub use ball::Ball;
 pub use canvas::{Canvas, FONT_FAMILY, PIXELS_PER_MM, PngError, font_faces};
-pub use chart::{Axis, Chart, Curve, Mark, Stroke, WIDTH, equal_aspect_height, stack, stack_to_width};
+pub use chart::{Chart, Curve, Mark, Stroke, WIDTH, equal_aspect_height, stack, stack_to_width};
 pub use color::{Rgb, color_scale};
 pub use gif::EncodingError;
 pub use palette::PALETTE;

@@ -9,6 +9,24 @@ const SCRIPT_SIZE: f64 = 0.7;
 const SUBSCRIPT_DROP: f64 = 0.2;
 const SUPERSCRIPT_RISE: f64 = -0.36;
 
+/// Mean width of a letter, a digit or a space, as a fraction of the size of the text.
+const LETTER: f64 = 0.49;
+
+/// About how wide a label is, its markup left out.
+pub fn width(label: &str, size: f64) -> f64 {
+    let (mut letters, mut rest) = (0.0, label);
+    while !rest.is_empty() {
+        let (piece, length) = next_piece(rest);
+        letters += match piece {
+            Piece::Star => 0.0,
+            Piece::Script(_) => SCRIPT_SIZE * (rest[..length].chars().count() - 3) as f64,
+            Piece::Plain => rest[..length].chars().count() as f64,
+        };
+        rest = &rest[length..];
+    }
+    LETTER * size * letters
+}
+
 /// Replaces the markup in every `<text>` element of an SVG document by tspans.
 pub fn typeset(svg: &str) -> String {
     let mut out = String::with_capacity(svg.len());
@@ -94,6 +112,12 @@ mod tests {
         assert_eq!(tspans("gluey (paper)"), "gluey (paper)");
         assert_eq!(tspans("\u{2212}1/2"), "\u{2212}1/2");
         assert_eq!(tspans("_{open"), "_{open");
+    }
+
+    #[test]
+    fn markup_has_no_width() {
+        assert_eq!(width("*x*", 10.0), LETTER * 10.0);
+        assert_eq!(width("10^{-5}", 10.0), LETTER * 10.0 * (2.0 + 2.0 * SCRIPT_SIZE));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, PALETTE, PIXELS_PER_MM, S
 
 use super::error::PlotError;
 use super::figure::Figure;
-use super::read::{Results, Source};
+use super::read::{Borders, Results, Source};
 use crate::output::solver_log::PHASES;
 use crate::table::TableError;
 
@@ -18,8 +18,11 @@ const THIN: Stroke = Stroke { color: "#0b4f9e", width: 1.0, dashes: None };
 const HEIGHT: f64 = 0.5;
 /// Least height of a frame: what the longest of the labels beside it takes.
 const LEAST_HEIGHT_MM: f64 = 42.5;
+/// Least and largest height of a frame of paths over its width.
+const FLATTEST: f64 = 0.3;
+const HIGHEST: f64 = 1.2;
 /// Ratio of the largest to the smallest gap from which on their axis is logarithmic.
-const LOGARITHMIC: f64 = 20.0;
+pub(super) const LOGARITHMIC: f64 = 20.0;
 /// Largest gap below which it is too, since its ticks would have many digits.
 const SMALL: f64 = 0.01;
 
@@ -96,13 +99,17 @@ pub fn trajectories(results: &Results, width_mm: f64) -> Result<Canvas, PlotErro
     let source = results.trajectory(Figure::Trajectories)?;
     let count = (1..).take_while(|n| source.table.find(&format!("x{n}")).is_some()).count();
     let rows = if source.table.find("z1").is_some() { &["y", "z"][..] } else { &["y"][..] };
+    let borders = results.borders();
     let charts: Result<Vec<Chart>, PlotError> =
-        rows.iter().map(|across| paths(&source, across, count)).collect();
-    Ok(stacked(&charts?, width_mm))
+        rows.iter().map(|across| paths(&source, across, count, borders.as_ref())).collect();
+    Ok(stack_to_width(&charts?, width_mm * PIXELS_PER_MM, Chart::equal_aspect))
 }
 
-fn paths(source: &Source, across: &str, count: usize) -> Result<Chart, PlotError> {
-    let mut curves = Vec::with_capacity(count);
+/// Paths over the box, whose walls are solid and whose periodic borders are dashed. Both axes have one scale;
+/// a long way or a high one has room beside it, so that the frame is neither flat nor narrow.
+fn paths(source: &Source, across: &str, count: usize, borders: Option<&Borders>) -> Result<Chart, PlotError> {
+    let axis = if across == "y" { 1 } else { 2 };
+    let mut curves = borders.map_or(Vec::new(), |borders| borders.curves(axis));
     for n in 1..=count {
         let (x, y) = (source.column(&format!("x{n}"))?, source.column(&format!("{across}{n}"))?);
         curves.push(match count <= PALETTE.len() {
@@ -110,16 +117,22 @@ fn paths(source: &Source, across: &str, count: usize) -> Result<Chart, PlotError
             false => curve(None, THIN, x, y),
         });
     }
-    let starts = curves.iter().filter_map(|curve| curve.pieces.first()?.first().copied());
+    let starts =
+        curves[curves.len() - count..].iter().filter_map(|curve| curve.pieces.first()?.first().copied());
     let marks = starts.map(|at| Mark { at, label: String::new() }).collect();
-    // Dots lie beside the frame, not on it.
-    let axis = |label: String, values: Vec<f64>| {
-        let (low, high) = ends(&values);
-        let room = 0.02 * (high - low);
-        Axis::around(&label, [low - room, high + room].into_iter().filter(|end| end.is_finite()))
+    let [x, y] = [0, 1].map(|k| {
+        let values: Vec<f64> = points(&curves).map(|point| [point.0, point.1][k]).collect();
+        ends(&values)
+    });
+    let (width, height) = (x.1 - x.0, y.1 - y.0);
+    let room = 0.02 * width.max(height);
+    let axis = |label: &str, (low, high): (f64, f64), least: f64| {
+        // Dots and borders lie beside the frame, not on it.
+        let room = room.max(0.5 * (least - (high - low)));
+        Axis::around(label, [low - room, high + room].into_iter().filter(|end| end.is_finite()))
     };
-    let x = axis("*x*".into(), points(&curves).map(|point| point.0).collect());
-    let y = axis(format!("*{across}*"), points(&curves).map(|point| point.1).collect());
+    let x = axis("*x*", x, height / HIGHEST);
+    let y = axis(&format!("*{across}*"), y, width * FLATTEST);
     let notes = if across == "y" { vec!["Dots: where particles begin".to_owned()] } else { Vec::new() };
     Ok(Chart { marks, notes, ..chart(x, y, curves) })
 }
@@ -171,10 +184,10 @@ pub fn solver(results: &Results, width_mm: f64, is_needed: bool) -> Result<Optio
     let phases = PHASES.iter().enumerate().map(|(k, (phase, column))| (*column, Some(*phase), stroke(k)));
     let mut charts = vec![of_steps(&source, "seconds per step", phases)?];
     if solves {
-        // Without names of their own: in the strokes of the phases that they belong to.
+        // In the strokes of the phases that they belong to.
         let of_phase = |name: &str| stroke(PHASES.iter().position(|(phase, _)| *phase == name).unwrap_or(0));
         let iterations = [("iterations", "solve"), ("contact_iterations", "contact")]
-            .map(|(column, phase)| (column, None, of_phase(phase)));
+            .map(|(column, phase)| (column, Some(phase), of_phase(phase)));
         charts.insert(0, of_steps(&source, "iterations per step", iterations.into_iter())?);
     }
     Ok(Some(stacked(&charts, width_mm)))
@@ -217,7 +230,7 @@ pub(super) fn points(curves: &[Curve]) -> impl Iterator<Item = (f64, f64)> {
     curves.iter().flat_map(|curve| curve.pieces.iter().flatten().copied())
 }
 
-fn ends(values: &[f64]) -> (f64, f64) {
+pub(super) fn ends(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
@@ -227,5 +240,5 @@ pub(super) fn chart(x: Axis, y: Axis, curves: Vec<Curve>) -> Chart {
 
 pub(super) fn stacked(charts: &[Chart], width_mm: f64) -> Canvas {
     let width = width_mm * PIXELS_PER_MM;
-    stack_to_width(charts, width, |_| (HEIGHT * width).max(LEAST_HEIGHT_MM * PIXELS_PER_MM))
+    stack_to_width(charts, width, |_, _| (HEIGHT * width).max(LEAST_HEIGHT_MM * PIXELS_PER_MM))
 }

@@ -13,8 +13,8 @@ use gluey_pictures::{Canvas, PIXELS_PER_MM, Raster, Stroke, color_scale};
 use gluey_suspension::Container;
 
 use super::error::PlotError;
-use super::rounded::rounded;
 use super::snapshot::{EDGE, FrameChoice, PERIODIC, images};
+use super::told::{told, told_to};
 use crate::case::Case;
 use crate::output::vtk::{read_fields, read_particles};
 use choice::AXES;
@@ -84,13 +84,13 @@ fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
     let Case { time, shear_rate, shear_stress, .. } = &frame.case;
     let slice = match D {
         2 => String::new(),
-        _ => format!(", *{}* = {}", AXES[plane.normal], rounded(plane.at)),
+        _ => format!(", *{}* = {}", AXES[plane.normal], told_to(plane.at, 4)),
     };
     let strain = match *shear_rate != 0.0 || shear_stress.is_some() {
-        true => format!(", strain *γ* = {}", rounded(frame.case.strain_after(frame.step))),
+        true => format!(", strain *γ* = {}", told_to(frame.case.strain_after(frame.step), 4)),
         false => String::new(),
     };
-    format!("*t* = {}{strain}{slice}", rounded(time.step * frame.step as f64))
+    format!("*t* = {}{strain}{slice}", told_to(time.step * frame.step as f64, 4))
 }
 
 /// Where the plane cuts particles and their images: centres in the plane and radii.
@@ -205,12 +205,12 @@ impl<const D: usize> Picture<D> {
         let below = lower_left.1 + 18.0;
         let middle = |a: f64, b: f64| 0.5 * (a + b);
         let name = |axis: usize| format!("*{}*", AXES[axis]);
-        canvas.text(lower_left.0, below, 13.0, "start", &rounded(ends[0][0]));
-        canvas.text(lower_right.0, below, 13.0, "end", &rounded(ends[0][1]));
+        canvas.text(lower_left.0, below, 13.0, "start", &told(ends[0][0]));
+        canvas.text(lower_right.0, below, 13.0, "end", &told(ends[0][1]));
         canvas.text(middle(lower_left.0, lower_right.0), below, 15.0, "middle", &name(*across));
         let beside = |x: f64| x - 8.0;
-        canvas.text(beside(lower_left.0), lower_left.1, 13.0, "end", &rounded(ends[1][0]));
-        canvas.text(beside(upper_left.0), upper_left.1 + 10.0, 13.0, "end", &rounded(ends[1][1]));
+        canvas.text(beside(lower_left.0), lower_left.1, 13.0, "end", &told(ends[1][0]));
+        canvas.text(beside(upper_left.0), upper_left.1 + 10.0, 13.0, "end", &told(ends[1][1]));
         let x = beside(middle(lower_left.0, upper_left.0));
         canvas.text(x, middle(lower_left.1, upper_left.1) + 5.0, 15.0, "end", &name(*up));
     }
@@ -260,7 +260,7 @@ impl Range {
     }
 
     fn labels(&self) -> [String; 2] {
-        let [low, high] = [self.low, self.high].map(rounded);
+        let [low, high] = [self.low, self.high].map(told);
         let [below, above] = self.is_cut;
         [if below { format!("≤ {low}") } else { low }, if above { format!("≥ {high}") } else { high }]
     }

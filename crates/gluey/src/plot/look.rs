@@ -8,7 +8,7 @@ use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::for_each_pair;
 
 use super::error::PlotError;
-use super::rounded::rounded;
+use super::told::told;
 use crate::output::xyz::XyzFrame;
 
 /// Smallest gap that has a colour of its own, in mean radii.
@@ -155,10 +155,10 @@ impl Look {
     /// Name of what colours tell, and what stands at the ends of their bar.
     pub(super) fn legend(&self, most: f64) -> [String; 3] {
         match self.coloring {
-            Coloring::Speed => ["speed (length / time)".to_owned(), "0".to_owned(), rounded(most)],
-            Coloring::Spin => ["spin (1 / time)".to_owned(), "0".to_owned(), rounded(most)],
+            Coloring::Speed => ["speed (length / time)".to_owned(), "0".to_owned(), told(most)],
+            Coloring::Spin => ["spin (1 / time)".to_owned(), "0".to_owned(), told(most)],
             Coloring::ContactForce => {
-                ["contact force / 6π*η* (length^{2} / time)".to_owned(), "0".to_owned(), rounded(most)]
+                ["contact force / 6π*η* (length^{2} / time)".to_owned(), "0".to_owned(), told(most)]
             }
             Coloring::Gap => {
                 ["smallest gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()]

@@ -9,6 +9,7 @@ use gluey_suspension::Container;
 
 use super::error::PlotError;
 use super::look::{Look, Viewpoint, near_pairs};
+use super::told::told_to;
 use crate::analyse::frames::{dimension, frame_files, read_frames};
 use crate::output::xyz::XyzFrame;
 
@@ -179,8 +180,11 @@ impl Scene {
         }
         balls.sort_by(|one, other| one.at[2].total_cmp(&other.at[2]));
         let links = look.network.map_or(Vec::new(), |reach| links(frame, &container, view, reach));
-        let strain = if is_sheared { format!(", strain *γ* = {:.4}", frame.strain) } else { String::new() };
-        let caption = format!("*t* = {:.4}{strain}", frame.time);
+        let strain = match is_sheared {
+            true => format!(", strain *γ* = {}", told_to(frame.strain, 4)),
+            false => String::new(),
+        };
+        let caption = format!("*t* = {}{strain}", told_to(frame.time, 4));
         Self { is_flat: D == 2, look: *look, balls, links, edges: edges(&container, view), caption }
     }
 

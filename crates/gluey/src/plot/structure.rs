@@ -6,7 +6,6 @@ use super::error::PlotError;
 use super::figure::Figure;
 use super::figures::{FAINT, chart, curve, points, stacked, under_frame};
 use super::read::{Source, Tables};
-use super::rounded::rounded;
 
 /// A column, its name in the legend, its stroke.
 type Column = (&'static str, &'static str, Stroke);
@@ -32,6 +31,9 @@ pub fn draw(
         Figure::Diffusion => diffusion(tables, is_needed)?,
         Figure::Gaps | Figure::Trajectories | Figure::Rheology | Figure::Solver => Vec::new(),
     };
+    // What no frame has makes no chart, unless it was asked for.
+    let has_points = |chart: &Chart| is_needed || points(&chart.curves).next().is_some();
+    let charts: Vec<Chart> = charts.into_iter().filter(has_points).collect();
     Ok((!charts.is_empty()).then(|| stacked(&charts, width_mm)))
 }
 
@@ -64,7 +66,7 @@ fn contacts(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
 fn correlations(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
     let named = [
         ("g_of_r.csv", "r_over_a", "distance *r* / *a*", "g", "*g*(*r*)"),
-        ("g_of_theta.csv", "theta", "angle to the flow *θ* (degrees)", "g", "*g*(*θ*) near contact"),
+        ("g_of_theta.csv", "theta_rad", "angle to the flow *θ* (degrees)", "g", "*g*(*θ*) near contact"),
         ("structure_factor.csv", "k_a", "wave number *k a*", "s", "*S*(*k*)"),
     ];
     let mut charts = Vec::new();
@@ -73,19 +75,32 @@ fn correlations(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, Plot
         let is_needed = is_needed && file != "structure_factor.csv";
         let Some(source) = tables.table(file, Figure::Correlations, is_needed)? else { continue };
         let x: Vec<f64> = match across {
-            "theta" => source.column(across)?.iter().map(|angle| angle.to_degrees()).collect(),
+            "theta_rad" => source.column(across)?.iter().map(|angle| angle.to_degrees()).collect(),
             _ => source.column(across)?.to_vec(),
         };
-        let ends = if across == "theta" { [0.0, 180.0] } else { [0.0, last(&x)] };
+        let ends = if across == "theta_rad" { [0.0, 180.0] } else { [0.0, last(&x)] };
         let level = curve(None, LEVEL, &ends, &[1.0, 1.0]);
-        let curves = vec![level, curve(None, PALETTE[0], &x, source.column(column)?)];
+        let partial = partial(&source, &x);
+        let of_all = (!partial.is_empty()).then(|| "all pairs".to_owned());
+        let whole = curve(of_all, PALETTE[0], &x, source.column(column)?);
+        let curves = partial.into_iter().chain([level, whole]).collect();
         let mut x = Axis::around(label, ends);
-        if across == "theta" {
+        if across == "theta_rad" {
             x = Axis { min: 0.0, max: 180.0, tick: 30.0, ..x };
         }
         charts.push(over(x, name, curves, &[0.0]));
     }
     Ok(charts)
+}
+
+/// Correlations between particles of two radii, where the table has them.
+fn partial(source: &Source, x: &[f64]) -> Vec<Curve> {
+    let pairs = (1..=3).flat_map(|one| (one..=3).map(move |other| (one, other)));
+    let found = pairs.filter_map(|(one, other)| {
+        Some((format!("radii {one} and {other}"), source.table.find(&format!("g_{one}{other}"))?))
+    });
+    let strokes = PALETTE[1..].iter().copied().chain([FAINT]);
+    found.zip(strokes).map(|((name, g), stroke)| curve(Some(name), stroke, x, g)).collect()
 }
 
 /// Fraction and velocities against the height.
@@ -121,10 +136,9 @@ fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErr
     let mut curves = Vec::new();
     for (name, label, stroke) in columns {
         let Some(squares) = found(&source, name)? else { continue };
-        let fit = fitted(lags, squares);
-        let told = fit.map_or(String::new(), |[slope, _]| format!(", *D* = {}", rounded(0.5 * slope)));
-        curves.push(curve(Some(format!("{label}{told}")), stroke, lags, squares));
-        let line = fit.map(|[slope, start]| lags.iter().map(|lag| start + slope * lag).collect::<Vec<_>>());
+        curves.push(curve(Some(label.to_owned()), stroke, lags, squares));
+        let line = fitted(lags, squares)
+            .map(|[slope, start]| lags.iter().map(|lag| start + slope * lag).collect::<Vec<_>>());
         curves.extend(line.map(|line| {
             let half = second_half(lags.len());
             curve(None, FIT, &lags[half..], &line[half..])
@@ -132,9 +146,8 @@ fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErr
     }
     let x = Axis::around(label, lags.iter().copied().chain([0.0]));
     let mut chart = over(x, "mean square displacement / *a*^{2}", curves, &[0.0]);
-    let unit = if name == "lag_strain" { "strain" } else { "time" };
     chart.notes.push("Black: fits of the second half, of slope 2 *D*".to_owned());
-    chart.notes.push(format!("*D* in *a*^{{2}} per unit of {unit}"));
+    chart.notes.push("*D* with its intervals is in summary.txt".to_owned());
     Ok(vec![chart])
 }
 

@@ -1,0 +1,75 @@
+//! What the curves of a chart are called, above its frame.
+
+use crate::canvas::Canvas;
+use crate::chart::{Chart, Stroke};
+use crate::text;
+
+const ROW: f64 = 19.0;
+const SAMPLE: f64 = 40.0;
+/// Between a sample and its label, and behind the label.
+const SPACE: f64 = 8.0;
+const SIZE: f64 = 15.0;
+const NOTE_SIZE: f64 = 13.0;
+const MOST_COLUMNS: usize = 2;
+
+/// Labels with samples of their strokes, and remarks below them.
+pub(crate) struct Legend<'a> {
+    pub entries: Vec<(&'a str, Stroke)>,
+    pub notes: &'a [String],
+}
+
+impl Chart {
+    /// What its curves are called, once each, but for entries that stand elsewhere.
+    pub(crate) fn legend(&self, elsewhere: &[(&str, Stroke)]) -> Legend<'_> {
+        let entries = entries(self).into_iter().filter(|entry| !elsewhere.contains(entry));
+        Legend { entries: entries.collect(), notes: &self.notes }
+    }
+}
+
+fn entries(chart: &Chart) -> Vec<(&str, Stroke)> {
+    let mut entries: Vec<(&str, Stroke)> = Vec::new();
+    for curve in &chart.curves {
+        if let Some(label) = &curve.label
+            && !entries.iter().any(|(name, _)| name == label)
+        {
+            entries.push((label, curve.stroke));
+        }
+    }
+    entries
+}
+
+/// Entries that all charts have.
+pub(crate) fn shared_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
+    let Some((first, others)) = charts.split_first() else { return Vec::new() };
+    let is_shared = |entry: &(&str, Stroke)| others.iter().all(|chart| entries(chart).contains(entry));
+    entries(first).into_iter().filter(is_shared).collect()
+}
+
+impl Legend<'_> {
+    /// As many columns as labels have room in.
+    fn columns(&self, width: f64) -> usize {
+        let widest = self.entries.iter().map(|(label, _)| text::width(label, SIZE)).fold(0.0, f64::max);
+        let columns = (width / (SAMPLE + 2.0 * SPACE + widest)).floor() as usize;
+        columns.clamp(1, MOST_COLUMNS)
+    }
+
+    /// Its height where it is so wide.
+    pub fn height(&self, width: f64) -> f64 {
+        ROW * (self.entries.len().div_ceil(self.columns(width)) + self.notes.len()) as f64
+    }
+
+    /// Draws it with this upper left corner, so wide.
+    pub fn draw(&self, canvas: &mut Canvas, (left, top): (f64, f64), width: f64) {
+        let columns = self.columns(width);
+        let middle = |row: usize| top + ROW * (row as f64 + 0.5);
+        for (i, (label, stroke)) in self.entries.iter().enumerate() {
+            let (x, y) = (left + width / columns as f64 * (i % columns) as f64, middle(i / columns));
+            canvas.line((x, y), (x + SAMPLE, y), *stroke);
+            canvas.text(x + SAMPLE + SPACE, y + 5.0, SIZE, "start", label);
+        }
+        let rows = self.entries.len().div_ceil(columns);
+        for (i, note) in self.notes.iter().enumerate() {
+            canvas.text(left, middle(rows + i) + 5.0, NOTE_SIZE, "start", note);
+        }
+    }
+}
