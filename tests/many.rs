@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use gluey::output::PairForces;
 use gluey::output::csv::CsvWriter;
 use gluey::{Case, Progress, ProgressState, Row, RunError, RunOptions, Silent, run};
 use gluey_contact::Domain;
@@ -27,7 +28,7 @@ fn output_of(count: usize) -> (u64, u64, Duration) {
     for step in 0..=STEP_COUNT {
         let row = Row { time: 0.01 * step as f64, particles: &particles, twists: &twists, domain: &domain };
         let start = Instant::now();
-        let smallest = writer.write(&row).expect("a row").expect("a pair");
+        let smallest = writer.write(&row, &PairForces::default()).expect("a row").expect("a pair");
         fastest = fastest.min(start.elapsed());
         let direct = row.pairs().map(|(i, j)| row.gap(i, j)).fold(f64::INFINITY, f64::min);
         assert_eq!(smallest, direct / row.mean_radius());

@@ -5,8 +5,9 @@
 //!
 //! Up to nine particles every pair has a column, `gap12_over_a,gap13_over_a,...,gap23_over_a,...`. From ten
 //! on there is one column `min_gap_over_a`, the smallest gap of all pairs, and a second file
-//! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,partner` for each gap of at most
-//! [`GAP_CUTOFF_OVER_A`]. Particles count from 1. The partner `j` is a `particle`, the nearest periodic
+//! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,contact_force,repulsion_force,partner` for each
+//! gap of at most [`GAP_CUTOFF_OVER_A`]; forces are positive apart, those of contacts over `6 pi eta`, and
+//! empty where there is no such force in the run. Particles count from 1. The partner `j` is a `particle`, the nearest periodic
 //! `image` of one, or a `wall` (1 below, 2 above).
 
 use std::fmt::Write as _;
@@ -16,6 +17,7 @@ use gluey_geom::{Dim, Space, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::draft::{Draft, Mark, RowsError};
+use super::pair_forces::{ContactForces, PairForces};
 use super::{OutputError, drafts};
 use crate::measures::Instant;
 use crate::near_pairs::{NearPairs, PairGap};
@@ -30,7 +32,7 @@ pub const MOST_WITH_PAIR_COLUMNS: usize = 9;
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// The first line of the file of near pairs.
-const GAPS_HEADER: &str = "t,i,j,gap_over_a,partner";
+const GAPS_HEADER: &str = "t,i,j,gap_over_a,contact_force,repulsion_force,partner";
 
 /// How far the files of a run had come, for checkpoints.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,7 +79,10 @@ where
     ) -> Result<Self, RowsError> {
         let mut rows = Draft::resume(path, &marks.rows)?;
         let gaps = gaps_path(path, particle_count).zip(marks.gaps.as_ref());
-        let gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
+        let mut gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
+        if let Some(gaps) = &mut gaps {
+            gaps.visit(|line, text| line > 1 || text == GAPS_HEADER)?;
+        }
         rows.visit(|line, text| match line {
             1 => text == header::<D>(particle_count),
             _ => parse(text, particle_count).map(|instant| visit(&instant)).is_some(),
@@ -87,14 +92,14 @@ where
 
     /// Adds one row, which is with the operating system when this returns, and gives the smallest gap of any
     /// pair in mean radii, if there is one.
-    pub fn write(&mut self, row: &Row<'_, D>) -> Result<Option<f64>, RowsError> {
+    pub fn write(&mut self, row: &Row<'_, D>, forces: &PairForces<'_>) -> Result<Option<f64>, RowsError> {
         let a = row.mean_radius();
         let smallest = match &mut self.gaps {
             None => row.pairs().map(|(first, second)| row.gap(first, second)).reduce(f64::min),
             Some(gaps) => {
                 let cutoff = GAP_CUTOFF_OVER_A * a;
                 let near = self.near.within(row, cutoff);
-                gaps.write(&gap_lines(row, &near, cutoff))?;
+                gaps.write(&gap_lines(row, &near, cutoff, forces))?;
                 self.near.smallest(row, &near, cutoff)
             }
         };
@@ -200,15 +205,28 @@ where
 }
 
 /// The rows of near pairs and near walls.
-fn gap_lines<const D: usize>(row: &Row<'_, D>, near: &[PairGap], cutoff: f64) -> String
+fn gap_lines<const D: usize>(
+    row: &Row<'_, D>,
+    near: &[PairGap],
+    cutoff: f64,
+    forces: &PairForces<'_>,
+) -> String
 where
     Dim<D>: Space<D>,
 {
     let (a, time) = (row.mean_radius(), format!("{:.16e}", row.time));
+    let of_contacts = ContactForces::of(forces);
+    let radius = |particle: usize| row.particles[particle].radius;
     let mut text = String::new();
     let mut add = |first: usize, second: usize, gap: f64, partner: &str| {
+        let is_wall = partner == "wall";
+        let radii = [radius(first), if is_wall { f64::INFINITY } else { radius(second) }];
+        let forces = [of_contacts.on((first, second, is_wall)), forces.repulsion::<D>(gap, radii)];
+        let [contact, repulsion] =
+            forces.map(|force| force.map_or(String::new(), |force| format!("{force:.16e}")));
+        let (i, j, gap) = (first + 1, second + 1, gap / a);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{time},{},{},{:.16e},{partner}", first + 1, second + 1, gap / a);
+        let _ = writeln!(text, "{time},{i},{j},{gap:.16e},{contact},{repulsion},{partner}");
     };
     for &PairGap { first, second, gap } in near {
         add(first, second, gap, if row.is_direct(first, second) { "particle" } else { "image" });
@@ -226,8 +244,9 @@ where
 
 #[cfg(test)]
 mod tests {
-    use gluey_contact::{Domain, Wall};
+    use gluey_contact::{Contact, Domain, PairKey, Wall};
     use gluey_geom::{Particle, Twist};
+    use gluey_suspension::Repulsion;
 
     use super::*;
 
@@ -283,15 +302,23 @@ mod tests {
         let twists = vec![Twist::default(); 10];
         let mut writer = CsvWriter::create(&path, 10).expect("files");
         let row = Row { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
-        assert_eq!(writer.write(&row).expect("a row"), Some(0.5));
+        let contact = |pair, lambda| Contact { pair, lambda, gamma: 0.0, gap: 0.5 };
+        let contacts = [contact(PairKey::across(0, 9, [-1, 0, 0]), 3.0), contact(PairKey::wall(0, 0), 7.0)];
+        let repulsion = Some(Repulsion { force: 2.0, range: 0.5, radius: 1.0 });
+        let forces = PairForces { contacts: Some(&contacts), repulsion };
+        assert_eq!(writer.write(&row, &forces).expect("a row"), Some(0.5));
         writer.finish().expect("complete");
         let text = std::fs::read_to_string(folder.path().join("t-gaps.csv")).expect("near pairs");
         let lines: Vec<&str> = text.lines().collect();
         let half = "5.0000000000000000e-1";
         assert_eq!(lines[0], GAPS_HEADER);
-        assert_eq!(lines[1], format!("{half},1,2,1.0000000000000000e0,particle"));
-        assert_eq!(lines[2], format!("{half},1,10,{half},image"));
-        assert_eq!(lines[10], format!("{half},1,1,{half},wall"));
+        let shown = |x: f64| format!("{x:.16e}");
+        let at = |gap: f64| shown(2.0 * (-gap / 0.5).exp());
+        let [none, three, seven] = [0.0, 3.0, 7.0].map(shown);
+        assert_eq!(lines[1], format!("{half},1,2,{},{none},{},particle", shown(1.0), at(1.0)));
+        assert_eq!(lines[2], format!("{half},1,10,{half},{three},{},image", at(0.5)));
+        let at_wall = shown(repulsion.expect("a law").at::<2>(0.5, [1.0, f64::INFINITY]));
+        assert_eq!(lines[10], format!("{half},1,1,{half},{seven},{at_wall},wall"));
         assert_eq!(lines.len(), 1 + 8 + 1 + 10);
     }
 }

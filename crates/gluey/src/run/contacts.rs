@@ -1,12 +1,13 @@
 //! The model of contact in runs.
 
 use gluey_contact::{
-    BodyStep, Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain,
-    MemoryError, PairContact, WithFixed,
+    BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
+    Domain, MemoryError, PairContact, WithFixed,
 };
 use gluey_geom::{Dim, Space, Twist};
 
 use crate::case::Case;
+use crate::output::PairForces;
 
 /// Contact among particles some of which may move as they are told: of one process, or shared by ranks.
 pub(super) struct Contacts<'a, const D: usize>(Box<dyn Surrounded<D> + 'a>);
@@ -50,6 +51,12 @@ where
     /// Law and tuning.
     pub fn params(&self) -> &ContactParams {
         self.0.params()
+    }
+
+    /// What acts between the particles of a case after the last step.
+    pub fn pair_forces(&self, case: &Case) -> PairForces<'_> {
+        let has_law = self.params().law != ContactLaw::None;
+        PairForces { contacts: has_law.then(|| self.contacts()), repulsion: case.repulsion() }
     }
 }
 
