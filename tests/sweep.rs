@@ -67,7 +67,9 @@ fn every_point_is_a_run_and_the_table_has_them_all() {
         (&"0.01".into(), &"complete".into())
     );
     assert_eq!(json[3]["report"]["steps"], 79);
-    for command in ["info", "resume", "plot", "view", "analyse"] {
+    let info = told(folder, &["info", "study"]);
+    assert!(info.contains("4: 4 done, 0 failed, 0 left") && info.contains("time.step"), "{info}");
+    for command in ["resume", "plot", "view", "analyse"] {
         fails(folder, &[command, "study"], &["of one of its points"]);
     }
 }

@@ -17,7 +17,8 @@
 //!
 //! They are read from `<stem>.csv`, `<stem>-gaps.csv`, `<stem>-rheology.csv`, `<stem>-solver.csv` and
 //! `<stem>-xyz` and go to `<stem>-plots`; from `contacts` on of the tables of `gluey analyse`, and to
-//! `structure-plots`.
+//! `structure-plots`. The folder of a study has one picture, the viscosity against a swept key, in
+//! `sweep-plots`.
 
 mod animation;
 mod error;
@@ -26,9 +27,10 @@ mod figures;
 mod flow;
 mod look;
 mod read;
-mod rounded;
 mod snapshot;
 mod structure;
+mod study;
+mod told;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -43,6 +45,7 @@ pub use look::{Coloring, Look, Viewpoint};
 pub use snapshot::FrameChoice;
 
 use crate::output::{prepare_folder_of, write_atomically};
+use crate::sweep::StudyProgress;
 use read::{Results, Tables};
 
 /// How a picture is written.
@@ -78,7 +81,7 @@ impl FromStr for Format {
 /// What to draw, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlotOptions {
-    /// Folder of results.
+    /// Folder of results, or of a study.
     pub folder: PathBuf,
     /// A frame whose particles to draw, or whose flow, instead of all that is not in `only`.
     pub frame: Option<FrameChoice>,
@@ -96,10 +99,18 @@ pub struct PlotOptions {
     pub width_mm: f64,
 }
 
-/// Draws the results of every run in a folder and gives the paths of the pictures.
+/// Draws the results of every run in a folder, or of a study, and gives the paths of the pictures.
 pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
     let mut written = Vec::new();
     let PlotOptions { folder, width_mm, .. } = options;
+    if let Some(study) = StudyProgress::read(folder)? {
+        let asks_for_run = options.frame.is_some() || options.flow.is_some() || options.animation.is_some();
+        if asks_for_run || !options.only.is_empty() {
+            return Err(PlotError::OfPoint { folder: folder.clone() });
+        }
+        let canvas = study::draw(&study, *width_mm)?;
+        return write(&canvas, &folder.join("sweep-plots").join("viscosity"), &options.formats);
+    }
     let picture = match (options.flow, options.frame) {
         (Some(flow), frame) => Some(flow::flow(folder, flow, frame, *width_mm)?),
         (None, Some(frame)) => Some(snapshot::snapshot(folder, frame, &options.look, *width_mm)?),

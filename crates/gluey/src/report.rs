@@ -5,6 +5,7 @@ use std::fmt;
 use gluey_motion::FlowStatistics;
 use serde::{Deserialize, Serialize};
 
+use crate::analyse::RheologyMeans;
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
 use crate::phases::PhaseTable;
@@ -50,6 +51,9 @@ pub struct RunReport {
     pub end_gap_rel_error: Option<f64>,
     /// Largest distance of a centre from its reference position over the common time span.
     pub max_abs_error_over_a: Option<f64>,
+    /// Means of the rheology behind its transient, in boxes that are sheared for ever.
+    #[serde(default)]
+    pub rheology: Option<RheologyMeans>,
     /// Seconds spent in each phase, in the order of a step.
     pub phases: Vec<(String, f64)>,
 }
@@ -62,6 +66,7 @@ impl RunReport {
         flow: &FlowStatistics,
         wall_s: f64,
         phases: &PhaseTable,
+        rheology: Option<RheologyMeans>,
     ) -> Self {
         let (a, pair) = (measures.mean_radius(), measures.pair());
         let deviation = measures.deviation();
@@ -81,6 +86,7 @@ impl RunReport {
             reference: case.reference.clone(),
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),
+            rheology,
             phases: phases.rows().to_vec(),
         }
     }
@@ -119,6 +125,16 @@ impl fmt::Display for RunReport {
         write_number(f, "smallest gap / a", self.min_gap_over_a)?;
         write_number(f, "gap of 1 and 2 at the end / a", self.end_gap_over_a)?;
         write_number(f, "reversibility error", self.reversibility_error)?;
+        if let Some(rheology) = &self.rheology {
+            writeln!(
+                f,
+                "  means of the rheology from a strain of {} on:",
+                shown_to(rheology.strain_skipped, 7)
+            )?;
+            for (name, mean) in rheology.named() {
+                writeln!(f, "    {name}: {}", mean.to_string().trim_start())?;
+            }
+        }
         if let Some(reference) = &self.reference {
             writeln!(f, "  compared with {reference}:")?;
         }

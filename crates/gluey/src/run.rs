@@ -276,7 +276,8 @@ where
         self.csv.finish()?;
         self.tables.finish()?;
         self.solver.finish()?;
-        Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases()))
+        let rheology = tables::means_of_rheology(self.case, &self.options.csv)?;
+        Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases(), rheology))
     }
 
     /// All steps. A panic of this or any other thread ends them as an error does; what it left half done is
@@ -334,7 +335,9 @@ where
         let simulation = &self.simulation;
         let (time, particles, twists) = (simulation.time(), simulation.particles(), simulation.twists());
         let domain = simulation.contact().domain();
-        let smallest_gap_over_a = self.csv.write(&Row { time, particles, twists, domain })?;
+        let forces = simulation.contact().pair_forces(self.case);
+        let row = Row { time, particles, twists, domain };
+        let smallest_gap_over_a = self.csv.write(&row, &forces)?;
         self.tables.write(simulation, smallest_gap_over_a)?;
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });

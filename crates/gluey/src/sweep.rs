@@ -1,10 +1,11 @@
 //! A study: one run for every combination of values of some keys of a case, each in a folder of its own.
 //!
 //! A folder of a study has a folder for each point, named after its values and with the results of an
-//! ordinary run in it, and `sweep.json`, which says which keys it is about. What is complete is not run
+//! ordinary run in it, and `sweep.json`, which says which keys and points it is about. What is complete is not run
 //! again, what was interrupted goes on from its checkpoint.
 
 mod axis;
+mod progress;
 mod study;
 mod table;
 
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub use axis::Axis;
+pub use progress::{PointProgress, PointStage, StudyProgress};
 pub use study::Study;
 pub use table::{PointResult, table};
 

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use gluey::sweep::{PointStage, StudyProgress, SweepError};
 use gluey::{
     Case, CaseSummary, CheckpointSummary, FolderError, RecordError, ResultPaths, RunRecord, RunState,
     recorded_runs, shown,
@@ -19,7 +20,7 @@ use crate::terminal::{print_json, print_lines};
 #[command(after_help = "Examples:\n  gluey info pair.toml\n  gluey info out --json\n  gluey info \
                         out/pair-gluey.checkpoint")]
 pub struct InfoArguments {
-    /// A case file, a checkpoint, a record of a run, or a folder of results.
+    /// A case file, a checkpoint, a record of a run, or a folder of results or of a study.
     path: PathBuf,
     /// Print it as JSON.
     #[arg(long)]
@@ -38,6 +39,9 @@ enum InfoError {
     /// A record cannot be read.
     #[error("the record of a run cannot be used")]
     Record(#[from] RecordError),
+    /// A study cannot be read.
+    #[error(transparent)]
+    Study(#[from] SweepError),
 }
 
 /// What a path is.
@@ -47,6 +51,7 @@ enum Info {
     Case(CaseSummary),
     Checkpoint(CheckpointInfo),
     Folder { runs: Vec<RunInfo> },
+    Study(StudyProgress),
 }
 
 /// What a checkpoint says of itself.
@@ -98,6 +103,7 @@ impl InfoArguments {
             (true, _) => print_json(&info),
             (_, Info::Case(case)) => print_lines(&case.lines()),
             (_, Info::Checkpoint(checkpoint)) => print_lines(&checkpoint.lines()),
+            (_, Info::Study(study)) => print_lines(&lines_of(study)),
             (_, Info::Folder { runs }) => runs.iter().for_each(|run| print_lines(&run.lines())),
         }
         Ok(())
@@ -106,6 +112,9 @@ impl InfoArguments {
 
 impl Info {
     fn of(path: &Path) -> Result<Self, Failure> {
+        if let Some(study) = StudyProgress::read(path).map_err(|error| failure(error.into()))? {
+            return Ok(Self::Study(study));
+        }
         if path.is_dir() {
             return Ok(Self::Folder { runs: runs(path).map_err(failure)? });
         }
@@ -123,10 +132,32 @@ impl Info {
 
 fn failure(error: InfoError) -> Failure {
     let hint = match &error {
-        InfoError::Record(_) | InfoError::Folder(FolderError::Study { .. }) => None,
+        InfoError::Record(_) | InfoError::Study(_) | InfoError::Folder(FolderError::Study { .. }) => None,
         _ => Some("give a case file, a checkpoint, or the folder that a run wrote to".to_owned()),
     };
     Failure::new(error, hint)
+}
+
+/// How many points of a study are done, failed and left, and which those are that need a look.
+fn lines_of(study: &StudyProgress) -> Vec<(&'static str, String)> {
+    let count = |state| study.count(state);
+    let [done, failed, running, left] =
+        [PointStage::Done, PointStage::Failed, PointStage::Running, PointStage::Left].map(count);
+    let now = if running > 0 { format!(", {running} running") } else { String::new() };
+    let mut lines = vec![
+        ("study", format!("{}, of {}", study.folder.display(), study.keys.join(", "))),
+        ("points", format!("{}: {done} done, {failed} failed{now}, {left} left", study.points.len())),
+    ];
+    for point in &study.points {
+        let error = || point.error.as_deref().unwrap_or("no reason is recorded");
+        match point.state {
+            PointStage::Failed => lines.push(("failed", format!("{}: {}", point.name, error()))),
+            PointStage::Running => lines.push(("running", point.name.clone())),
+            PointStage::Left => lines.push(("left", point.name.clone())),
+            PointStage::Done => {}
+        }
+    }
+    lines
 }
 
 fn runs(folder: &Path) -> Result<Vec<RunInfo>, InfoError> {

@@ -11,6 +11,7 @@ use crate::analyse::FramesError;
 use crate::case::CaseError;
 use crate::output::OutputError;
 use crate::output::vtk::VtkReadError;
+use crate::sweep::SweepError;
 use crate::table::TableError;
 
 /// Why results could not be drawn.
@@ -143,6 +144,37 @@ pub enum PlotError {
         at: f64,
         /// Where the box ends.
         ends: [f64; 2],
+    },
+    /// A study could not be read.
+    #[error(transparent)]
+    Study(#[from] SweepError),
+    /// Pictures of a run, of a study.
+    #[error("{}: a study has one picture, that of its viscosities: name the folder of a point", folder.display())]
+    OfPoint {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A study of keys without numbers.
+    #[error("{}: none of the swept keys ({}) has two numbers to draw viscosities against", folder.display(), keys.join(", "))]
+    NoNumbers {
+        /// The folder.
+        folder: PathBuf,
+        /// The keys.
+        keys: Vec<String>,
+    },
+    /// A study without viscosities.
+    #[error(
+        "{}: no point that is done has a viscosity ({done} of {of} are done); runs in boxes with domain.boundary = \
+         \"sheared\" have one",
+        folder.display()
+    )]
+    NoViscosity {
+        /// The folder.
+        folder: PathBuf,
+        /// Points that are done.
+        done: usize,
+        /// Points in all.
+        of: usize,
     },
     /// A picture could not be drawn.
     #[error("{}: cannot be drawn", path.display())]

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::last_steps::Ended;
 use super::occupied::OccupiedError;
+use crate::analyse::RheologyError;
 use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
@@ -50,6 +51,9 @@ pub enum RunError {
     /// What the next step starts from could not be kept.
     #[error("the flow could not be kept for a checkpoint")]
     Store(#[source] HydrodynamicsError),
+    /// The means of the rheology could not be taken.
+    #[error(transparent)]
+    Rheology(#[from] RheologyError),
     /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError<HydrodynamicsError>),

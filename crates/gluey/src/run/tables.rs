@@ -8,12 +8,24 @@ use gluey_motion::Hydrodynamics;
 use super::contacts::Contacts;
 use super::error::RunError;
 use super::stress::with_contacts;
+use crate::analyse::{RheologyError, RheologyMeans};
 use crate::case::Case;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::forces::{self, ForcesWriter};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::{Mark, OutputError, RowsError};
 use crate::simulation::{Simulation, StepError};
+
+/// Means of the rheology that a run has written, if it writes any.
+///
+/// # Errors
+/// If its table cannot be read back.
+pub(super) fn means_of_rheology(case: &Case, csv: &Path) -> Result<Option<RheologyMeans>, RheologyError> {
+    if !case.has_rheology() {
+        return Ok(None);
+    }
+    RheologyMeans::read(&rheology::rheology_path(csv), None)
+}
 
 /// The tables of a run in progress.
 #[derive(Debug)]

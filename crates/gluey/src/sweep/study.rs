@@ -13,15 +13,44 @@ use crate::run::TABLE_OF_STUDY;
 /// Counts changes of the layout of [`Manifest`].
 const LAYOUT: u32 = 1;
 
+const MANIFEST: &str = "sweep.json";
+
 /// What a study says of itself, `sweep.json`.
 #[derive(Debug, Serialize, Deserialize)]
-struct Manifest {
+pub(super) struct Manifest {
     /// Layout of this file.
     layout: u32,
     /// Version of gluey.
     gluey: String,
     /// The keys, in the order of the names of points.
-    keys: Vec<String>,
+    pub keys: Vec<String>,
+    /// Its points, those that were added later last.
+    #[serde(default)]
+    pub points: Vec<NamedPoint>,
+}
+
+/// A point as a study names it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct NamedPoint {
+    /// Name of the point and of its folder.
+    pub name: String,
+    /// Values of the keys, as they were written.
+    pub values: Vec<String>,
+}
+
+impl Manifest {
+    /// Of the study in a folder; `None` if there is none.
+    pub fn read(folder: &Path) -> Result<Option<Self>, SweepError> {
+        let text = match fs::read_to_string(folder.join(MANIFEST)) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(_) => return Err(SweepError::Foreign { folder: folder.to_owned() }),
+        };
+        match serde_json::from_str::<Self>(&text) {
+            Ok(manifest) if manifest.layout == LAYOUT => Ok(Some(manifest)),
+            _ => Err(SweepError::Foreign { folder: folder.to_owned() }),
+        }
+    }
 }
 
 /// The folder of a study, in which its points are run.
@@ -43,9 +72,7 @@ impl Study {
     /// # Errors
     /// [`SweepError`] with what is in the way; everything is then as it was.
     pub fn open(&self, points: &[Point], force: bool) -> Result<Vec<PointState>, SweepError> {
-        if !force {
-            self.check_free()?;
-        }
+        let earlier = if force { Vec::new() } else { self.check_free()? };
         let mut states = Vec::new();
         for point in points {
             let state = match point.state() {
@@ -57,7 +84,7 @@ impl Study {
             }
             states.push(state);
         }
-        self.write()?;
+        self.write(earlier, points)?;
         Ok(states)
     }
 
@@ -67,28 +94,32 @@ impl Study {
     }
 
     fn manifest(&self) -> PathBuf {
-        self.folder.join("sweep.json")
+        self.folder.join(MANIFEST)
     }
 
-    fn check_free(&self) -> Result<(), SweepError> {
+    /// The points that the study in the folder has, if it is this one.
+    fn check_free(&self) -> Result<Vec<NamedPoint>, SweepError> {
         let folder = self.folder.clone();
-        let text = match fs::read_to_string(self.manifest()) {
-            Ok(text) => text,
-            Err(_) if is_free(&folder) => return Ok(()),
-            Err(_) => return Err(SweepError::Foreign { folder }),
-        };
-        match serde_json::from_str::<Manifest>(&text) {
-            Ok(manifest) if manifest.layout == LAYOUT && manifest.keys == self.keys => Ok(()),
-            Ok(manifest) if manifest.layout == LAYOUT => {
+        match Manifest::read(&folder)? {
+            None if is_free(&folder) => Ok(Vec::new()),
+            None => Err(SweepError::Foreign { folder }),
+            Some(manifest) if manifest.keys == self.keys => Ok(manifest.points),
+            Some(manifest) => {
                 Err(SweepError::OtherKeys { folder, found: manifest.keys, wanted: self.keys.clone() })
             }
-            _ => Err(SweepError::Foreign { folder }),
         }
     }
 
-    fn write(&self) -> Result<(), OutputError> {
-        let manifest =
-            Manifest { layout: LAYOUT, gluey: env!("CARGO_PKG_VERSION").to_owned(), keys: self.keys.clone() };
+    /// Writes down the study with its earlier points and these.
+    fn write(&self, mut all: Vec<NamedPoint>, points: &[Point]) -> Result<(), OutputError> {
+        for Point { name, values, .. } in points {
+            let point = NamedPoint { name: name.clone(), values: values.clone() };
+            if !all.contains(&point) {
+                all.push(point);
+            }
+        }
+        let gluey = env!("CARGO_PKG_VERSION").to_owned();
+        let manifest = Manifest { layout: LAYOUT, gluey, keys: self.keys.clone(), points: all };
         let path = self.manifest();
         let encoded = serde_json::to_string_pretty(&manifest).map_err(io::Error::from);
         let text = encoded.map_err(|error| OutputError::new(&path, "encode the study", error))?;

@@ -24,7 +24,8 @@ pub struct PointResult {
 }
 
 /// The head of the table and its lines: values of the keys, then `state`, then numbers of reports. Lengths
-/// named `_over_a` are in mean radii, `wall_s` in seconds.
+/// named `_over_a` are in mean radii, `wall_s` in seconds; means of the rheology behind `strain_skipped` have
+/// half the width of their 95 % interval beside them, which `blocks_independent` says to hold.
 pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
     let numbers = [
         "steps",
@@ -37,6 +38,16 @@ pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
         "reversibility_error",
         "end_gap_rel_error",
         "max_abs_error_over_a",
+        "strain_skipped",
+        "viscosity",
+        "viscosity_half_width",
+        "N1",
+        "N1_half_width",
+        "N2",
+        "N2_half_width",
+        "particle_pressure",
+        "particle_pressure_half_width",
+        "blocks_independent",
     ];
     let keys = axes.iter().map(|axis| axis.key.clone());
     let head = keys.chain(["state"].into_iter().chain(numbers).map(str::to_owned)).collect();
@@ -51,7 +62,7 @@ pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
 /// In the order of the head.
 fn numbers_of(report: &RunReport) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| shown_to(value, 7));
-    vec![
+    let mut cells = vec![
         report.steps.to_string(),
         format!("{:.3}", report.wall_s),
         report.cells.to_string(),
@@ -62,5 +73,16 @@ fn numbers_of(report: &RunReport) -> Vec<String> {
         number(report.reversibility_error),
         number(report.end_gap_rel_error),
         number(report.max_abs_error_over_a),
-    ]
+    ];
+    let rheology = report.rheology.as_ref();
+    cells.push(number(rheology.map(|rheology| rheology.strain_skipped)));
+    let means =
+        rheology.map_or([None; 4], |means| [means.viscosity, means.n1, means.n2, means.particle_pressure]);
+    for mean in means {
+        cells.push(number(mean.map(|mean| mean.mean)));
+        cells.push(number(mean.and_then(|mean| mean.half_width)));
+    }
+    let is_resolved = means.into_iter().flatten().map(|mean| mean.is_resolved).reduce(|all, one| all && one);
+    cells.push(is_resolved.map_or(String::new(), |is| if is { "yes" } else { "no" }.to_owned()));
+    cells
 }
