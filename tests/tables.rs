@@ -128,22 +128,32 @@ fn means_of_the_rheology_are_in_report_and_summary() {
 fn studies_tell_viscosities_and_how_far_they_are() {
     let folder = TempDir::new().expect("a folder");
     write(folder.path(), "s.toml", &sheared(0.3, ""));
-    let set = ["--set", "suspension.volume_fraction=0.1,0.2", "--set", "suspension.count=6,90000"];
-    let sweep = [&["sweep", "s.toml", "--out", "study"][..], &set].concat();
-    let (code, ..) = gluey(folder.path(), &sweep);
-    assert_eq!(code, Some(1), "the crowds are too many for the mesh");
-    let head = read(folder.path(), "study/sweep.csv");
+    let key = "suspension.volume_fraction";
+    told(folder.path(), &["sweep", "s.toml", "--set", &format!("{key}=0.05,0.1,0.15,0.2"), "--out", "study"]);
+    let text = read(folder.path(), "study/sweep.csv");
     let names = "strain_skipped,viscosity,viscosity_half_width,N1,N1_half_width,N2,N2_half_width,\
                  particle_pressure,particle_pressure_half_width,blocks_independent";
-    assert!(head.lines().next().is_some_and(|line| line.ends_with(names)), "{head}");
-    let info = told(folder.path(), &["info", "study"]);
-    println!("{info}");
-    assert!(info.contains("4: 2 done") && info.contains("suspension.volume_fraction"), "{info}");
-    let pictures = told(folder.path(), &["plot", "study", "--format", "svg,png"]);
+    assert!(text.lines().next().is_some_and(|line| line.ends_with(names)), "{text}");
+    let cell = |line: usize, name: &str| {
+        let place = text.lines().next().expect("a head").split(',').position(|one| one == name).expect(name);
+        text.lines().nth(line).and_then(|line| line.split(',').nth(place)?.parse::<f64>().ok())
+    };
+    let viscosities: Vec<f64> = (1..=4).filter_map(|line| cell(line, "viscosity")).collect();
+    assert!(viscosities.len() == 4 && viscosities.windows(2).all(|two| two[0] < two[1]), "{viscosities:?}");
+    assert!((1..=4).all(|line| cell(line, "viscosity_half_width") > Some(0.0) && cell(line, "N2").is_none()));
+    let pictures = told(folder.path(), &["plot", "study"]);
     assert_eq!(pictures, "study/sweep-plots/viscosity.svg\nstudy/sweep-plots/viscosity.png\n");
     let svg = read(folder.path(), "study/sweep-plots/viscosity.svg");
-    assert!(svg.contains("suspension.volume_fraction") && svg.contains("relative viscosity"));
+    assert!(svg.contains(key) && svg.contains("relative viscosity"));
+    // A dot for each point.
+    assert_eq!(svg.matches("<circle").count(), 4);
     fails(folder.path(), &["plot", "study", "--only", "gaps"], &["study: a study has one picture"]);
+    let record = format!("study/{key}=0.1/s-none-unfitted-run.json");
+    let failed = read(folder.path(), &record).replacen("\"complete\"", "\"failed\"", 1);
+    write(folder.path(), &record, &failed.replacen("\"error\": null", "\"error\": \"no room\"", 1));
+    fs::remove_dir_all(folder.path().join(format!("study/{key}=0.2"))).expect("a folder");
+    let info = told(folder.path(), &["info", "study"]);
+    assert!(info.contains("4: 2 done, 1 failed, 1 left") && info.contains("=0.1: no room"), "{info}");
 }
 
 /// Discs or spheres in a box that is sheared for ever, under these forces.
@@ -174,7 +184,8 @@ fn the_work_of_weight_is_no_viscosity() {
             first.iter().zip(second).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
         });
         println!("{dimension}D: routes {without:.1e}, under weight {with:.1e}");
-        assert!(with < 5e-3, "{dimension}D: {with}");
+        // Measured: 5.9e-4 and 1.0e-3; with the work of weight in it several per cent.
+        assert!(with < 3e-3, "{dimension}D: {with}");
     }
     let rows = rheology(2, "shear_rate = 1e-3\ngravity = [0.0, -20.0]");
     assert!(rows.column("viscosity_by_dissipation").expect("a column").iter().all(|cell| cell.is_nan()));

@@ -75,8 +75,8 @@ pub struct Mark {
     pub label: String,
 }
 
-/// Stacks charts of the usual width into one SVG canvas, each under its legend; what all of them share is on
-/// top.
+/// Stacks charts of the usual width into one SVG canvas, each under its legend, or all under one that
+/// they share.
 pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
     stack_to_width(charts, WIDTH, |chart, _| frame_height(chart))
 }

@@ -38,11 +38,12 @@ fn entries(chart: &Chart) -> Vec<(&str, Stroke)> {
     entries
 }
 
-/// Entries that all charts have.
+/// The entries of charts that all have the same ones; none if they differ.
 pub(crate) fn shared_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
     let Some((first, others)) = charts.split_first() else { return Vec::new() };
-    let is_shared = |entry: &(&str, Stroke)| others.iter().all(|chart| entries(chart).contains(entry));
-    entries(first).into_iter().filter(is_shared).collect()
+    let shared = entries(first);
+    let is_same = |chart: &Chart| entries(chart) == shared;
+    if others.iter().all(is_same) { shared } else { Vec::new() }
 }
 
 impl Legend<'_> {
@@ -71,5 +72,31 @@ impl Legend<'_> {
         for (i, note) in self.notes.iter().enumerate() {
             canvas.text(left, middle(rows + i) + 5.0, NOTE_SIZE, "start", note);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axis, Curve, PALETTE};
+
+    fn chart(labels: &[&str]) -> Chart {
+        let curve = |(label, stroke): (&&str, &Stroke)| Curve {
+            label: Some((*label).to_owned()),
+            stroke: *stroke,
+            pieces: vec![vec![(0.0, 0.0), (1.0, 1.0)]],
+        };
+        let curves = labels.iter().zip(&PALETTE).map(curve).collect();
+        let [x, y] = [Axis::around("*x*", [0.0, 1.0]), Axis::around("*y*", [0.0, 1.0])];
+        Chart { x, y, curves, notes: Vec::new(), marks: Vec::new() }
+    }
+
+    #[test]
+    fn legends_stand_at_their_panel_or_once_on_top() {
+        assert_eq!(shared_entries(&[chart(&["a", "b"]), chart(&["a", "b"])]).len(), 2);
+        let different = [chart(&["a", "b"]), chart(&["a"])];
+        assert!(shared_entries(&different).is_empty());
+        assert_eq!(different[0].legend(&[]).entries.len(), 2);
+        assert!(different[1].legend(&[("a", PALETTE[0])]).entries.is_empty());
     }
 }
