@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use gluey::table::Table;
-use program::{fails, gluey, told};
+use program::{fails, told};
 use tempfile::TempDir;
 
 fn read(folder: &Path, name: &str) -> String {
