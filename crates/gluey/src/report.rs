@@ -42,8 +42,8 @@ pub struct RunReport {
     pub end_gap_over_a: Option<f64>,
     /// `|D(t_end) - D(2 t* - t_end)| / D(2 t* - t_end)` of particles 1 and 2, with `t*` the last time when
     /// their line of centres is at 90 degrees to the flow; `None` where that mirror time is not in the run,
-    /// where they touch at it, with a reversal of the shear, and where there are others: only the encounter of
-    /// two is its own mirror image.
+    /// where they touch at it, with a reversal of the shear, and where there are others: only the encounter
+    /// of two is its own mirror image.
     pub reversibility_error: Option<f64>,
     /// Name of the reference solution.
     pub reference: Option<String>,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use gluey_motion::PairMobilityError;
+use gluey_motion::{FilmError, PairMobilityError};
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
 use gluey_suspension::packing::PackingError;
@@ -31,6 +31,9 @@ pub enum VerifyError {
     /// In the mobility of two spheres.
     #[error(transparent)]
     Mobility(#[from] PairMobilityError),
+    /// In the films of a step.
+    #[error(transparent)]
+    Films(#[from] FilmError),
     /// In the configuration of particles.
     #[error(transparent)]
     Packing(#[from] PackingError),

@@ -12,6 +12,9 @@ use crate::norms::Lattice;
 use crate::number::Number;
 use crate::statistics::{mean, scatter};
 
+/// The tolerance of a solve that cases have by default.
+pub const DEFAULT_TOLERANCE: f64 = 1e-6;
+
 /// Radius of the discs in the reference data.
 pub const RADIUS: f64 = 0.05;
 

@@ -1,6 +1,6 @@
-//! Known disagreements: rows that do not hold, with the reason as far as it was found, and the numbers that they
-//! have. They are shown as "no" like any other; they only do not make the reproduction fail, as long as their
-//! numbers are those. One that begins to hold makes it fail too, until it leaves the list.
+//! Known disagreements: rows that do not hold, with the reason as far as it was found, and the numbers that
+//! they have. They are shown as "no" like any other; they only do not make the reproduction fail, as long as
+//! their numbers are those. One that begins to hold makes it fail too, until it leaves the list.
 
 use serde::Serialize;
 

@@ -204,8 +204,8 @@ impl<const D: usize> Cells<'_, D> {
         });
     }
 
-    /// The rows of the owned pressures, with twos on the diagonal where nothing is unknown: what own cells and
-    /// those of others add to them.
+    /// The rows of the owned pressures, with twos on the diagonal where nothing is unknown: what own cells
+    /// and those of others add to them.
     fn matrix(
         &self,
         columns: &Columns,

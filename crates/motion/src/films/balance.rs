@@ -22,8 +22,9 @@ use super::error::{FilmClosed, FilmError};
 use super::film::Film;
 use super::step::Step;
 
-/// A gap this near to where it should be, relative to it, is there...
-const TOLERANCE: f64 = 1e-6;
+/// A gap this near to where it should be, relative to it, is there: what is left adds up over thousands of
+/// steps...
+const TOLERANCE: f64 = 1e-10;
 /// ... or as near as this share of the thinnest film.
 const LEAST: f64 = 1e-2;
 /// Linearisations of the gaps at most. Steps in which particles move far around each other would take more:
