@@ -43,12 +43,14 @@ pub struct MeshSpec {
     #[schemars(range(min = 1))]
     pub cells_per_radius: Option<f64>,
     /// Root cells of the tree along the shortest edge of the box, at least. Cells are halves of halves of
-    /// these: with 3 instead of 1 they may have 2/3 of the size. Unit: cells. Default: in 2D 1; in 3D what of
-    /// 1, 3 and 5 makes the largest cells that `cells_per_radius` allows, up to 125 root cells in the box.
+    /// these: with 3 instead of 1 they may have 2/3 of the size. Unit: cells. Default: in 2D 1; in 3D, where
+    /// `coarsest_level` is not given either, what of 1, 3 and 5 makes the largest cells that
+    /// `cells_per_radius` allows, up to 125 root cells in the box.
     #[schemars(range(min = 1, max = 16))]
     pub root_cells: Option<u32>,
     /// Cells are at most `2^-coarsest_level` of a root cell; at most the level of the cells at the surfaces.
-    /// Unit: levels. Default: 3, or the level of the cells at the surfaces where that is less.
+    /// Unit: levels. Default: 3, where 3 or 5 root cells are chosen 1, or the level of the cells at the
+    /// surfaces where that is less.
     #[schemars(range(max = 18))]
     pub coarsest_level: Option<u32>,
     /// Cells of the finest level kept around each particle, beside those that fill it: coarser ones inside

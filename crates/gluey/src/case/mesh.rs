@@ -17,6 +17,9 @@ const MOST_CHOSEN: u32 = 125;
 /// The coarsest level of the mesh where a case does not state it and cells at the surfaces are no coarser.
 const COARSEST_LEVEL: u32 = 3;
 
+/// The same where there are three or five times the fewest roots.
+const COARSEST_OF_CHOSEN: u32 = 1;
+
 /// A mesh has at most `2^18` cells along an axis: [`gluey_fem::TreeMesh`] refuses more.
 pub(super) const FINEST_LEVEL: u32 = 18;
 
@@ -40,28 +43,31 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 
 impl Case {
     /// Numbers of equal cubes that fill the box along each axis: the root cells of the mesh. They are as few
-    /// as possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge; where that is
-    /// not given, what of once, three and five times the fewest comes nearest to [`Case::cells_per_radius`]
-    /// in 3D. `None` if it takes more than 16 of them along that edge, or more than a tree can number along
-    /// the longest.
+    /// as possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge. In 3D, where
+    /// neither that nor a coarsest level is given, it is once, three or five times the fewest, whichever comes
+    /// nearest to [`Case::cells_per_radius`]. `None` if it takes more than 16 of them along that edge, or more
+    /// than a tree can number along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let fewest = self.cubes(self.flow.mesh.root_cells.unwrap_or(1))?;
-        if self.flow.mesh.root_cells.is_some() || self.dimension == 2 {
-            return Some(fewest);
+        let factor = self.factor_of_roots(&fewest);
+        Some(fewest.into_iter().map(|count| count * factor).collect())
+    }
+
+    /// By how much the fewest root cells are multiplied: what makes the largest cells at the surfaces that
+    /// are small enough.
+    fn factor_of_roots(&self, fewest: &[u32]) -> u32 {
+        let mesh = &self.flow.mesh;
+        if self.dimension == 2 || mesh.root_cells.is_some() || mesh.coarsest_level.is_some() {
+            return 1;
         }
-        let of = |factor: u32| fewest.iter().map(|count| count * factor).collect::<Vec<u32>>();
-        // Along the longest edge; halves of halves of the roots.
-        let cells = |factor: u32| {
-            let roots = of(factor);
+        let cells = |factor: u32| -> Option<f64> {
+            let roots: Vec<u32> = fewest.iter().map(|count| count * factor).collect();
             let level = self.level_of(&roots);
-            let along = roots.iter().copied().max()?;
             let is_cheap = roots.iter().product::<u32>() <= MOST_CHOSEN;
-            let least = f64::from(self.flow.mesh.coarsest_level.unwrap_or(0)).max(1.0);
-            (factor == 1 || (is_cheap && level >= least)).then(|| f64::from(along) * level.exp2())
+            (factor == 1 || (is_cheap && level >= 1.0)).then(|| f64::from(factor) * level.exp2())
         };
         let counts = FACTORS.into_iter().filter_map(|factor| Some((factor, cells(factor)?)));
-        let (factor, _) = counts.reduce(|best, next| if next.1 < best.1 { next } else { best })?;
-        Some(of(factor))
+        counts.reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(1, |best| best.0)
     }
 
     /// Numbers of equal cubes along each axis, as few as possible but no fewer than these along the shortest.
@@ -105,10 +111,13 @@ impl Case {
         (cells * (1.0 - ROUNDING)).log2().ceil().max(0.0)
     }
 
-    /// The level that all cells have at least, as stated or by default.
+    /// The level that all cells have at least, as stated or by default: that of cells of about an eighth of
+    /// the shortest edge, where roots are chosen.
     pub fn coarsest_level(&self) -> u32 {
-        let surface = || self.surface_level().map_or(COARSEST_LEVEL, |level| level as u32);
-        self.flow.mesh.coarsest_level.unwrap_or_else(|| COARSEST_LEVEL.min(surface()))
+        let factor = self.cubes(1).map_or(1, |fewest| self.factor_of_roots(&fewest));
+        let level = if factor == 1 { COARSEST_LEVEL } else { COARSEST_OF_CHOSEN };
+        let surface = || self.surface_level().map_or(level, |surface| surface as u32);
+        self.flow.mesh.coarsest_level.unwrap_or_else(|| level.min(surface()))
     }
 
     /// Cells per radius of the smallest particle as the mesh has them at the surfaces, no fewer than
@@ -169,10 +178,8 @@ mod tests {
             // Roots as many as that would cost more than they save.
             ("[4.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0", [12, 3, 3], 2.4),
             ("[8.0, 1.0, 2.0]", 0.1, "cells_per_radius = 2.0", [8, 1, 2], 3.2),
-            // There are as many levels as were asked for.
-            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.1, coarsest_level = 3", [3; 3], 2.4),
-            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0, coarsest_level = 2", [5; 3], 2.0),
-            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0, coarsest_level = 4", [1; 3], 3.2),
+            // The mesh is named by its levels.
+            ("[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.1, coarsest_level = 2", [1; 3], 3.2),
         ] {
             let case = case(3, upper, radius, mesh);
             assert_eq!(case.root_cells().as_deref(), Some(&roots[..]), "{upper} {mesh}");
@@ -180,7 +187,11 @@ mod tests {
             assert!((found - built).abs() < 1e-9, "{upper} {mesh}: {found}");
         }
         let disc = case(2, "[1.0, 1.0]", 0.1, "cells_per_radius = 2.0");
-        assert_eq!(disc.root_cells(), Some(vec![1, 1]));
+        assert_eq!((disc.root_cells(), disc.coarsest_level()), (Some(vec![1, 1]), 3));
+        let sphere = case(3, "[1.0, 1.0, 1.0]", 0.1, "cells_per_radius = 2.0");
+        let filled = sphere.filled();
+        assert_eq!((sphere.coarsest_level(), filled.coarsest_level()), (1, 1));
+        assert_eq!(filled.root_cells(), sphere.root_cells());
     }
 
     #[test]
