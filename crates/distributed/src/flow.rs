@@ -9,7 +9,7 @@ use gluey_linalg::{
 };
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Traffic};
-use gluey_stokes::{StokesError, Stress};
+use gluey_stokes::{RaisedPenalties, StokesError, Stress};
 
 use crate::bodies::{Shared, rigid};
 use crate::cells::MyCells;
@@ -182,6 +182,8 @@ where
     pub dof_count: usize,
     /// Solves that it took: one, but for weak penalties, boxes without mean flow and given stresses.
     pub solve_count: usize,
+    /// How penalties were changed for them.
+    pub raised_penalties: RaisedPenalties,
     /// Iterations of the solver in all of them.
     pub iterations: usize,
     /// Norm of the true residual, over that of a fluid at rest.
@@ -217,6 +219,7 @@ where
         wrenches.for_each(|(wrench, other)| *wrench = *wrench + *other * factor);
         self.cells.add(factor, &other.cells);
         self.solve_count += other.solve_count;
+        self.raised_penalties += other.raised_penalties;
         self.iterations += other.iterations;
         self.relative_residual = self.relative_residual.max(other.relative_residual);
     }
@@ -263,8 +266,7 @@ impl BoxFlow {
         Dim<D>: Space<D>,
     {
         bodies.check()?;
-        let start = ranks.traffic();
-        let tree_of_balls = BallTree::new(bodies.balls);
+        let (start, tree_of_balls) = (ranks.traffic(), BallTree::new(bodies.balls));
         let shared = Shared { cuts, ranks, bodies: &tree_of_balls, offset: bodies.offset, held: &[] };
         let cycle = VCycle::new(tree, &shared, self.viscosity)?;
         let top = &cycle.levels[cycle.levels.len() - 1].operator;
@@ -279,8 +281,7 @@ impl BoxFlow {
         let points = operator.space.velocity.clone();
         let lift = operator.lift(|node| walls(&points.map.point(node)).into());
         let b = right_hand_side(&mut operator, bodies, &lift);
-        let setup_traffic = ranks.traffic().since(start);
-        let mut x = vec![0.0; b.len()];
+        let (setup_traffic, mut x) = (ranks.traffic().since(start), vec![0.0; b.len()]);
         let report =
             self.krylov(&mut operator, &mut preconditioner, &b, &mut x).map_err(FlowError::Krylov)?;
         let solve_traffic = ranks.traffic().since(start).since(setup_traffic);
@@ -304,6 +305,7 @@ impl BoxFlow {
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
             solve_count: 1,
+            raised_penalties: RaisedPenalties::default(),
             iterations: report.iterations,
             relative_residual: report.residual_norm / reference,
             levels,

@@ -209,6 +209,12 @@ pub struct TimeSpec {
     #[serde(default = "second_order")]
     #[schemars(schema_with = "schemes")]
     pub scheme: Scheme,
+    /// A step in which films cannot be kept open, because particles move too far in it, is done in two halves,
+    /// these in halves again, and so on up to so many times: to a 256th by default. Rows stay where they are.
+    /// 0: such a step ends the run. Unit: none. Default: 8.
+    #[serde(default = "default_halvings")]
+    #[schemars(range(max = 20))]
+    pub halvings: u32,
     /// The shear is reversed at the first step that starts at this time or later. Unit: time. Default: never.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -334,6 +340,10 @@ impl Case {
 
 fn one() -> f64 {
     1.0
+}
+
+fn default_halvings() -> u32 {
+    8
 }
 
 fn second_order() -> Scheme {

@@ -21,9 +21,10 @@ use crate::output::{Mark, OutputError, write_atomically};
 use crate::phases::PhaseTable;
 use crate::sealed::{Kind, Unopened};
 use crate::simulation::{RestoreError, SimulationState};
+use crate::tally::Tally;
 
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 const KIND: Kind = Kind { magic: b"gluey-ck", layout: VERSION };
 
 /// A run between two steps.
@@ -43,6 +44,8 @@ where
     pub forces: Option<Mark>,
     /// How far that of the solver had come.
     pub solver: Mark,
+    /// What was counted so far.
+    pub tally: Tally,
     /// Wall time so far, phase by phase.
     pub phases: PhaseTable,
     /// Wall time so far, in seconds.

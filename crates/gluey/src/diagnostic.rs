@@ -7,8 +7,9 @@ use std::path::Path;
 use gluey::case::{CaseIssue, InvalidCase, Place};
 use gluey::{
     CaseError, CheckpointError, CheckpointSummary, NotText, OccupiedError, OutputError, ResultPaths,
-    RowsError, RunError,
+    RowsError, RunError, StepError,
 };
+use gluey_motion::FilmError;
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -86,6 +87,9 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Interrupted { checkpoint: Some(checkpoint), .. } => {
             format!("to go on: {}", go_on(checkpoint))
         }
+        RunError::Stopped { cause, .. } if matches!(**cause, RunError::Step(StepError::Film { .. })) => {
+            hint(cause, case)?
+        }
         RunError::Stopped { checkpoint, cause, .. } => {
             let cure = match &**cause {
                 RunError::Output(error) if is_full(error) => Some("make room on that disk".into()),
@@ -115,6 +119,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Occupied(_) => {
             "write elsewhere with --out DIR, or replace those results with --force".into()
         }
+        RunError::Step(StepError::Film { source, .. }) => film_hint(source)?,
         RunError::LeftBox { .. } => {
             "end the run earlier, or take a larger box; contact keeps particles from its walls \
                                      (y), not from open sides"
@@ -129,6 +134,16 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Case(error) if NotText::is_in(error) => NotText::HINT.into(),
         RunError::Case(CaseError::Read { path, .. }) => unread_hint(path),
         _ => return None,
+    })
+}
+
+/// What to do where films cannot be kept open, also in the smallest part of a step: to resume is no help.
+fn film_hint(error: &FilmError) -> Option<String> {
+    (!error.is_given()).then(|| {
+        "to go on from there would end there again: run the case anew with a smaller time.step or with more \
+         time.halvings, up to 20 (--set time.step=..., --force or --out DIR), or let a repulsion keep particles apart \
+         ([repulsion]); where particles that are held or driven leave no room, nothing of this helps"
+            .into()
     })
 }
 

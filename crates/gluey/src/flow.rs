@@ -19,7 +19,9 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, Refinement};
+use gluey_stokes::{
+    Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, RaisedPenalties, Refinement,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Lubrication};
@@ -93,6 +95,7 @@ where
     /// Where the stress is given instead of the rate.
     control: Option<StressControl<D>>,
     last: Option<Flow<D>>,
+    last_raised: RaisedPenalties,
     last_balls: Vec<Ball<D>>,
     last_positions: Vec<Vector<D>>,
     last_strain: f64,
@@ -137,6 +140,7 @@ where
         force_density: case.force_density(),
         control: case.shear_stress.map(StressControl::new),
         last: None,
+        last_raised: RaisedPenalties::default(),
         last_balls: Vec::new(),
         last_positions: Vec::new(),
         last_strain: 0.0,
@@ -294,6 +298,7 @@ where
         self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
         self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
         self.last = Some(flow);
+        self.last_raised = self.solver.take_raised_penalties();
         self.last_balls = balls;
         Ok(())
     }
@@ -369,12 +374,16 @@ where
     fn statistics(&self) -> FlowStatistics {
         let Some(flow) = &self.last else { return FlowStatistics::default() };
         let PhaseTimes { assembly, preparation, solve } = flow.times;
+        let RaisedPenalties { doubled, cells, solved_again } = self.last_raised;
         FlowStatistics {
             cell_count: flow.discretisation.mesh.cell_count(),
             dof_count: flow.discretisation.dof_count(),
             solve_count: flow.solve_count,
             iteration_count: flow.iteration_count,
             residual: flow.residual,
+            penalties_doubled: doubled,
+            cells_raised: cells,
+            solved_again,
             phases: vec![("mesh and assembly", assembly), ("solver set-up", preparation), ("solve", solve)],
         }
     }

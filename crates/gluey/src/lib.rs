@@ -41,6 +41,7 @@ mod simulation;
 pub mod summary;
 pub mod sweep;
 pub mod table;
+mod tally;
 mod text;
 mod trajectory;
 pub mod view;
@@ -63,8 +64,9 @@ pub use run::{
     recorded_runs, run,
 };
 pub use shown::shown;
-pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
+pub use simulation::{Motion, RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
+pub use tally::Tally;
 pub use text::NotText;
 pub use trajectory::Row;
 

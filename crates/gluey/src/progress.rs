@@ -6,8 +6,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use gluey_motion::FilmError;
+
 use crate::case::{Case, IdleKey};
 use crate::output::solver_log::SolverRow;
+use crate::shown::shown;
+use crate::tally::Tally;
 
 /// Where a run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +64,7 @@ pub trait Progress: Sync {
 }
 
 /// Something a run came upon that is no error but should be known.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
     /// Keys of the case are set and do nothing.
     NoEffect {
@@ -96,6 +100,24 @@ pub enum Notice {
         /// Why.
         reason: String,
     },
+    /// A step was done in parts, for the first time in the run.
+    HalvedStep {
+        /// Steps done before.
+        step: usize,
+        /// Time at its beginning.
+        time: f64,
+        /// How many parts.
+        parts: usize,
+        /// Why the whole could not be done.
+        reason: Option<FilmError>,
+    },
+    /// Penalties at surfaces were changed, for the first time in the run.
+    ChangedPenalties {
+        /// Steps done before.
+        step: usize,
+        /// Time at its beginning.
+        time: f64,
+    },
     /// A run ended, and its record could not be brought up to date.
     NoRecord {
         /// The file.
@@ -116,6 +138,17 @@ impl Notice {
             }
         }
         notices
+    }
+
+    /// What a step is the first of a run to need, which made this of what was counted before.
+    pub(crate) fn of_first(before: &Tally, after: &Tally, row: &SolverRow<'_>) -> Vec<Self> {
+        let (step, time) = (row.step, row.time);
+        let halved = (before.halved_steps == 0 && after.halved_steps > 0).then(|| {
+            let (parts, reason) = (row.motion.parts, row.motion.refused);
+            Self::HalvedStep { step, time, parts, reason }
+        });
+        let changed = !before.has_changed_penalties() && after.has_changed_penalties();
+        halved.into_iter().chain(changed.then_some(Self::ChangedPenalties { step, time })).collect()
     }
 }
 
@@ -157,6 +190,21 @@ impl fmt::Display for Notice {
             Self::NoCheckpoint { path, reason } => {
                 write!(f, "{}: no checkpoint of the last good step: {reason}", path.display())
             }
+            Self::HalvedStep { step, time, parts, reason } => {
+                let why = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+                write!(
+                    f,
+                    "step {step} (t = {}) was done in {parts} parts{why}; such steps are counted in the column `parts` \
+                     of the solver's table",
+                    shown(*time)
+                )
+            }
+            Self::ChangedPenalties { step, time } => write!(
+                f,
+                "penalties at surfaces were raised in step {step} (t = {}); how often is in the columns \
+                 `penalties_doubled` and `cells_raised` of the solver's table",
+                shown(*time)
+            ),
             Self::NoRecord { path, reason } => {
                 write!(f, "{}: does not say how the run ended: {reason}", path.display())
             }

@@ -10,6 +10,7 @@ use crate::case::{Case, Strategy};
 use crate::measures::Measures;
 use crate::phases::PhaseTable;
 use crate::shown::shown_to;
+use crate::tally::Tally;
 use crate::trajectory::PairHistory;
 
 /// Gaps below this many radii are contact, and no measure of anything.
@@ -54,6 +55,9 @@ pub struct RunReport {
     /// Means of the rheology behind its transient, in boxes that are sheared for ever.
     #[serde(default)]
     pub rheology: Option<RheologyMeans>,
+    /// What was counted.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// Seconds spent in each phase, in the order of a step.
     pub phases: Vec<(String, f64)>,
 }
@@ -63,7 +67,7 @@ impl RunReport {
     pub(crate) fn of<const D: usize>(
         case: &Case,
         measures: &Measures<D>,
-        flow: &FlowStatistics,
+        (flow, tally): (&FlowStatistics, &Tally),
         wall_s: f64,
         phases: &PhaseTable,
         rheology: Option<RheologyMeans>,
@@ -87,6 +91,7 @@ impl RunReport {
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),
             rheology,
+            tally: *tally,
             phases: phases.rows().to_vec(),
         }
     }
@@ -123,6 +128,7 @@ impl fmt::Display for RunReport {
             writeln!(f, "{}", cells.unwrap_or_default())?;
         }
         write_number(f, "smallest gap / a", self.min_gap_over_a)?;
+        self.tally.fmt(f)?;
         write_number(f, "gap of 1 and 2 at the end / a", self.end_gap_over_a)?;
         write_number(f, "reversibility error", self.reversibility_error)?;
         if let Some(rheology) = &self.rheology {

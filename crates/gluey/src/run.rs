@@ -61,6 +61,7 @@ use crate::output::{Claim, OutputError};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
+use crate::tally::Tally;
 use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
 use contacts::Contacts;
@@ -149,6 +150,7 @@ where
     progress: &'a dyn Progress,
     simulation: Simulation<D, H, Contacts<'a, D>>,
     measures: Measures<D>,
+    tally: Tally,
     csv: CsvWriter<D>,
     tables: Tables,
     solver: SolverLog,
@@ -177,7 +179,7 @@ where
         others: Option<&'a dyn Others>,
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics, contact);
-        let (mut measures, mut wall_before_s) = (Measures::new(case), 0.0);
+        let (mut measures, mut tally, mut wall_before_s) = (Measures::new(case), Tally::default(), 0.0);
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
         drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
@@ -196,7 +198,7 @@ where
             }
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?.on(ranks);
-                wall_before_s = checkpoint.wall_s;
+                (wall_before_s, tally) = (checkpoint.wall_s, checkpoint.tally);
                 let Checkpoint { rheology, forces, .. } = checkpoint.clone();
                 let tables = Tables::resume(&options.csv, &TableMarks { rheology, forces })?;
                 let solver = SolverLog::resume(&options.csv, &checkpoint.solver, &checkpoint.phases)?;
@@ -228,6 +230,7 @@ where
             progress,
             simulation,
             measures,
+            tally,
             csv,
             tables,
             solver,
@@ -271,13 +274,13 @@ where
     /// Gives all files their names.
     fn complete(self) -> Result<RunReport, RunError> {
         let wall_s = self.wall_s();
-        let flow = self.simulation.statistics();
         self.frames.finish()?;
         self.csv.finish()?;
         self.tables.finish()?;
         self.solver.finish()?;
         let rheology = tables::means_of_rheology(self.case, &self.options.csv)?;
-        Ok(RunReport::of(self.case, &self.measures, &flow, wall_s, self.simulation.phases(), rheology))
+        let counted = (self.simulation.statistics(), &self.tally);
+        Ok(RunReport::of(self.case, &self.measures, counted, wall_s, self.simulation.phases(), rheology))
     }
 
     /// All steps. A panic of this or any other thread ends them as an error does; what it left half done is
@@ -294,11 +297,14 @@ where
         self.remember()?;
         while self.simulation.step_index() < self.case.step_count() {
             self.observe()?;
+            let at = (self.simulation.step_index(), self.simulation.time());
             self.advance()?;
+            self.log_effort(at)?;
             self.remember()?;
             self.save_if_due()?;
         }
-        self.observe()
+        self.observe()?;
+        self.log_effort((self.simulation.step_index(), self.simulation.time()))
     }
 
     /// Computes the velocities here and now, and writes them down.
@@ -313,22 +319,24 @@ where
         let start = Instant::now();
         self.write()?;
         self.simulation.phases_mut().add("output", start.elapsed().as_secs_f64());
-        self.log_effort()
+        Ok(())
     }
 
-    /// Writes down what the step took so far; the motion that ends it counts with the next.
-    fn log_effort(&mut self) -> Result<(), RunError> {
-        let (simulation, step) = (&self.simulation, self.simulation.step_index());
-        let row = SolverRow {
-            step,
-            time: simulation.time(),
-            strain: self.case.strain_after(step),
-            flow: &simulation.statistics(),
-            contact: simulation.contact_report(),
-            phases: simulation.phases(),
-        };
+    /// Counts what the step took that began then, and writes it down if it was done: the velocities at the end
+    /// of a run are those of a step that a longer run does.
+    fn log_effort(&mut self, (step, time): (usize, f64)) -> Result<(), RunError> {
+        let (simulation, strain) = (&self.simulation, self.case.strain_after(step));
+        let (flow, motion, phases) = (simulation.statistics(), simulation.motion(), simulation.phases());
+        let contact = simulation.contact_report();
+        let row = SolverRow { step, time, strain, flow, contact, motion, phases };
         self.progress.step(&row);
-        Ok(self.solver.write(&row)?)
+        let before = self.tally;
+        self.tally.add(motion, flow);
+        Notice::of_first(&before, &self.tally, &row).iter().for_each(|notice| self.progress.notice(notice));
+        if motion.parts > 0 {
+            self.solver.write(&row)?;
+        }
+        Ok(())
     }
 
     fn write(&mut self) -> Result<(), RunError> {
@@ -348,7 +356,7 @@ where
     /// Moves the particles, and turns the shear round when it is time.
     fn advance(&mut self) -> Result<(), RunError> {
         self.tell("motion");
-        self.simulation.advance();
+        self.simulation.advance().map_err(StepError::widen)?;
         self.check_inside()?;
         if self.case.is_reversed_after(self.simulation.step_index()) != self.simulation.is_reversed() {
             self.simulation.reverse_shear();
@@ -410,6 +418,7 @@ where
             rheology,
             forces,
             solver: self.solver.mark(),
+            tally: self.tally,
             phases: self.simulation.phases().clone(),
             wall_s: self.wall_s(),
             ranks: self.others.map_or(0, Others::rank_count),

@@ -1,18 +1,23 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
 mod error;
+mod part;
 mod repelling;
 mod strain_clock;
 
 use gluey_contact::{BodyStep, Contact, ContactModel, ContactReport, ContactState, Domain};
 use gluey_geom::{Dim, Particle, Pose, Space, Twist};
-use gluey_motion::{Fields, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, Scheme};
+use gluey_motion::{
+    Fields, FilmError, FilmReport, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, Scheme,
+};
 use gluey_suspension::Repulsion;
 
 use crate::phases::PhaseTable;
+use part::Part;
 use repelling::Repelling;
 
 pub use error::{RestoreError, StepError};
+pub use part::Motion;
 pub use strain_clock::StrainClock;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
@@ -43,6 +48,10 @@ where
 {
     dt: f64,
     step: usize,
+    /// The part of the step that is being done.
+    part: Part,
+    /// A step is halved so often at most.
+    most_halvings: u32,
     reversed: bool,
     sliding: Option<Sliding>,
     repelling: Option<Repelling<D>>,
@@ -60,6 +69,9 @@ where
     drift: Vec<Twist<D>>,
     twists: Vec<Twist<D>>,
     contact_report: ContactReport,
+    /// Size and effort of the flows of the step so far.
+    statistics: FlowStatistics,
+    motion: Motion,
     phases: PhaseTable,
 }
 
@@ -111,6 +123,8 @@ where
         Self {
             dt,
             step: 0,
+            part: Part::WHOLE,
+            most_halvings: 0,
             reversed: false,
             sliding: None,
             repelling: None,
@@ -126,6 +140,8 @@ where
             drift: vec![Twist::default(); count],
             twists: vec![Twist::default(); count],
             contact_report: ContactReport::default(),
+            statistics: FlowStatistics::default(),
+            motion: Motion::default(),
             phases: PhaseTable::default(),
         }
     }
@@ -134,6 +150,14 @@ where
     #[must_use]
     pub fn sheared(self, sliding: Sliding) -> Self {
         Self { sliding: Some(sliding), ..self }
+    }
+
+    /// The same where a step in which films cannot be kept open is done in two halves, and these in halves
+    /// again, up to so often; up to 20 times. The history of velocities knows how old it is: the order of the
+    /// scheme stays.
+    #[must_use]
+    pub fn halving(self, most_halvings: u32) -> Self {
+        Self { most_halvings, ..self }
     }
 
     /// The same with particles that repel each other, their images and the walls of `surroundings`.
@@ -182,24 +206,28 @@ where
         self.predict()?;
         self.open_films()?;
         self.correct()?;
-        self.advance();
-        Ok(())
+        self.advance()
     }
 
     /// Computes the velocities of all particles where they are, without contact.
     pub fn predict(&mut self) -> Result<(), StepError<H::Error>> {
+        let is_first = self.part.is_first();
+        if is_first {
+            (self.part, self.motion) = (Part::WHOLE, Motion::default());
+        }
         let (step, time) = (self.step, self.time());
-        if let Some(Sliding { height, stress_every, .. }) = self.sliding {
-            self.hydrodynamics.set_strain(self.strain, step.is_multiple_of(stress_every));
-            self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * self.dt);
+        if let Some(Sliding { stress_every, .. }) = self.sliding {
+            self.hydrodynamics.set_strain(self.strain, is_first && step.is_multiple_of(stress_every));
         }
         self.repel()?;
         let start = std::time::Instant::now();
         let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
         self.book_flow(start.elapsed().as_secs_f64());
         predicted.map_err(|source| StepError::Flow { step, time, source })?;
-        let rate = self.hydrodynamics.clock_rate();
-        self.clock.iter_mut().for_each(|clock| clock.reach(step, self.dt, rate));
+        let flow = self.hydrodynamics.statistics();
+        self.statistics = if is_first { flow } else { flow.after(&self.statistics) };
+        let (rate, start) = (self.hydrodynamics.clock_rate(), self.part.start());
+        self.clock.iter_mut().for_each(|clock| clock.reach((step, start), self.dt, rate));
         match self.twists.iter().position(|twist| !is_finite(twist)) {
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),
@@ -221,46 +249,90 @@ where
             .map_err(|source| StepError::Forces { step, time, source })
     }
 
-    /// Corrects the predicted velocities so that films that lubrication keeps open stay open.
+    /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the step
+    /// until they do.
     pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
-        let (step, time) = (self.step, self.time());
-        let rate = self.sliding_rate();
-        let reach = self.integrator.film_reach_in_shear(self.dt, &self.particles, &self.twists, rate);
+        let predicted = self.twists.clone();
+        loop {
+            let source = match self.try_to_open_films() {
+                Ok(FilmReport { closed_count, largest_push }) => {
+                    if self.part.is_first() {
+                        self.motion.closed_films = closed_count;
+                    }
+                    self.motion.film_push = self.motion.film_push.max(largest_push);
+                    return Ok(());
+                }
+                Err(error) => error,
+            };
+            let half = self.part.halved(self.most_halvings).filter(|_| !source.is_given());
+            let (step, time, length) = (self.step, self.time(), self.part_length());
+            self.part = half.ok_or(StepError::Film { step, time, length, source })?;
+            self.motion.refused = Some(source);
+            self.twists.copy_from_slice(&predicted);
+        }
+    }
+
+    fn try_to_open_films(&mut self) -> Result<FilmReport, FilmError> {
+        let (dt, rate) = (self.part_length(), self.sliding_rate());
+        let reach = self.integrator.film_reach_in_shear(dt, &self.particles, &self.twists, rate);
         let films = self.hydrodynamics.films(reach);
         let (integrator, particles, twists) = (&mut self.integrator, &self.particles, &mut self.twists);
-        self.phases
-            .time("motion", || integrator.open_films(self.dt, particles, &films, twists))
-            .map_err(|source| StepError::Film { step, time, source })
+        self.phases.time("motion", || integrator.open_films(dt, particles, &films, twists))
     }
 
     /// Corrects the predicted velocities for contact.
     pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
-        let (step, time) = (self.step, self.time());
+        let (step, time, dt) = (self.step, self.time(), self.part_length());
+        if let Some(Sliding { height, .. }) = self.sliding {
+            self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * dt);
+        }
         for (pose, particle) in self.poses.iter_mut().zip(&self.particles) {
             *pose = particle.pose;
         }
-        self.integrator.body_drift(self.dt, &mut self.drift);
+        self.integrator.body_drift(dt, &mut self.drift);
         let body_step = BodyStep {
             poses: &self.poses,
             radii: &self.radii,
             drift: &self.drift,
-            velocity_weight: self.integrator.velocity_weight(self.dt),
-            dt: self.dt,
+            velocity_weight: self.integrator.velocity_weight(dt),
+            dt,
         };
         let (contact, twists) = (&mut self.contact, &mut self.twists);
-        self.contact_report = self
+        let report = self
             .phases
             .time("contact", || contact.correct_bodies(&body_step, twists))
             .map_err(|source| StepError::Contact { step, time, source })?;
+        if self.part.is_first() {
+            self.contact_report = report;
+        }
         Ok(())
     }
 
-    /// Moves the particles with the corrected velocities.
-    pub fn advance(&mut self) {
-        let (integrator, particles) = (&mut self.integrator, &mut self.particles);
-        self.phases.time("motion", || integrator.advance(self.dt, particles, &self.twists));
-        self.strain += self.sliding_rate() * self.dt;
+    /// Moves the particles with the corrected velocities. Where these are for a part of the step only, the
+    /// rest of it is done as well, part by part.
+    pub fn advance(&mut self) -> Result<(), StepError<H::Error>> {
+        self.advance_part();
+        while let Some(next) = self.part.next() {
+            self.part = next;
+            self.predict()?;
+            self.open_films()?;
+            self.correct()?;
+            self.advance_part();
+        }
+        self.part = Part::WHOLE;
         self.step += 1;
+        Ok(())
+    }
+
+    fn advance_part(&mut self) {
+        let dt = self.part_length();
+        let (integrator, particles) = (&mut self.integrator, &mut self.particles);
+        self.phases.time("motion", || integrator.advance(dt, particles, &self.twists));
+        self.strain += self.sliding_rate() * dt;
+        let Motion { parts, shortest, .. } = self.motion;
+        let share = self.part.share();
+        self.motion.shortest = if parts == 0 { share } else { shortest.min(share) };
+        self.motion.parts += 1;
     }
 
     /// Reverses the shear from the next step on.
@@ -290,7 +362,12 @@ where
 
     /// Time reached.
     pub fn time(&self) -> f64 {
-        self.step as f64 * self.dt
+        (self.step as f64 + self.part.start()) * self.dt
+    }
+
+    /// Length of the part of the step that is being done.
+    fn part_length(&self) -> f64 {
+        self.dt * self.part.share()
     }
 
     /// The particles where they are now.
@@ -313,7 +390,7 @@ where
         self.contact.contacts()
     }
 
-    /// Effort and outcome of the last correction.
+    /// Effort and outcome of the last correction, of the first part of the step.
     pub fn contact_report(&self) -> &ContactReport {
         &self.contact_report
     }
@@ -336,9 +413,14 @@ where
         self.hydrodynamics.holding()
     }
 
-    /// Size and effort of the last prediction.
-    pub fn statistics(&self) -> FlowStatistics {
-        self.hydrodynamics.statistics()
+    /// Size and effort of the flows of the last step, or of the one that is being done so far.
+    pub fn statistics(&self) -> &FlowStatistics {
+        &self.statistics
+    }
+
+    /// How the particles were moved in the last step, or are in the one that is being done.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
     }
 
     /// Wall time spent so far, phase by phase.

@@ -145,8 +145,31 @@ pub struct FlowStatistics {
     pub iteration_count: usize,
     /// Norm of the last solve's residual over that of its right-hand side.
     pub residual: f64,
+    /// How often the penalties of all cells at surfaces were doubled, for smoothers that need it.
+    pub penalties_doubled: usize,
+    /// Cells at surfaces whose penalties were raised, because flows took too little notice of them.
+    pub cells_raised: usize,
+    /// Flows that were solved again for that.
+    pub solved_again: usize,
     /// Seconds spent in each named phase (mesh, assembly, factorisation, ...), in order.
     pub phases: Vec<(&'static str, f64)>,
+}
+
+impl FlowStatistics {
+    /// The same for this prediction after others of the same step: efforts of all, the largest residual, the
+    /// last mesh.
+    #[must_use]
+    pub fn after(self, others: &Self) -> Self {
+        Self {
+            solve_count: self.solve_count + others.solve_count,
+            iteration_count: self.iteration_count + others.iteration_count,
+            residual: self.residual.max(others.residual),
+            penalties_doubled: self.penalties_doubled + others.penalties_doubled,
+            cells_raised: self.cells_raised + others.cells_raised,
+            solved_again: self.solved_again + others.solved_again,
+            ..self
+        }
+    }
 }
 
 /// The mean stress of a suspension in simple shear `rate y e_x` in a periodic box, beyond that of the fluid

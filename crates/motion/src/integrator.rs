@@ -6,7 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::films::{Film, FilmError, FilmMemory, Step};
+use crate::films::{Film, FilmError, FilmMemory, FilmReport, Step};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -113,7 +113,8 @@ where
     /// names, sorted by particles.
     ///
     /// # Errors
-    /// [`FilmError`] where particles are so crowded that none can be given room; take smaller steps then.
+    /// [`FilmError`] where particles are so crowded that none can be given room: nothing is remembered of this
+    /// step then, and it can be tried again with the velocities as they were and half the length.
     ///
     /// [`Hydrodynamics`]: crate::Hydrodynamics
     pub fn open_films(
@@ -122,7 +123,7 @@ where
         particles: &[Particle<D>],
         films: &[Film<D>],
         twists: &mut [Twist<D>],
-    ) -> Result<(), FilmError> {
+    ) -> Result<FilmReport, FilmError> {
         let mut memory = std::mem::take(&mut self.films);
         let corrected = memory.correct(&self.film_step(dt, particles), films, twists);
         self.films = memory;
@@ -167,12 +168,11 @@ where
         self.remember(dt, twists);
     }
 
-    /// Forgets the history: the next step is Euler. For a jump of the flow with no relation to what was
-    /// before.
+    /// Forgets the velocities: the next step is Euler. For a jump of the flow with no relation to what was
+    /// before. What pressed closed films together stays to be made up for.
     pub fn restart(&mut self) {
         self.history.clear();
         self.history_age = 0.0;
-        self.films.clear();
     }
 
     /// Tells that the flow has been reversed, `u -> -u` at equal positions (Stokes flow under `-shear rate`).

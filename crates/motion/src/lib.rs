@@ -35,7 +35,7 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
-pub use films::{Film, FilmClosed, FilmError};
+pub use films::{Film, FilmClosed, FilmEnds, FilmError, FilmReport};
 pub use hydrodynamics::{Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};

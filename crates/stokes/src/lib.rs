@@ -42,7 +42,7 @@ mod surface;
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{
     Conditions, Field, Flow, FlowParams, FlowSolver, Given, GivenOf, NodalFields, PhaseTimes, Prepared,
-    Refinement, Stress, WarmStartError,
+    RaisedPenalties, Refinement, Stress, WarmStartError,
 };
 // Near bodies and the films between them.
 pub use film::{Film, FilmForce, Heights, Lubrication, Partner, films, thin_films};

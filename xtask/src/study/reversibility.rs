@@ -1,5 +1,6 @@
 //! Particles that do not come back in an oscillating shear.
 
+use gluey::Tally;
 use std::f64::consts::PI;
 
 use super::drawing::{Series, draw};
@@ -112,8 +113,10 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
             let smallest = run.report.min_gap_over_a.map_or(String::new(), |gap| format!("{gap:.1e}"));
             let numbers =
                 [format!("{}", run.point.at), format!("{share:.3}"), format!("{distance:.2e}"), smallest];
+            let Tally { closed_films, halved_steps, .. } = run.report.tally;
+            let counts = [closed_films, halved_steps].map(|count| count.to_string());
             let model = run.point.model.replace(',', "");
-            rows.push([dimension.to_string(), model].into_iter().chain(numbers).collect());
+            rows.push([dimension.to_string(), model].into_iter().chain(numbers).chain(counts).collect());
             if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
                 shares[place].points.push((run.point.at, share, 0.0));
                 distances[place].points.push((run.point.at, distance, 0.0));
@@ -126,7 +129,16 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         drawings.push((names[0], draw(x, &format!("share of {of} away"), false, &shares, Vec::new())));
         drawings.push((names[1], draw(x, "displacement in a cycle / *a*", true, &distances, Vec::new())));
     }
-    let columns = vec!["dimension", "model", "amplitude", "share_away", "rms_over_a", "min_gap_over_a"];
+    let columns = vec![
+        "dimension",
+        "model",
+        "amplitude",
+        "share_away",
+        "rms_over_a",
+        "min_gap_over_a",
+        "closed_films",
+        "halved_steps",
+    ];
     Ok(Findings { columns, rows, drawings, remarks: Vec::new() })
 }
 

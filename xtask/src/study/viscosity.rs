@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use gluey::Tally;
 use gluey_suspension::statistics::{Estimate, mser};
 use gluey_verify::literature::viscosity_of_spheres;
 
@@ -106,7 +107,8 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         let resolved = if eta.is_resolved { "yes" } else { "no" };
         let numbers = [run.point.at, begin, eta.mean, eta.half_width, contacts.mean];
         let numbers = numbers.into_iter().chain([n1.mean, n1.half_width, n2.mean, n2.half_width]).map(shown);
-        let ends = [resolved.to_owned(), smallest];
+        let Tally { closed_films, halved_steps, .. } = run.report.tally;
+        let ends = [resolved.to_owned(), smallest, closed_films.to_string(), halved_steps.to_string()];
         rows.push([run.point.model.to_owned()].into_iter().chain(numbers).chain(ends).collect());
         if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
             let (viscosities, firsts, seconds) = &mut by_model[place];
@@ -138,6 +140,8 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         "N2_half_width",
         "blocks_independent",
         "min_gap_over_a",
+        "closed_films",
+        "halved_steps",
     ];
     Ok(Findings {
         columns,

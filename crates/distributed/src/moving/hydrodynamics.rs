@@ -138,6 +138,9 @@ where
             solve_count: flow.solve_count,
             iteration_count: flow.iterations,
             residual: flow.relative_residual,
+            penalties_doubled: flow.raised_penalties.doubled,
+            cells_raised: flow.raised_penalties.cells,
+            solved_again: flow.raised_penalties.solved_again,
             phases: vec![("shared flow", start.elapsed().as_secs_f64())],
         };
         self.last = Some(flow);

@@ -275,6 +275,8 @@ where
         let wrenches = told.wrenches.iter().map(|wrench| *wrench * rate.recip()).collect();
         let mut both = self.sheared(&Told { wrenches, with_stress: true, ..told.clone() }, solve)?;
         both.solve_count += flow.solve_count + pushed.solve_count;
+        both.raised_penalties += flow.raised_penalties;
+        both.raised_penalties += pushed.raised_penalties;
         both.iterations += flow.iterations + pushed.iterations;
         Ok((both, rate))
     }

@@ -22,8 +22,8 @@ use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
 use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
-    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
-    StokesSystem, Stress,
+    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, RaisedPenalties,
+    StokesError, StokesSystem, Stress,
 };
 use rustc_hash::FxHashMap;
 
@@ -204,26 +204,29 @@ where
         mut method: PartMethod,
         mut before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
-        let (ranks, mut rounds, mut wasted) = (self.shared.ranks, 0, 0);
+        let (ranks, mut raised, mut wasted) = (self.shared.ranks, RaisedPenalties::default(), 0);
         loop {
             let problem = agreed(ranks, self.problem(tree, &method))?;
             let smoother = self.named(AssembledSmoother::new(&problem));
             if let Some(stiffer) = self.stiffened(&method, &smoother) {
                 method = stiffer;
+                raised.doubled += 1;
                 continue;
             }
             let smoother = agreed(ranks, smoother)?;
             let attempt = self.attempt(tree, levels, (&problem, smoother), before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
-                return self.finished((tree, &problem), attempt, [rounds, wasted], before);
+                return self.finished((tree, &problem), attempt, (raised, wasted), before);
             };
+            let rounds = raised.solved_again;
             if rounds == MOST_ROUNDS {
                 attempt.report.map_err(FlowError::Krylov)?;
                 let (body, share) = (body as usize, f64::from_bits(share));
                 return Err(FlowError::WeakSurface { body, share, rounds });
             }
-            rounds += 1;
+            raised.cells += weak.len();
+            raised.solved_again += 1;
             wasted += attempt.report.as_ref().map_or(0, |report| report.iterations);
             method = method.raised(self.found(tree, &weak).into_iter());
             levels = attempt.levels;
@@ -446,7 +449,7 @@ where
         &self,
         (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
         attempt: Attempt<'a, D>,
-        [rounds, wasted]: [usize; 2],
+        (raised_penalties, wasted): (RaisedPenalties, usize),
         before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let Attempt { space, velocity, pressure, deviation, sizes, report, .. } = attempt;
@@ -466,7 +469,8 @@ where
             twists: self.twists_of_all(problem, &space, &velocity),
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
-            solve_count: rounds + 1,
+            solve_count: raised_penalties.solved_again + 1,
+            raised_penalties,
             iterations: wasted + report.iterations,
             relative_residual: report.residual_norm / reference,
             wrenches: attempt.wrenches,

@@ -1,6 +1,6 @@
 //! What each step cost, as comma-separated values: a row per step, beside the trajectory.
 //!
-//! The columns up to `contact_iterations` are the same on every run of a case. The rest are seconds of wall
+//! The columns up to `cells_raised` are the same on every run of a case. The rest are seconds of wall
 //! time since the row before, phase by phase; `output_s` is that of the step's own rows and frames. A resumed
 //! run keeps the seconds of rows that an earlier one had written.
 
@@ -13,10 +13,12 @@ use gluey_motion::FlowStatistics;
 use super::draft::{Draft, Mark, RowsError};
 use super::{OutputError, drafts};
 use crate::phases::PhaseTable;
+use crate::simulation::Motion;
 
 /// What is the same on every run.
 const FACTS: &str = "step,t,strain,cells,unknowns,solves,iterations,residual,\
-     contact_pairs,active_contacts,contact_iterations";
+     contact_pairs,active_contacts,contact_iterations,parts,closed_films,film_push_over_radius,\
+     penalties_doubled,cells_raised";
 
 /// Phases of a step, as [`PhaseTable`] names them, and the columns of their seconds.
 pub const PHASES: [(&str, &str); 7] = [
@@ -42,6 +44,8 @@ pub struct SolverRow<'a> {
     pub flow: &'a FlowStatistics,
     /// The correction for contact.
     pub contact: &'a ContactReport,
+    /// How the particles were moved.
+    pub motion: &'a Motion,
     /// Wall time since the run began, this step's included.
     pub phases: &'a PhaseTable,
 }
@@ -114,12 +118,15 @@ pub fn solver_log_path(csv: &Path) -> PathBuf {
 
 /// What is the same on every run, with the comma behind it.
 fn facts(row: &SolverRow<'_>) -> String {
-    let SolverRow { step, time, strain, flow, contact, .. } = row;
+    let SolverRow { step, time, strain, flow, contact, motion, .. } = row;
     let FlowStatistics { cell_count, dof_count, solve_count, iteration_count, residual, .. } = flow;
+    let FlowStatistics { penalties_doubled, cells_raised, .. } = flow;
     let ContactReport { pair_count, active_count, iterations, .. } = contact;
+    let Motion { parts, closed_films, film_push, .. } = motion;
     format!(
         "{step},{time:.16e},{strain:.16e},{cell_count},{dof_count},{solve_count},{iteration_count},\
-         {residual:.3e},{pair_count},{active_count},{iterations},"
+         {residual:.3e},{pair_count},{active_count},{iterations},{parts},{closed_films},{film_push:.3e},\
+         {penalties_doubled},{cells_raised},"
     )
 }
 
@@ -146,7 +153,8 @@ mod tests {
         for step in 0..2 {
             phases.add("solve", 1.5 + step as f64);
             let (time, strain) = (step as f64, 0.0);
-            let row = SolverRow { step, time, strain, flow: &flow, contact: &contact, phases: &phases };
+            let (flow, contact, motion) = (&flow, &contact, &Motion { parts: 2, ..Motion::default() });
+            let row = SolverRow { step, time, strain, flow, contact, motion, phases: &phases };
             log.write(&row).expect("a row");
         }
         log.finish().expect("complete");
@@ -154,6 +162,7 @@ mod tests {
         let table = crate::table::Table::parse(&text).expect("a table");
         assert_eq!(table.column("solve_s"), Ok(&[1.5, 2.5][..]));
         assert_eq!(table.column("iterations"), Ok(&[9.0, 9.0][..]));
+        assert_eq!(table.column("parts"), Ok(&[2.0, 2.0][..]));
         assert_eq!(table.column("output_s"), Ok(&[0.0, 0.0][..]));
     }
 }

@@ -18,6 +18,7 @@ where
 {
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    simulation = simulation.halving(case.time.halvings);
     if case.has_forces() {
         simulation = simulation.under_forces();
     }

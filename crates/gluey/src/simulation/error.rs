@@ -40,12 +40,14 @@ pub enum StepError<E: std::error::Error + 'static> {
         source: ContactError,
     },
     /// A film could not be kept open.
-    #[error("motion failed in step {step} (t = {})", shown(*time))]
+    #[error("motion failed in step {step} (t = {}), also with a time step of {}", shown(*time), shown(*length))]
     Film {
         /// Steps done before.
         step: usize,
-        /// Time at the start of the step.
+        /// Time at the start of the step, or of the part of it.
         time: f64,
+        /// The time step, the smallest that was tried.
+        length: f64,
         /// Why.
         source: FilmError,
     },
@@ -68,7 +70,7 @@ impl<E: std::error::Error + 'static> StepError<E> {
             Self::Flow { step, time, source } => StepError::Flow { step, time, source: source.into() },
             Self::Forces { step, time, source } => StepError::Forces { step, time, source },
             Self::Contact { step, time, source } => StepError::Contact { step, time, source },
-            Self::Film { step, time, source } => StepError::Film { step, time, source },
+            Self::Film { step, time, length, source } => StepError::Film { step, time, length, source },
             Self::NotFinite { particle, step, time } => StepError::NotFinite { particle, step, time },
         }
     }

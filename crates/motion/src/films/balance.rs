@@ -27,9 +27,10 @@ use super::step::Step;
 const TOLERANCE: f64 = 1e-10;
 /// ... or as near as this share of the thinnest film.
 const LEAST: f64 = 1e-2;
-/// Linearisations of the gaps at most. Steps in which particles move far around each other would take more:
-/// what is left then are gaps wider than they should be.
-const MOST_PASSES: usize = 20;
+/// After the last linearisation a gap may be off by this share of itself, and by that of the thinnest film.
+const ACCEPTED: f64 = 1e-6;
+/// Linearisations of the gaps at most. Steps in which particles move far around each other would take more.
+const MOST_PASSES: usize = 50;
 /// Newton steps of one of them at most. A linear problem takes one to ten.
 const MOST_NEWTON_STEPS: usize = 100;
 /// Iterations of a Newton step at most; what is left then is left to the next.
@@ -63,6 +64,8 @@ struct Balance<'a, const D: usize> {
     /// `L`.
     loads: Vec<f64>,
     state: State,
+    /// Newton steps so far.
+    corrections: usize,
 }
 
 /// What loads lead to.
@@ -90,10 +93,9 @@ where
 {
     let free = twists.to_vec();
     let mut balance = Balance::new(step, wanted);
-    let mut history = Vec::new();
     for pass in 0..MOST_PASSES {
         balance.linearise(step, &free, (pass > 0).then_some(&*twists));
-        let is_solved = balance.solve(&mut history);
+        let is_solved = balance.solve();
         for ((twist, free), moved) in twists.iter_mut().zip(&free).zip(balance.displacements(&balance.loads))
         {
             twist.velocity = free.velocity + moved / step.weight;
@@ -101,13 +103,14 @@ where
         if !is_solved {
             break;
         }
-        let off = balance.farthest(|k| step.gap_after(wanted[k].0, twists) - balance.state.gaps[k]);
-        if off <= 2.0 * TOLERANCE || pass + 1 == MOST_PASSES {
+        let off = |k: usize| step.gap_after(wanted[k].0, twists) - balance.state.gaps[k];
+        let allowed = |k: usize| ACCEPTED * balance.state.gaps[k] + LEAST * wanted[k].0.thinnest();
+        let is_accepted = pass + 1 == MOST_PASSES && (0..wanted.len()).all(|k| off(k).abs() <= allowed(k));
+        if is_accepted || balance.farthest(off) <= 2.0 * TOLERANCE {
             return Ok(balance.impulses());
         }
-        history.push(off);
     }
-    Err(balance.failure(step, twists, history))
+    Err(balance.failure(step, twists))
 }
 
 impl<'a, const D: usize> Balance<'a, D>
@@ -126,7 +129,8 @@ where
         }
         let (zeros, normals) = (vec![0.0; wanted.len()], Vec::with_capacity(wanted.len()));
         let state = State { gaps: wanted.iter().map(|(film, _)| film.gap).collect(), ..State::default() };
-        Self { wanted, ends, mobilities, normals, free_gaps: zeros.clone(), loads: zeros, state }
+        let (free_gaps, loads) = (zeros.clone(), zeros);
+        Self { wanted, ends, mobilities, normals, free_gaps, loads, state, corrections: 0 }
     }
 
     /// Linearises about the bodies where these velocities take them, or where they are now: the gap after
@@ -143,15 +147,27 @@ where
         }
     }
 
-    /// Why there is no balance.
-    fn failure(&self, step: &Step<'_, D>, twists: &[Twist<D>], history: Vec<f64>) -> FilmError {
-        let left = |film: &Film<D>| step.gap_after(film, twists);
-        let films = self.wanted.iter().map(|(film, _)| *film);
-        let closed = films.min_by(|a, b| left(a).total_cmp(&left(b))).filter(|film| left(film) <= 0.0);
-        closed.map_or(FilmError::NotBalanced { history }, |film| {
-            let Film { first, second, gap, .. } = *film;
-            FilmError::Closed(FilmClosed { first, second, gap, left: left(film), is_given: false })
-        })
+    /// Why there is no balance: a film that is closed, or the one that is farthest off.
+    fn failure(&self, step: &Step<'_, D>, twists: &[Twist<D>]) -> FilmError {
+        let left = |k: usize| step.gap_after(self.wanted[k].0, twists);
+        let off =
+            |k: usize| (left(k) - self.state.gaps[k]).abs().max(self.state.excess[k].abs()) / self.unit(k);
+        let most = |of: &dyn Fn(usize) -> f64| {
+            let films = 0..self.wanted.len();
+            films.max_by(|&a, &b| of(a).total_cmp(&of(b))).expect("without films there is balance")
+        };
+        let (thinnest, farthest) = (most(&|k| -left(k)), most(&off));
+        let told = |k: usize| {
+            let film = self.wanted[k].0;
+            let radius = step.particles[film.first].radius;
+            (step.ends(film), [film.gap, left(k), self.state.gaps[k]].map(|gap| gap / radius))
+        };
+        if left(thinnest) <= 0.0 {
+            let (ends, [gap, left, _]) = told(thinnest);
+            return FilmError::Closed(FilmClosed { ends, gap, left, is_given: false });
+        }
+        let (ends, [gap, left, wanted]) = told(farthest);
+        FilmError::NotBalanced { ends, gap, left, wanted, corrections: self.corrections }
     }
 }
 
@@ -207,7 +223,7 @@ impl<const D: usize> Balance<'_, D> {
     }
 
     /// Newton's method for the loads; whether it came to an end.
-    fn solve(&mut self, history: &mut Vec<f64>) -> bool {
+    fn solve(&mut self) -> bool {
         self.state = self.state(&self.loads);
         let [least, most] = SOFTENINGS;
         let mut softening = least;
@@ -216,7 +232,7 @@ impl<const D: usize> Balance<'_, D> {
             if off <= TOLERANCE {
                 return true;
             }
-            history.push(off);
+            self.corrections += 1;
             let step = self.newton_step(softening);
             softening = match self.go_along(&step) {
                 ..SHORT => (softening * HARDENING).min(most),

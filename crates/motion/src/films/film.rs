@@ -56,6 +56,11 @@ impl<const D: usize> Film<D> {
         THINNEST * self.curvature_radius
     }
 
+    /// Whether it is thinner than positions resolve: its gap is no measurement then.
+    pub(super) fn is_closed(&self) -> bool {
+        self.gap <= self.thinnest()
+    }
+
     pub(super) fn reach_of_correction(&self) -> f64 {
         REACH * self.curvature_radius
     }

@@ -26,7 +26,7 @@ mod film;
 mod opening;
 mod step;
 
-pub use error::{FilmClosed, FilmError};
+pub use error::{FilmClosed, FilmEnds, FilmError};
 pub use film::Film;
 use opening::open;
 pub(crate) use step::Step;
@@ -35,11 +35,24 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+/// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii beyond
+/// what the flow closes, so that no two can meet that were not known to be near.
+const MOST_PUSHED: f64 = 1.0;
+
 /// The forces in films at the last step.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(crate) struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
+
+/// What films did in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FilmReport {
+    /// Films that are closed before the step: their gaps, 0.5e-9 to 1e-9 `A`, are a floor and no measurement.
+    pub closed_count: usize,
+    /// How far they move a particle from where the flow alone takes it, at most, in radii.
+    pub largest_push: f64,
+}
 
 /// The force `F` in a film and its impulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,11 +76,6 @@ where
         self.0.iter_mut().for_each(|film| film.force = -film.force);
     }
 
-    /// Forgets.
-    pub fn clear(&mut self) {
-        self.0.clear();
-    }
-
     /// Corrects `twists` so that films have the gaps that their impulses give, and remembers the forces.
     ///
     /// # Errors
@@ -77,7 +85,8 @@ where
         step: &Step<'_, D>,
         films: &[Film<D>],
         twists: &mut [Twist<D>],
-    ) -> Result<(), FilmError> {
+    ) -> Result<FilmReport, FilmError> {
+        let free = twists.to_vec();
         let (mut impulses, mut memory) = (Vec::with_capacity(films.len()), Vec::with_capacity(films.len()));
         for film in films {
             let Film { first, second, branch, .. } = *film;
@@ -99,8 +108,13 @@ where
         }
         open(step, films, &mut impulses, twists)?;
         memory.iter_mut().zip(impulses).for_each(|(film, impulse)| film.impulse = impulse);
+        let (particle, largest_push) = step.largest_push(&free, twists);
+        if largest_push > MOST_PUSHED {
+            return Err(FilmError::Pushed { particle, pushed: largest_push });
+        }
         self.0 = memory;
-        Ok(())
+        let closed_count = films.iter().filter(|film| film.is_closed()).count();
+        Ok(FilmReport { closed_count, largest_push })
     }
 
     /// What is remembered of a film, which is one of these.

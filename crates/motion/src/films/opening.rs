@@ -47,23 +47,20 @@ where
         }
     };
     found.for_each(|(k, impulse)| impulses[k] = impulse);
-    let mut given = films.iter().filter(|film| film.is_given());
-    Ok(given.try_for_each(|film| check_given(step, film, twists))?)
+    films.iter().try_for_each(|film| check(step, film, twists))?;
+    Ok(())
 }
 
-/// Refuses given motions that close a film by more than rounding.
-fn check_given<const D: usize>(
-    step: &Step<'_, D>,
-    film: &Film<D>,
-    twists: &[Twist<D>],
-) -> Result<(), FilmClosed>
+/// Refuses what closes a film by more than rounding, such as given motions.
+fn check<const D: usize>(step: &Step<'_, D>, film: &Film<D>, twists: &[Twist<D>]) -> Result<(), FilmClosed>
 where
     Dim<D>: Space<D>,
 {
     let left = step.gap_after(film, twists);
-    let Film { first, second, gap, .. } = *film;
-    match left < -film.thinnest() {
-        true => Err(FilmClosed { first, second, gap, left, is_given: true }),
-        false => Ok(()),
+    if left >= -film.thinnest() {
+        return Ok(());
     }
+    let radius = step.particles[film.first].radius;
+    let (gap, left) = (film.gap / radius, left / radius);
+    Err(FilmClosed { ends: step.ends(film), gap, left, is_given: film.is_given() })
 }

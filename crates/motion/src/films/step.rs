@@ -2,6 +2,7 @@
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 
+use super::error::FilmEnds;
 use super::film::{Film, memory_reach};
 
 /// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
@@ -55,6 +56,26 @@ where
     fn shift(&self, k: usize, twists: &[Twist<D>]) -> Vector<D> {
         let old = self.history.get(k).map_or(Vector::zeros(), |twist| twist.velocity);
         twists[k].velocity * self.weight + old * self.history_weight
+    }
+
+    /// The particle that one choice of velocities takes farthest from where another does, and how far, in its
+    /// radii.
+    pub fn largest_push(&self, free: &[Twist<D>], twists: &[Twist<D>]) -> (usize, f64) {
+        let push = |k: usize| {
+            let moved = (twists[k].velocity - free[k].velocity) * self.weight;
+            (k, moved.norm() / self.particles[k].radius)
+        };
+        (0..twists.len()).map(push).fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
+    }
+
+    /// What a film is between.
+    pub fn ends(&self, film: &Film<D>) -> FilmEnds {
+        let Film { first, second, branch, .. } = *film;
+        let position = |k: usize| self.particles[k].pose.position;
+        // Images are a period away, which is more than a diameter or so.
+        let is_away =
+            |second| (position(second) - position(first) - branch).norm() > self.particles[first].radius;
+        FilmEnds { first, second, is_image: second.is_some_and(is_away) }
     }
 
     /// From the centre of the first particle of a film to its partner, or to the wall, after the step.

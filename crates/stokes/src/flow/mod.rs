@@ -28,6 +28,7 @@ pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
 pub use refinement::Refinement;
 pub use stress::Stress;
+pub use trusted::RaisedPenalties;
 pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 
@@ -142,6 +143,7 @@ where
     /// The last mesh, which the next one is often equal to.
     discretisation: Option<Discretisation<D>>,
     warm_start: Option<WarmStart<D>>,
+    raised_penalties: RaisedPenalties,
 }
 
 /// Effort of the solves of one prediction.
@@ -176,7 +178,14 @@ where
         check(&params)?;
         let method = params.formulation.method()?;
         let solvers = [(); 2].map(|()| params.solver.solver());
-        Ok(Self { params, solvers, method, discretisation: None, warm_start: None })
+        Ok(Self {
+            params,
+            solvers,
+            method,
+            discretisation: None,
+            warm_start: None,
+            raised_penalties: RaisedPenalties::default(),
+        })
     }
 
     /// Flow on `mesh` around `bodies` with the velocity `boundary(x)` on the outer boundary; the same

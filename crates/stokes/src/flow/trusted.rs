@@ -1,6 +1,7 @@
 //! Flows whose penalties are large enough: where the smoother or the flow shows that they are not, the
 //! problem is set up again with larger ones.
 
+use std::ops::AddAssign;
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
@@ -13,6 +14,25 @@ use crate::formulation::{Method, Problem};
 
 /// How often penalties are raised for one flow, at most.
 const MOST_ROUNDS: usize = 6;
+
+/// How penalties were changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RaisedPenalties {
+    /// How often those of all cells at surfaces were doubled, for smoothers that need it.
+    pub doubled: usize,
+    /// Cells in which they were raised, because flows took too little notice of their surfaces.
+    pub cells: usize,
+    /// Flows that were solved again for that.
+    pub solved_again: usize,
+}
+
+impl AddAssign for RaisedPenalties {
+    fn add_assign(&mut self, other: Self) {
+        self.doubled += other.doubled;
+        self.cells += other.cells;
+        self.solved_again += other.solved_again;
+    }
+}
 
 /// A flow whose penalties are large enough, and the reduced vector it belongs to.
 pub(super) struct Trusted<const D: usize>
@@ -29,6 +49,11 @@ impl<const D: usize> FlowSolver<D>
 where
     Dim<D>: Space<D>,
 {
+    /// How penalties were changed since this was asked last.
+    pub fn take_raised_penalties(&mut self) -> RaisedPenalties {
+        std::mem::take(&mut self.raised_penalties)
+    }
+
     /// Prepares the solver for a problem; where the smoother finds a penalty too small, for one with larger
     /// penalties instead. Whether it did so is told.
     ///
@@ -46,6 +71,7 @@ where
                 other => return other.map(|_| is_stiffened),
             };
             *method = method.stiffened().ok_or(error)?;
+            self.raised_penalties.doubled += 1;
             self.rebuild(problem, method.as_ref())?;
             is_stiffened = true;
         }
@@ -98,6 +124,8 @@ where
                 wasted.iteration_count += flow.iteration_count;
             }
             *method = raised.ok_or_else(|| solved.err().unwrap_or(error))?;
+            self.raised_penalties.cells += weak.len();
+            self.raised_penalties.solved_again += 1;
             self.rebuild(problem, method.as_ref())?;
             self.prepare(problem, method)?;
         }

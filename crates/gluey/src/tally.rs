@@ -1,0 +1,106 @@
+//! What is counted over a run, so that nothing that was helped over goes unseen.
+
+use std::fmt;
+
+use gluey_motion::FlowStatistics;
+use serde::{Deserialize, Serialize};
+
+use crate::simulation::Motion;
+
+/// Films that move no particle by more than this, in its radii, are nothing to be told of at the end of a run.
+const SMALL_PUSH: f64 = 0.01;
+
+/// Steps that were halved, films that closed, penalties that were changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Tally {
+    /// Steps that were done in parts, because films could not be kept open in the whole.
+    pub halved_steps: usize,
+    /// The shortest part, as a share of a step; 1 where none was halved, 0 before any.
+    pub shortest_part: f64,
+    /// Most films that were closed at once: their gaps of 0.5e-9 to 1e-9 radii are a floor and no measurement.
+    pub closed_films: usize,
+    /// Rows with closed films.
+    pub rows_with_closed_films: usize,
+    /// How far films moved a particle in a step from where the flow alone would have taken it, at most, in its
+    /// radii.
+    pub film_push: f64,
+    /// How often the penalties of all cells at surfaces were doubled.
+    pub penalties_doubled: usize,
+    /// Cells at surfaces whose penalties were raised, step by step.
+    pub cells_raised: usize,
+    /// Flows that were solved again for that.
+    pub flows_solved_again: usize,
+}
+
+impl Tally {
+    /// Adds a step.
+    pub(crate) fn add(&mut self, motion: &Motion, flow: &FlowStatistics) {
+        self.halved_steps += usize::from(motion.parts > 1);
+        if motion.parts > 0 {
+            let before = if self.shortest_part > 0.0 { self.shortest_part } else { 1.0 };
+            self.shortest_part = before.min(motion.shortest);
+        }
+        self.closed_films = self.closed_films.max(motion.closed_films);
+        self.rows_with_closed_films += usize::from(motion.closed_films > 0);
+        self.film_push = self.film_push.max(motion.film_push);
+        self.penalties_doubled += flow.penalties_doubled;
+        self.cells_raised += flow.cells_raised;
+        self.flows_solved_again += flow.solved_again;
+    }
+
+    /// Whether any penalty was changed.
+    pub(crate) fn has_changed_penalties(&self) -> bool {
+        self.penalties_doubled + self.cells_raised > 0
+    }
+}
+
+/// A line for each that there was.
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { halved_steps, closed_films, rows_with_closed_films, film_push, .. } = self;
+        if *halved_steps > 0 {
+            writeln!(
+                f,
+                "  steps done in parts: {halved_steps}, the shortest part 1/{} of a step",
+                self.shortest_part.recip()
+            )?;
+        }
+        if *closed_films > 0 {
+            writeln!(
+                f,
+                "  closed films: {closed_films} at most, in {rows_with_closed_films} rows; their gaps are a floor"
+            )?;
+        }
+        if *film_push > SMALL_PUSH {
+            writeln!(f, "  farthest that films moved a particle in a step: {film_push:.2e} radii")?;
+        }
+        if self.has_changed_penalties() {
+            let Self { penalties_doubled, cells_raised, flows_solved_again, .. } = self;
+            writeln!(
+                f,
+                "  penalties: doubled {penalties_doubled} times, raised in {cells_raised} cells; \
+                 {flows_solved_again} flows solved again"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_happened_is_told_and_no_more() {
+        let mut tally = Tally::default();
+        let whole = Motion { parts: 1, shortest: 1.0, ..Motion::default() };
+        tally.add(&whole, &FlowStatistics::default());
+        assert_eq!((tally.shortest_part, tally.to_string().as_str()), (1.0, ""));
+        let halved = Motion { parts: 3, shortest: 0.25, closed_films: 2, film_push: 0.5, refused: None };
+        tally.add(&halved, &FlowStatistics { cells_raised: 4, solved_again: 1, ..FlowStatistics::default() });
+        let told = tally.to_string();
+        assert!(told.contains("in parts: 1, the shortest part 1/4") && told.contains("2 at most, in 1 rows"));
+        assert!(told.contains("5.00e-1 radii") && told.contains("in 4 cells; 1 flows"), "{told}");
+    }
+}
