@@ -111,7 +111,8 @@ fn open_films(
     };
     let films: Vec<Film<2>> =
         gluey_stokes::films(discs, &Aabb::unit(), reach).into_iter().map(film).collect();
-    Ok(integrator.open_films(step, particles, &films, twists)?)
+    integrator.open_films(step, particles, &films, twists)?;
+    Ok(())
 }
 
 /// Sine of the angle from one line to another.
