@@ -1,7 +1,8 @@
 //! Particles that do not come back in an oscillating shear.
 
-use gluey::Tally;
 use std::f64::consts::PI;
+
+use gluey::Tally;
 
 use super::drawing::{Series, draw};
 use super::point::{Done, Point, PointError};
