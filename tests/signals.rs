@@ -1,5 +1,6 @@
-//! Runs that are asked to stop, once, twice or by `kill -9`, at any moment: no row and no checkpoint is lost,
-//! `gluey info` tells what is there, and what is gone on with ends with the bits of a run that nobody stopped.
+//! Runs that are asked to stop, once, twice or by `kill -9`, at any moment: no row and no checkpoint is
+//! lost, `gluey info` tells what is there, and what is gone on with ends with the bits of a run that nobody
+//! stopped.
 #![cfg(unix)]
 
 mod program;

@@ -183,7 +183,6 @@ where
         let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
         drafts.extend(solver_log::earlier_drafts(&options.csv)?);
         drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
-        let ranks = others.map_or(0, Others::rank_count);
         let file = CheckpointFile::new(options, !drafts.is_empty());
         let (csv, tables, solver) = match &options.resume {
             None => {
@@ -197,7 +196,7 @@ where
                 (csv, Tables::create::<D>(case, &options.csv)?, SolverLog::create(&options.csv)?)
             }
             Some(path) => {
-                let checkpoint = Checkpoint::read(case, path)?.on(ranks);
+                let checkpoint = Checkpoint::read(case, path)?.on(others.map_or(0, Others::rank_count));
                 (wall_before_s, tally) = (checkpoint.wall_s, checkpoint.tally);
                 let Checkpoint { rheology, forces, .. } = checkpoint.clone();
                 let tables = Tables::resume(&options.csv, &TableMarks { rheology, forces })?;
@@ -208,22 +207,11 @@ where
         };
         let first_step = simulation.step_index();
         let frames = Frames::create(case, options, first_step, others)?;
-        let saved = file.as_ref().filter(|file| file.is_own()).map(|_| first_step);
-        let last = Arc::new(Mutex::new(LastStep {
-            case: case.clone(),
-            paths: ResultPaths::of_csv(&options.csv),
-            file,
-            recorder: Recorder::begin(case, options, first_step, csv.path())?,
-            frames: frames.on_their_way(),
-            checkpoint: None,
-            saved,
-            is_ending: false,
-        }));
+        let recorder = Recorder::begin(case, options, first_step, csv.path())?;
+        let last = LastStep::before(case, options, (file, recorder, frames.on_their_way()), first_step);
         if let (Some(list), None) = (&options.last_steps, others) {
-            let last: Arc<dyn OfRun> = last.clone();
-            list.add(&last);
+            list.add(&(last.clone() as Arc<dyn OfRun>));
         }
-        let started = Instant::now();
         Ok(Self {
             case,
             options,
@@ -237,8 +225,8 @@ where
             frames,
             last,
             others,
-            started,
-            saved: started,
+            started: Instant::now(),
+            saved: Instant::now(),
             first_step,
             wall_before_s,
         })

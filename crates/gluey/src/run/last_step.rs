@@ -2,7 +2,7 @@
 //! thread than that of the run, which may be busy for long.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use gluey_geom::{Dim, Space};
 
@@ -11,6 +11,7 @@ use super::error::RunError;
 use super::frames::Others;
 use super::last_steps::{Ended, OfRun, locked};
 use super::log;
+use super::options::RunOptions;
 use super::paths::ResultPaths;
 use super::recorder::Recorder;
 use crate::case::Case;
@@ -25,16 +26,16 @@ pub(super) struct LastStep<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    pub case: Case,
-    pub paths: ResultPaths,
+    case: Case,
+    paths: ResultPaths,
     /// Where it is saved, if it is to be.
-    pub file: Option<CheckpointFile>,
+    file: Option<CheckpointFile>,
     pub recorder: Option<Recorder>,
-    pub frames: OnTheirWay,
+    frames: OnTheirWay,
     /// The run before the step that is being done, where there is a file for it.
     pub checkpoint: Option<Checkpoint<D>>,
     /// The step that was saved last.
-    pub saved: Option<usize>,
+    saved: Option<usize>,
     /// Whether the run comes to its end without another step.
     pub is_ending: bool,
 }
@@ -43,6 +44,19 @@ impl<const D: usize> LastStep<D>
 where
     Dim<D>: Space<D>,
 {
+    /// That of a run that goes on after `step` steps, before it keeps any.
+    pub fn before(
+        case: &Case,
+        options: &RunOptions,
+        (file, recorder, frames): (Option<CheckpointFile>, Option<Recorder>, OnTheirWay),
+        step: usize,
+    ) -> Arc<Mutex<Self>> {
+        let saved = file.as_ref().filter(|file| file.is_own()).map(|_| step);
+        let (case, paths) = (case.clone(), ResultPaths::of_csv(&options.csv));
+        let (checkpoint, is_ending) = (None, false);
+        Arc::new(Mutex::new(Self { case, paths, file, recorder, frames, checkpoint, saved, is_ending }))
+    }
+
     /// Steps done at the last whole step, where it is kept.
     pub fn step(&self) -> Option<usize> {
         self.checkpoint.as_ref().map(|checkpoint| checkpoint.state.step)

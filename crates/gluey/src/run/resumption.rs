@@ -79,8 +79,8 @@ impl Resumption {
         Self::find_to_prolong(folder, name, previous)?.to_end_at(0)
     }
 
-    /// The same, but for runs that are complete, too: [`Resumption::to_end_at`] tells whether anything is left
-    /// to do.
+    /// The same, but for runs that are complete, too: [`Resumption::to_end_at`] tells whether anything is
+    /// left to do.
     ///
     /// # Errors
     /// [`ResumeError`] if there is no such run or checkpoint.
