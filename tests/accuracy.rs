@@ -63,8 +63,8 @@ fn spheres_approach_at_these_speeds_by_default() {
         (Unfitted, 1.0, -5e-4, 5e-4),
         (Unfitted, 0.2, -0.01, 0.02),
         (Unfitted, 0.05, -0.04, 0.01),
-        (Unfitted, 1e-3, -0.03, 0.005),
-        (Unfitted, 1e-4, -0.03, 0.005),
+        (Unfitted, 1e-3, -0.005, 0.005),
+        (Unfitted, 1e-4, -0.005, 0.005),
     ] {
         let (smallest, largest) = errors(formulation, gap);
         eprintln!("{formulation}, gap {gap}: {smallest:.5} to {largest:.5}");

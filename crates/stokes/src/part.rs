@@ -18,6 +18,7 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface;
 use crate::space::Discretisation;
 
+pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::operator::PressureForces;
 pub use crate::precondition::surface::{SharedVelocities, SurfaceSmoother};
 pub use crate::precondition::velocity::cell_lambda_max;
@@ -129,8 +130,7 @@ where
     /// # Errors
     /// [`StokesError::AtSurface`] where penalties are too small, on all parts that have the body.
     pub fn completed(self, shared: &mut dyn SharedVelocities) -> Result<SurfaceSmoother<D>, StokesError> {
-        let surfaces = self.elements.system().surfaces.as_ref().ok_or(StokesError::NotPrepared)?;
-        self.smoother.completed(&self.elements, surfaces, shared)
+        self.smoother.completed(&self.elements, shared)
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod balance;
 mod conditions;
+mod films;
 mod operator;
 mod precondition;
 mod space;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
-use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference};
+use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
 use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
@@ -36,6 +37,7 @@ use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use crate::warm_start::{Moved, WarmStart};
 use conditions::{check_count, given};
+use films::{SharedFilms, network};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
 pub use space::NearBodies;
@@ -275,8 +277,15 @@ where
         let smoother = agreed(ranks, self.named(smoother.completed(&mut reduced)))?;
         let cycle = SurfaceCycle::new(levels, smoother, reduced, system);
         let schur = self.schur(tree, system, &space)?;
-        let mut operator = SurfaceOperator::new(system, space.clone());
-        let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur);
+        let all = self.shared.bodies.balls().len();
+        let network = network(ranks, system, &self.bodies, (all, self.shared.held))?;
+        let films = || {
+            let shared = network.as_ref().map(|films| SharedFilms::new(films, &space, (&self.bodies, all)));
+            agreed(ranks, shared.transpose())
+        };
+        let [of_iterates, of_steps] = [films()?, films()?];
+        let mut operator = SurfaceOperator::new(system, space.clone(), of_iterates);
+        let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur, of_steps);
         let (lift, [whole, b]) = self.data(problem, &mut operator)?;
         let mut x = self.guess((tree, problem), &mut operator.space, &whole, before);
         drop(whole);
@@ -412,7 +421,10 @@ where
             ..GcrParams::default()
         };
         let mut gcr = Gcr::<f64, f64, f32>::with_directions(params);
-        gcr.solve(operator, preconditioner, b, x, Reference::RightHandSide)
+        let films = operator.space.parts(b)[2].len();
+        let mut square = [vector::dot(&b[..b.len() - films], &b[..b.len() - films])];
+        self.shared.ranks.sum(&mut square);
+        gcr.solve(operator, preconditioner, b, x, Reference::Norm(square[0].sqrt()))
     }
 
     /// Own cells whose penalty is too small for what was found, as in the serial solver also for a flow that

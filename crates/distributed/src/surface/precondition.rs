@@ -10,6 +10,7 @@ use gluey_linalg::{Preconditioner, vector};
 use gluey_stokes::part::{PressureForces, SharedVelocities, SurfaceSmoother};
 use gluey_stokes::{PressureSpace, StokesSystem};
 
+use super::films::SharedFilms;
 use super::space::{Reduced, SurfaceSpace};
 use crate::bodies::rigid;
 use crate::cycle::VCycle;
@@ -133,6 +134,7 @@ where
     /// Owned velocities.
     own_load: Vec<f32>,
     wide: Vec<f64>,
+    films: Option<SharedFilms<'s>>,
 }
 
 impl<'s, 'a, const D: usize> SurfaceTriangular<'s, 'a, D>
@@ -144,6 +146,7 @@ where
         space: SurfaceSpace<'a, D>,
         cycle: SurfaceCycle<'a, D>,
         schur: SchurInverse<'a, D>,
+        films: Option<SharedFilms<'s>>,
     ) -> Self {
         let [r, z] = [0, 1].map(|_| vec![0.0; space.pressure_dim()]);
         Self {
@@ -158,6 +161,7 @@ where
             space,
             cycle,
             schur,
+            films,
         }
     }
 
@@ -172,7 +176,20 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
-        let Self { system, space, cycle, schur, forces, r: rhs, z: answer, p, load, own_load, wide } = self;
+        let Self {
+            system,
+            space,
+            cycle,
+            schur,
+            forces,
+            r: rhs,
+            z: answer,
+            p,
+            load,
+            own_load,
+            wide,
+            films: network,
+        } = self;
         let ranks = space.ranks;
         let [ru, rp, rf] = space.parts(r);
         let [zu, zp, zf] = space.parts_mut(z);
@@ -195,5 +212,8 @@ where
         let twists = zu[space.level.owned_nodal_dim()..].chunks_exact_mut(rigid::<D>());
         let held = twists.zip(&space.own_bodies).filter(|(_, body)| system.space.is_held(**body as usize));
         held.for_each(|(twist, _)| twist.fill(0.0));
+        if let Some(network) = network {
+            network.apply(space, rf, z);
+        }
     }
 }

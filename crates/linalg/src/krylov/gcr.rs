@@ -143,6 +143,7 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         self.direction.resize(b.len(), S::ZERO);
         self.forget();
         let right_hand_side_norm = finite(norm::<T>(a, b), 0)?;
+        LinOp::<T>::settle(a, b, x);
         let norm = finite(true_residual(a, b, x, &mut self.residual), 0)?;
         let GcrParams { relative_tolerance, absolute_floor, max_iterations, .. } = self.params;
         let target = Target::new(reference, right_hand_side_norm, norm, relative_tolerance, absolute_floor);
@@ -255,6 +256,7 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
         self.coefficients.iter_mut().for_each(|c| *c *= norm);
         finite(self.coefficients.iter().map(|c| c.abs()).sum(), iterations)?;
         self.directions.add(&self.coefficients, x);
+        a.settle(b, x);
         let norm = finite(true_residual(a, b, x, &mut self.residual), iterations)?;
         if let Some(last) = self.history.last_mut() {
             *last = norm;

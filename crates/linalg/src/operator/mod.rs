@@ -14,6 +14,10 @@ pub trait LinOp<T> {
     /// Completes sums over the entries held here to sums over all entries, where vectors are shared by ranks.
     /// [`crate::Gcr`] takes all its scalar products so.
     fn complete(&self, _sums: &mut [f64]) {}
+
+    /// Changes an iterate for the right-hand side `b` so that equations hold exactly that are wanted to. Every
+    /// iterate whose true residual [`crate::Gcr`] computes went through it.
+    fn settle(&mut self, _b: &[T], _x: &mut [T]) {}
 }
 
 /// An approximate inverse `M^-1` of an operator.
@@ -54,6 +58,10 @@ impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
 
     fn complete(&self, sums: &mut [f64]) {
         (**self).complete(sums);
+    }
+
+    fn settle(&mut self, b: &[T], x: &mut [T]) {
+        (**self).settle(b, x);
     }
 }
 

@@ -24,6 +24,7 @@ use rayon::prelude::*;
 
 use super::deficit::Deficits;
 use super::near::{Film, Heights, Partner};
+use super::network::FilmRow;
 use super::through::FilmFlow;
 use crate::space::VelocitySpace;
 
@@ -206,6 +207,20 @@ where
     /// The entries of a row in reduced velocities; that of its own force is -1.
     pub fn row(&self, row: usize) -> &[(u32, f64)] {
         &self.rows[row]
+    }
+
+    /// The rows of relative motions of surfaces, on the twists, the first of which is entry `first` of reduced
+    /// velocities.
+    pub fn rows_of_motion(&self, first: usize) -> Vec<FilmRow> {
+        let rigid = Dim::<D>::RIGID;
+        let is_of_motion = |&row: &usize| {
+            !self.modes[row / Self::MODES][row % Self::MODES].is_flow && self.scales[row] > 0.0
+        };
+        let of_twists = |row: usize| {
+            let entries: Vec<_> = self.rows[row].iter().map(|&(k, w)| (k - first as u32, w)).collect();
+            FilmRow::new(row, rigid, &entries)
+        };
+        (0..self.dim()).filter(is_of_motion).map(of_twists).collect()
     }
 
     /// The inverses of the entries of about the Schur complement.

@@ -42,7 +42,7 @@ pub struct FlowParams {
     /// Linear solver.
     pub solver: SolverKind,
     /// Relative tolerance of a solve: Euclidean norm of the residual, relative to that of the undisturbed
-    /// flow.
+    /// flow in the rows of fluid and bodies. Rows of motions in films hold exactly.
     pub tolerance: f64,
 }
 
@@ -93,7 +93,7 @@ where
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
     pub iteration_count: usize,
-    /// Norm of the last solve's residual over that of its right-hand side.
+    /// Norm of the last solve's residual over what it is relative to, see [`StokesSystem::fluid_norm`].
     pub residual: f64,
     /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
     pub fine_operator_applications: f64,
@@ -156,9 +156,8 @@ struct Effort {
 }
 
 impl Effort {
-    /// A solve for the right-hand side `b`.
-    fn add(&mut self, report: &SolveReport, b: &[f64]) {
-        let norm = gluey_linalg::vector::norm(b);
+    fn add(&mut self, report: &SolveReport) {
+        let norm = report.reference;
         self.residual = report.residuals.last().filter(|_| norm > 0.0).map_or(0.0, |last| last / norm);
         self.solve_count += 1;
         self.iteration_count += report.iterations;
@@ -268,7 +267,7 @@ where
         let tolerance = self.params.tolerance;
         let solver = self.solver(problem);
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
-            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?, b);
+            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
             Ok(())
         };
         let data = Data { lift: &lift, b: &b };

@@ -10,10 +10,10 @@ use gluey_fem::Evaluator;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_linalg::{LinOp, Scalar, vector};
+use gluey_linalg::{DirectError, LinOp, Scalar, vector};
 
 use super::cells::cell_operator;
-use crate::film::{Film, FilmCoupling, Heights};
+use crate::film::{Film, FilmCorrection, FilmCoupling, FilmNetwork, FilmRow, Heights};
 use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
@@ -114,6 +114,41 @@ where
     /// Length of a vector: reduced velocities, then all pressure nodes, then the forces of films.
     pub fn dim(&self) -> usize {
         self.velocity_dim() + self.pressure.dim() + self.film_dim()
+    }
+
+    /// Norm of the fluid's part of a right-hand side, loads on bodies included: what residuals are small
+    /// beside. Rows of films are left out, whose scale grows as they close.
+    pub fn fluid_norm(&self, b: &[f64]) -> f64 {
+        vector::norm(&b[..b.len() - self.film_dim()])
+    }
+
+    /// The own surfaces' block for the twist of each body, row by row.
+    pub fn twist_blocks(&self) -> Vec<f64> {
+        let rigid = Dim::<D>::RIGID;
+        let mut blocks = vec![0.0; self.space.body_count() * rigid * rigid];
+        if let Some(surfaces) = &self.surfaces {
+            let own =
+                surfaces.pieces().enumerate().filter(|(_, (cell, _))| self.discretisation().is_own(*cell));
+            for (piece, (_, body)) in own {
+                surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
+            }
+        }
+        blocks
+    }
+
+    /// The rows of the films' motions, on the twists of the bodies.
+    pub fn rows_of_motion(&self) -> Vec<FilmRow> {
+        self.films.as_ref().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()))
+    }
+
+    /// The network of its films; `None` without films.
+    ///
+    /// # Errors
+    /// Those of [`FilmNetwork::new`].
+    pub fn film_network(&self) -> Result<Option<FilmNetwork>, DirectError> {
+        let rows = self.rows_of_motion();
+        let blocks = if rows.is_empty() { Vec::new() } else { self.twist_blocks() };
+        FilmNetwork::new::<D>(&blocks, self.space.held(), &rows, rows.clone())
     }
 
     /// Length of the films' part of a vector.
@@ -217,6 +252,8 @@ where
     wide: Work<f64>,
     narrow: Work<f32>,
     applications: usize,
+    /// What makes the films' rows of iterates hold.
+    films: Option<FilmCorrection<'a>>,
 }
 
 /// Workspace of the operator for vectors of `X`.
@@ -234,7 +271,13 @@ where
 {
     /// The operator of `system`.
     pub fn new(system: &'a StokesSystem<D>) -> Self {
-        Self { system, wide: Work::new(), narrow: Work::new(), applications: 0 }
+        Self { system, wide: Work::new(), narrow: Work::new(), applications: 0, films: None }
+    }
+
+    /// The same whose iterates fulfil the rows of a network of films.
+    #[must_use]
+    pub fn with_films(self, films: Option<FilmCorrection<'a>>) -> Self {
+        Self { films, ..self }
     }
 
     /// How often it was applied.
@@ -282,6 +325,14 @@ where
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
         self.wide.apply(self.system, x, y);
+    }
+
+    fn settle(&mut self, b: &[f64], x: &mut [f64]) {
+        if let Some(films) = &mut self.films {
+            let [_, _, bf] = self.system.parts(b);
+            let [u, _, g] = self.system.parts_mut(x);
+            films.apply(bf, &mut u[self.system.space.full_dim()..], g, |_| ());
+        }
     }
 }
 

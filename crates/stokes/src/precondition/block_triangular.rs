@@ -3,11 +3,13 @@
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
 
+use crate::film::FilmCorrection;
 use crate::operator::{PressureForces, StokesSystem};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 
-/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures.
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures. Then the films' rows of
+/// motions are made to hold ([`FilmCorrection`]), so that no step opens them.
 pub struct BlockTriangular<'a, const D: usize>
 where
     Dim<D>: Space<D>,
@@ -20,6 +22,7 @@ where
     pressure: Vec<f32>,
     /// `z_p`.
     answer: Vec<f32>,
+    films: Option<FilmCorrection<'a>>,
 }
 
 impl<'a, const D: usize> BlockTriangular<'a, D>
@@ -28,12 +31,11 @@ where
 {
     pub fn new(
         system: &'a StokesSystem<D>,
-        forces: &'a mut PressureForces<D>,
-        cycle: &'a mut VCycle<D>,
-        schur: &'a mut SchurInverse<D>,
+        (forces, cycle, schur): (&'a mut PressureForces<D>, &'a mut VCycle<D>, &'a mut SchurInverse<D>),
+        films: Option<FilmCorrection<'a>>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];
-        Self { system, forces, cycle, schur, pressure: zeros(), answer: zeros() }
+        Self { system, forces, cycle, schur, pressure: zeros(), answer: zeros(), films }
     }
 }
 
@@ -42,7 +44,7 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
-        let Self { system, forces, cycle, schur, pressure, answer } = self;
+        let Self { system, forces, cycle, schur, pressure, answer, films: correction } = self;
         let [ru, rp, rf] = system.parts(r);
         let [zu, zp, zf] = system.parts_mut(z);
         if let Some(films) = &system.films {
@@ -59,5 +61,8 @@ where
         system.pressure.expand(pressure);
         cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu);
         system.space.clear_held(zu);
+        if let Some(correction) = correction {
+            correction.apply(rf, &mut zu[system.space.full_dim()..], zf, |_| ());
+        }
     }
 }

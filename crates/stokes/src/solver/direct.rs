@@ -10,6 +10,7 @@ use gluey_linalg::{
 
 use super::{SaddleSolver, SolveReport};
 use crate::error::StokesError;
+use crate::film::FilmNetwork;
 use crate::formulation::Problem;
 use crate::operator::{StokesSystem, SystemOperator, assemble_stokes};
 
@@ -90,11 +91,14 @@ where
         };
         let mut consistent = b.to_vec();
         system.pressure.remove_mean(system.parts_mut(&mut consistent)[1]);
-        let mut operator = SystemOperator::new(system);
+        let films = system.film_network()?;
+        let films = films.as_ref().map(FilmNetwork::correction).transpose()?;
+        let mut operator = SystemOperator::new(system).with_films(films);
+        let reference = system.fluid_norm(&consistent);
         let mut substitution = Substitution { system, unknowns, factor, b: &mut self.b, x: &mut self.x };
         self.krylov.set_relative_tolerance(tolerance);
-        let solved =
-            self.krylov.solve(&mut operator, &mut substitution, &consistent, x, Reference::RightHandSide);
+        let goal = Reference::Norm(reference);
+        let solved = self.krylov.solve(&mut operator, &mut substitution, &consistent, x, goal);
         let residuals = self.krylov.residual_history().to_vec();
         match solved {
             Err(KrylovError::NotConverged { residual_norm, .. })
@@ -105,6 +109,7 @@ where
             iterations: residuals.len() - 1,
             fine_operator_applications: operator.applications() as f64,
             residuals,
+            reference,
         })
     }
 }

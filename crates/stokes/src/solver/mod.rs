@@ -25,6 +25,8 @@ pub struct SolveReport {
     pub fine_operator_applications: f64,
     /// Norm of the residual at the start and after each iteration; the last is the true one.
     pub residuals: Vec<f64>,
+    /// The norm that the tolerance is relative to, see [`StokesSystem::fluid_norm`].
+    pub reference: f64,
 }
 
 /// Solves `[A, -B^T; -B, 0] x = b` for reduced vectors of a [`StokesSystem`].
@@ -35,8 +37,9 @@ where
     /// Builds what depends on the system: factors, levels, preconditioners.
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError>;
 
-    /// Solves from the guess in `x` to a true residual of at most `tolerance |b|` and says what it took. The
-    /// divergences in `b` sum to zero, as those of [`StokesSystem::residual`] do.
+    /// Solves from the guess in `x` to a true residual of at most `tolerance` times [`StokesSystem::fluid_norm`] of `b` and says what it
+    /// took; rows of the films' motions hold exactly. The divergences in `b` sum to zero, as those of
+    /// [`StokesSystem::residual`] do.
     fn solve(
         &mut self,
         system: &StokesSystem<D>,

@@ -15,6 +15,7 @@ use gluey_linalg::{Gcr, GcrParams, LinOp, Preconditioner, Reference, Scalar};
 
 use super::{SaddleSolver, SolveReport};
 use crate::error::StokesError;
+use crate::film::FilmNetwork;
 use crate::formulation::Problem;
 use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
 use crate::precondition::schur::SchurInverse;
@@ -41,6 +42,7 @@ where
     cycle: Option<VCycle<D>>,
     schur: Option<SchurInverse<D>>,
     forces: Option<PressureForces<D>>,
+    films: Option<FilmNetwork>,
 }
 
 impl<const D: usize> Default for MultigridSolver<D>
@@ -56,6 +58,7 @@ where
             cycle: None,
             schur: None,
             forces: None,
+            films: None,
         }
     }
 }
@@ -91,6 +94,7 @@ where
         );
         (self.schur, self.cycle) = (Some(schur?), Some(cycle?));
         self.forces = Some(PressureForces::new(system));
+        self.films = system.film_network()?;
         // Penalties and extrapolated nodes in thin films leave large numbers that nearly cancel.
         self.noise = if system.surfaces.is_some() { f64::INFINITY } else { rounding_noise(system) };
         Ok(())
@@ -108,17 +112,21 @@ where
             return Err(StokesError::NotPrepared);
         };
         cycle.take_fine_applications();
-        let operator = &mut SystemOperator::new(system);
-        let preconditioner = &mut BlockTriangular::new(system, forces, cycle, schur);
+        let [of_iterates, of_steps] =
+            [(); 2].map(|()| self.films.as_ref().map(FilmNetwork::correction).transpose());
+        let operator = &mut SystemOperator::new(system).with_films(of_iterates?);
+        let preconditioner = &mut BlockTriangular::new(system, (forces, cycle, schur), of_steps?);
+        let goal = Goal { tolerance, reference: system.fluid_norm(b) };
         let residuals = if self.noise <= MOST_NOISE {
-            run(&mut self.single, operator, preconditioner, b, x, tolerance)?
+            run(&mut self.single, operator, preconditioner, b, x, goal)?
         } else {
-            run(&mut self.double, operator, preconditioner, b, x, tolerance)?
+            run(&mut self.double, operator, preconditioner, b, x, goal)?
         };
         Ok(SolveReport {
             iterations: residuals.len() - 1,
             fine_operator_applications: operator.applications() as f64 + cycle.take_fine_applications(),
             residuals,
+            reference: goal.reference,
         })
     }
 }
@@ -150,6 +158,13 @@ where
     VCycle::new(hierarchy, plans, correction, system.viscosity())
 }
 
+/// Where a solve stops: at this fraction of a norm.
+#[derive(Clone, Copy)]
+struct Goal {
+    tolerance: f64,
+    reference: f64,
+}
+
 /// Solves `A x = b` with steps in `S` and returns the norms of the residuals.
 fn run<S: Scalar>(
     krylov: &mut Gcr<f64, S, f32>,
@@ -157,10 +172,10 @@ fn run<S: Scalar>(
     m: &mut impl Preconditioner<S>,
     b: &[f64],
     x: &mut [f64],
-    tolerance: f64,
+    goal: Goal,
 ) -> Result<Vec<f64>, StokesError> {
-    krylov.set_relative_tolerance(tolerance);
-    krylov.solve(a, m, b, x, Reference::RightHandSide)?;
+    krylov.set_relative_tolerance(goal.tolerance);
+    krylov.solve(a, m, b, x, Reference::Norm(goal.reference))?;
     Ok(krylov.residual_history().to_vec())
 }
 

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
+mod closing;
 mod errors;
 mod exactness;
 mod examples;

@@ -79,7 +79,7 @@ where
         surfaces: &SurfaceCoupling<D>,
         shared: &mut dyn SharedVelocities,
     ) -> Result<Self, StokesError> {
-        Self::assembled(elements, surfaces)?.completed(elements, surfaces, shared)
+        Self::assembled(elements, surfaces)?.completed(elements, shared)
     }
 
     /// What of it needs no other part.
@@ -128,13 +128,12 @@ where
     pub fn completed(
         self,
         elements: &Elements<'_, D>,
-        surfaces: &SurfaceCoupling<D>,
         shared: &mut dyn SharedVelocities,
     ) -> Result<SurfaceSmoother<D>, StokesError> {
         let Self { mut operator, blocks, nodal, near } = self;
         let system = elements.system();
         // Parts that fail send all messages first, which others wait for.
-        let (mut diagonal, failure) = diagonal(elements, surfaces, nodal, shared);
+        let (mut diagonal, failure) = diagonal(elements, nodal, shared);
         let near: Vec<u32> = if system.discretisation().is_part() {
             let near = (0..near.len()).filter(|&node| near[node] && system.space.is_free(node));
             near.flat_map(|node| (node * D) as u32..((node + 1) * D) as u32).collect()
@@ -400,7 +399,6 @@ where
 /// The inverse diagonal, with blocks for the twists, and the first of these that is not positive.
 fn diagonal<const D: usize>(
     elements: &Elements<'_, D>,
-    surfaces: &SurfaceCoupling<D>,
     mut nodal: Vec<f32>,
     shared: &mut dyn SharedVelocities,
 ) -> (BlockDiagonal, Option<StokesError>)
@@ -409,11 +407,7 @@ where
 {
     let system = elements.system();
     let rigid = Dim::<D>::RIGID;
-    let mut blocks = vec![0.0; system.space.body_count() * rigid * rigid];
-    let own = surfaces.pieces().enumerate().filter(|(_, (cell, _))| system.discretisation().is_own(*cell));
-    for (piece, (_, body)) in own {
-        surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
-    }
+    let mut blocks = system.twist_blocks();
     let nodal_dim = nodal.len();
     nodal.resize(system.space.dim(), 0.0);
     shared.update(&mut nodal);
