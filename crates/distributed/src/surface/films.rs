@@ -53,7 +53,10 @@ impl<'n> SharedFilms<'n> {
         network: &'n FilmNetwork,
         space: &SurfaceSpace<'_, D>,
         (near, body_count): (&NearBodies<D>, usize),
-    ) -> Result<Self, StokesError> {
+    ) -> Result<Self, StokesError>
+    where
+        Dim<D>: Space<D>,
+    {
         Ok(Self {
             correction: network.correction()?,
             own: space.own_bodies.iter().map(|&place| near.ids[place as usize]).collect(),
@@ -63,7 +66,10 @@ impl<'n> SharedFilms<'n> {
 
     /// Changes owned velocities, twists behind nodes, and forces of own films so that the rows hold for the
     /// films' part of a right-hand side. All ranks call this.
-    pub fn apply<const D: usize>(&mut self, space: &SurfaceSpace<'_, D>, b: &[f64], x: &mut [f64]) {
+    pub fn apply<const D: usize>(&mut self, space: &SurfaceSpace<'_, D>, b: &[f64], x: &mut [f64])
+    where
+        Dim<D>: Space<D>,
+    {
         let Self { correction, own, twists } = self;
         let (ranks, n) = (space.ranks, rigid::<D>());
         let [u, _, g] = space.parts_mut(x);

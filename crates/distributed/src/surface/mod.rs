@@ -278,7 +278,7 @@ where
         let cycle = SurfaceCycle::new(levels, smoother, reduced, system);
         let schur = self.schur(tree, system, &space)?;
         let all = self.shared.bodies.balls().len();
-        let network = network(ranks, system, &self.bodies, (all, self.shared.held))?;
+        let network = agreed(ranks, network(ranks, system, &self.bodies, (all, self.shared.held)))?;
         let films = || {
             let shared = network.as_ref().map(|films| SharedFilms::new(films, &space, (&self.bodies, all)));
             agreed(ranks, shared.transpose())
