@@ -1,5 +1,5 @@
-//! Steps that are too long for a crowd are done in parts: nothing overlaps, rows stay where they are, what was
-//! done is counted, and a run that is resumed has the same bits.
+//! Steps that are too long for a crowd are done in parts: nothing overlaps, rows stay where they are, what
+//! was done is counted, and a run that is resumed has the same bits.
 
 use std::fs;
 

@@ -166,8 +166,8 @@ fn under(dimension: usize, forces: &str) -> String {
     )
 }
 
-/// Weight does work beside that of the shear, which is no viscosity: the two routes agree as they do without it.
-/// Where it does more than the shear, there is no second one.
+/// Weight does work beside that of the shear, which is no viscosity: the two routes agree as they do without
+/// it. Where it does more than the shear, there is no second one.
 #[test]
 fn the_work_of_weight_is_no_viscosity() {
     let folder = TempDir::new().expect("a folder");

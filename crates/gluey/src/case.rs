@@ -29,6 +29,7 @@ mod form;
 mod given;
 mod given_stress;
 mod idle;
+mod idle_key;
 mod key;
 mod keys;
 mod load;
@@ -52,7 +53,7 @@ pub use error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem}
 pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec, RigidDofsSpec};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
-pub use idle::IdleKey;
+pub use idle_key::IdleKey;
 pub use keys::CaseKey;
 pub use mesh::{default_cells_per_radius, default_gap_levels};
 pub use names::{
@@ -209,9 +210,9 @@ pub struct TimeSpec {
     #[serde(default = "second_order")]
     #[schemars(schema_with = "schemes")]
     pub scheme: Scheme,
-    /// A step in which films cannot be kept open, because particles move too far in it, is done in two halves,
-    /// these in halves again, and so on up to so many times: to a 256th by default. Rows stay where they are.
-    /// 0: such a step ends the run. Unit: none. Default: 8.
+    /// A step in which films cannot be kept open, because particles move too far in it, is done in two
+    /// halves, these in halves again, and so on up to so many times: to a 256th by default. Rows stay where
+    /// they are. 0: such a step ends the run. Unit: none. Default: 8.
     #[serde(default = "default_halvings")]
     #[schemars(range(max = 20))]
     pub halvings: u32,

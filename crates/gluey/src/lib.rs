@@ -64,9 +64,9 @@ pub use run::{
     recorded_runs, run,
 };
 pub use shown::shown;
-pub use simulation::{Motion, RestoreError, Simulation, SimulationState, StepError, StrainClock};
+pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
-pub use tally::Tally;
+pub use tally::{Motion, Tally};
 pub use text::NotText;
 pub use trajectory::Row;
 

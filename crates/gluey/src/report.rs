@@ -63,14 +63,13 @@ pub struct RunReport {
 }
 
 impl RunReport {
-    /// The report of a run of `case`.
+    /// The report of a run of `case`, without means of the rheology.
     pub(crate) fn of<const D: usize>(
         case: &Case,
         measures: &Measures<D>,
         (flow, tally): (&FlowStatistics, &Tally),
         wall_s: f64,
         phases: &PhaseTable,
-        rheology: Option<RheologyMeans>,
     ) -> Self {
         let (a, pair) = (measures.mean_radius(), measures.pair());
         let deviation = measures.deviation();
@@ -90,7 +89,7 @@ impl RunReport {
             reference: case.reference.clone(),
             end_gap_rel_error: deviation.and_then(|deviation| deviation.end_gap_rel_error),
             max_abs_error_over_a: deviation.map(|deviation| deviation.max_abs_error_over_a),
-            rheology,
+            rheology: None,
             tally: *tally,
             phases: phases.rows().to_vec(),
         }

@@ -268,7 +268,8 @@ where
         self.solver.finish()?;
         let rheology = tables::means_of_rheology(self.case, &self.options.csv)?;
         let counted = (self.simulation.statistics(), &self.tally);
-        Ok(RunReport::of(self.case, &self.measures, counted, wall_s, self.simulation.phases(), rheology))
+        let report = RunReport::of(self.case, &self.measures, counted, wall_s, self.simulation.phases());
+        Ok(RunReport { rheology, ..report })
     }
 
     /// All steps. A panic of this or any other thread ends them as an error does; what it left half done is
@@ -310,8 +311,8 @@ where
         Ok(())
     }
 
-    /// Counts what the step took that began then, and writes it down if it was done: the velocities at the end
-    /// of a run are those of a step that a longer run does.
+    /// Counts what the step took that began then, and writes it down if it was done: the velocities at the
+    /// end of a run are those of a step that a longer run does.
     fn log_effort(&mut self, (step, time): (usize, f64)) -> Result<(), RunError> {
         let (simulation, strain) = (&self.simulation, self.case.strain_after(step));
         let (flow, motion, phases) = (simulation.statistics(), simulation.motion(), simulation.phases());

@@ -13,11 +13,11 @@ use gluey_motion::{
 use gluey_suspension::Repulsion;
 
 use crate::phases::PhaseTable;
+use crate::tally::Motion;
 use part::Part;
 use repelling::Repelling;
 
 pub use error::{RestoreError, StepError};
-pub use part::Motion;
 pub use strain_clock::StrainClock;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
@@ -249,8 +249,8 @@ where
             .map_err(|source| StepError::Forces { step, time, source })
     }
 
-    /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the step
-    /// until they do.
+    /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the
+    /// step until they do.
     pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
         let predicted = self.twists.clone();
         loop {

@@ -1,8 +1,8 @@
 //! A study: one run for every combination of values of some keys of a case, each in a folder of its own.
 //!
 //! A folder of a study has a folder for each point, named after its values and with the results of an
-//! ordinary run in it, and `sweep.json`, which says which keys and points it is about. What is complete is not run
-//! again, what was interrupted goes on from its checkpoint.
+//! ordinary run in it, and `sweep.json`, which says which keys and points it is about. What is complete is
+//! not run again, what was interrupted goes on from its checkpoint.
 
 mod axis;
 mod progress;

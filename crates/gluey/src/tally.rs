@@ -2,13 +2,27 @@
 
 use std::fmt;
 
-use gluey_motion::FlowStatistics;
+use gluey_motion::{FilmError, FlowStatistics};
 use serde::{Deserialize, Serialize};
 
-use crate::simulation::Motion;
-
-/// Films that move no particle by more than this, in its radii, are nothing to be told of at the end of a run.
+/// Films that move no particle by more than this, in its radii, are nothing to be told of at the end of a
+/// run.
 const SMALL_PUSH: f64 = 0.01;
+
+/// How the particles were moved in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Parts in which the step was done; 0 before it was.
+    pub parts: usize,
+    /// The shortest of them, as a share of the step.
+    pub shortest: f64,
+    /// Why the step was halved, where it was: what was found at the shortest length that could not be done.
+    pub refused: Option<FilmError>,
+    /// Films that are closed at the beginning: their gaps are a floor and no measurement.
+    pub closed_films: usize,
+    /// How far films moved a particle from where the flow alone would have taken it, at most, in its radii.
+    pub film_push: f64,
+}
 
 /// Steps that were halved, films that closed, penalties that were changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,12 +32,13 @@ pub struct Tally {
     pub halved_steps: usize,
     /// The shortest part, as a share of a step; 1 where none was halved, 0 before any.
     pub shortest_part: f64,
-    /// Most films that were closed at once: their gaps of 0.5e-9 to 1e-9 radii are a floor and no measurement.
+    /// Most films that were closed at once: their gaps of 0.5e-9 to 1e-9 radii are a floor and no
+    /// measurement.
     pub closed_films: usize,
     /// Rows with closed films.
     pub rows_with_closed_films: usize,
-    /// How far films moved a particle in a step from where the flow alone would have taken it, at most, in its
-    /// radii.
+    /// How far films moved a particle in a step from where the flow alone would have taken it, at most, in
+    /// its radii.
     pub film_push: f64,
     /// How often the penalties of all cells at surfaces were doubled.
     pub penalties_doubled: usize,

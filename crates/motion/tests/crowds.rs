@@ -181,8 +181,8 @@ fn impulse<const D: usize>(gap: f64) -> f64 {
 }
 
 /// Displacements `x` with `2 x_i = sum_k +- n_k (I_k - Phi(g_k))` at the gaps and normals after the step: the
-/// minimum of `sum_k int (Phi - I_k) dg_k + sum_i |x_i|^2`, by Newton's method with the whole matrix of second
-/// derivatives. `branches` are those after a step without films.
+/// minimum of `sum_k int (Phi - I_k) dg_k + sum_i |x_i|^2`, by Newton's method with the whole matrix of
+/// second derivatives. `branches` are those after a step without films.
 fn newton<const D: usize>(count: usize, films: &[(usize, usize, Vector<D>, f64)]) -> Vec<Vector<D>> {
     let branch = |x: &DVector<f64>, (i, j, free, _): &(usize, usize, Vector<D>, f64)| {
         Vector::<D>::from_fn(|d, _| free[d] + x[D * j + d] - x[D * i + d])
@@ -325,7 +325,8 @@ fn gaps_after_a_step_are_those_of_newton_s_method() {
     assert!(off[0] < 2.3e-5 && off[1] < 3.9e-5, "{off:?}");
 }
 
-/// Largest relative error of a gap below 0.1, and largest distance of a body, at the strain 0.4 after such steps.
+/// Largest relative error of a gap below 0.1, and largest distance of a body, at the strain 0.4 after such
+/// steps.
 fn errors<const D: usize>(fraction: f64, scale: f64, steps: &[f64]) -> Vec<[f64; 2]>
 where
     Dim<D>: Space<D>,
@@ -364,14 +365,16 @@ fn crowds_go_where_small_steps_without_films_take_them() {
     }
 }
 
-/// The scale of `R` is a choice: that of two bodies over the drag that each has alone, which in a crowd is none
-/// of all films. Errors of a step are of the same size with films that resist a third and three times as much.
+/// The scale of `R` is a choice: that of two bodies over the drag that each has alone, which in a crowd is
+/// none of all films. Errors of a step are of the same size with films that resist a third and three times as
+/// much.
 #[test]
 fn crowds_whose_films_resist_otherwise_than_taken_for_granted_go_there_as_well() {
     for scale in [1.0 / 3.0, 1.0, 3.0] {
         let errors = [errors::<2>(0.6, scale, &[0.01]), errors::<3>(0.4, scale, &[0.01])].concat();
         println!("scale {scale:.2}: {errors:?}");
-        // Measured: gaps to 1.0e-3 in 2D and 5.4e-3 in 3D, places to 1.0e-3; with `R` itself 2.1e-4, 3.8e-3, 2.4e-4.
+        // Measured: gaps to 1.0e-3 in 2D and 5.4e-3 in 3D, places to 1.0e-3; with `R` itself 2.1e-4, 3.8e-3,
+        // 2.4e-4.
         assert!(errors.iter().all(|[gap, place]| *gap < 0.015 && *place < 3e-3), "{scale}: {errors:?}");
     }
 }

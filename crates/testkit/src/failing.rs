@@ -60,9 +60,9 @@ impl Communicator for Failing<'_> {
 pub fn within_a_minute<T: Send + 'static>(what: &str, work: impl FnOnce() -> T + Send + 'static) -> T {
     let (sender, ended) = channel();
     std::thread::spawn(move || sender.send(work()));
-    match ended.recv_timeout(Duration::from_secs(60)) {
-        Ok(outcome) => outcome,
-        Err(RecvTimeoutError::Timeout) => panic!("{what}: not done after a minute"),
-        Err(RecvTimeoutError::Disconnected) => panic!("{what}: it panicked"),
-    }
+    let outcome = ended.recv_timeout(Duration::from_secs(60)).map_err(|error| match error {
+        RecvTimeoutError::Timeout => format!("{what}: not done after a minute"),
+        RecvTimeoutError::Disconnected => format!("{what}: it panicked"),
+    });
+    outcome.expect("work of all ranks ends")
 }

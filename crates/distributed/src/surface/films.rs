@@ -6,8 +6,9 @@ use gluey_stokes::part::{FilmCorrection, FilmNetwork, FilmRow};
 use gluey_stokes::{StokesError, StokesSystem};
 
 use super::space::{NearBodies, SurfaceSpace};
-use crate::agreement::gathered;
+use crate::agreement::{agreed, gathered};
 use crate::bodies::rigid;
+use crate::flow::FlowError;
 
 /// The network of films around all bodies, of which some may be `held`. All ranks call this.
 ///
@@ -44,12 +45,31 @@ pub struct SharedFilms<'n> {
     twists: Vec<f64>,
 }
 
+/// Those of iterates and of steps, on all ranks or none.
+///
+/// # Errors
+/// If there is no memory on some rank.
+pub fn corrections<'n, const D: usize>(
+    network: Option<&'n FilmNetwork>,
+    space: &SurfaceSpace<'_, D>,
+    (near, body_count): (&NearBodies<D>, usize),
+) -> Result<[Option<SharedFilms<'n>>; 2], FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let one = || {
+        let films = network.map(|network| SharedFilms::new(network, space, (near, body_count)));
+        agreed(space.ranks, films.transpose())
+    };
+    Ok([one()?, one()?])
+}
+
 impl<'n> SharedFilms<'n> {
     /// For vectors of a space.
     ///
     /// # Errors
     /// If there is no memory.
-    pub fn new<const D: usize>(
+    fn new<const D: usize>(
         network: &'n FilmNetwork,
         space: &SurfaceSpace<'_, D>,
         (near, body_count): (&NearBodies<D>, usize),

@@ -13,6 +13,7 @@ mod operator;
 mod precondition;
 mod space;
 mod sums;
+mod weak;
 
 use std::sync::Arc;
 
@@ -21,12 +22,11 @@ use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
 use gluey_parallel::{Communicator, GhostPlan, Traffic};
-use gluey_stokes::part::{AssembledSmoother, PartMethod, WeakCell, coarse_offset, rings_around_surfaces};
+use gluey_stokes::part::{AssembledSmoother, PartMethod, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
-    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, RaisedPenalties,
-    StokesError, StokesSystem, Stress,
+    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
+    StokesSystem, Stress,
 };
-use rustc_hash::FxHashMap;
 
 use crate::agreement::{agreed, gathered};
 use crate::bodies::Shared;
@@ -37,11 +37,12 @@ use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use crate::warm_start::{Moved, WarmStart};
 use conditions::{check_count, given};
-use films::{SharedFilms, network};
+use films::{corrections, network};
 use operator::SurfaceOperator;
 use precondition::{SurfaceCycle, SurfaceTriangular};
 pub use space::NearBodies;
 use space::{SurfaceSpace, is_near_surface, owner_of_film};
+use weak::Before;
 
 /// Iterations between restarts.
 const RESTART: usize = 60;
@@ -169,10 +170,6 @@ fn part_of<const D: usize>(level: &LevelSpace<D>) -> Discretisation<D> {
     Discretisation::of_part(level.part.mesh.clone(), nodes, level.chunks.clone(), level.part.own())
 }
 
-/// A cell whose penalty is too small, as ranks tell each other: its key, the factor, a body and the share of
-/// energy that it takes.
-type Named = [u64; 4];
-
 /// A flow with the penalties that were tried.
 struct Attempt<'a, const D: usize>
 where
@@ -206,30 +203,30 @@ where
         mut method: PartMethod,
         mut before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
-        let (ranks, mut raised, mut wasted) = (self.shared.ranks, RaisedPenalties::default(), 0);
+        let (ranks, mut earlier) = (self.shared.ranks, Before::default());
         loop {
             let problem = agreed(ranks, self.problem(tree, &method))?;
             let smoother = self.named(AssembledSmoother::new(&problem));
             if let Some(stiffer) = self.stiffened(&method, &smoother) {
                 method = stiffer;
-                raised.doubled += 1;
+                earlier.raised.doubled += 1;
                 continue;
             }
             let smoother = agreed(ranks, smoother)?;
             let attempt = self.attempt(tree, levels, (&problem, smoother), before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
-                return self.finished((tree, &problem), attempt, (raised, wasted), before);
+                return self.finished((tree, &problem), attempt, &earlier, before);
             };
-            let rounds = raised.solved_again;
+            let rounds = earlier.raised.solved_again;
             if rounds == MOST_ROUNDS {
                 attempt.report.map_err(FlowError::Krylov)?;
                 let (body, share) = (body as usize, f64::from_bits(share));
                 return Err(FlowError::WeakSurface { body, share, rounds });
             }
-            raised.cells += weak.len();
-            raised.solved_again += 1;
-            wasted += attempt.report.as_ref().map_or(0, |report| report.iterations);
+            earlier.raised.cells += weak.len();
+            earlier.raised.solved_again += 1;
+            earlier.iterations += attempt.report.as_ref().map_or(0, |report| report.iterations);
             method = method.raised(self.found(tree, &weak).into_iter());
             levels = attempt.levels;
         }
@@ -277,13 +274,9 @@ where
         let smoother = agreed(ranks, self.named(smoother.completed(&mut reduced)))?;
         let cycle = SurfaceCycle::new(levels, smoother, reduced, system);
         let schur = self.schur(tree, system, &space)?;
-        let all = self.shared.bodies.balls().len();
-        let network = agreed(ranks, network(ranks, system, &self.bodies, (all, self.shared.held)))?;
-        let films = || {
-            let shared = network.as_ref().map(|films| SharedFilms::new(films, &space, (&self.bodies, all)));
-            agreed(ranks, shared.transpose())
-        };
-        let [of_iterates, of_steps] = [films()?, films()?];
+        let all = (self.shared.bodies.balls().len(), self.shared.held);
+        let network = agreed(ranks, network(ranks, system, &self.bodies, all))?;
+        let [of_iterates, of_steps] = corrections(network.as_ref(), &space, (&self.bodies, all.0))?;
         let mut operator = SurfaceOperator::new(system, space.clone(), of_iterates);
         let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur, of_steps);
         let (lift, [whole, b]) = self.data(problem, &mut operator)?;
@@ -295,15 +288,7 @@ where
         let mut space = operator.into_space();
         let [mut velocity, pressure, mut whole] = self.fields(problem, &mut space, &lift, &mut x);
         let integrals = self.integrals(problem, [&velocity, &pressure]);
-        let holds_any = !self.shared.held.is_empty();
-        let mut mean_velocity = None;
-        if holds_any || !self.level.part.mesh.periodic().contains(&false) {
-            let mean = self.mean_velocity(problem, &space, &velocity, &integrals);
-            match holds_any {
-                true => mean_velocity = Some(mean),
-                false => problem.subtract_uniform(&mean, &mut velocity, &mut whole),
-            }
-        }
+        let mean_velocity = self.mean_flow(problem, &space, [&mut velocity, &mut whole], &integrals);
         let wrenches = self.wrenches(problem, &velocity, &whole)?;
         let wants_stress = self.conditions.stress;
         let stress = wants_stress.then(|| {
@@ -427,41 +412,12 @@ where
         gcr.solve(operator, preconditioner, b, x, Reference::Norm(square[0].sqrt()))
     }
 
-    /// Own cells whose penalty is too small for what was found, as in the serial solver also for a flow that
-    /// did not converge.
-    fn weak_cells(
-        &self,
-        tree: &ImplicitTree<'_, D>,
-        problem: &Problem<D>,
-        attempt: &Attempt<'a, D>,
-    ) -> Vec<Named> {
-        if !matches!(attempt.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
-            return Vec::new();
-        }
-        let weak = problem.weak_cells(&attempt.velocity, &self.conditions.strain);
-        let cells = self.level.part.mesh.cells();
-        let named = |weak: &WeakCell| {
-            let body = u64::from(self.bodies.ids[weak.body as usize]);
-            let key = tree.key(&cells[weak.cell as usize]);
-            [key, weak.factor().to_bits(), body, weak.share.to_bits()]
-        };
-        weak.iter().map(named).collect()
-    }
-
-    /// Those of named cells that the part holds, with their factors.
-    fn found(&self, tree: &ImplicitTree<'_, D>, named: &[Named]) -> Vec<(u32, f64)> {
-        let cells = self.level.part.mesh.cells().iter().zip(0..);
-        let places: FxHashMap<u64, u32> = cells.map(|(cell, place)| (tree.key(cell), place)).collect();
-        let found = named.iter().map(|&[key, factor, ..]| (places.get(&key), f64::from_bits(factor)));
-        found.filter_map(|(place, factor)| Some((*place?, factor))).collect()
-    }
-
     /// The flow, and what the next one may start from.
     fn finished(
         &self,
         (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
         attempt: Attempt<'a, D>,
-        (raised_penalties, wasted): (RaisedPenalties, usize),
+        earlier: &Before,
         before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let Attempt { space, velocity, pressure, deviation, sizes, report, .. } = attempt;
@@ -481,9 +437,9 @@ where
             twists: self.twists_of_all(problem, &space, &velocity),
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
-            solve_count: raised_penalties.solved_again + 1,
-            raised_penalties,
-            iterations: wasted + report.iterations,
+            solve_count: earlier.raised.solved_again + 1,
+            raised_penalties: earlier.raised,
+            iterations: earlier.iterations + report.iterations,
             relative_residual: report.residual_norm / reference,
             wrenches: attempt.wrenches,
             mean_velocity: attempt.mean_velocity,

@@ -28,7 +28,7 @@ where
 
     /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid
     /// leaves of the box, in proportion to their volumes.
-    pub(super) fn mean_velocity(
+    fn mean_velocity(
         &self,
         problem: &Problem<D>,
         space: &SurfaceSpace<'a, D>,
@@ -43,6 +43,26 @@ where
         let share = |ball: &Ball<D>| (whole_box - integrals.volume) * volume(ball) / all;
         let of_bodies = balls.iter().zip(&twists).map(|(ball, twist)| twist.velocity * share(ball));
         (integrals.velocity + of_bodies.sum::<Vector<D>>()) / whole_box
+    }
+
+    /// The mean velocity where bodies are held; where all are free and no wall is there, it is taken out of a
+    /// flow.
+    pub(super) fn mean_flow(
+        &self,
+        problem: &Problem<D>,
+        space: &SurfaceSpace<'a, D>,
+        [velocity, whole]: [&mut Vec<f64>; 2],
+        integrals: &FluidIntegrals<D>,
+    ) -> Option<Vector<D>> {
+        let holds_any = !self.shared.held.is_empty();
+        if !holds_any && self.level.part.mesh.periodic().contains(&false) {
+            return None;
+        }
+        let mean = self.mean_velocity(problem, space, velocity, integrals);
+        if !holds_any {
+            problem.subtract_uniform(&mean, velocity, whole);
+        }
+        holds_any.then_some(mean)
     }
 
     /// Forces and torques on all bodies: those that are given, or what held ones lack.

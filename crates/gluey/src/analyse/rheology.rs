@@ -57,8 +57,8 @@ pub enum RheologyError {
 }
 
 impl RheologyMeans {
-    /// Of the table `path`, or of what there is of it; `None` if there is no row. The transient is that of the
-    /// viscosity by the rule MSER-5, unless it is given as the time at which it is over.
+    /// Of the table `path`, or of what there is of it; `None` if there is no row. The transient is that of
+    /// the viscosity by the rule MSER-5, unless it is given as the time at which it is over.
     pub fn read(path: &Path, begin: Option<f64>) -> Result<Option<Self>, RheologyError> {
         let Some(rows) = rows_of(path) else { return Ok(None) };
         let text = whole_lines(&rows).map_err(|source| RheologyError::Read { path: rows.clone(), source })?;

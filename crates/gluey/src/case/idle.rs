@@ -2,21 +2,13 @@
 
 use toml::Value;
 
+use super::idle_key::IdleKey;
 use super::names::{ArrangementName, OutputKind, Precision, RadiiKind};
 use super::{
     Boundary, Case, ContactSpec, FlowSpec, Formulation, Hydrodynamics, RepulsionSpec, Strategy,
     SuspensionSpec,
 };
 use crate::shown::shown;
-
-/// A key that is set to something else than its default and does nothing.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct IdleKey {
-    /// The key, with its tables: `flow.paper.rho`.
-    pub key: String,
-    /// What makes it idle, as a case says it: `flow.formulation = "unfitted"`.
-    pub why: String,
-}
 
 impl Case {
     /// The keys of a checked case that do nothing. Those with the value that they would have anyway are not

@@ -44,9 +44,9 @@ pub fn default_gap_levels(dimension: usize) -> u32 {
 impl Case {
     /// Numbers of equal cubes that fill the box along each axis: the root cells of the mesh. They are as few
     /// as possible, but no fewer than [`super::MeshSpec::root_cells`] along the shortest edge. In 3D, where
-    /// neither that nor a coarsest level is given, it is once, three or five times the fewest, whichever comes
-    /// nearest to [`Case::cells_per_radius`]. `None` if it takes more than 16 of them along that edge, or more
-    /// than a tree can number along the longest.
+    /// neither that nor a coarsest level is given, it is once, three or five times the fewest, whichever
+    /// comes nearest to [`Case::cells_per_radius`]. `None` if it takes more than 16 of them along that edge,
+    /// or more than a tree can number along the longest.
     pub fn root_cells(&self) -> Option<Vec<u32>> {
         let fewest = self.cubes(self.flow.mesh.root_cells.unwrap_or(1))?;
         let factor = self.factor_of_roots(&fewest);

@@ -1,12 +1,12 @@
 //! The rheology of a sheared suspension as comma-separated values, a row whenever its stress was computed.
 //!
-//! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate.
-//! `viscosity` is by the stresslets of the particles and by the forces between them,
-//! `viscosity_by_dissipation` by the power that fluid and films dissipate, less that of weight and other forces
-//! of the case: without forces between particles the difference is an error of discretisation. It is empty
-//! where these forces do more than the shear. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and
-//! `viscosity_of_repulsion` are the shares of films too thin for the mesh, of contacts and of repulsion in
-//! the first. `particle_pressure` is `-tr S / (D V)`, relative to the mean pressure of the fluid.
+//! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate. `viscosity` is
+//! by the stresslets of the particles and by the forces between them, `viscosity_by_dissipation` by the power
+//! that fluid and films dissipate, less that of weight and other forces of the case: without forces between
+//! particles the difference is an error of discretisation. It is empty where these forces do more than the
+//! shear. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and `viscosity_of_repulsion` are the shares of
+//! films too thin for the mesh, of contacts and of repulsion in the first. `particle_pressure` is `-tr S / (D
+//! V)`, relative to the mean pressure of the fluid.
 
 use std::path::{Path, PathBuf};
 

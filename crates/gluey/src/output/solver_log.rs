@@ -13,7 +13,7 @@ use gluey_motion::FlowStatistics;
 use super::draft::{Draft, Mark, RowsError};
 use super::{OutputError, drafts};
 use crate::phases::PhaseTable;
-use crate::simulation::Motion;
+use crate::tally::Motion;
 
 /// What is the same on every run.
 const FACTS: &str = "step,t,strain,cells,unknowns,solves,iterations,residual,\

@@ -1,7 +1,5 @@
 //! Steps that are halved, and their halves again, until particles can be moved.
 
-use gluey_motion::FilmError;
-
 /// A step is halved so often at most, whatever is asked for.
 const MOST_HALVINGS: u32 = 20;
 
@@ -43,21 +41,6 @@ impl Part {
         let start = self.start + self.length;
         (start < Self::WHOLE.length).then(|| Self { start, length: 1 << start.trailing_zeros() })
     }
-}
-
-/// How the particles were moved in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
-    /// Parts in which the step was done; 0 before it was.
-    pub parts: usize,
-    /// The shortest of them, as a share of the step.
-    pub shortest: f64,
-    /// Why the step was halved, where it was: what was found at the shortest length that could not be done.
-    pub refused: Option<FilmError>,
-    /// Films that are closed at the beginning: their gaps are a floor and no measurement.
-    pub closed_films: usize,
-    /// How far films moved a particle from where the flow alone would have taken it, at most, in its radii.
-    pub film_push: f64,
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@ pub trait LinOp<T> {
     /// [`crate::Gcr`] takes all its scalar products so.
     fn complete(&self, _sums: &mut [f64]) {}
 
-    /// Changes an iterate for the right-hand side `b` so that equations hold exactly that are wanted to. Every
-    /// iterate whose true residual [`crate::Gcr`] computes went through it.
+    /// Changes an iterate for the right-hand side `b` so that equations hold exactly that are wanted to.
+    /// Every iterate whose true residual [`crate::Gcr`] computes went through it.
     fn settle(&mut self, _b: &[T], _x: &mut [T]) {}
 }
 

@@ -35,8 +35,8 @@ use gluey_geom::{Dim, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii beyond
-/// what the flow closes, so that no two can meet that were not known to be near.
+/// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
+/// beyond what the flow closes, so that no two can meet that were not known to be near.
 const MOST_PUSHED: f64 = 1.0;
 
 /// The forces in films at the last step.

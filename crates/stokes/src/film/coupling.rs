@@ -209,8 +209,8 @@ where
         &self.rows[row]
     }
 
-    /// The rows of relative motions of surfaces, on the twists, the first of which is entry `first` of reduced
-    /// velocities.
+    /// The rows of relative motions of surfaces, on the twists, the first of which is entry `first` of
+    /// reduced velocities.
     pub fn rows_of_motion(&self, first: usize) -> Vec<FilmRow> {
         let rigid = Dim::<D>::RIGID;
         let is_of_motion = |&row: &usize| {

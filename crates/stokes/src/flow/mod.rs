@@ -5,6 +5,7 @@ mod combined;
 mod conditions;
 mod mean;
 mod prepared;
+mod raised;
 mod refinement;
 mod stress;
 mod trusted;
@@ -26,9 +27,9 @@ use crate::space::{Discretisation, solid_nodes};
 pub use conditions::{Conditions, Field, Given, GivenOf};
 pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
+pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
 pub use stress::Stress;
-pub use trusted::RaisedPenalties;
 pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 

@@ -1,38 +1,19 @@
 //! Flows whose penalties are large enough: where the smoother or the flow shows that they are not, the
 //! problem is set up again with larger ones.
 
-use std::ops::AddAssign;
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::KrylovError;
 
 use super::conditions::Conditions;
+use super::raised::RaisedPenalties;
 use super::{Effort, Flow, FlowSolver};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem};
 
 /// How often penalties are raised for one flow, at most.
 const MOST_ROUNDS: usize = 6;
-
-/// How penalties were changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RaisedPenalties {
-    /// How often those of all cells at surfaces were doubled, for smoothers that need it.
-    pub doubled: usize,
-    /// Cells in which they were raised, because flows took too little notice of their surfaces.
-    pub cells: usize,
-    /// Flows that were solved again for that.
-    pub solved_again: usize,
-}
-
-impl AddAssign for RaisedPenalties {
-    fn add_assign(&mut self, other: Self) {
-        self.doubled += other.doubled;
-        self.cells += other.cells;
-        self.solved_again += other.solved_again;
-    }
-}
 
 /// A flow whose penalties are large enough, and the reduced vector it belongs to.
 pub(super) struct Trusted<const D: usize>

@@ -8,8 +8,8 @@ use crate::operator::{PressureForces, StokesSystem};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 
-/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures. Then the films' rows of
-/// motions are made to hold ([`FilmCorrection`]), so that no step opens them.
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures. Then the films' rows
+/// of motions are made to hold ([`FilmCorrection`]), so that no step opens them.
 pub struct BlockTriangular<'a, const D: usize>
 where
     Dim<D>: Space<D>,

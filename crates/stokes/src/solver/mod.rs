@@ -37,9 +37,9 @@ where
     /// Builds what depends on the system: factors, levels, preconditioners.
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError>;
 
-    /// Solves from the guess in `x` to a true residual of at most `tolerance` times [`StokesSystem::fluid_norm`] of `b` and says what it
-    /// took; rows of the films' motions hold exactly. The divergences in `b` sum to zero, as those of
-    /// [`StokesSystem::residual`] do.
+    /// Solves from the guess in `x` to a true residual of at most `tolerance` times
+    /// [`StokesSystem::fluid_norm`] of `b` and says what it took; rows of the films' motions hold exactly.
+    /// The divergences in `b` sum to zero, as those of [`StokesSystem::residual`] do.
     fn solve(
         &mut self,
         system: &StokesSystem<D>,

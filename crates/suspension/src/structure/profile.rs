@@ -13,7 +13,8 @@ pub struct Slab<const D: usize> {
     pub middle: f64,
     /// Volume of the particles over that of the slab.
     pub fraction: f64,
-    /// Mean velocity of the centres of the particles, weighted by their volumes in the slab; none without any.
+    /// Mean velocity of the centres of the particles, weighted by their volumes in the slab; none without
+    /// any.
     pub velocity: Option<Vector<D>>,
 }
 
