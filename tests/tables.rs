@@ -133,7 +133,7 @@ fn studies_tell_viscosities_and_how_far_they_are() {
     let text = read(folder.path(), "study/sweep.csv");
     let names = "strain_skipped,viscosity,viscosity_half_width,N1,N1_half_width,N2,N2_half_width,\
                  particle_pressure,particle_pressure_half_width,blocks_independent";
-    assert!(text.lines().next().is_some_and(|line| line.ends_with(names)), "{text}");
+    assert!(text.lines().next().is_some_and(|line| line.contains(names)), "{text}");
     let cell = |line: usize, name: &str| {
         let place = text.lines().next().expect("a head").split(',').position(|one| one == name).expect(name);
         text.lines().nth(line).and_then(|line| line.split(',').nth(place)?.parse::<f64>().ok())

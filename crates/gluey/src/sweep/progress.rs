@@ -55,7 +55,8 @@ impl StudyProgress {
     /// # Errors
     /// When what it says of itself, or a record of a point, cannot be read.
     pub fn read(folder: &Path) -> Result<Option<Self>, SweepError> {
-        let Some(Manifest { keys, points, .. }) = Manifest::read(folder)? else { return Ok(None) };
+        let manifest = if folder.is_dir() { Manifest::read(folder)? } else { None };
+        let Some(Manifest { keys, points, .. }) = manifest else { return Ok(None) };
         let points = points.into_iter().map(|point| {
             let record = record(&folder.join(&point.name))?;
             let (state, error, report) = record.map_or((PointStage::Left, None, None), |(record, state)| {
