@@ -94,7 +94,7 @@ where
 #[test]
 fn with_repulsion_the_rate_makes_the_stress() {
     at_the_rate_that_follows_the_stress_is_that_given::<2>([4.1e-8, 7.2e-8]);
-    at_the_rate_that_follows_the_stress_is_that_given::<3>([6.5e-8, 8.7e-7]);
+    at_the_rate_that_follows_the_stress_is_that_given::<3>([6.1e-7, 9.4e-6]);
 }
 
 /// Sheared forth and back in equal strains: at first the rate is that of free discs, then it depends on the

@@ -23,9 +23,6 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     check_name(&case.name, root.name("name"), findings);
     if findings.are_good(&["flow"]) {
         check_force(&case.gravity, case, &root.name("gravity"), findings);
-        if case.repulsion.force > 0.0 {
-            check_answered(case, &root.name("repulsion").name("force"), findings);
-        }
         if let Some(force) = &case.body_force {
             check_coordinates(force, case.dimension, root.name("body_force"), findings);
         }
