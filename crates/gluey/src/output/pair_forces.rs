@@ -33,7 +33,9 @@ impl ContactForces {
     pub fn on(&self, wanted: Pair) -> Option<f64> {
         let all = self.0.as_ref()?;
         let first = all.partition_point(|(pair, _)| *pair < wanted);
-        Some(all[first..].iter().take_while(|(pair, _)| *pair == wanted).map(|(_, force)| force).sum())
+        let of_pair = all[first..].iter().take_while(|(pair, _)| *pair == wanted);
+        // A sum of none is -0.
+        Some(of_pair.fold(0.0, |sum, (_, force)| sum + force))
     }
 }
 

@@ -25,7 +25,8 @@ pub struct PointResult {
 
 /// The head of the table and its lines: values of the keys, then `state`, then numbers of reports. Lengths
 /// named `_over_a` are in mean radii, `wall_s` in seconds; means of the rheology behind `strain_skipped` have
-/// half the width of their 95 % interval beside them, which `blocks_independent` says to hold.
+/// half the width of their 95 % interval beside them, which `blocks_independent` says to hold. No count where
+/// there was nothing to be counted.
 pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
     let numbers = [
         "steps",
@@ -87,6 +88,6 @@ fn numbers_of(report: &RunReport) -> Vec<String> {
     let is_resolved = means.into_iter().flatten().map(|mean| mean.is_resolved).reduce(|all, one| all && one);
     cells.push(is_resolved.map_or(String::new(), |is| if is { "yes" } else { "no" }.to_owned()));
     let counts = [report.tally.halved_steps, report.tally.closed_films];
-    cells.extend(counts.map(|count| count.to_string()));
+    cells.extend(counts.map(|count| number((count > 0).then_some(count as f64))));
     cells
 }
