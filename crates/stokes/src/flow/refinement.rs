@@ -4,8 +4,11 @@ use gluey_fem::{MeshError, TreeMesh, half_diagonal};
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, BallTree, Body, LevelSet};
 
+/// Part of its size by which a cell may be too far away and still counts as near: where bodies have round
+/// places and sizes many distances are equal to the band, and rounding must not decide.
+const SLACK: f64 = 1e-9;
 /// Bodies are sought this much farther than they can matter, so that rounding loses none.
-const ENOUGH: f64 = 1.0 + 1e-9;
+const ENOUGH: f64 = 1.0 + SLACK;
 
 /// How a mesh follows the bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,8 +87,8 @@ impl Refinement {
             let mut is_near = false;
             body.for_each_image(center, ENOUGH * farthest, |arm| {
                 let outside = Vector::<D>::from_fn(|d, _| (arm[d].abs() - half(d)).max(0.0)).norm();
-                is_near |= outside < body.bounding_radius() + band
-                    || distance_from_cell(arm, h, shear) < body.bounding_radius();
+                let radius = body.bounding_radius() + SLACK * h;
+                is_near |= outside < radius + band || distance_from_cell(arm, h, shear) < radius;
             });
             is_near
         })

@@ -228,7 +228,12 @@ mod tests {
         for _ in 0..2 {
             let again = flow();
             assert_eq!(again.iteration_count, 0, "{D}D");
-            assert_eq!(again.twists, first.twists);
+            // The rows of films are made to hold again, which rounds.
+            for (again, first) in again.twists.iter().zip(&first.twists) {
+                let spin = again.spin - first.spin;
+                let spin = Dim::<D>::spin_slice(&spin).iter().fold(0.0f64, |most, spin| most.max(spin.abs()));
+                assert!((again.velocity - first.velocity).amax().max(spin) < 1e-15, "{again:?} {first:?}");
+            }
         }
     }
 
