@@ -30,6 +30,7 @@ const RESTART: usize = 4;
 pub struct DirectSolver {
     factor: Option<DirectIndefinite>,
     unknowns: Option<Subset>,
+    films: Option<FilmNetwork>,
     krylov: Gcr<f64>,
     b: Vec<f64>,
     x: Vec<f64>,
@@ -38,12 +39,19 @@ pub struct DirectSolver {
 impl Default for DirectSolver {
     fn default() -> Self {
         let params = GcrParams { max_iterations: MAX_CORRECTIONS, restart: RESTART, ..GcrParams::default() };
-        Self { factor: None, unknowns: None, krylov: Gcr::new(params), b: Vec::new(), x: Vec::new() }
+        Self {
+            factor: None,
+            unknowns: None,
+            films: None,
+            krylov: Gcr::new(params),
+            b: Vec::new(),
+            x: Vec::new(),
+        }
     }
 }
 
 impl DirectSolver {
-    /// Factorises the matrix of a system.
+    /// Factorises the matrix of a system and the block of its films.
     ///
     /// # Errors
     /// If it is singular.
@@ -64,6 +72,7 @@ impl DirectSolver {
         };
         factor.factorise(assembled.matrix.values())?;
         self.factor = Some(factor);
+        self.films = system.film_network()?;
         self.b.resize(assembled.unknowns.len(), 0.0);
         self.x.resize(assembled.unknowns.len(), 0.0);
         self.unknowns = Some(assembled.unknowns);
@@ -91,8 +100,7 @@ where
         };
         let mut consistent = b.to_vec();
         system.pressure.remove_mean(system.parts_mut(&mut consistent)[1]);
-        let films = system.film_network()?;
-        let films = films.as_ref().map(FilmNetwork::correction).transpose()?;
+        let films = self.films.as_ref().map(FilmNetwork::correction).transpose()?;
         let mut operator = SystemOperator::new(system).with_films(films);
         let reference = system.fluid_norm(&consistent);
         let mut substitution = Substitution { system, unknowns, factor, b: &mut self.b, x: &mut self.x };
