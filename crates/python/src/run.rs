@@ -90,7 +90,7 @@ pub fn resume(
 ) -> PyResult<(PathBuf, String)> {
     let Which { folder, name, previous } = which;
     let found = Resumption::find(&folder, name.as_deref(), previous);
-    let Resumption { case_file, options } = found.map_err(|error| of_resume(py, &error))?;
+    let Resumption { case_file, options, .. } = found.map_err(|error| of_resume(py, &error))?;
     let case = gluey::Case::load(case_file).map_err(|error| of_case(py, &error))?;
     finish(py, case, options, threads, &Listener { progress, notice })
 }
