@@ -112,9 +112,9 @@ where
     /// which are positive; see [`Film`]. To be called once a step, with the films that [`Hydrodynamics`]
     /// names, sorted by particles.
     ///
-    /// # Errors [`FilmError`] where particles are so crowded that none can be given room: nothing is
-    /// remembered of this step then, and it can be tried again with the velocities as they were and half the
-    /// length.
+    /// # Errors
+    /// [`FilmError`] where particles are so crowded that none can be given room: nothing is remembered of
+    /// this step then, and it can be tried again with the velocities as they were and half the length.
     ///
     /// [`Hydrodynamics`]: crate::Hydrodynamics
     pub fn open_films(

@@ -115,12 +115,14 @@ impl fmt::Display for RheologyMeans {
 mod tests {
     use super::*;
 
-    /// A viscosity of 2 and 3 in turn behind ten rows of a start at 9; in 2D.
+    /// A viscosity of 2 and 3 in turn behind ten rows of a start at 9, a normal stress difference that
+    /// changes every five rows; in 2D.
     fn table() -> Table {
         let line = |row: i32| {
             let viscosity = if row < 10 { 9 } else { 2 + row % 2 };
             let by_dissipation = if row % 2 == 0 { String::new() } else { "2.5".to_owned() };
-            format!("{},{},{viscosity},{by_dissipation},-0.5,{}\n", row, 0.5 * f64::from(row), 1 + row % 2)
+            let n1 = if row % 10 < 5 { -0.25 } else { -0.75 };
+            format!("{row},{},{viscosity},{by_dissipation},{n1},{}\n", 0.5 * f64::from(row), 1 + row % 2)
         };
         let head = "t,strain,viscosity,viscosity_by_dissipation,N1,particle_pressure\n";
         Table::parse(&(head.to_owned() + &(0..60).map(line).collect::<String>())).expect("a table")
@@ -133,7 +135,9 @@ mod tests {
         let mean = |mean: Option<Mean>| mean.expect("a mean").mean;
         assert_eq!((mean(means.viscosity), mean(means.n1)), (2.5, -0.5));
         assert_eq!((mean(means.viscosity_by_dissipation), mean(means.particle_pressure)), (2.5, 1.5));
-        assert!(means.n2.is_none() && means.viscosity.is_some_and(|mean| mean.half_width.is_some()));
+        let half_width = |mean: Option<Mean>| mean.expect("a mean").half_width;
+        assert_eq!(half_width(means.viscosity), Some(0.0), "each block has as many rows of 2 as of 3");
+        assert!(half_width(means.n1) > Some(0.0) && means.n2.is_none());
         let from = RheologyMeans::of(&table(), Some(30.0)).expect("columns").expect("rows");
         assert_eq!((from.skipped, from.strain_skipped), (30, 15.0));
         assert_eq!(RheologyMeans::of(&table(), Some(60.0)), Ok(None));

@@ -5,8 +5,8 @@
 //! that fluid and films dissipate, less that of weight and other forces of the case: without forces between
 //! particles the difference is an error of discretisation. It is empty where these forces do more than the
 //! shear. `viscosity_of_films`, in 3D `viscosity_of_contacts`, and `viscosity_of_repulsion` are the shares of
-//! films too thin for the mesh, of contacts and of repulsion in the first. `particle_pressure` is `-tr S / (D
-//! V)`, relative to the mean pressure of the fluid.
+//! films too thin for the mesh, of contacts and of repulsion in the first. `particle_pressure` is
+//! `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
 use std::path::{Path, PathBuf};
 
