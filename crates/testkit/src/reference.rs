@@ -129,6 +129,11 @@ reference_table!(
     "sphere_pair_mobility_unbounded.csv"
 );
 reference_table!(
+    /// Spheres of radii 1 and 2 in unbounded fluid, by gap: `gap, one_minus_A, one_minus_B, C1, C2, Mn, Mr`.
+    spheres_one_to_two,
+    "sphere_pair_1to2.csv"
+);
+reference_table!(
     /// Square (0) and hexagonal (1) lattices of discs:
     /// `lattice, phi, gap_over_a, drag_F_over_muU, eta_axes_strain, eta_shear, rel_diff_drag`.
     lattices_of_discs,

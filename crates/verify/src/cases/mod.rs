@@ -19,6 +19,7 @@ mod random_pairs;
 mod sheared;
 mod spheres;
 mod symmetry;
+mod unequal_pairs;
 mod wall;
 
 use crate::case::Case;
@@ -34,6 +35,7 @@ pub const CASES: &[Case] = &[
     inclusion::CASE,
     spheres::CASE,
     pair_stresslets::CASE,
+    unequal_pairs::CASE,
     disc_wall::CASE,
     wall::CASE,
     lattices::CASE,

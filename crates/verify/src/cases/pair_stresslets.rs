@@ -82,7 +82,7 @@ fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec
 }
 
 /// Orthonormal axes that differ with the position, the line of centres last.
-fn axes(position: usize) -> [Vector<3>; 3] {
+pub(super) fn axes(position: usize) -> [Vector<3>; 3] {
     let random = shift::<3>(position + 5) + Vector::repeat(0.5);
     let (sin, cos) = (2.0 * PI * random[0]).sin_cos();
     let up = 2.0 * random[1] - 1.0;
