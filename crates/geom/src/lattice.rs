@@ -227,7 +227,7 @@ mod tests {
         let mut next = numbers();
         let lattice = |n: usize| {
             let edges: [f64; D] = std::array::from_fn(|d| if d == 1 { 1.0 } else { 8f64.powf(next()) });
-            let periods = std::array::from_fn(|d| (d < 2 || n % 3 > 0).then_some(edges[d]));
+            let periods = std::array::from_fn(|d| (d < 2 || !n.is_multiple_of(3)).then_some(edges[d]));
             let tilt = [0.0, 0.5 * edges[0], 0.5 * next() * edges[0], 3.0 * next() * edges[0]][n % 4];
             let arm = Vector::from_fn(|d, _| 2.0 * next() * edges[d]);
             (Lattice::new(periods).tilted(tilt), arm)

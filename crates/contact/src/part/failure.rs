@@ -71,7 +71,7 @@ impl PartFailure {
     /// here.
     pub fn of_all(self, failures: &[Vec<u64>]) -> ContactError {
         let mut errors = failures.iter().filter_map(|words| error_of(words));
-        let mut first = errors.next().unwrap_or_else(|| match self {
+        let mut first = errors.next().unwrap_or(match self {
             Self::Here(error) => error,
             Self::Elsewhere { message } => ContactError::Elsewhere { message },
         });

@@ -304,8 +304,8 @@ mod tests {
         let row = Row { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
         let contact = |pair, lambda| Contact { pair, lambda, gamma: 0.0, gap: 0.5 };
         let contacts = [contact(PairKey::across(0, 9, [-1, 0, 0]), 3.0), contact(PairKey::wall(0, 0), 7.0)];
-        let repulsion = Some(Repulsion { force: 2.0, range: 0.5, radius: 1.0 });
-        let forces = PairForces { contacts: Some(&contacts), repulsion };
+        let repulsion = Repulsion { force: 2.0, range: 0.5, radius: 1.0 };
+        let forces = PairForces { contacts: Some(&contacts), repulsion: Some(repulsion) };
         assert_eq!(writer.write(&row, &forces).expect("a row"), Some(0.5));
         writer.finish().expect("complete");
         let text = std::fs::read_to_string(folder.path().join("t-gaps.csv")).expect("near pairs");
@@ -317,7 +317,7 @@ mod tests {
         let [none, three, seven] = [0.0, 3.0, 7.0].map(shown);
         assert_eq!(lines[1], format!("{half},1,2,{},{none},{},particle", shown(1.0), at(1.0)));
         assert_eq!(lines[2], format!("{half},1,10,{half},{three},{},image", at(0.5)));
-        let at_wall = shown(repulsion.expect("a law").at::<2>(0.5, [1.0, f64::INFINITY]));
+        let at_wall = shown(repulsion.at::<2>(0.5, [1.0, f64::INFINITY]));
         assert_eq!(lines[10], format!("{half},1,1,{half},{seven},{at_wall},wall"));
         assert_eq!(lines.len(), 1 + 8 + 1 + 10);
     }

@@ -26,9 +26,9 @@ pub(super) fn remove(paths: &ResultPaths) -> Result<(), OutputError> {
     let entries = list(paths.folder())?;
     let of_run: Vec<&PathBuf> = entries.iter().filter(|path| is_of_run(path, paths, &entries)).collect();
     // The tables and the page of a folder are of the only run in it that has frames.
-    let others_have_frames = entries.iter().any(|path| {
-        name(path).ends_with("-xyz") && !of_run.contains(&path) && holds(path, |name| is_frame(name))
-    });
+    let others_have_frames = entries
+        .iter()
+        .any(|path| name(path).ends_with("-xyz") && !of_run.contains(&path) && holds(path, is_frame));
     for table in &tables {
         remove_if_there(table)?;
         drafts(table)?.iter().try_for_each(|draft| remove_file(draft))?;
