@@ -37,6 +37,7 @@ def test_gaps_and_rheology_of_a_suspension(tmp_path: Path) -> None:
     near = run.near_gaps
     assert near is not None and set(near["partner"]) <= {"particle", "image"}
     assert near["i"].min() >= 0 and near["j"].max() <= 11 and (near["gap_over_a"] <= 1.0).all()
+    assert np.isnan(near["contact_force"]).all() and np.isnan(near["repulsion_force"]).all()
     for row, time in enumerate(run.times):
         assert near["gap_over_a"][near["t"] == time].min() == run.min_gap[row]
     rheology = run.rheology

@@ -23,7 +23,7 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Iterator, Union
+from typing import Any, Callable, Dict, Iterator, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,19 @@ __all__ = ["Frame", "Result", "ResultsError", "frame", "read", "table"]
 
 _RECORD = "-run.json"
 _SAID = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
-_NEAR = np.dtype([("t", "f8"), ("i", "i8"), ("j", "i8"), ("gap_over_a", "f8"), ("partner", "U8")])
+_NEAR = np.dtype(
+    [
+        ("t", "f8"),
+        ("i", "i8"),
+        ("j", "i8"),
+        ("gap_over_a", "f8"),
+        ("contact_force", "f8"),
+        ("repulsion_force", "f8"),
+        ("partner", "U8"),
+    ]
+)
+# Cells of forces that do not act are empty.
+_FORCES: Dict[Union[int, str], Callable[[str], float]] = {column: lambda text: float(text or "nan") for column in (4, 5)}
 
 
 class ResultsError(ValueError):
@@ -68,6 +80,12 @@ def read(folder: PathLike, name: str | None = None) -> Result:
     if name is not None and name not in names:
         raise ResultsError(f"{folder}: no run {name!r} is recorded there, but {', '.join(names)}")
     return Result(folder, names[0] if name is None else name)
+
+
+def _near_of(lines: list[str]) -> NDArray[Any]:
+    if not lines:
+        return np.empty(0, _NEAR)
+    return np.loadtxt(lines, dtype=_NEAR, delimiter=",", ndmin=1, converters=_FORCES)
 
 
 def table(path: PathLike) -> dict[str, Array]:
@@ -271,8 +289,9 @@ class Result:
     def near_gaps(self) -> NDArray[Any] | None:
         """Gaps of at most one mean radius, from ten particles on; None up to nine.
 
-        A structured array with the fields ``t``, ``i``, ``j``, ``gap_over_a`` and ``partner``: ``particle``,
-        the nearest periodic ``image`` of one, or a ``wall``, of which ``j`` is 0 below and 1 above.
+        A structured array with the fields ``t``, ``i``, ``j``, ``gap_over_a``, ``contact_force`` and
+        ``repulsion_force`` (nan without such a force), and ``partner``: ``particle``, the nearest periodic
+        ``image`` of one, or a ``wall``, of which ``j`` is 0 below and 1 above.
         """
         path = self._newest("-gaps.csv")
         if path is None:
@@ -281,7 +300,7 @@ class Result:
         if names != list(_NEAR.names or ()):
             raise ResultsError(f"{path}: not a table of gaps")
         try:
-            near = np.loadtxt(lines, dtype=_NEAR, delimiter=",", ndmin=1) if lines else np.empty(0, _NEAR)
+            near = _near_of(lines)
         except ValueError as error:
             raise ResultsError(f"{path}: not a table of gaps ({error})") from error
         near["i"] -= 1

@@ -4,7 +4,7 @@
 //! radii `a` and `b` (`1/b = 0` at a wall). Where it is thinner than a height `G` of about a cell
 //! ([`Lubrication::heights`]) both bodies are cut flat there (`crate::surface`), so that the mesh sees the
 //! profile `max(G, H)` and resolves it at any gap. Removing solid lowers every resistance, so what the mesh
-//! then lacks, the *deficit*, is never negative; lubrication theory gives it ([`deficits`]), as a force
+//! then lacks, the *deficit*, is never negative; lubrication theory gives it (`deficit`), as a force
 //! between the two surfaces that is proportional to their relative motion and implicit in their velocities
 //! ([`FilmCoupling`]).
 

@@ -39,7 +39,7 @@ where
     /// penalties instead. Whether it did so is told.
     ///
     /// # Errors
-    /// Those of [`SaddleSolver::prepare`].
+    /// Those of [`crate::SaddleSolver::prepare`].
     pub(super) fn prepare(
         &mut self,
         problem: &mut Problem<D>,
