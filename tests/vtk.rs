@@ -356,14 +356,32 @@ fn a_sheared_box_is_shown_whole() {
     near(&points, &[0.3, 0.92, 0.0, 0.3, 0.08, 0.0, 0.4, 1.08, 0.0]);
 }
 
-#[test]
-fn runs_leave_a_collection_of_all_times() {
+/// Two spheres without a mesh to a time of 1, and options that write every so many steps into a folder.
+fn mobility_run(folder: &Path, every: usize) -> (Case, RunOptions) {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
     let mut case = Case::load(file).expect("a case");
     case.time.end = 1.0;
+    let vtk = VtkOptions::new(folder.join("vtk"), every);
+    (case, RunOptions { vtk: Some(vtk), ..RunOptions::csv(folder.join("t.csv")) })
+}
+
+/// Frames are on their way while the run goes on: the last ones, too, are waited for.
+#[test]
+fn a_last_frame_that_cannot_be_written_fails_the_run() {
     let folder = TempDir::new().expect("a folder");
-    let vtk = VtkOptions::new(folder.path().join("vtk"), 8);
-    let options = RunOptions { vtk: Some(vtk), ..RunOptions::csv(folder.path().join("t.csv")) };
+    let (case, options) = mobility_run(folder.path(), 10);
+    // Where a file should be there is a folder.
+    let last = folder.path().join("vtk/particles-000020.vtu");
+    fs::create_dir_all(&last).expect("a folder");
+    let error = run(&case, &options, &Silent).expect_err("a frame is missing");
+    assert!(error.to_string().contains(&last.display().to_string()), "{error}");
+    assert!(folder.path().join("vtk/particles-000010.vtu").is_file());
+}
+
+#[test]
+fn runs_leave_a_collection_of_all_times() {
+    let folder = TempDir::new().expect("a folder");
+    let (case, options) = mobility_run(folder.path(), 8);
     run(&case, &options, &Silent).unwrap_or_else(|error| panic!("{error}"));
     let collection = fs::read_to_string(folder.path().join("vtk/particles.pvd")).expect("a collection");
     for (time, file) in

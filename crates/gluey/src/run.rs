@@ -293,7 +293,9 @@ where
             self.save_if_due()?;
         }
         self.observe()?;
-        self.log_effort((self.simulation.step_index(), self.simulation.time()))
+        self.log_effort((self.simulation.step_index(), self.simulation.time()))?;
+        // A frame that could not be written is known now.
+        Ok(self.frames.flush()?)
     }
 
     /// Computes the velocities here and now, and writes them down.

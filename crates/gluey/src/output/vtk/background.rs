@@ -82,6 +82,7 @@ where
     folder: PathBuf,
     on_their_way: OnTheirWay,
     queue: Option<SyncSender<Message<D>>>,
+    /// Nothing once it ended, which it does before it is told to only where a frame could not be written.
     thread: Option<JoinHandle<Result<(), OutputError>>>,
 }
 
@@ -123,7 +124,7 @@ where
 
     /// Ends the thread when all frames are on disk.
     pub fn finish(mut self) -> Result<(), OutputError> {
-        self.end()
+        if self.thread.is_some() { self.end() } else { self.failure() }
     }
 
     fn send(&mut self, message: Message<D>) -> Result<(), OutputError> {
@@ -227,5 +228,6 @@ mod tests {
         assert!(frames.flush().is_err(), "the frame is still missing");
         frames.on_their_way.wait();
         assert!(frames.write(&frame(2, &[], &domain), None).is_err());
+        assert!(frames.finish().is_err());
     }
 }
