@@ -83,6 +83,13 @@ fn has_kept(before: &BTreeMap<PathBuf, Vec<u8>>, out: &Path) {
     }
 }
 
+/// Whether the run says of itself that it is complete.
+fn is_complete(out: &Path) -> bool {
+    let record = fs::read(out.join(format!("{STEM}-run.json"))).expect("a record");
+    let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+    record["state"] == "complete"
+}
+
 /// What `gluey info` says of a run is what lies there.
 fn is_told(folder: &Path, state: &str) {
     let out = folder.join("out");
@@ -153,6 +160,12 @@ fn nothing_is_lost_to_one_signal_or_two() {
             // Before it listens to requests, or by one that cannot be listened to.
             (None, Some(_)) if has_record && before.is_none() && saved(&out).is_none() => {
                 is_told(folder, "killed")
+            }
+            // Its process was still there, the run was not.
+            (None, Some(9)) if has_record && is_complete(&out) => {
+                is_told(folder, "complete");
+                same_results(&out, &folder.join("whole"));
+                fs::remove_dir_all(&out).expect("removed");
             }
             (None, Some(9)) if has_record => is_told(folder, "killed"),
             (None, Some(_)) => {}
