@@ -94,7 +94,8 @@ where
     pub solve_count: usize,
     /// Krylov iterations or refinements over all solves.
     pub iteration_count: usize,
-    /// Norm of the last solve's residual over what it is relative to, see [`crate::StokesSystem::fluid_norm`].
+    /// Norm of the last solve's residual over what it is relative to, see
+    /// [`crate::StokesSystem::fluid_norm`].
     pub residual: f64,
     /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
     pub fine_operator_applications: f64,
