@@ -2,7 +2,7 @@
 //! against exact mobilities. What is measured here is what README says.
 
 use gluey::case::Hydrodynamics;
-use gluey::{Case, Formulation, RunOptions, Silent, Strategy, run};
+use gluey::{Case, RunOptions, Silent, Strategy, run};
 use tempfile::TempDir;
 
 /// Spheres so small that the box changes their velocities by less than 2e-4.
@@ -10,13 +10,12 @@ const RADIUS: f64 = 0.0125;
 
 /// Two spheres with their line of centres at 135 degrees to the flow, `gap` radii apart, a part of a cell off
 /// the middle.
-fn spheres(formulation: Formulation, gap: f64, shift: [f64; 3]) -> Case {
+fn spheres(gap: f64, shift: [f64; 3]) -> Case {
     let half = (1.0 + 0.5 * gap) * RADIUS * std::f64::consts::FRAC_1_SQRT_2;
     let at = |sign: f64| [0.5 - sign * half + shift[0], 0.5 + sign * half + shift[1], 0.5 + shift[2]];
     let particle = |x: [f64; 3]| format!("[[particles]]\nposition = {x:?}\nradius = {RADIUS}\n");
     let text = format!(
-        "name = \"spheres\"\ndimension = 3\n{}{}[time]\nstep = 1e-4\nend = 1e-4\n[contact]\nstrategy = \"none\"\n\
-         [flow]\nformulation = \"{formulation}\"\n",
+        "name = \"spheres\"\ndimension = 3\n{}{}[time]\nstep = 1e-4\nend = 1e-4\n[contact]\nstrategy = \"none\"\n",
         particle(at(1.0)),
         particle(at(-1.0))
     );
@@ -40,11 +39,11 @@ fn approach_speed(case: &Case) -> f64 {
 }
 
 /// Smallest and largest relative error of the approach speed over positions of the lattice under the pair.
-fn errors(formulation: Formulation, gap: f64) -> (f64, f64) {
+fn errors(gap: f64) -> (f64, f64) {
     let cell = 1.0 / 256.0;
     let shifts = [[0.0; 3], [0.3, 0.1, 0.45], [0.55, 0.8, 0.2]].map(|shift| shift.map(|s| s * cell));
     let relative = shifts.map(|shift| {
-        let flow = spheres(formulation, gap, shift);
+        let flow = spheres(gap, shift);
         assert_eq!(flow.contact.strategy, Strategy::None);
         let mut exact = flow.clone();
         exact.flow.hydrodynamics = Hydrodynamics::PairMobility;
@@ -55,19 +54,15 @@ fn errors(formulation: Formulation, gap: f64) -> (f64, f64) {
 
 #[test]
 fn spheres_approach_at_these_speeds_by_default() {
-    use Formulation::{RigidDofs, Unfitted};
-    for (formulation, gap, low, high) in [
-        (RigidDofs, 1.0, -0.03, 0.01),
-        (RigidDofs, 0.2, -0.25, 0.05),
-        (RigidDofs, 0.05, 0.1, 1.5),
-        (Unfitted, 1.0, -5e-4, 5e-4),
-        (Unfitted, 0.2, -0.01, 0.02),
-        (Unfitted, 0.05, -0.04, 0.01),
-        (Unfitted, 1e-3, -0.005, 0.005),
-        (Unfitted, 1e-4, -0.005, 0.005),
+    for (gap, low, high) in [
+        (1.0, -5e-4, 5e-4),
+        (0.2, -0.01, 0.02),
+        (0.05, -0.04, 0.01),
+        (1e-3, -0.005, 0.005),
+        (1e-4, -0.005, 0.005),
     ] {
-        let (smallest, largest) = errors(formulation, gap);
-        eprintln!("{formulation}, gap {gap}: {smallest:.5} to {largest:.5}");
-        assert!(low <= smallest && largest <= high, "{formulation}, gap {gap}: {smallest} to {largest}");
+        let (smallest, largest) = errors(gap);
+        eprintln!("gap {gap}: {smallest:.5} to {largest:.5}");
+        assert!(low <= smallest && largest <= high, "gap {gap}: {smallest} to {largest}");
     }
 }

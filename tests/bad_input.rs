@@ -316,7 +316,7 @@ fn names_that_are_not_known() {
         "strategy = \"glue\"",
         &["contact.strategy", "`glue` is not a known strategy", near, all],
     );
-    refused_line(22, "formulation = \"rigid\"", &["flow.formulation", "\"paper\", \"rigid-dofs\""]);
+    refused_line(22, "formulation = \"rigid\"", &["flow.formulation", "\"paper\", \"unfitted\""]);
     refused_line(16, "scheme = \"rk4\"", &["time.scheme", "\"euler\", \"adams-bashforth-2\""]);
     refused_line(6, "boundary = \"periodc\"", &["domain.boundary", "did you mean \"periodic\"?"]);
     refused_line(21, "hydrodynamics = \"navier\"", &["flow.hydrodynamics", "\"stokes\", \"pair-mobility\""]);
@@ -390,8 +390,6 @@ fn references_of_something_else() {
 #[test]
 fn meshes_that_cannot_be_numbered() {
     refused_line(25, "cells_per_radius = 1e9", &["flow.mesh.cells_per_radius = 1e9", "level", "at most"]);
-    let gaps = with_line(22, "formulation = \"rigid-dofs\"\nrigid-dofs = { gap_levels = 12 }");
-    refused(&gaps, &["case.toml:23:", "flow.rigid-dofs.gap_levels = 12", "from 0 to 11"]);
     refused_line(26, "coarsest_level = 12", &["flow.mesh.coarsest_level = 12", "between 0 and 7"]);
 }
 

@@ -29,11 +29,11 @@ fn vectors(report: &Value, key: &str) -> Vec<Vec<f64>> {
 #[test]
 fn reports_hold_together() {
     for (arguments, particles) in [
-        (["--case", "C2", "--n", "16", "--formulation", "rigid-dofs"], 0),
-        (["--case", "S2", "--n", "64", "--formulation", "rigid-dofs"], 2),
+        (["--case", "C2", "--n", "16", "--formulation", "unfitted"], 0),
+        (["--case", "S2", "--n", "64", "--formulation", "unfitted"], 2),
         (["--case", "S2", "--n", "64", "--formulation", "paper"], 2),
         (["--case", "C3", "--n", "8", "--formulation", "paper"], 0),
-        (["--case", "M3", "--n", "16", "--formulation", "rigid-dofs"], 27),
+        (["--case", "M3", "--n", "16", "--formulation", "unfitted"], 27),
     ] {
         let report = report(&arguments);
         let (case, n) = (arguments[1], arguments[3].parse::<f64>().expect("a number"));

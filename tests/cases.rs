@@ -81,11 +81,11 @@ fn drops(formulation: Formulation, gravity: f64) -> Vec<f64> {
 /// Discs fall with gravity, the largest fastest, rise against it, and stay where they are without it.
 #[test]
 fn heavy_discs_settle() {
-    let [rigid, soft] = [Formulation::RigidDofs, Formulation::Paper].map(|f| drops(f, 1.0));
+    let [rigid, soft] = [Formulation::Unfitted, Formulation::Paper].map(|f| drops(f, 1.0));
     assert!(rigid.iter().zip(&soft).all(|(a, b)| (a / b - 1.0).abs() < 0.06), "{rigid:?} {soft:?}");
     assert!(rigid[..4].iter().all(|drop| (0.03..rigid[4]).contains(drop)), "{rigid:?}");
-    assert!(drops(Formulation::RigidDofs, -1.0).iter().all(|drop| *drop < -0.03));
-    assert!(drops(Formulation::RigidDofs, 0.0).iter().all(|drop| drop.abs() < 1e-12));
+    assert!(drops(Formulation::Unfitted, -1.0).iter().all(|drop| *drop < -0.03));
+    assert!(drops(Formulation::Unfitted, 0.0).iter().all(|drop| drop.abs() < 1e-12));
 }
 
 #[test]

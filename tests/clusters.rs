@@ -16,9 +16,8 @@ fn case(side: f64, centers: impl Iterator<Item = [f64; 2]>) -> Case {
     let text = format!(
         "name = \"cluster\"\ndimension = 2\n[domain]\nupper = [{side}, {side}]\n\
          [[particles]]\nposition = [1.0, 1.0]\nradius = {RADIUS}\n\
-         [time]\nstep = 0.005\nend = 0.01\n[flow]\nformulation = \"rigid-dofs\"\n\
-         [flow.mesh]\ncells_per_radius = 1.0\ncoarsest_level = 0\nband = 0.0\n\
-         [flow.rigid-dofs]\ngap_fraction = 0.0\n"
+         [time]\nstep = 0.005\nend = 0.01\n[flow]\nformulation = \"paper\"\n\
+         [flow.mesh]\ncells_per_radius = 1.0\ncoarsest_level = 0\nband = 0.0\n"
     );
     let mut case = Case::parse(&text, "cluster.toml").expect("a good case");
     case.particles = centers.map(|center| ParticleSpec::new(center.to_vec(), RADIUS)).collect();

@@ -40,7 +40,7 @@ fn ratio(case: &Case) -> Option<f64> {
 #[test]
 fn shipped_cases_have_as_many_cells_as_expected() {
     for mut case in shipped() {
-        for formulation in [Formulation::Paper, Formulation::RigidDofs] {
+        for formulation in [Formulation::Paper, Formulation::Unfitted] {
             case.flow.formulation = formulation;
             let ratio = ratio(&case);
             assert!(ratio.is_none_or(|ratio| (0.6..=1.6).contains(&ratio)), "{ratio:?}");
@@ -71,7 +71,7 @@ fn random_case(seed: u64) -> Case {
     case.flow.mesh.coarsest_level = Some(random.random_range(0..4));
     case.flow.mesh.band = random.random_range(0.0..4.0);
     if random.random_range(0..2) == 0 {
-        case.flow.formulation = Formulation::RigidDofs;
+        case.flow.formulation = Formulation::Paper;
     }
     case.check().unwrap_or_else(|error| panic!("{error}"));
     case

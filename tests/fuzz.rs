@@ -80,7 +80,7 @@ solver = "auto"
 tolerance = 1e-13
 [flow]
 hydrodynamics = "stokes"
-formulation = "rigid-dofs"
+formulation = "paper"
 solver = "auto"
 tolerance = 1e-6
 [flow.mesh]
@@ -92,10 +92,6 @@ viscosity_ratio = 1e3
 uzawa_steps = 1
 rho = 1.0
 ramp = 1.0
-[flow.rigid-dofs]
-offset = -0.1
-gap_fraction = 1.0
-gap_levels = 2
 [flow.pair-mobility]
 gap_offset = 0.0
 "#;

@@ -31,7 +31,6 @@ boundary = "{boundary}"
 step = 0.02
 end = 0.02
 [flow]
-formulation = "rigid-dofs"
 solver = "multigrid"
 tolerance = 1e-11
 [flow.mesh]

@@ -89,11 +89,10 @@ fn on_the_way_back() {
 fn with_the_finite_element_flow() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-2d.toml");
     for solver in [Solver::Direct, Solver::Multigrid] {
-        for formulation in [Formulation::Paper, Formulation::RigidDofs, Formulation::Unfitted] {
+        for formulation in [Formulation::Paper, Formulation::Unfitted] {
             let mut case = Case::load(file).expect("a case");
             case.time.end = 5.0 * case.time.step;
             case.flow.mesh.cells_per_radius = Some(3.2);
-            case.flow.rigid_dofs.gap_fraction = 0.0;
             (case.flow.solver, case.flow.formulation) = (solver, formulation);
             resumes_bit_by_bit(&case, 2);
         }

@@ -44,7 +44,6 @@ strategy = "gluey"
 exact_gap = false
 
 [flow]
-formulation = "rigid-dofs"
 solver = "multigrid"
 tolerance = 1e-11
 
@@ -54,7 +53,7 @@ root_cells = 1
 band = 1
 "#;
 /// Its trajectory.
-const TRAJECTORY: &str = "near-gluey-rigid-dofs.csv";
+const TRAJECTORY: &str = "near-gluey-unfitted.csv";
 /// Spheres in a box that is sheared for ever, by the default formulation.
 const SHEARED: &str = r#"name = "sheared"
 dimension = 3
@@ -121,7 +120,7 @@ const LIMIT: f64 = 1e-11;
 /// The same in the sheared box, whose stresses one process finds from the flow of the step before.
 const LIMIT_OF_SHEARED: f64 = 5e-10;
 /// Its checkpoint.
-const CHECKPOINT: &str = "near-gluey-rigid-dofs.checkpoint";
+const CHECKPOINT: &str = "near-gluey-unfitted.checkpoint";
 /// A key that makes the run longer.
 const LONG: &str = "time.end=2";
 /// Ranks of a run that loses one.

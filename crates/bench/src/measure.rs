@@ -111,7 +111,7 @@ fn prepare<const D: usize>(options: &Options) -> Result<(Problem<D>, MultigridSo
 where
     Dim<D>: Space<D>,
 {
-    let formulation = options.formulation(D);
+    let formulation = options.formulation();
     let stopwatch = Stopwatch::start();
     let mesh = mesh(options, &options.case.balls_of_the_mesh())?;
     let problem = Problem::new(mesh, &options.case.balls(), VISCOSITY, formulation)?;

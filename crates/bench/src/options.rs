@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use gluey_stokes::{CutCellPressures, Formulation, Lubrication, PaperParams};
+use gluey_stokes::{Formulation, Lubrication, PaperParams};
 use serde::Serialize;
 
 use crate::cases::Case;
@@ -19,7 +19,7 @@ pub struct Options {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     n: CellsPerSide,
     /// How rigidity is imposed.
-    #[arg(long, value_name = "NAME", default_value = "rigid-dofs")]
+    #[arg(long, value_name = "NAME", default_value = "unfitted")]
     pub formulation: FormulationName,
     /// Residual to reach, relative to that of a zero guess.
     #[arg(long = "tol", value_name = "T", default_value = "1e-8", value_parser = tolerance, allow_hyphen_values = true)]
@@ -39,8 +39,6 @@ pub struct Options {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum FormulationName {
-    /// Elimination of the solid degrees of freedom.
-    RigidDofs,
     /// Nitsche's conditions on the true surfaces.
     Unfitted,
     /// Penalty with a ramp of one cell, solved once.
@@ -58,13 +56,9 @@ impl Options {
         self.n.level
     }
 
-    /// The formulation with its parameters in dimension `dimension`.
-    pub fn formulation(&self, dimension: usize) -> Formulation {
+    /// The formulation with its parameters.
+    pub fn formulation(&self) -> Formulation {
         match self.formulation {
-            FormulationName::RigidDofs => Formulation::RigidDofs {
-                offset: gluey_stokes::default_offset(dimension),
-                cut_cell_pressures: CutCellPressures::Aggregate,
-            },
             FormulationName::Unfitted => Formulation::Unfitted { lubrication: Lubrication::Deficit },
             FormulationName::Paper => Formulation::Paper(PaperParams {
                 viscosity_ratio: self.contrast,

@@ -19,7 +19,7 @@ pub struct Report {
     /// Tolerance, relative to the initial residual.
     #[serde(rename = "tol")]
     pub tolerance: f64,
-    /// Viscosity of the particles over that of the fluid in `paper`; `null` in `rigid-dofs`.
+    /// Viscosity of the particles over that of the fluid in `paper`; `null` in `unfitted`.
     pub contrast: Option<f64>,
     /// Threads.
     pub threads: usize,

@@ -9,14 +9,16 @@ use gluey_contact::{ContactModel, ContactParams, PairContact, StepGeometry};
 use gluey_geom::{Aabb, Particle, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Integrator, Scheme};
-use gluey_stokes::{
-    CutCellPressures, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind,
-};
+use gluey_stokes::{FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, Refinement, SolverKind};
 
 /// Radius of the discs; the box is the unit square.
 const RADIUS: f64 = 0.05;
 /// Time step, in units of the inverse shear rate.
 const DT: f64 = 0.025;
+
+/// Cells at the surfaces fit six times into a radius.
+const REFINEMENT: Refinement =
+    Refinement { coarsest: 3, surface: 7, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
 
 /// The undisturbed flow, which is also the velocity of the boundary.
 fn shear(x: &Vector<2>) -> Vector<2> {
@@ -28,22 +30,18 @@ pub struct Method {
     /// What it is, as it is printed.
     pub name: &'static str,
     formulation: Formulation,
-    refinement: Refinement,
     has_contact: bool,
 }
 
-/// Penalised discs without and with contact, and rigid discs whose film is resolved.
+/// Penalised discs without and with contact, and rigid discs with lubrication.
 pub fn methods() -> [Method; 3] {
-    let coarse = Refinement { coarsest: 3, surface: 7, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
-    let resolved = Refinement { surface: 8, gap_fraction: 1.0, gap_levels: 9, ..coarse };
     let paper = Formulation::Paper(PaperParams::default());
-    let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
-    let method =
-        |name, formulation, refinement, has_contact| Method { name, formulation, refinement, has_contact };
+    let unfitted = Formulation::Unfitted { lubrication: Lubrication::Deficit };
+    let method = |name, formulation, has_contact| Method { name, formulation, has_contact };
     [
-        method("penalised discs, no contact model", paper, coarse, false),
-        method("penalised discs, gluey contact", paper, coarse, true),
-        method("rigid discs, film resolved, no contact model", rigid, resolved, false),
+        method("penalised discs, no contact model", paper, false),
+        method("penalised discs, gluey contact", paper, true),
+        method("true surfaces, lubrication in the film, no contact model", unfitted, false),
     ]
 }
 
@@ -62,7 +60,6 @@ pub struct Instant {
 /// Two discs, the flow around them, what keeps them apart and what moves them.
 struct Suspension {
     particles: [Particle<2>; 2],
-    refinement: Refinement,
     flow: FlowSolver<2>,
     contact: Option<PairContact<2>>,
     integrator: Integrator<2>,
@@ -81,7 +78,6 @@ impl Suspension {
         let disc = |x, y| Particle::new(Vector::<2>::new(x, y), RADIUS);
         Ok(Self {
             particles: [disc(0.451, 0.51), disc(0.549, 0.49)],
-            refinement: method.refinement,
             flow: FlowSolver::new(params)?,
             contact: method.has_contact.then_some(contact),
             integrator: Integrator::new(Scheme::AdamsBashforth2),
@@ -98,7 +94,7 @@ impl Suspension {
     /// The velocities and spins that the flow alone would give.
     fn predict(&mut self) -> Result<Vec<Twist<2>>, Box<dyn Error>> {
         let discs = self.particles.map(|particle| Ball::new(particle.pose.position, particle.radius));
-        let mesh = self.refinement.mesh(Aabb::unit(), [1; 2], [false; 2], &discs)?;
+        let mesh = REFINEMENT.mesh(Aabb::unit(), [1; 2], [false; 2], &discs)?;
         Ok(self.flow.solve(mesh, &discs, &shear)?.twists)
     }
 

@@ -50,12 +50,12 @@ mod validate;
 
 pub use contact::ContactSpec;
 pub use error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem};
-pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec, RigidDofsSpec};
+pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use idle_key::IdleKey;
 pub use keys::CaseKey;
-pub use mesh::{default_cells_per_radius, default_gap_levels};
+pub use mesh::default_cells_per_radius;
 pub use names::{
     ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, OutputKind, ParticleVelocity,
     Precision, RadiiKind, Solver, UnknownName,

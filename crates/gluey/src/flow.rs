@@ -1,6 +1,6 @@
 //! The finite-element flow as [`Hydrodynamics`]: particles in, velocities out.
 //!
-//! Each prediction builds a mesh that is fine at the surfaces (and, in `rigid-dofs`, in narrow gaps), solves
+//! Each prediction builds a mesh that is fine at the surfaces , solves
 //! the Stokes problem of `gluey-stokes` in the undisturbed shear `gamma_dot (y - y_mid) e_x` and under the
 //! forces and torques of the case, and reads off the twists.
 

@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn processes_that_share_a_case_need_less_each() {
         let toml = "name = \"many\"\ndimension = 3\nparticles = [{ position = [0.5, 0.5, 0.5], radius = 0.05 }]\n\
-                    [time]\nstep = 0.1\nend = 0.1\n[flow]\nformulation = \"rigid-dofs\"\n\
+                    [time]\nstep = 0.1\nend = 0.1\n\
                     [flow.mesh]\nband = 40\n";
         let case = Case::parse(toml, "many.toml").unwrap();
         let bytes = |ranks| MeshEstimate::of_rank(&case, ranks).unwrap().bytes;

@@ -23,7 +23,7 @@ pub struct RunReport {
     pub case: String,
     /// Contact strategy.
     pub strategy: Strategy,
-    /// `paper`, `rigid-dofs` or `unfitted`; the name of the analytic model where there is no finite-element
+    /// `unfitted` or `paper`; the name of the analytic model where there is no finite-element
     /// flow.
     pub formulation: String,
     /// Time steps.

@@ -54,10 +54,6 @@ impl Settings {
 fn flow(case: &Case) -> String {
     let flow = &case.flow;
     match flow.formulation {
-        Formulation::RigidDofs => {
-            let offset = case.rigid_offset();
-            format!("rigid-dofs, offset {offset} h")
-        }
         Formulation::Unfitted => match case.lubrication() {
             Lubrication::Deficit => "unfitted, lubrication below the cell".to_owned(),
             Lubrication::None => "unfitted, no lubrication below the cell".to_owned(),

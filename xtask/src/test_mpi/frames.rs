@@ -11,7 +11,7 @@ use super::{Case, MpiError, RANKS, line, outcome, words};
 use crate::python::{self, PythonError};
 
 /// Its folder of frames.
-const FRAMES: &str = "near-gluey-rigid-dofs-vtk";
+const FRAMES: &str = "near-gluey-unfitted-vtk";
 /// Steps with a frame, and the words that ask for them.
 const STEPS: [usize; 3] = [0, 2, 4];
 const EVERY: [&str; 2] = ["--vtk", "2"];

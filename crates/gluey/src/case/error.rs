@@ -12,6 +12,7 @@ pub use super::key::{Key, KeyPart};
 use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
+use super::suggest::former;
 use crate::shown::{shown, shown_to};
 use crate::text::{named, visible};
 
@@ -398,9 +399,8 @@ impl Problem {
                     .into()
             }
             Self::MissingKey { example, .. } => format!("add a line like `{example}`"),
-            Self::UnknownKey { suggestion, elsewhere, known, .. } => {
-                unknown_key_hint(suggestion.as_deref(), elsewhere, known)
-            }
+            Self::UnknownKey { name, suggestion, elsewhere, known } => former(name)
+                .map_or_else(|| unknown_key_hint(suggestion.as_deref(), elsewhere, known), str::to_owned),
             Self::Version { found } if *found > i64::from(VERSION) => {
                 format!("it reads layout {VERSION}: take a newer gluey, or write the case in that layout")
             }

@@ -1,10 +1,10 @@
 //! A case with what it leaves to defaults written down.
 
-use super::{Case, mesh::FINEST_LEVEL};
+use super::Case;
 
 impl Case {
     /// This case with all defaults that follow from others stated: corners of the box, the tree of the mesh,
-    /// what acts in films, the numbers of `rigid-dofs`. It runs bit for bit as this one does.
+    /// what acts in films. It runs bit for bit as this one does.
     pub fn filled(&self) -> Self {
         let mut case = self.clone();
         case.domain.lower = Some(self.lower());
@@ -14,8 +14,6 @@ impl Case {
         case.flow.mesh.cells_per_radius = Some(self.cells_per_radius());
         case.flow.mesh.root_cells = self.root_cells().and_then(|roots| roots.into_iter().min());
         case.flow.mesh.coarsest_level = Some(self.coarsest_level());
-        case.flow.rigid_dofs.offset = Some(self.rigid_offset());
-        case.flow.rigid_dofs.gap_levels = Some(self.gap_levels().min(self.levels_left()));
         case
     }
 
@@ -25,12 +23,6 @@ impl Case {
     /// When a value has no form in TOML, which no checked case has.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(&self.filled())
-    }
-
-    /// Levels that the tree has beyond that of the surfaces; all of them where there is no mesh.
-    fn levels_left(&self) -> u32 {
-        let level = self.finest_level().zip(self.surface_level());
-        level.map_or(FINEST_LEVEL, |(finest, surface)| finest.saturating_sub(surface as u32))
     }
 }
 

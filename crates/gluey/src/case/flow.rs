@@ -26,9 +26,6 @@ pub struct FlowSpec {
     pub mesh: MeshSpec,
     /// Parameters of the `paper` formulation.
     pub paper: PaperSpec,
-    /// Parameters of the `rigid-dofs` formulation.
-    #[serde(rename = "rigid-dofs")]
-    pub rigid_dofs: RigidDofsSpec,
     /// Parameters of the `pair-mobility` model.
     #[serde(rename = "pair-mobility")]
     pub pair_mobility: PairMobilitySpec,
@@ -39,7 +36,7 @@ pub struct FlowSpec {
 #[serde(deny_unknown_fields, default)]
 pub struct MeshSpec {
     /// The cells at the surfaces have at least this many edges in a radius of the smallest particle. Unit:
-    /// cells. Default: in 2D 12.8 with `rigid-dofs` and 6.4 without, in 3D 3.2.
+    /// cells. Default: 6.4 in 2D, 3.2 in 3D.
     #[schemars(range(min = 1))]
     pub cells_per_radius: Option<f64>,
     /// Root cells of the tree along the shortest edge of the box, at least. Cells are halves of halves of
@@ -82,24 +79,6 @@ pub struct PaperSpec {
     pub velocity: ParticleVelocity,
 }
 
-/// Parameters of the `rigid-dofs` formulation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RigidDofsSpec {
-    /// A node is rigid where the signed distance (positive inside) is at least this many cells. Unit: cells.
-    /// Default: -0.1 in 2D, -0.2 in 3D.
-    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
-    pub offset: Option<f64>,
-    /// Cells in a gap are no larger than this part of the local distance between the surfaces, from 0.1 on;
-    /// 0 leaves gaps alone. Unit: distance of the surfaces. Default: 1.
-    #[schemars(range(min = 0, max = 10))]
-    pub gap_fraction: f64,
-    /// Levels beyond that of the surfaces that gaps may use. Unit: levels. Default: in 2D 9, or what the tree
-    /// has left, in 3D 0.
-    #[schemars(range(max = 18))]
-    pub gap_levels: Option<u32>,
-}
-
 /// Parameters of the `pair-mobility` model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -120,7 +99,6 @@ impl Default for FlowSpec {
             tolerance: 1e-6,
             mesh: MeshSpec::default(),
             paper: PaperSpec::default(),
-            rigid_dofs: RigidDofsSpec::default(),
             pair_mobility: PairMobilitySpec::default(),
         }
     }
@@ -153,11 +131,5 @@ impl PaperSpec {
             },
             ..PaperParams::default()
         }
-    }
-}
-
-impl Default for RigidDofsSpec {
-    fn default() -> Self {
-        Self { offset: None, gap_fraction: 1.0, gap_levels: None }
     }
 }

@@ -57,25 +57,18 @@ impl Case {
                     "flow.tolerance",
                     "flow.mesh",
                     "flow.paper",
-                    "flow.rigid-dofs",
                 ],
                 format!("flow.hydrodynamics = \"{}\"", flow.hydrodynamics),
             ),
             Hydrodynamics::Stokes => {
-                let why = format!("flow.formulation = \"{}\"", flow.formulation);
                 add(&["flow.pair-mobility"], format!("flow.hydrodynamics = \"{}\"", flow.hydrodynamics));
-                match flow.formulation {
-                    Formulation::Paper => add(&["flow.rigid-dofs"], why),
-                    Formulation::RigidDofs => add(&["flow.paper"], why),
-                    Formulation::Unfitted => add(&["flow.paper", "flow.rigid-dofs"], why),
+                if flow.formulation != Formulation::Paper {
+                    add(&["flow.paper"], format!("flow.formulation = \"{}\"", flow.formulation));
                 }
             }
         }
         if self.is_penalty() {
             add(&["flow.paper.rho"], "flow.paper.uzawa_steps = 1".to_owned());
-        }
-        if flow.formulation == Formulation::RigidDofs && flow.rigid_dofs.gap_fraction == 0.0 {
-            add(&["flow.rigid-dofs.gap_levels"], "flow.rigid-dofs.gap_fraction = 0".to_owned());
         }
         add(idle_of_contact(&self.contact), format!("contact.strategy = \"{}\"", self.contact.strategy));
         if self.repulsion.force == 0.0 {
@@ -184,12 +177,7 @@ mod tests {
 
     #[test]
     fn nothing_is_idle_in_a_case_that_sets_nothing() {
-        for lines in [
-            "",
-            "contact = { strategy = \"none\" }",
-            "flow = { formulation = \"rigid-dofs\" }",
-            "flow = { formulation = \"paper\" }",
-        ] {
+        for lines in ["", "contact = { strategy = \"none\" }", "flow = { formulation = \"paper\" }"] {
             assert!(idle(2, lines).is_empty() && idle(3, lines).is_empty(), "{:?}", idle(2, lines));
         }
         assert!(idle(3, "flow = { hydrodynamics = \"pair-mobility\" }").is_empty());
@@ -223,18 +211,11 @@ mod tests {
             |formulation: &str, key: &str| format!("flow = {{ formulation = \"{formulation}\", {key} }}");
         let paper = "flow.paper.ramp: flow.formulation = \"unfitted\"";
         assert_eq!(idle(2, &flow("unfitted", "paper = { ramp = 2.0 }")), [paper]);
-        let offset = "flow.rigid-dofs.offset: flow.formulation = \"paper\"";
-        assert_eq!(idle(2, &flow("paper", "rigid-dofs = { offset = -0.3 }")), [offset]);
         let gap = "flow.pair-mobility.gap_offset: flow.hydrodynamics = \"stokes\"";
         assert_eq!(idle(3, &flow("unfitted", "pair-mobility = { gap_offset = 0.1 }")), [gap]);
         let rho = "flow.paper.rho: flow.paper.uzawa_steps = 1";
         assert_eq!(idle(2, &flow("paper", "paper = { uzawa_steps = 1, rho = 2.0 }")), [rho]);
         assert!(idle(2, &flow("paper", "paper = { rho = 2.0 }")).is_empty());
-        let levels = "flow.rigid-dofs.gap_levels: flow.rigid-dofs.gap_fraction = 0";
-        assert_eq!(
-            idle(2, &flow("rigid-dofs", "rigid-dofs = { gap_fraction = 0, gap_levels = 1 }")),
-            [levels]
-        );
         let mobility = "flow = { hydrodynamics = \"pair-mobility\", formulation = \"paper\", solver = \"direct\", \
                         tolerance = 1e-8, mesh = { band = 3.0, cells_per_radius = 6.0 } }\n\
                         domain = { boundary = \"periodic\" }";

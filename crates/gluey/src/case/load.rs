@@ -133,13 +133,12 @@ fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
     if flow.contains_key("formulation") {
         return;
     }
-    for formulation in [Formulation::Paper, Formulation::RigidDofs].map(|name| name.to_string()) {
-        if flow.contains_key(&formulation) {
-            let key = Key::default().name("flow").name(&formulation);
-            let needs = format!("flow.formulation = \"{formulation}\"");
-            let found = format!("no `flow.formulation`, which means \"{}\"", Formulation::default());
-            findings.add(key, Problem::Unfit { choice: format!("`[flow.{formulation}]`"), needs, found });
-        }
+    let paper = Formulation::Paper.name();
+    if flow.contains_key(paper) {
+        let key = Key::default().name("flow").name(paper);
+        let needs = format!("flow.formulation = \"{paper}\"");
+        let found = format!("no `flow.formulation`, which means \"{}\"", Formulation::default());
+        findings.add(key, Problem::Unfit { choice: format!("`[flow.{paper}]`"), needs, found });
     }
 }
 

@@ -1,8 +1,6 @@
 //! The tree that a case asks for: its root cells, and the levels it refines them to.
 
-use gluey_stokes::default_offset;
-
-use super::{Case, Formulation, Hydrodynamics};
+use super::{Case, Hydrodynamics};
 
 /// Largest number of root cells along the shortest edge of the box.
 pub(super) const MOST_ROOTS: u32 = 16;
@@ -27,18 +25,8 @@ pub(super) const FINEST_LEVEL: u32 = 18;
 const ROUNDING: f64 = 1e-9;
 
 /// Cells per radius where a case does not state them.
-pub fn default_cells_per_radius(dimension: usize, formulation: Formulation) -> f64 {
-    match (dimension, formulation) {
-        (2, Formulation::RigidDofs) => 12.8,
-        (2, Formulation::Paper | Formulation::Unfitted) => 6.4,
-        _ => 3.2,
-    }
-}
-
-/// Levels that gaps may use beyond that of the surfaces where a case does not state them: enough for any film
-/// in 2D, none in 3D, where they spoil the convergence of the solver.
-pub fn default_gap_levels(dimension: usize) -> u32 {
-    if dimension == 2 { 9 } else { 0 }
+pub fn default_cells_per_radius(dimension: usize) -> f64 {
+    if dimension == 2 { 6.4 } else { 3.2 }
 }
 
 impl Case {
@@ -130,18 +118,7 @@ impl Case {
 
     /// Cells per radius at the surfaces, as stated or by default.
     pub fn cells_per_radius(&self) -> f64 {
-        let default = default_cells_per_radius(self.dimension, self.flow.formulation);
-        self.flow.mesh.cells_per_radius.unwrap_or(default)
-    }
-
-    /// Levels beyond that of the surfaces that gaps may use in `rigid-dofs`, as stated or by default.
-    pub fn gap_levels(&self) -> u32 {
-        self.flow.rigid_dofs.gap_levels.unwrap_or(default_gap_levels(self.dimension))
-    }
-
-    /// Signed distance, in cells, from which on a node is rigid in `rigid-dofs`, as stated or by default.
-    pub fn rigid_offset(&self) -> f64 {
-        self.flow.rigid_dofs.offset.unwrap_or(default_offset(self.dimension))
+        self.flow.mesh.cells_per_radius.unwrap_or(default_cells_per_radius(self.dimension))
     }
 
     /// Radius of the smallest particle.

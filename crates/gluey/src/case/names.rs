@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::suggest::closest;
+use super::suggest::{closest, former};
 
 /// A name that is none of the known ones.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -25,6 +25,9 @@ impl UnknownName {
     /// Hint at the known names, with the nearest one first.
     pub fn hint(&self) -> String {
         let choices = self.known.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+        if let Some(instead) = former(&self.found) {
+            return format!("{instead}; one of {choices}");
+        }
         match closest(&self.found, self.known.iter().map(String::as_str)) {
             Some(near) => format!("did you mean \"{near}\"? One of {choices}"),
             None => format!("one of {choices}"),
@@ -91,8 +94,6 @@ named! {
     Formulation, "formulation" {
         /// Viscosity ratio and Uzawa multiplier, as in the paper: soft near contact.
         Paper = "paper",
-        /// Velocity nodes inside particles take part in their rigid motion exactly.
-        RigidDofs = "rigid-dofs",
         /// The fluid ends at the true surfaces, wherever these cut the mesh.
         #[default]
         Unfitted = "unfitted",

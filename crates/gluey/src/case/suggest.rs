@@ -16,6 +16,14 @@ pub(crate) fn synonym<'a>(found: &str, known: impl IntoIterator<Item = &'a str>)
     known.into_iter().find(|candidate| candidate == name)
 }
 
+/// What to write instead of a name that case files had.
+pub(crate) fn former(found: &str) -> Option<&'static str> {
+    (found == "rigid-dofs").then_some(
+        "write formulation = \"unfitted\" instead, without a table [flow.rigid-dofs]: it is more exact with half the \
+         cells in a radius",
+    )
+}
+
 /// The candidate with the smallest edit distance to `found`, if that is at most a third of its letters (but
 /// two edits are always allowed).
 pub(crate) fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

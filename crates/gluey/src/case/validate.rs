@@ -307,10 +307,6 @@ fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut Findings) 
 fn check_flow(case: &Case, key: &Key, findings: &mut Findings) {
     check_mesh(case, &key.name("mesh"), findings);
     check_lubrication(case, key.name("lubrication"), findings);
-    let (key, fraction) = (key.clone(), case.flow.rigid_dofs.gap_fraction);
-    if fraction != 0.0 && fraction < 0.1 {
-        findings.out_of_range(key.name("rigid-dofs").name("gap_fraction"), fraction, "from 0.1 to 10, or 0");
-    }
     if case.flow.hydrodynamics == Hydrodynamics::PairMobility {
         check_pair_mobility(case, key.name("hydrodynamics"), findings);
     }
@@ -352,14 +348,9 @@ fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
         return findings.add(key.name("cells_per_radius"), problem);
     }
     let level = level as u32;
-    let (mesh, left) = (&case.flow.mesh, finest - level);
-    if let Some(found) = mesh.coarsest_level.filter(|&found| found > level) {
+    if let Some(found) = case.flow.mesh.coarsest_level.filter(|&found| found > level) {
         let problem = Problem::CoarseTooFine { found, finest: level };
         findings.add(key.name("coarsest_level"), problem);
-    }
-    if let Some(levels) = case.flow.rigid_dofs.gap_levels.filter(|&levels| levels > left) {
-        let key = Key::default().name("flow").name("rigid-dofs").name("gap_levels");
-        findings.out_of_range(key, f64::from(levels), &format!("from 0 to {left} with surfaces this fine"));
     }
 }
 

@@ -29,7 +29,7 @@ pub struct RunArguments {
     /// inelastic, gluey.
     #[arg(long)]
     strategy: Option<Strategy>,
-    /// How rigidity enters the flow, instead of the case's choice: paper, rigid-dofs, unfitted.
+    /// How rigidity enters the flow, instead of the case's choice: unfitted, paper.
     #[arg(long, value_parser = by_name::<Formulation>)]
     formulation: Option<Formulation>,
     /// Folder for all output.

@@ -5,8 +5,7 @@
 //!
 //! `pi R^2 + 4 R + 1` squares or `4/3 pi R^3 + 3 pi R^2 + 6 R + 1` cubes of edge `h`,
 //!
-//! and no more than fill the box. Gaps between particles add those in the lens where they are narrower than
-//! their cells. The mesh that is built has 0.6 to 1.6 times as many cells (`tests/estimate.rs`: the shipped
+//! and no more than fill the box. The mesh that is built has 0.6 to 1.6 times as many cells (`tests/estimate.rs`: the shipped
 //! cases, and sixty at random).
 
 use std::f64::consts::PI;
@@ -15,7 +14,6 @@ use gluey_geom::{Dim, Particle, Space, Vector};
 use gluey_stokes::{Discretisation, Refinement};
 
 use super::{FlowError, StokesFlow, refinement, stokes_flow};
-use crate::case::neighbours::{Neighbours, nearer_than};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 
 /// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
@@ -25,18 +23,13 @@ const PROGRAM: f64 = 16e6;
 /// The same of a process that shares a case over MPI.
 const PROGRAM_OF_RANK: f64 = 24e6;
 /// What an unknown takes there; unit: bytes.
-const OF_RANK: f64 = 500.0;
-/// The same with steps in double precision, in `unfitted`.
-const OF_RANK_AT_SURFACES: f64 = 800.0;
+const OF_RANK: f64 = 800.0;
 /// Layers of cells around its own whose cuts a process of `unfitted` holds, as a cube of its cells would
 /// have.
 const LAYERS_AT_SURFACES: f64 = 6.0;
 /// What a cell that a surface cuts takes in `unfitted`: its moments, its matrix and its part of the
 /// penalties; unit: bytes.
 const CUT_CELL: [f64; 2] = [40e3, 55e3];
-/// Cells across a gap that are refined because of it, those inside the particles included.
-const GAP_THICKNESS: f64 = 2.6;
-
 /// A cell is refined, too, where one of its children's size that touches it meets a ball: as many do as meet
 /// a ball this much larger (squares of twice the edge: `pi R^2 + 8 R + 4`). Unit: cells.
 const TOUCHING: f64 = 0.7;
@@ -156,8 +149,7 @@ impl Tree {
     /// Leaves: the roots, and for each refined cell its children less itself.
     fn cell_count(&self, case: &Case) -> f64 {
         let surface = i32::from(self.refinement.surface);
-        let near = (0..surface).map(|level| self.near_surfaces(case, level));
-        let refined: f64 = near.sum::<f64>() + self.in_gaps(case);
+        let refined: f64 = (0..surface).map(|level| self.near_surfaces(case, level)).sum();
         self.root_count + refined * (2f64.powi(self.dimension) - 1.0)
     }
 
@@ -194,37 +186,6 @@ impl Tree {
         let met = |radius: f64| cells_met(self.dimension, (radius + beyond) / size);
         case.particles.iter().map(|particle| met(particle.radius)).sum::<f64>().min(most)
     }
-
-    /// Refined cells of the levels beyond that of the surfaces.
-    fn in_gaps(&self, case: &Case) -> f64 {
-        let Refinement { surface, gap_fraction, gap_levels, .. } = self.refinement;
-        if gap_fraction <= 0.0 || gap_levels == 0 {
-            return 0.0;
-        }
-        let widest = |size: f64| size * (1.0 / gap_fraction + f64::from(self.dimension).sqrt());
-        let pairs = nearer_than(case, widest(self.size(i32::from(surface))));
-        let levels = (0..i32::from(gap_levels)).map(|level| i32::from(surface) + level);
-        levels
-            .map(|level| {
-                let size = self.size(level);
-                let most = self.root_count * 2f64.powi(self.dimension * level);
-                pairs.iter().map(|pair| self.in_gap(case, pair, size, widest(size))).sum::<f64>().min(most)
-            })
-            .sum()
-    }
-
-    /// Cells of a size in the lens where the distance of two surfaces, `gap + r^2 (1/a + 1/b) / 2` at the
-    /// distance `r` from their axis, is less than `widest`.
-    fn in_gap(&self, case: &Case, pair: &Neighbours, size: f64, widest: f64) -> f64 {
-        let [a, b] = [pair.first, pair.second].map(|particle| case.particles[particle].radius);
-        let excess = widest - (pair.distance - pair.contact_distance).max(0.0);
-        if excess <= 0.0 {
-            return 0.0;
-        }
-        let radius = (2.0 * excess / (1.0 / a + 1.0 / b)).sqrt().min(1.5 * a.min(b)) / size;
-        GAP_THICKNESS
-            * if self.dimension == 2 { 2.0 * radius + 1.0 } else { PI * radius * radius + 4.0 * radius + 1.0 }
-    }
 }
 
 /// Cells that a ball meets on average, whose radius is so many cells.
@@ -239,7 +200,7 @@ fn cells_met(dimension: i32, radius: f64) -> f64 {
 fn memory(case: &Case, tree: &Tree, counts: (f64, f64)) -> f64 {
     let of_cuts = match case.flow.formulation {
         Formulation::Unfitted => CUT_CELL[case.dimension - 2] * tree.cells_cut(case),
-        Formulation::Paper | Formulation::RigidDofs => 0.0,
+        Formulation::Paper => 0.0,
     };
     PROGRAM + of_cuts + memory_of_solver(case, tree, counts)
 }
@@ -250,11 +211,8 @@ fn memory_of_rank(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f
     let side = (cell_count / ranks).powf(1.0 / case.dimension as f64);
     let with_layers = |count: f64| (1.0 + 2.0 * count / side).powi(case.dimension as i32).min(ranks);
     let of_unknowns = |bytes: f64| PROGRAM_OF_RANK + bytes * unknown_count / ranks * with_layers(1.0);
-    if case.flow.formulation != Formulation::Unfitted {
-        return of_unknowns(OF_RANK);
-    }
     let of_cuts = CUT_CELL[case.dimension - 2] * tree.cells_cut(case) / ranks;
-    of_unknowns(OF_RANK_AT_SURFACES) + of_cuts * with_layers(LAYERS_AT_SURFACES)
+    of_unknowns(OF_RANK) + of_cuts * with_layers(LAYERS_AT_SURFACES)
 }
 
 fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64)) -> f64 {
@@ -271,7 +229,6 @@ fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64,
         let per_unknown = match formulation {
             Formulation::Unfitted => 290.0,
             Formulation::Paper => 310.0,
-            Formulation::RigidDofs => 150.0,
         };
         return match case.dimension {
             2 => solved * per_unknown * solved.log2(),
@@ -279,7 +236,6 @@ fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64,
         };
     }
     let per_unknown = match (case.dimension, formulation) {
-        (_, Formulation::RigidDofs) => 500.0,
         (_, Formulation::Unfitted) => 800.0,
         (2, Formulation::Paper) => 2400.0,
         (_, Formulation::Paper) => 1400.0,

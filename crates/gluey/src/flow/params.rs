@@ -1,7 +1,7 @@
 //! Mesh and parameters of the flow of a case.
 
 use gluey_geom::Aabb;
-use gluey_stokes::{CutCellPressures, FlowParams, Refinement, SolverKind};
+use gluey_stokes::{FlowParams, Refinement, SolverKind};
 
 use super::error::FlowError;
 use crate::case::{Case, Formulation, Lubrication, Solver};
@@ -15,16 +15,13 @@ pub(crate) fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u3
 
 /// Refinement of the mesh of a checked case, whose surfaces are at `level`.
 pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
-    let (mesh, rigid_dofs) = (&case.flow.mesh, &case.flow.rigid_dofs);
     let surface = level as u8;
-    let rigid = case.flow.formulation == Formulation::RigidDofs;
-    let levels_left = case.finest_level().unwrap_or(0).saturating_sub(u32::from(surface));
     Refinement {
         coarsest: case.coarsest_level().min(u32::from(surface)) as u8,
         surface,
-        band: mesh.band,
-        gap_fraction: if rigid { rigid_dofs.gap_fraction } else { 0.0 },
-        gap_levels: case.gap_levels().min(levels_left) as u8,
+        band: case.flow.mesh.band,
+        gap_fraction: 0.0,
+        gap_levels: 0,
     }
 }
 
@@ -32,10 +29,6 @@ pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
 pub(crate) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let flow = &case.flow;
     let formulation = match flow.formulation {
-        Formulation::RigidDofs => gluey_stokes::Formulation::RigidDofs {
-            offset: case.rigid_offset(),
-            cut_cell_pressures: CutCellPressures::Aggregate,
-        },
         Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
         Formulation::Unfitted => gluey_stokes::Formulation::Unfitted {
             lubrication: match case.lubrication() {

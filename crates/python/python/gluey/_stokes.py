@@ -65,7 +65,7 @@ class Stokes:
     cells_per_radius
         Cells in a radius of the smallest particle, at least; 6.4 in 2D and 3.2 in 3D when absent.
     formulation
-        How rigidity enters: ``unfitted``, ``rigid-dofs``, or ``paper`` (whose particles cannot be held).
+        How rigidity enters: ``unfitted`` or ``paper`` (whose particles cannot be held).
     tolerance
         Relative tolerance of the residual of a solve.
     flow

@@ -7,10 +7,8 @@ use crate::plot::Plot;
 use crate::statistics::{mean, rms};
 
 /// Tables it is taken from, with the keys of their rows.
-const SOURCES: [(&str, &[(&str, f64)]); 2] = [
-    ("discs", &[("refined film", 0.0), ("gap", 1.0), ("angle", 135.0)]),
-    ("spheres", &[("gap", 1.0), ("angle", 135.0)]),
-];
+const SOURCES: [(&str, &[(&str, f64)]); 2] =
+    [("discs", &[("gap", 1.0), ("angle", 135.0)]), ("spheres", &[("gap", 1.0), ("angle", 135.0)])];
 
 /// The chapter.
 pub const CASE: Case = Case {

@@ -33,9 +33,8 @@ pub const CASE: Case = Case {
            1e-8; at gaps of 0.05, 1e-3 and 1e-4 a the speed is the force that holds the pair, interpolated, over the resistance of \
            unbounded discs, data/reference/pair2d_resistance.csv: to 2e-4). With the line of centres at 135 degrees: relative \
            error of the speed of approach. At 0 degrees: errors of the rotation of the line and of the spin, in units of \
-           the shear rate. Cells are of equal size at the surfaces and in the gap, where not said otherwise; refined films are \
-           what cases of rigid-dofs have by default.",
-    keys: &["refined film", "a/h", "gap", "angle", "position"],
+           the shear rate. Cells are of equal size at the surfaces and in the gap.",
+    keys: &["a/h", "gap", "angle", "position"],
     measures: &["approach", "line rotation", "spin"],
     tasks,
     numbers,
@@ -54,21 +53,18 @@ fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
     for method in FILM_METHODS {
         for &cells in cells_per_radius(extent) {
-            tasks.extend(of_mesh(method, cells, false));
-        }
-        if method.refines_films {
-            tasks.extend(of_mesh(method, 6.4, true));
+            tasks.extend(of_mesh(method, cells));
         }
     }
     tasks
 }
 
-fn of_mesh(method: &'static Method, cells: f64, refined: bool) -> Vec<Task> {
+fn of_mesh(method: &'static Method, cells: f64) -> Vec<Task> {
     let pressed = pressed_gaps(method).map(|gap| (gap, PRESSED));
     let level = level_gaps(method).map(|gap| (gap, 0.0));
     let places = pressed.chain(level).flat_map(|(gap, angle)| (0..POSITIONS).map(move |k| (gap, angle, k)));
     let task = |(gap, angle, k)| {
-        let at = [f64::from(u8::from(refined)), cells, gap, angle, k as f64];
+        let at = [cells, gap, angle, k as f64];
         Task::new(method.name, &at, move || measure(method, &at))
     };
     places.map(task).collect()
@@ -85,12 +81,8 @@ fn level_gaps(method: &Method) -> impl Iterator<Item = f64> + use<> {
     GAPS_ALONG.into_iter().chain(FILM_ALONG.into_iter().take(films))
 }
 
-fn measure(
-    method: &Method,
-    &[refined, cells, gap, angle, position]: &[f64; 5],
-) -> Result<Vec<f64>, VerifyError> {
-    let refinement =
-        Refinement { gap_fraction: refined, gap_levels: 9, ..Refinement::to_level(level(RADIUS, cells)) };
+fn measure(method: &Method, &[cells, gap, angle, position]: &[f64; 4]) -> Result<Vec<f64>, VerifyError> {
+    let refinement = Refinement::to_level(level(RADIUS, cells));
     let center = Vector::<2>::repeat(0.5) + shift::<2>(position as usize) * (RADIUS / cells);
     let discs = pair(center, RADIUS, gap, angle);
     let flow = solve(method, 1e-9, mesh(&refinement, &discs)?, &discs, &couette)?;
@@ -153,19 +145,16 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     let table = tables.of(CASE.name);
     let mut numbers = Vec::new();
     for method in FILM_METHODS {
-        for refined in [0.0, 1.0] {
-            for cells in table.steps("a/h", method.name, &[("refined film", refined)]) {
-                let mesh = if refined == 0.0 { "" } else { ", refined film" };
-                for (measure, angle, gaps) in [
-                    ("approach", PRESSED, pressed_gaps(method).collect::<Vec<_>>()),
-                    ("line rotation", 0.0, level_gaps(method).collect()),
-                    ("spin", 0.0, level_gaps(method).collect()),
-                ] {
-                    for gap in gaps {
-                        let at = [("refined film", refined), ("a/h", cells), ("gap", gap), ("angle", angle)];
-                        let name = format!("{measure}, a/h = {cells}{mesh}, gap {gap} a");
-                        numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
-                    }
+        for cells in table.steps("a/h", method.name, &[]) {
+            for (measure, angle, gaps) in [
+                ("approach", PRESSED, pressed_gaps(method).collect::<Vec<_>>()),
+                ("line rotation", 0.0, level_gaps(method).collect()),
+                ("spin", 0.0, level_gaps(method).collect()),
+            ] {
+                for gap in gaps {
+                    let at = [("a/h", cells), ("gap", gap), ("angle", angle)];
+                    let name = format!("{measure}, a/h = {cells}, gap {gap} a");
+                    numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
                 }
             }
         }
@@ -178,7 +167,7 @@ fn plot(tables: &Tables) -> Plot {
     let cells = [3.2, 6.4, 12.8, 25.6];
     let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8", "*a*/*h* = 25.6"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {
-        let at = |gap| [("refined film", 0.0), ("a/h", cells[thing]), ("gap", gap), ("angle", PRESSED)];
+        let at = |gap| [("a/h", cells[thing]), ("gap", gap), ("angle", PRESSED)];
         let gaps = GAPS.into_iter().chain(FILMS);
         gaps.map(|gap| (gap, rms(&table.values("approach", method, &at(gap))))).collect()
     })

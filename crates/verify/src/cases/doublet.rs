@@ -47,7 +47,7 @@ fn tasks(extent: Extent) -> Vec<Task> {
         Task::new(method.name, &[start, cells, step], move || measure(method, start, cells, step))
     };
     let of_method = |method: &'static Method| {
-        let starts = if method.refines_films || method.lubricates { &[0.0, 1.0][..] } else { &[0.0] };
+        let starts = if method.lubricates { &[0.0, 1.0][..] } else { &[0.0] };
         starts.iter().flat_map(move |&start| runs(extent).iter().map(move |&run| task(method, start, run)))
     };
     METHODS.iter().flat_map(of_method).collect()
@@ -62,8 +62,7 @@ fn start(number: f64) -> [Vector<2>; 2] {
 }
 
 fn measure(method: &Method, number: f64, cells: f64, step: f64) -> Result<Vec<f64>, VerifyError> {
-    let gap_fraction = if method.refines_films { 1.0 } else { 0.0 };
-    let refinement = Refinement { gap_fraction, gap_levels: 9, ..Refinement::to_level(level(RADIUS, cells)) };
+    let refinement = Refinement::to_level(level(RADIUS, cells));
     let mut particles = start(number).map(|center| Particle::new(center, RADIUS));
     let first = particles[1].pose.position - particles[0].pose.position;
     let gap_at_start = particles[0].gap(&particles[1]) / RADIUS;

@@ -24,7 +24,7 @@ pub const CASE: Case = Case {
     text: "A disc and a sphere of 2, 10 and 100 times the viscosity of the fluid around them in a linear flow, whose exact velocity is \
            given on the sides of a box of half-width 2.5 radii: Schmid and Podladchikov 2003, 10.1046/j.1365-246X.2003.02042.x, for a \
            disc; Eshelby 1957, 10.1098/rspa.1957.0133, for a sphere, inside which the strain is 5 / (2 r + 3) of that far away. Only \
-           `paper` has a viscosity inside bodies (here without multiplier, one solve); in the other formulations they are rigid. Relative \
+           `paper` has a viscosity inside bodies (here without multiplier, one solve); elsewhere they are rigid. Relative \
            errors of the velocity in fluid and body (mean square) and of the stresslet (mean over positions).",
     keys: &["dimension", "a/h", "ratio", "position"],
     measures: &["velocity", "stresslet"],

@@ -39,10 +39,6 @@ pub const CASE: Case = Case {
     plot,
 };
 
-/// Cells per radius of a mesh for `rigid-dofs` alone, and the gaps there.
-const FINE: f64 = 12.8;
-const FIRST_ORDER: [f64; 2] = [1.0, 0.2];
-
 /// Cells per radius, and positions of the lattice.
 fn meshes(extent: Extent) -> &'static [(f64, usize)] {
     match extent {
@@ -66,22 +62,7 @@ fn tasks(extent: Extent) -> Vec<Task> {
             }
         }
     }
-    if extent == Extent::Full {
-        tasks.extend(FIRST_ORDER.into_iter().flat_map(of_first_order));
-    }
     tasks
-}
-
-/// Computations on the mesh on which a formulation of first order is as accurate as one of third order on a
-/// coarse one, for their costs.
-fn of_first_order(gap: f64) -> impl Iterator<Item = Task> {
-    let method = METHODS.iter().find(|method| method.name == "rigid-dofs");
-    method.into_iter().flat_map(move |method| {
-        (0..FEW).map(move |k| {
-            let at = [FINE, gap, DIRECTIONS[0][0], k as f64];
-            Task::new(method.name, &at, move || measure(method, &at, DIRECTIONS[0]))
-        })
-    })
 }
 
 /// Gaps and directions; what resolves no film is computed in the first of these.
@@ -130,9 +111,6 @@ fn numbers(tables: &Tables) -> Vec<Number> {
                 let oblique = if angle == DIRECTIONS[0][0] { "" } else { ", oblique" };
                 let name = format!("approach, a/h = {cells}, gap {gap} a{oblique}");
                 let at = [("a/h", cells), ("gap", gap), ("angle", angle)];
-                if cells == FINE && !FIRST_ORDER.contains(&gap) {
-                    continue;
-                }
                 numbers.extend(mean_and_scatter(&table, method.name, "approach", &at, &name));
             }
         }
