@@ -10,14 +10,14 @@ use gluey::table::Table;
 use program::told;
 use tempfile::TempDir;
 
-/// Three discs in a channel of this height. No surface is just as far from a cell as finer ones reach, where
-/// rounding decides.
+/// Three discs in a channel of this height, at round places: surfaces are just as far from cells as finer
+/// ones reach, where rounding must not decide.
 fn case(unit: f64) -> String {
     let disc = |x: f64, y: f64| {
         let [x, y, radius] = [x, y, 0.05].map(|length| length * unit);
         format!("[[particles]]\nposition = [{x:e}, {y:e}]\nradius = {radius:e}\n")
     };
-    let discs = disc(0.3037, 0.5511) + &disc(0.5013, 0.4809) + &disc(0.1207, 0.3011);
+    let discs = disc(0.3, 0.55) + &disc(0.5, 0.48) + &disc(0.12, 0.3);
     format!(
         "name = \"u\"\ndimension = 2\n[domain]\nupper = [{unit:e}, {unit:e}]\nboundary = \"periodic\"\n{discs}\
          [time]\nstep = 0.1\nend = 0.5\n[contact]\nstrategy = \"none\"\n[flow.mesh]\ncells_per_radius = 2.0\n"
