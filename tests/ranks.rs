@@ -97,7 +97,8 @@ fn held_and_driven_particles_are_carried_by_the_same_forces() {
     ranks_are_as_one_process("driven spheres", &solid, &tables, 1.4e-10);
 }
 
-/// A line of discs that nearly touch, each faster than the next one.
+/// A line of discs that nearly touch, each faster than the next one. Multigrid does not converge to 1e-10 on
+/// every mesh of such a line; on this one it does.
 fn line_of_discs(end: f64) -> Case {
     let disc = |k: usize| {
         let (x, y) = (0.2 + 0.098 * k as f64, 0.55 - 0.02 * k as f64);
@@ -107,8 +108,8 @@ fn line_of_discs(end: f64) -> Case {
     case(&format!(
         "name = \"r\"\ndimension = 2\nparticles = [{}]\ndomain = {{ boundary = \"periodic\" }}\n\
          time = {{ step = 0.05, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
-         [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-9\n\
-         [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\n",
+         [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-10\n\
+         [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\nband = 3\n",
         discs.join(", ")
     ))
 }
@@ -181,7 +182,7 @@ fn at_a_given_stress_the_rate_is_the_same() {
 fn contacts_are_shared_too() {
     let until = line_of_discs;
     let long = until(0.15);
-    ranks_are_as_one_process("contacts", &long, &[""], 1.2e-6);
+    ranks_are_as_one_process("contacts", &long, &[""], 1.3e-7);
     let [whole, again, stopped] = [(); 3].map(|()| TempDir::new().expect("a folder"));
     for folder in [&whole, &again] {
         assert!(run_on(3, &long, &with_checkpoints(folder.path())).iter().all(Result::is_ok));
@@ -203,7 +204,7 @@ fn contacts_are_shared_too() {
         let csv = [whole.path(), folder.path()].map(|folder| folder.join("t.csv"));
         let difference = largest_difference(&csv[0], &csv[1], &[""]);
         println!("contacts, gone on with by {size} ranks: {difference:.1e}");
-        assert!(difference < 8.6e-7, "{size} ranks: {difference:e}");
+        assert!(difference < 8.6e-8, "{size} ranks: {difference:e}");
     }
 }
 
