@@ -5,8 +5,9 @@ use gluey_levelset::Ball;
 use gluey_stokes::fem::TreeMesh;
 use gluey_stokes::{Flow, FlowSolver, Refinement, Stress};
 use gluey_testkit::exact::{InclusionViscosity, RigidSphere, ViscousInclusion};
+use gluey_testkit::reference::{self, TableError};
 
-use crate::case::{Table, VerifyError};
+use crate::case::{Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::Lattice;
 use crate::number::Number;
@@ -172,6 +173,69 @@ pub fn mean_and_scatter(
 ) -> [Number; 2] {
     let values = table.values(measure, method, at);
     Number::mean_and_scatter(name, method, mean(&values), scatter(&values))
+}
+
+/// The cells of these names in a row of a table of exact values.
+pub fn cells_of_row<const N: usize>(
+    table: &reference::Table,
+    row: usize,
+    names: [&str; N],
+) -> Result<[f64; N], TableError> {
+    let mut values = [0.0; N];
+    for (value, name) in values.iter_mut().zip(names) {
+        *value = table.column(name)?[row];
+    }
+    Ok(values)
+}
+
+/// The measures of a pair by a method, with these cells per radius, at this gap and position.
+type PairMeasure = fn(&Method, f64, f64, usize) -> Result<Vec<f64>, VerifyError>;
+
+/// A chapter on two spheres in a periodic box, each at several places in the cells and in several directions.
+pub struct SpherePairs {
+    /// Cells per radius.
+    pub meshes: &'static [f64],
+    /// Gaps in radii.
+    pub gaps: &'static [f64],
+}
+
+impl SpherePairs {
+    /// A computation for each mesh, gap and position, by the methods that know such boxes.
+    pub fn tasks(&self, extent: Extent, measure: PairMeasure) -> Vec<Task> {
+        let positions = match extent {
+            Extent::Quick => 2,
+            Extent::Full => 8,
+        };
+        let mut tasks = Vec::new();
+        for method in methods_in_sheared_boxes() {
+            for &cells in self.meshes {
+                for &gap in self.gaps {
+                    tasks.extend((0..positions).map(|k| {
+                        let at = [cells, gap, k as f64];
+                        Task::new(method.name, &at, move || measure(method, cells, gap, k))
+                    }));
+                }
+            }
+        }
+        tasks
+    }
+
+    /// Mean and scatter of each measure over the positions; names begin with `what`.
+    pub fn numbers(&self, table: &Table, measures: &[&str], what: &str) -> Vec<Number> {
+        let mut numbers = Vec::new();
+        for method in methods_in_sheared_boxes() {
+            for &cells in self.meshes {
+                for &gap in self.gaps {
+                    let at = [("a/h", cells), ("gap", gap)];
+                    for measure in measures {
+                        let name = format!("{what}{measure}, a/h = {cells}, gap {gap} a");
+                        numbers.extend(mean_and_scatter(table, method.name, measure, &at, &name));
+                    }
+                }
+            }
+        }
+        numbers
+    }
 }
 
 #[cfg(test)]

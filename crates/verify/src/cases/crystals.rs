@@ -12,7 +12,7 @@ use crate::method::Method;
 use crate::norms::superficial_velocity;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{methods_in_sheared_boxes, shift, simple_shear, stress_of};
+use crate::set_up::{cells_of_row, methods_in_sheared_boxes, shift, simple_shear, stress_of};
 
 /// A crystal: bodies in a box with the edges of `cells`, places in shares of the box.
 struct Crystal {
@@ -212,11 +212,7 @@ impl Crystal {
         let mut rows = table.column("lattice")?.iter().zip(table.column("phi")?);
         let row = rows.position(|(&number, &x)| number == self.number && x == phi);
         let row = row.ok_or_else(|| VerifyError::NoReference(format!("{}, phi = {phi}", self.name)))?;
-        let mut values = [0.0; 3];
-        for (value, name) in values.iter_mut().zip(names) {
-            *value = table.column(name)?[row];
-        }
-        Ok(values)
+        Ok(cells_of_row(&table, row, names)?)
     }
 }
 

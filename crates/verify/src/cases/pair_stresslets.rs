@@ -7,11 +7,10 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::exact::{PairStrain, pair_in_strain};
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Tables, VerifyError};
 use crate::method::Method;
-use crate::number::Number;
 use crate::plot::Plot;
-use crate::set_up::{level, mean_and_scatter, methods_in_sheared_boxes, shift, stress_of};
+use crate::set_up::{SpherePairs, level, shift, stress_of};
 use crate::statistics::rms;
 
 /// Radius in the unit box, which is periodic.
@@ -20,6 +19,8 @@ const RADIUS: f64 = 0.0125;
 const GAPS: [f64; 6] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.01];
 /// Cells per radius.
 const MESHES: [f64; 2] = [1.6, 3.2];
+
+const PAIRS: SpherePairs = SpherePairs { meshes: &MESHES, gaps: &GAPS };
 
 /// The chapter.
 pub const CASE: Case = Case {
@@ -33,29 +34,10 @@ pub const CASE: Case = Case {
            taken out.",
     keys: &["a/h", "gap", "position"],
     measures: &["along", "tilting", "across"],
-    tasks,
-    numbers,
+    tasks: |extent| PAIRS.tasks(extent, measure),
+    numbers: |tables| PAIRS.numbers(&tables.of(CASE.name), CASE.measures, "stresslet, "),
     plot,
 };
-
-fn tasks(extent: Extent) -> Vec<Task> {
-    let positions = match extent {
-        Extent::Quick => 2,
-        Extent::Full => 8,
-    };
-    let mut tasks = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for cells in MESHES {
-            for gap in GAPS {
-                tasks.extend((0..positions).map(|k| {
-                    let at = [cells, gap, k as f64];
-                    Task::new(method.name, &at, move || measure(method, cells, gap, k))
-                }));
-            }
-        }
-    }
-    tasks
-}
 
 fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
     let level = level(RADIUS, cells);
@@ -91,23 +73,6 @@ pub(super) fn axes(position: usize) -> [Vector<3>; 3] {
     let (side, other) = (Vector::<3>::new(-sin, cos, 0.0), Vector::<3>::new(-up * cos, -up * sin, across));
     let (turn_sin, turn_cos) = (2.0 * PI * random[2]).sin_cos();
     [side * turn_cos + other * turn_sin, other * turn_cos - side * turn_sin, line]
-}
-
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
-    let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for cells in MESHES {
-            for gap in GAPS {
-                let at = [("a/h", cells), ("gap", gap)];
-                for measure in CASE.measures {
-                    let name = format!("stresslet, {measure}, a/h = {cells}, gap {gap} a");
-                    numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
-                }
-            }
-        }
-    }
-    numbers
 }
 
 fn plot(tables: &Tables) -> Plot {

@@ -7,11 +7,10 @@ use gluey_testkit::exact::PairStrain;
 use gluey_testkit::reference::spheres_one_to_two;
 
 use super::pair_stresslets::axes;
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Tables, VerifyError};
 use crate::method::Method;
-use crate::number::Number;
 use crate::plot::Plot;
-use crate::set_up::{level, mean_and_scatter, methods_in_sheared_boxes, shift};
+use crate::set_up::{SpherePairs, cells_of_row, level, shift};
 use crate::statistics::rms;
 
 /// Radii in the unit box, which is periodic.
@@ -20,6 +19,8 @@ const RADII: [f64; 2] = [0.0125, 0.025];
 const GAPS: [f64; 5] = [1.0, 0.3, 0.1, 0.01, 0.001];
 /// Cells in the smaller radius.
 const MESHES: [f64; 2] = [1.6, 3.2];
+
+const PAIRS: SpherePairs = SpherePairs { meshes: &MESHES, gaps: &GAPS };
 
 /// The chapter.
 pub const CASE: Case = Case {
@@ -32,32 +33,13 @@ pub const CASE: Case = Case {
            different directions and places in the cells. Nothing in the formulation was chosen on spheres of different sizes.",
     keys: &["a/h", "gap", "position"],
     measures: &["approach", "turning", "spin of the smaller", "spin of the larger", "pushed", "dragged"],
-    tasks,
-    numbers,
+    tasks: |extent| PAIRS.tasks(extent, measure),
+    numbers: |tables| PAIRS.numbers(&tables.of(CASE.name), CASE.measures, ""),
     plot,
 };
 
 /// Columns of the reference, in the order of the measures.
 const COLUMNS: [&str; 6] = ["one_minus_A", "one_minus_B", "C1", "C2", "Mn", "Mr"];
-
-fn tasks(extent: Extent) -> Vec<Task> {
-    let positions = match extent {
-        Extent::Quick => 2,
-        Extent::Full => 8,
-    };
-    let mut tasks = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for cells in MESHES {
-            for gap in GAPS {
-                tasks.extend((0..positions).map(|k| {
-                    let at = [cells, gap, k as f64];
-                    Task::new(method.name, &at, move || measure(method, cells, gap, k))
-                }));
-            }
-        }
-    }
-    tasks
-}
 
 fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
     let level = level(RADII[0], cells);
@@ -107,28 +89,7 @@ fn exact(gap: f64) -> Result<[f64; 6], VerifyError> {
     let table = spheres_one_to_two()?;
     let row = table.column("gap")?.iter().position(|&value| value == gap);
     let row = row.ok_or_else(|| VerifyError::NoReference(format!("spheres at a gap of {gap}")))?;
-    let mut values = [0.0; 6];
-    for (value, name) in values.iter_mut().zip(COLUMNS) {
-        *value = table.column(name)?[row];
-    }
-    Ok(values)
-}
-
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
-    let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for cells in MESHES {
-            for gap in GAPS {
-                let at = [("a/h", cells), ("gap", gap)];
-                for measure in CASE.measures {
-                    let name = format!("{measure}, a/h = {cells}, gap {gap} a");
-                    numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
-                }
-            }
-        }
-    }
-    numbers
+    Ok(cells_of_row(&table, row, COLUMNS)?)
 }
 
 fn plot(tables: &Tables) -> Plot {
