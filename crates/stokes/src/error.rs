@@ -94,9 +94,7 @@ pub enum StokesError {
         bodies: usize,
     },
     /// The formulation of rigidity cannot answer this.
-    #[error(
-        "{what} are not available in this formulation of rigidity; `rigid-dofs` and `unfitted` have them"
-    )]
+    #[error("{what} are not available in this formulation of rigidity; `unfitted` has them")]
     Unsupported {
         /// What was asked for.
         what: &'static str,

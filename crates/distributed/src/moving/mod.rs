@@ -73,11 +73,8 @@ pub enum SuspensionError {
     /// The flow failed, on all ranks.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// Ranks have it not.
-    #[error(
-        "ranks share flows of `unfitted`, and of `rigid-dofs` with aggregated pressures around free particles \
-         between walls, without a force on the fluid, only"
-    )]
+    /// Not supported on ranks.
+    #[error("ranks share flows of the formulation `unfitted` only")]
     Formulation,
     /// The forces between particles drive them faster than the stress that is given.
     #[error(
