@@ -128,7 +128,7 @@ const LOSING: &str = "3";
 /// What is said of a case that ranks cannot share.
 const REFUSAL: &str = "several ranks cannot share the formulation paper";
 /// A limit of memory in gigabytes that one process refuses the case under, and eight do not.
-const LIMIT_OF_MEMORY: &str = "0.043";
+const LIMIT_OF_MEMORY: &str = "0.08";
 /// What is said of a case that needs more.
 const TOO_LARGE: &str = "the limit is";
 /// How long the others may go on.
