@@ -11,15 +11,13 @@ use std::time::{Duration, Instant};
 /// Numbers of ranks.
 const RANKS: [&str; 5] = ["1", "2", "3", "4", "8"];
 /// Flows that are computed.
-const FLOWS: [&str; 8] = [
+const FLOWS: [&str; 6] = [
     "--dimension 2 --level 5",
     "--dimension 2 --level 6 --adaptive --tolerance 1e-11",
     "--dimension 3 --level 3",
     "--dimension 3 --level 4 --adaptive --tolerance 1e-11",
     "--dimension 2 --level 5 --bodies",
     "--dimension 3 --level 4 --bodies",
-    "--dimension 2 --level 5 --bodies --unfitted",
-    "--dimension 3 --level 4 --bodies --unfitted",
 ];
 /// Contacts that are solved for.
 const CONTACTS: [&str; 3] = [

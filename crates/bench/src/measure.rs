@@ -126,14 +126,12 @@ fn mesh<const D: usize>(options: &Options, balls: &[Ball<D>]) -> Result<TreeMesh
     if !options.adaptive {
         return TreeMesh::uniform(Aabb::unit(), roots, periodic, options.level());
     }
-    Refinement {
-        coarsest: COARSEST_LEVEL.min(options.level()),
-        surface: options.level(),
-        band: BAND,
-        gap_fraction: 0.0,
-        gap_levels: 0,
-    }
-    .mesh(Aabb::unit(), roots, periodic, balls)
+    Refinement { coarsest: COARSEST_LEVEL.min(options.level()), surface: options.level(), band: BAND }.mesh(
+        Aabb::unit(),
+        roots,
+        periodic,
+        balls,
+    )
 }
 
 fn solve<const D: usize>(

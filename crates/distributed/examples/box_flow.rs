@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use common::{Spread, TrafficRecord, fail, hash, on_ranks};
-use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, RigidBodies, SurfaceBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -40,9 +40,6 @@ struct Options {
     /// The two bodies of S2 and S3 in the shear of `bench-stokes`, all cells as fine.
     #[arg(long)]
     pair: bool,
-    /// Bodies whose surfaces cut cells, with films; without it, bodies whose nodes move with them.
-    #[arg(long)]
-    unfitted: bool,
     #[arg(long, default_value_t = 1e-8)]
     tolerance: f64,
     /// This rank fails before the solve, to see that all end.
@@ -77,13 +74,8 @@ where
         _ => Vec::new(),
     };
     let tree_of_balls = BallTree::new(&balls);
-    let around = Refinement {
-        coarsest: options.level.saturating_sub(2),
-        surface: options.level,
-        band: 2.0,
-        gap_fraction: 0.0,
-        gap_levels: 0,
-    };
+    let coarsest = options.level.saturating_sub(2);
+    let around = Refinement { coarsest, ..Refinement::to_level(options.level) };
     let wants = |lower: &Vector<D>, h: f64, level: u8| {
         if options.bodies {
             return around.wants(lower, h, level, &tree_of_balls);
@@ -108,15 +100,9 @@ where
     assert_ne!(options.fail_rank, Some(ranks.rank()), "this rank was told to fail");
     let flow = BoxFlow { viscosity: 1.0, tolerance: options.tolerance, max_iterations: 200 };
     let wrenches = if options.pair { Vec::new() } else { wrenches(balls.len()) };
-    let (balls, wrenches) = (&balls[..], &wrenches[..]);
-    let mine = if options.unfitted {
-        let bodies = SurfaceBodies { balls, lubrication: Lubrication::Deficit };
-        let conditions = Conditions::boundary(&walls).with_wrenches(wrenches);
-        flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &conditions)
-    } else {
-        let offset = if options.pair { gluey_stokes::default_offset(D) } else { -0.1 };
-        flow.solve_around(&RigidBodies { balls, offset, wrenches }, &mut tree, &cuts, ranks, &walls)
-    };
+    let bodies = SurfaceBodies { balls: &balls, lubrication: Lubrication::Deficit };
+    let conditions = Conditions::boundary(&walls).with_wrenches(&wrenches);
+    let mine = flow.solve_around_surfaces(&bodies, &mut tree, &cuts, ranks, &conditions);
     let mine = mine.unwrap_or_else(|error| fail(&error.to_string()));
     let seconds = start.elapsed().as_secs_f64();
     let peaks = ranks.all_gather(&[peak_kibibytes()]);
@@ -178,7 +164,6 @@ struct Record {
     adaptive: bool,
     bodies: bool,
     pair: bool,
-    unfitted: bool,
     tolerance: f64,
     ranks: usize,
     iterations: usize,
@@ -202,7 +187,7 @@ impl Record {
             .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
         let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[hash(bits)]);
-        let &Options { dimension, level, adaptive, bodies, pair, unfitted, tolerance, .. } = options;
+        let &Options { dimension, level, adaptive, bodies, pair, tolerance, .. } = options;
         let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
         Self {
             dimension,
@@ -210,7 +195,6 @@ impl Record {
             adaptive,
             bodies,
             pair,
-            unfitted,
             tolerance,
             ranks: ranks.size(),
             iterations: mine.iterations,

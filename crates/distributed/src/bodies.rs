@@ -146,11 +146,6 @@ impl<const D: usize> LevelBodies<D> {
         first != NO_BODY && nodes.iter().all(|&node| self.body_of[node as usize] == first)
     }
 
-    /// Whether something flows in cells with these nodes.
-    pub fn is_fluid(&self, nodes: &[u32]) -> bool {
-        nodes.iter().any(|&node| self.body_of[node as usize] == NO_BODY)
-    }
-
     /// Sets the velocities of rigid nodes from the twists.
     pub fn expand<T: Scalar>(&self, nodal: &mut [T], twists: &[T]) {
         let n = rigid::<D>();

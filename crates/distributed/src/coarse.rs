@@ -19,16 +19,11 @@ pub struct CoarseFactor {
 }
 
 impl CoarseFactor {
-    /// Where nothing fixes a constant velocity and it `may_float`, one node is left out, as in the serial
-    /// solver.
-    pub fn new<const D: usize>(
-        space: &LevelSpace<D>,
-        viscosity: f64,
-        may_float: bool,
-    ) -> Result<Self, DirectError> {
+    /// Where nothing fixes a constant velocity one node is left out, as in the serial solver.
+    pub fn new<const D: usize>(space: &LevelSpace<D>, viscosity: f64) -> Result<Self, DirectError> {
         let (nodal, nodes) = (space.nodal_dim(), space.velocity.map.node_count());
         let is_on_wall = |node| space.velocity.map.is_on_boundary(node);
-        let is_fixed = !may_float || space.bodies.holds_nodes() || (0..nodes).any(is_on_wall);
+        let is_fixed = space.bodies.holds_nodes() || (0..nodes).any(is_on_wall);
         let loose = if is_fixed { None } else { (0..nodes).find(|&node| space.is_free(node)) };
         let unknowns = Subset::new(space.dim(), |k| match k.checked_sub(nodal) {
             Some(twist) => {

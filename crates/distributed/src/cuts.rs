@@ -10,10 +10,8 @@ use gluey_parallel::Communicator;
 /// Blocks of keys a rank counts, at least: a cut is searched in one of them.
 const BLOCKS_OF_A_RANK: usize = 16;
 
-/// Work on a cell that flows, on one that moves as a body does, and on one that a surface cuts (measured:
-/// `docs/ranks.md`).
+/// Work on a cell that flows, and on one that a surface cuts (measured: `docs/ranks.md`).
 const OF_CELL: u64 = 10;
-const OF_RIGID_CELL: u64 = 12;
 const OF_CUT_CELL: u64 = 82;
 /// Work on a cell without fluid, of which nothing but a coarser level knows.
 const OF_SOLID_CELL: u64 = 4;
@@ -55,24 +53,8 @@ pub fn weighted_cuts<const D: usize>(
     Cuts::new(ranks.all_gather(&[key]), end)
 }
 
-/// Cuts it into runs of equal work around these bodies.
+/// Cuts it into runs of equal work around bodies whose surfaces cut cells.
 pub fn cuts_of_work<const D: usize>(
-    tree: &ImplicitTree<'_, D>,
-    bodies: &BallTree<'_, D>,
-    ranks: &dyn Communicator,
-) -> Cuts {
-    let frame = tree.frame();
-    let weight = |cell: &Cell<D>| {
-        let h = frame.size(cell.level);
-        let center: Vector<D> = frame.lower_corner(cell).add_scalar(0.5 * h);
-        let is_rigid = bodies.nearest_within(&center, -frame.half_diagonal(h)).is_some();
-        if is_rigid { OF_RIGID_CELL } else { OF_CELL }
-    };
-    weighted_cuts(tree, ranks, &weight)
-}
-
-/// Cuts it into runs of equal work around these bodies where their surfaces cut cells.
-pub fn cuts_of_work_at_surfaces<const D: usize>(
     tree: &ImplicitTree<'_, D>,
     bodies: &BallTree<'_, D>,
     ranks: &dyn Communicator,

@@ -1,5 +1,5 @@
 //! One V-cycle on the velocities, as the serial solver runs it for bodies that are eliminated: loads go down
-//! as they are, and each level smooths once on the way up.
+//! as they are, and each level but the finest smooths once on the way up.
 
 use gluey_fem::ImplicitTree;
 
@@ -21,27 +21,16 @@ pub struct VCycle<'a, const D: usize> {
     transfers: Vec<Transfer>,
     /// On rank zero.
     coarse: Option<CoarseFactor>,
-    /// Whether the finest level smooths.
-    smooths: bool,
 }
 
 impl<'a, const D: usize> VCycle<'a, D> {
-    /// All ranks call this.
+    /// Under a smoother of the finest level elsewhere, for which its part is to hold more. All ranks call
+    /// this.
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'a, '_, D>,
         viscosity: f64,
-    ) -> Result<Self, FlowError> {
-        Self::under(tree, shared, viscosity, None)
-    }
-
-    /// The same under a smoother of the finest level elsewhere, for which its part is to hold more. All ranks
-    /// call this.
-    pub fn under(
-        tree: &mut ImplicitTree<'_, D>,
-        shared: &Shared<'a, '_, D>,
-        viscosity: f64,
-        around: Option<&Around<'_, D>>,
+        around: &Around<'_, D>,
     ) -> Result<Self, FlowError> {
         let ranks = shared.ranks;
         let finest = tree.max_level();
@@ -50,11 +39,11 @@ impl<'a, const D: usize> VCycle<'a, D> {
         for depth in coarsest..=finest {
             // Rank zero holds all of the coarsest level: what it lacks are ghosts.
             let all = (depth == coarsest && ranks.rank() == 0).then(|| 0..tree.end());
-            let around = around.filter(|_| depth == finest);
-            let space = LevelSpace::widened(tree, depth, shared, all, around);
+            let around = (depth == finest).then_some(around);
+            let space = LevelSpace::new(tree, depth, shared, all, around);
             let plans = ghost_plan(tree, shared, &space);
-            let mut level = Level::new(ranks, space, plans, viscosity, depth == finest)?;
-            if depth > coarsest && around.is_none() {
+            let mut level = Level::new(ranks, space, plans, viscosity)?;
+            if depth > coarsest && depth < finest {
                 level.relax_near_bodies(tree, shared, viscosity);
             }
             levels.push(level);
@@ -62,10 +51,9 @@ impl<'a, const D: usize> VCycle<'a, D> {
         let pairs = levels.windows(2);
         let transfers =
             pairs.map(|pair| Transfer::new(&pair[0].operator.space, &pair[1].operator.space)).collect();
-        let coarse = (ranks.rank() == 0)
-            .then(|| CoarseFactor::new(&levels[0].operator.space, viscosity, around.is_some()));
+        let coarse = (ranks.rank() == 0).then(|| CoarseFactor::new(&levels[0].operator.space, viscosity));
         let coarse = agreed(ranks, coarse.transpose())?;
-        Ok(Self { levels, transfers, coarse, smooths: around.is_none() })
+        Ok(Self { levels, transfers, coarse })
     }
 
     /// `z = V b` on the finest level.
@@ -91,7 +79,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let nodal = operator.space.owned_nodal_dim();
             self.transfers[fine - 1].prolong(space, &x[..space.nodal_dim()], &mut z[..nodal]);
             operator.project(z);
-            if self.smooths || fine + 1 < self.levels.len() {
+            if fine + 1 < self.levels.len() {
                 self.levels[fine].smooth();
             }
         }

@@ -15,11 +15,9 @@ use crate::flow::{FlowError, PartError};
 use crate::near_bodies::NearBodies;
 use crate::space::{LevelSpace, Plans};
 
-/// Applications in a sweep of the finest level, and the part of the spectrum that it damps, as in the serial
-/// solver. The largest eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.05, lanczos_steps: 0 };
-/// Applications in a sweep of the others.
-const DEGREE_BELOW: usize = 5;
+/// Applications in a sweep, and the part of the spectrum that it damps, as in the serial solver. The largest
+/// eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
+const SWEEP: ChebyshevParams = ChebyshevParams { degree: 5, ratio: 5.0, safety: 1.05, lanczos_steps: 0 };
 
 /// The viscous operator on the owned nodes and twists.
 pub struct LevelOperator<'a, const D: usize> {
@@ -175,16 +173,14 @@ impl<'a, const D: usize> Level<'a, D> {
         space: LevelSpace<D>,
         plans: Plans,
         viscosity: f64,
-        is_finest: bool,
     ) -> Result<Self, FlowError> {
         let cells = space.operator(viscosity);
         let [x, y] = [0, 1].map(|_| vec![0.0; space.dim()]);
         let mut operator = LevelOperator { ranks, space, plans, cells, work: Workspace::default(), x, y };
         let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
-        let degree = if is_finest { SWEEP.degree } else { DEGREE_BELOW };
         let largest = cell_lambda_max(&operator.space.reference());
-        let chebyshev = Chebyshev::below(largest, dim, &ChebyshevParams { degree, ..SWEEP });
+        let chebyshev = Chebyshev::below(largest, dim, &SWEEP);
         let nodal = vec![0.0; operator.space.owned_nodal_dim()];
         let [b, z] = [0, 1].map(|_| vec![0.0; dim]);
         Ok(Self { operator, diagonal, chebyshev, near_bodies: None, b, z, nodal })

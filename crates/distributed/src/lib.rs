@@ -42,8 +42,6 @@ mod flow;
 mod level;
 mod moving;
 mod near_bodies;
-mod operator;
-mod precondition;
 mod pressures;
 mod schur;
 mod space;
@@ -52,8 +50,8 @@ mod transfer;
 mod warm_start;
 
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
-pub use cuts::{cuts_of_work, cuts_of_work_at_surfaces, equal_cuts, weighted_cuts};
-pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError, RigidBodies};
+pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
+pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError};
 pub use moving::{
     Follower, FrameName, Memory, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
     ask_to_keep,

@@ -82,18 +82,9 @@ impl<const D: usize> Nodes<D> {
 }
 
 impl<const D: usize> LevelSpace<D> {
-    /// The tree cut at `depth`, around the keys `inner` or else those of the rank. All ranks call this.
+    /// The tree cut at `depth`, around the keys `inner` or else those of the rank, with more of what is around.
+    /// All ranks call this.
     pub fn new(
-        tree: &mut ImplicitTree<'_, D>,
-        depth: u8,
-        shared: &Shared<'_, '_, D>,
-        inner: Option<Range<u64>>,
-    ) -> Self {
-        Self::widened(tree, depth, shared, inner, None)
-    }
-
-    /// The same with more of what is around. All ranks call this.
-    pub fn widened(
         tree: &mut ImplicitTree<'_, D>,
         depth: u8,
         shared: &Shared<'_, '_, D>,

@@ -5,7 +5,7 @@
 use gluey_distributed::{BoxFlow, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Communicator, Threads};
-use gluey_stokes::{CutCellPressures, Formulation, Lubrication, Refinement};
+use gluey_stokes::{Lubrication, Refinement};
 use gluey_testkit::allocation::{CountingAllocator, largest_in_thread};
 
 #[global_allocator]
@@ -14,12 +14,12 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 const RANKS: usize = 16;
 
 /// The most bytes of one allocation of a rank, among all.
-fn largest<const D: usize>(formulation: Formulation, level: u8, ranks: usize) -> usize
+fn largest<const D: usize>(lubrication: Lubrication, level: u8, ranks: usize) -> usize
 where
     Dim<D>: Space<D>,
 {
     // Libraries take what they need once in each thread, whatever the mesh.
-    let [small, whole] = [4, level].map(|level| suspension::<D>(formulation, level));
+    let [small, whole] = [4, level].map(|level| suspension::<D>(lubrication, level));
     // They nearly touch, so that there is a gap.
     let places = [[0.3, 0.4, 0.5], [0.651, 0.4, 0.5]].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
     let solve = |suspension: &Suspension<D>, ranks: &dyn Communicator| {
@@ -33,7 +33,7 @@ where
 }
 
 /// Two bodies among cells of one level.
-fn suspension<const D: usize>(formulation: Formulation, level: u8) -> Suspension<D>
+fn suspension<const D: usize>(lubrication: Lubrication, level: u8) -> Suspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -43,7 +43,7 @@ where
         roots: [1; D],
         periods: [None; D],
         refinement: Refinement { coarsest: level, ..Refinement::to_level(level) },
-        formulation,
+        lubrication,
         radii: vec![0.2, 0.15],
         wrenches: Vec::new(),
         given: Vec::new(),
@@ -54,11 +54,11 @@ where
 }
 
 /// A rank holds its part of the whole and what is around it.
-fn allocations_shrink<const D: usize>(formulation: Formulation, level: u8, share: f64)
+fn allocations_shrink<const D: usize>(lubrication: Lubrication, level: u8, share: f64)
 where
     Dim<D>: Space<D>,
 {
-    let (alone, shared) = (largest::<D>(formulation, level, 1), largest::<D>(formulation, level, RANKS));
+    let (alone, shared) = (largest::<D>(lubrication, level, 1), largest::<D>(lubrication, level, RANKS));
     let nodes = ((1usize << (level + 1)) + 1).pow(D as u32);
     assert!(alone >= nodes * D * size_of::<f32>(), "one rank has vectors of all velocities: {alone}");
     println!("{alone} and {shared}");
@@ -69,7 +69,6 @@ where
 /// for.
 #[test]
 fn no_rank_allocates_an_array_as_large_as_the_mesh() {
-    let cut_cell_pressures = CutCellPressures::Aggregate;
-    allocations_shrink::<2>(Formulation::RigidDofs { offset: -0.1, cut_cell_pressures }, 9, 0.12);
-    allocations_shrink::<2>(Formulation::Unfitted { lubrication: Lubrication::Deficit }, 9, 0.2);
+    allocations_shrink::<2>(Lubrication::None, 9, 0.2);
+    allocations_shrink::<2>(Lubrication::Deficit, 9, 0.2);
 }

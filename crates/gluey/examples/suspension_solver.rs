@@ -17,8 +17,7 @@ const RADIUS: f64 = 0.05;
 const DT: f64 = 0.025;
 
 /// Cells at the surfaces fit six times into a radius.
-const REFINEMENT: Refinement =
-    Refinement { coarsest: 3, surface: 7, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
+const REFINEMENT: Refinement = Refinement { coarsest: 3, surface: 7, band: 2.0 };
 
 /// The undisturbed flow, which is also the velocity of the boundary.
 fn shear(x: &Vector<2>) -> Vector<2> {

@@ -28,6 +28,8 @@ use crate::case::{Case, Lubrication};
 
 use stress_control::StressControl;
 
+#[cfg(feature = "ranks")]
+pub(crate) use params::lubrication;
 pub(crate) use params::{flow_params, refinement, tree};
 
 pub use error::FlowError;

@@ -161,21 +161,6 @@ pub enum StokesError {
         /// Cells of the coarsest mesh.
         cells: usize,
     },
-    /// The Schur complement of the pressures of a gap cannot be inverted.
-    #[error(
-        "the {matrix} of the gap at {place:?}, with {pressures} pressures and {velocities} velocities, is not positive \
-         definite"
-    )]
-    GapPressures {
-        /// The matrix that is not positive definite.
-        matrix: SmallMatrix,
-        /// A node of the gap.
-        place: Vec<f64>,
-        /// Pressures of the gap.
-        pressures: usize,
-        /// Velocities that these act on.
-        velocities: usize,
-    },
     /// A solve was asked for before the solver was prepared.
     #[error("the solver was not prepared for this system")]
     NotPrepared,
@@ -224,8 +209,6 @@ pub enum DiagonalError {
 /// A small dense matrix of some pressures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SmallMatrix {
-    /// Stiffness of the velocities that the pressures act on.
-    Stiffness,
     /// Schur complement.
     Schur,
     /// Approximation of the Schur complement that is used elsewhere.
@@ -235,7 +218,6 @@ pub enum SmallMatrix {
 impl std::fmt::Display for SmallMatrix {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Stiffness => "stiffness",
             Self::Schur => "Schur complement",
             Self::Mass => "mass",
         })

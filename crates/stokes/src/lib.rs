@@ -47,8 +47,7 @@ pub use flow::{
 // Near bodies and the films between them.
 pub use film::{Film, FilmForce, Heights, Lubrication, Partner, films, thin_films};
 // How rigidity is imposed.
-pub use formulation::{Formulation, PaperParams, ParticleVelocity, default_offset};
-pub use space::CutCellPressures;
+pub use formulation::{Formulation, PaperParams, ParticleVelocity};
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.

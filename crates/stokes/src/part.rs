@@ -20,6 +20,7 @@ use crate::space::Discretisation;
 
 pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::operator::PressureForces;
+pub use crate::precondition::schur::ratio_inside;
 pub use crate::precondition::surface::{SharedVelocities, SurfaceSmoother};
 pub use crate::precondition::velocity::cell_lambda_max;
 pub use crate::surface::WeakCell;

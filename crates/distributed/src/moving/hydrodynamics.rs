@@ -5,7 +5,7 @@ use std::rc::Rc;
 use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
 use gluey_parallel::Communicator;
-use gluey_stokes::{Formulation, Lubrication};
+use gluey_stokes::Lubrication;
 
 use super::told::{Order, Told};
 use super::{Memory, Suspension, SuspensionError};
@@ -201,8 +201,7 @@ where
     }
 
     fn films(&self, reach: f64) -> Vec<Film<D>> {
-        let lubrication = Lubrication::Deficit;
-        if self.last.is_none() || self.suspension.formulation != (Formulation::Unfitted { lubrication }) {
+        if self.last.is_none() || self.suspension.lubrication != Lubrication::Deficit {
             return Vec::new();
         }
         let (balls, domain) = (self.suspension.balls(&self.told), &self.suspension.domain);

@@ -19,11 +19,11 @@ use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::Fields;
 use gluey_parallel::Communicator;
-use gluey_stokes::{Conditions, CutCellPressures, Field, Formulation, GivenOf, Refinement};
+use gluey_stokes::{Conditions, Field, GivenOf, Lubrication, Refinement};
 
 use crate::contact::ContactFollower;
-use crate::cuts::{cuts_of_work, cuts_of_work_at_surfaces};
-use crate::flow::{BoxFlow, FlowError, MyFlow, RigidBodies};
+use crate::cuts::cuts_of_work;
+use crate::flow::{BoxFlow, FlowError, MyFlow};
 use crate::surface::{SharedTree, SurfaceBodies};
 use crate::warm_start::SavedPiece;
 use told::Told;
@@ -41,22 +41,21 @@ where
     pub domain: Aabb<D>,
     /// Cells along its edges before any is refined.
     pub roots: [u32; D],
-    /// Periods along its axes, where it has some. Without walls it is sheared for ever, by `unfitted` only.
+    /// Periods along its axes, where it has some. Without walls it is sheared for ever.
     pub periods: [Option<f64>; D],
     /// How the mesh follows the particles.
     pub refinement: Refinement,
-    /// How rigidity is imposed: `rigid-dofs` with aggregated pressures, or `unfitted`.
-    pub formulation: Formulation,
+    /// Treatment of films that are too thin for the mesh.
+    pub lubrication: Lubrication,
     /// Radii of the particles.
     pub radii: Vec<f64>,
     /// Forces and torques on them, or no entries for none on any.
     pub wrenches: Vec<Wrench<D>>,
     /// Motions of the particles that are held or driven while the shear is not reversed, or no entries where
-    /// all are free; by `unfitted` only.
+    /// all are free.
     pub given: Vec<Option<Twist<D>>>,
-    /// Force per unit of volume on fluid and particles, between walls or where particles are held; by
-    /// `unfitted` only. Where particles are held in a box without walls and it is not given, it is what stops
-    /// the mean flow.
+    /// Force per unit of volume on fluid and particles, between walls or where particles are held. Where
+    /// particles are held in a box without walls and it is not given, it is what stops the mean flow.
     pub force_density: Option<Vector<D>>,
     /// The shear rate; where the stress is given, one or minus one.
     pub shear_rate: f64,
@@ -73,9 +72,6 @@ pub enum SuspensionError {
     /// The flow failed, on all ranks.
     #[error(transparent)]
     Flow(#[from] FlowError),
-    /// Not supported on ranks.
-    #[error("ranks share flows of the formulation `unfitted` only")]
-    Formulation,
     /// The forces between particles drive them faster than the stress that is given.
     #[error(
         "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
@@ -117,8 +113,8 @@ where
         self.periods.iter().all(Option::is_some)
     }
 
-    /// The flow, and where the stress is given the rate by which it is to be multiplied. In `unfitted` the
-    /// first solve starts from the flows in memory, and its flow is kept there for the next.
+    /// The flow, and where the stress is given the rate by which it is to be multiplied. The first
+    /// solve starts from the flows in memory, and its flow is kept there for the next.
     fn solve_as_told(
         &self,
         ranks: &dyn Communicator,
@@ -135,47 +131,29 @@ where
             let tree = ImplicitTree::new(self.domain, self.roots, periodic, depth, &wants)?;
             Ok::<_, MeshError>(tree.sheared(shear))
         };
-        let deepest = self.refinement.deepest();
+        let deepest = self.refinement.surface;
         let mut whole = tree(deepest)?;
-        let cuts_of = |tree: &ImplicitTree<'_, D>| match self.formulation {
-            Formulation::Unfitted { .. } => cuts_of_work_at_surfaces(tree, &tree_of_balls, ranks),
-            _ => cuts_of_work(tree, &tree_of_balls, ranks),
-        };
-        let mut cuts = cuts_of(&whole);
+        let mut cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
         let used = finest_level(&mut whole, &cuts.of(ranks.rank()), ranks);
         if used < deepest {
-            // Cells as deep as gaps might ask for are not there: the lattice is that of the finest there are.
             whole = tree(used)?;
-            cuts = cuts_of(&whole);
+            cuts = cuts_of_work(&whole, &tree_of_balls, ranks);
         }
         let shear = self.undisturbed(told.shear_factor);
-        let (balls, wrenches) = (&balls, &told.wrenches[..]);
-        let flow = match self.formulation {
-            Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Aggregate }
-                if !self.is_sheared() && self.force_density.is_none() && self.given.is_empty() =>
-            {
-                let bodies = RigidBodies { balls, offset, wrenches };
-                self.flow.solve_around(&bodies, &mut whole, &cuts, ranks, &shear)?
-            }
-            Formulation::Unfitted { lubrication } => {
-                let bodies = SurfaceBodies { balls, lubrication };
-                let mut kept = memory.last.take();
-                let mut first = Some(&mut kept);
-                let mut leaves = SharedTree { tree: &mut whole, cuts: &cuts, ranks };
-                let mut solve = |conditions: &Conditions<'_, D>| {
-                    self.flow.solve_from(&bodies, &mut leaves, conditions, first.take())
-                };
-                let found = match (self.is_sheared(), self.shear_stress) {
-                    (true, Some(stress)) => self.at_stress(stress, told, &mut solve)?,
-                    (true, None) => (self.sheared(told, &mut solve)?, 1.0),
-                    (false, _) => (self.between_walls(told, &shear, &mut solve)?, 1.0),
-                };
-                memory.last.replace(kept);
-                return Ok(found);
-            }
-            _ => return Err(SuspensionError::Formulation),
+        let bodies = SurfaceBodies { balls: &balls, lubrication: self.lubrication };
+        let mut kept = memory.last.take();
+        let mut first = Some(&mut kept);
+        let mut leaves = SharedTree { tree: &mut whole, cuts: &cuts, ranks };
+        let mut solve = |conditions: &Conditions<'_, D>| {
+            self.flow.solve_from(&bodies, &mut leaves, conditions, first.take())
         };
-        Ok((flow, 1.0))
+        let found = match (self.is_sheared(), self.shear_stress) {
+            (true, Some(stress)) => self.at_stress(stress, told, &mut solve)?,
+            (true, None) => (self.sheared(told, &mut solve)?, 1.0),
+            (false, _) => (self.between_walls(told, &shear, &mut solve)?, 1.0),
+        };
+        memory.last.replace(kept);
+        Ok(found)
     }
 
     /// The motion that is given to a particle now.

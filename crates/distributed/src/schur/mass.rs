@@ -22,9 +22,9 @@ pub type Masses<'a> = dyn Fn(&mut dyn FnMut(usize, &[f64])) + 'a;
 pub struct SharedMass<'a> {
     pub ranks: &'a dyn Communicator,
     pub columns: Columns,
-    pub viscosity: f64,
+    /// Its diagonal at the owned pressures.
+    pub diagonal: Vec<f32>,
     /// Rows of ghosts are empty.
-    matrix: SparseMatrix,
     rows: SellMatrix<f32>,
     x: Vec<f32>,
     y: Vec<f32>,
@@ -56,11 +56,6 @@ impl Columns {
         self.owned + self.ghosts.len()
     }
 
-    /// Number of owned ones.
-    pub fn owned(&self) -> usize {
-        self.owned
-    }
-
     /// Number of a pressure by its place in the part.
     pub fn number(&self, place: u32) -> usize {
         match (place as usize).checked_sub(self.first).filter(|&own| own < self.owned) {
@@ -84,7 +79,7 @@ impl<'a> SharedMass<'a> {
         ranks: &'a dyn Communicator,
         space: &LevelSpace<D>,
         pressures: &SharedPressures,
-        (viscosity, masses): (f64, &Masses<'_>),
+        masses: &Masses<'_>,
         weights: &[f64],
     ) -> Result<Self, FlowError> {
         let mut columns = Columns::new(space, pressures);
@@ -108,30 +103,8 @@ impl<'a> SharedMass<'a> {
             }
         }
         let [x, y] = [0, 1].map(|_| vec![0.0; columns.len()]);
-        Ok(Self { ranks, rows: SellMatrix::new(&matrix), matrix, columns, viscosity, x, y })
-    }
-
-    /// The diagonal at the owned pressures.
-    pub fn diagonal(&self) -> Vec<f32> {
-        (0..self.columns.owned).map(|q| self.matrix.get(q, q) as f32).collect()
-    }
-
-    /// The entry of an owned row.
-    pub fn entry(&self, row: usize, column: usize) -> f64 {
-        self.matrix.get(row, column)
-    }
-
-    /// Columns of an owned row.
-    pub fn columns_of(&self, row: usize) -> &[u32] {
-        self.matrix.pattern().columns_of(row)
-    }
-
-    /// Keeps what products need alone.
-    pub fn forget_entries(&mut self) {
-        let empty = Pattern::from_entries(0, 0, &[]).map(|none| SparseMatrix::zeros(Arc::new(none)));
-        if let Ok(empty) = empty {
-            self.matrix = empty;
-        }
+        let diagonal = (0..owned).map(|q| matrix.get(q, q) as f32).collect();
+        Ok(Self { ranks, diagonal, rows: SellMatrix::new(&matrix), columns, x, y })
     }
 }
 

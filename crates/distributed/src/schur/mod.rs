@@ -1,24 +1,20 @@
 //! Approximate inverse of the pressure Schur complement, as in the serial solver: the weighted mass of the
-//! pressures over twice the viscosity by Chebyshev's method, dense inverses in gaps narrower than a cell, and
-//! the pressures as large as the box from a small mesh.
+//! pressures over twice the viscosity by Chebyshev's method, and the pressures as large as the box from a small
+//! mesh.
 
-mod cluster;
-mod gap;
 mod mass;
 mod weights;
 mod whole_box;
 
-use gluey_fem::{ImplicitTree, ReferenceMatrices};
+use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, SpectralInterval, estimate_lambda_max_from};
-use gluey_parallel::GhostPlan;
+use gluey_parallel::Communicator;
 
 use crate::agreement::agreed;
-use crate::bodies::Shared;
 use crate::flow::FlowError;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
-use gap::Gaps;
 use mass::Masses;
 use mass::SharedMass;
 pub use weights::Flowing;
@@ -44,7 +40,6 @@ pub struct SchurInverse<'a, const D: usize> {
     mass: SharedMass<'a>,
     jacobi: Jacobi<f32>,
     chebyshev: Chebyshev<f32>,
-    gaps: Gaps,
     whole_box: Option<WholeBox<D>>,
 }
 
@@ -52,59 +47,32 @@ impl<'a, const D: usize> SchurInverse<'a, D>
 where
     Dim<D>: Space<D>,
 {
-    /// Around bodies whose nodes move with them. All ranks call this.
-    pub fn new(
-        tree: &mut ImplicitTree<'_, D>,
-        shared: &Shared<'a, '_, D>,
-        space: &LevelSpace<D>,
-        nodes: &GhostPlan,
-        pressures: &SharedPressures,
-        viscosity: f64,
-    ) -> Result<Self, FlowError> {
-        let unit = ReferenceMatrices::<D>::new().pressure_mass;
-        let masses = |visit: &mut dyn FnMut(usize, &[f64])| {
-            let (mesh, mut matrix) = (&space.part.mesh, unit.to_vec());
-            for cell in space.own_cells() {
-                let scale = mesh.size(mesh.cells()[cell].level).powi(D as i32) / viscosity;
-                matrix.iter_mut().zip(unit.iter()).for_each(|(value, unit)| *value = scale * unit);
-                visit(cell, &matrix);
-            }
-        };
-        let flowing = &Flowing::around_rigid_nodes(space);
-        let cells = PressureCells { viscosity, flowing, masses: &masses };
-        Self::of_cells(tree, shared, space, (nodes, pressures), &cells)
-    }
-
     /// For cells of these masses. All ranks call this.
-    pub fn of_cells(
-        tree: &mut ImplicitTree<'_, D>,
-        shared: &Shared<'a, '_, D>,
+    pub fn new(
+        tree: &ImplicitTree<'_, D>,
+        ranks: &'a dyn Communicator,
         space: &LevelSpace<D>,
-        (nodes, pressures): (&GhostPlan, &SharedPressures),
+        pressures: &SharedPressures,
         cells: &PressureCells<'_>,
     ) -> Result<Self, FlowError> {
-        let (ranks, PressureCells { viscosity, flowing, masses }) = (shared.ranks, *cells);
+        let PressureCells { viscosity, flowing, masses } = *cells;
         let weights = weights::weights(ranks, space, pressures, flowing, viscosity);
-        let mut mass = SharedMass::new(ranks, space, pressures, (viscosity, masses), &weights)?;
-        let gaps = agreed(ranks, Gaps::new(tree, shared, space, nodes, pressures, &mass))?;
+        let mut mass = SharedMass::new(ranks, space, pressures, masses, &weights)?;
         let whole_box = agreed(ranks, WholeBox::new(tree, ranks, space, pressures, viscosity))?;
-        let mut jacobi = agreed(ranks, Jacobi::new(&mass.diagonal()))?;
+        let mut jacobi = agreed(ranks, Jacobi::new(&mass.diagonal))?;
         let start = space.pressure.owned.clone().zip(&pressures.is_free);
         let start: Vec<f32> = start.map(|(q, &is_free)| pseudo_random(space, q, is_free)).collect();
         let largest = estimate_lambda_max_from(start, &mut mass, &mut jacobi, LANCZOS_STEPS);
         let largest = largest.map_err(FlowError::Krylov)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
         let chebyshev = Chebyshev::new(space.pressure.owned.len(), steps(interval), interval);
-        // Entries of the diagonal were needed for the gaps.
-        mass.forget_entries();
-        Ok(Self { mass, jacobi, chebyshev, gaps, whole_box })
+        Ok(Self { mass, jacobi, chebyshev, whole_box })
     }
 
     /// `z` close to `S^-1 r` at the owned pressures, up to a constant. Both are zero but at unknowns.
     pub fn apply(&mut self, r: &[f32], z: &mut [f32]) {
-        let Self { mass, jacobi, chebyshev, gaps, whole_box } = self;
+        let Self { mass, jacobi, chebyshev, whole_box } = self;
         chebyshev.smooth(mass, jacobi, r, z, Guess::Zero);
-        gaps.add(mass.ranks, r, z);
         if let Some(whole_box) = whole_box {
             whole_box.add(mass.ranks, r, z);
         }

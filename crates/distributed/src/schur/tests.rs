@@ -4,13 +4,14 @@ use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Threads};
+use gluey_stokes::PressureSpace;
 use gluey_testkit::failing::within_a_minute;
 
 use super::{Flowing, PressureCells, SchurInverse};
 use crate::bodies::Shared;
 use crate::cuts::equal_cuts;
-use crate::cycle::VCycle;
 use crate::pressures::SharedPressures;
+use crate::space::LevelSpace;
 
 /// What ranks say of masses that one of them multiplies by `factor`.
 fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
@@ -22,20 +23,21 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
             let none: [Ball<2>; 0] = [];
             let bodies = BallTree::new(&none);
             let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, offset: 0.0, held: &[] };
-            let cycle = VCycle::new(&mut tree, &shared, 1.0).unwrap();
-            let top = &cycle.levels[cycle.levels.len() - 1].operator;
-            let space = top.space.clone();
-            let pressures = SharedPressures::new(&mut tree, &shared, &space);
+            let space = LevelSpace::new(&mut tree, 4, &shared, None, None);
+            let free = PressureSpace::around_surfaces(&space.pressure.map, |_| true, &[]);
+            let pressures = SharedPressures::new(&mut tree, &shared, &space, &free);
             let scale = if ranks.rank() == 1 { factor } else { 1.0 };
             let unit = gluey_fem::ReferenceMatrices::<2>::new().pressure_mass;
             let matrix: Vec<f64> = unit.iter().map(|entry| scale * entry).collect();
             let masses = |visit: &mut dyn FnMut(usize, &[f64])| {
                 space.own_cells().for_each(|cell| visit(cell, &matrix));
             };
-            let flowing = Flowing::around_rigid_nodes(&space);
+            let map = &space.velocity.map;
+            let is_fixed = (0..map.node_count()).map(|node| map.is_on_boundary(node)).collect();
+            let all = (0..map.cell_count()).collect();
+            let flowing = Flowing { own: space.own_cells().collect(), all, is_fixed };
             let cells = PressureCells { viscosity: 1.0, flowing: &flowing, masses: &masses };
-            let around = (&top.plans.nodes, &pressures);
-            let made = SchurInverse::of_cells(&mut tree, &shared, &space, around, &cells);
+            let made = SchurInverse::new(&tree, ranks, &space, &pressures, &cells);
             made.err().map(|error| error.to_string())
         })
     };

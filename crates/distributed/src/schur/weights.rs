@@ -7,12 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use gluey_fem::{Cuts, ImplicitTree, ReferenceMatrices};
-use gluey_geom::{Aabb, Vector};
-use gluey_levelset::BallTree;
-use gluey_parallel::{Alone, Communicator, route};
+use gluey_fem::ReferenceMatrices;
+use gluey_geom::{Dim, Space};
+use gluey_parallel::{Communicator, route};
+use gluey_stokes::part::ratio_inside;
 
-use crate::bodies::Shared;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
 
@@ -30,17 +29,6 @@ pub struct Flowing {
 }
 
 impl Flowing {
-    /// Around bodies whose nodes move with them.
-    pub fn around_rigid_nodes<const D: usize>(space: &LevelSpace<D>) -> Self {
-        let map = &space.velocity.map;
-        let is_fixed = |node: usize| space.bodies.body_of(node).is_some() || map.is_on_boundary(node);
-        Self {
-            own: space.own_cells().collect(),
-            all: (0..map.cell_count()).filter(|&cell| !space.bodies.is_rigid(map.cell(cell))).collect(),
-            is_fixed: (0..map.node_count()).map(is_fixed).collect(),
-        }
-    }
-
     fn is_fixed(&self, node: u32) -> bool {
         self.is_fixed[node as usize]
     }
@@ -53,29 +41,14 @@ pub fn weights<const D: usize>(
     pressures: &SharedPressures,
     flowing: &Flowing,
     viscosity: f64,
-) -> Vec<f64> {
+) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
     let inside = ratio_inside::<D>();
     let ratios = ratios(ranks, space, pressures, flowing, viscosity);
     let weight = |ratio: Option<f64>| ratio.map_or(1.0, |ratio| (ratio / inside).clamp(LEAST, 1.0));
     ratios.into_iter().map(weight).collect()
-}
-
-/// `s_q / m_q` in the middle of a mesh without bodies.
-fn ratio_inside<const D: usize>() -> f64 {
-    let wants = |_: &Vector<D>, _: f64, _: u8| true;
-    let tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], 2, &wants);
-    let mut tree = tree.expect("four cells a side");
-    let (ranks, cuts, none) = (Alone::default(), Cuts::one(&tree), BallTree::new(&[]));
-    let shared = Shared { cuts: &cuts, ranks: &ranks, bodies: &none, offset: 0.0, held: &[] };
-    let space = LevelSpace::new(&mut tree, 2, &shared, None);
-    let pressures = SharedPressures::new(&mut tree, &shared, &space);
-    let centre = Vector::<D>::repeat(0.5);
-    let is_centre = |q: &usize| space.pressure.map.point(*q) == centre;
-    let centre = space.pressure.owned.clone().find(is_centre).expect("a uniform mesh has a centre node");
-    let flowing = Flowing::around_rigid_nodes(&space);
-    let rows = Rows::new(&space, &pressures, &flowing, 1.0, |q| q == centre);
-    let [stiffness, mass] = rows.sums(centre, &[]);
-    stiffness / mass
 }
 
 /// `s_q / m_q` of the owned unknowns next to fixed velocities.

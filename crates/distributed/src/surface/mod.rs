@@ -21,7 +21,7 @@ use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
-use gluey_parallel::{Communicator, GhostPlan, Traffic};
+use gluey_parallel::{Communicator, Traffic};
 use gluey_stokes::part::{AssembledSmoother, PartMethod, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
     Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
@@ -140,8 +140,7 @@ impl BoxFlow {
         let is_own = |film: &Film<D>| owner_of_film(tree, &shared, film) == ranks.rank();
         let all = (around.balls, frame.domain());
         let rings = rings_around_surfaces(around.lubrication, all, cell_size, &is_own);
-        let levels =
-            VCycle::under(tree, &shared, self.viscosity, Some(&Around { rings, spreads: &spreads }))?;
+        let levels = VCycle::new(tree, &shared, self.viscosity, &Around { rings, spreads: &spreads })?;
         let level = levels.levels[levels.levels.len() - 1].operator.space.clone();
         let bodies = NearBodies::new(tree, &shared, &level.part);
         let setting = Setting {
@@ -364,10 +363,8 @@ where
             is_fixed: (0..map.node_count()).map(is_fixed).collect(),
         };
         let masses = |visit: &mut dyn FnMut(usize, &[f64])| system.for_each_pressure_mass(visit);
-        // Aggregates leave no gaps, which alone ask for velocities of others.
-        let pressures = (&GhostPlan::default(), &space.pressures);
         let cells = PressureCells { viscosity: self.flow.viscosity, flowing: &flowing, masses: &masses };
-        SchurInverse::of_cells(tree, &self.shared, &self.level, pressures, &cells)
+        SchurInverse::new(tree, space.ranks, &self.level, &space.pressures, &cells)
     }
 
     /// The field that carries the data, and the right-hand side: the sums over own cells, without what is

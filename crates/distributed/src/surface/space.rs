@@ -106,7 +106,7 @@ where
         let nodes = plan_of(&needed);
         let around = plan_of(&masters.around(level, system));
         let twists = twist_plan(ranks, bodies, &bodies_here(level, problem));
-        let pressures = SharedPressures::around_surfaces(tree, shared, level, &system.pressure);
+        let pressures = SharedPressures::new(tree, shared, level, &system.pressure);
         let nodal = system.space.full_dim();
         let of_velocities = [(&nodes, D, 0), (&twists, rigid::<D>(), nodal)];
         let [nodes_first, twists_after] = of_velocities;

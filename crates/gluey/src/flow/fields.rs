@@ -51,7 +51,7 @@ where
     Dim<D>: Space<D>,
 {
     match params.formulation {
-        Formulation::RigidDofs { .. } | Formulation::Unfitted { .. } => params.viscosity,
+        Formulation::Unfitted { .. } => params.viscosity,
         Formulation::Paper(paper) => {
             let mesh = &flow.discretisation.mesh;
             let ramp = Ramp::new(paper.ramp * mesh.size(mesh.max_level()));

@@ -20,8 +20,6 @@ pub(crate) fn refinement(case: &Case, level: f64) -> Refinement {
         coarsest: case.coarsest_level().min(u32::from(surface)) as u8,
         surface,
         band: case.flow.mesh.band,
-        gap_fraction: 0.0,
-        gap_levels: 0,
     }
 }
 
@@ -30,12 +28,7 @@ pub(crate) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
     let flow = &case.flow;
     let formulation = match flow.formulation {
         Formulation::Paper => gluey_stokes::Formulation::Paper(flow.paper.params()),
-        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted {
-            lubrication: match case.lubrication() {
-                Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
-                Lubrication::None => gluey_stokes::Lubrication::None,
-            },
-        },
+        Formulation::Unfitted => gluey_stokes::Formulation::Unfitted { lubrication: lubrication(case) },
     };
     let solver = match flow.solver {
         Solver::Direct => SolverKind::Direct,
@@ -44,4 +37,12 @@ pub(crate) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
         Solver::Auto => SolverKind::Multigrid,
     };
     FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance }
+}
+
+/// Treatment of films that are too thin for the mesh.
+pub(crate) fn lubrication(case: &Case) -> gluey_stokes::Lubrication {
+    match case.lubrication() {
+        Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
+        Lubrication::None => gluey_stokes::Lubrication::None,
+    }
 }

@@ -11,7 +11,7 @@ use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
 use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, leftovers, logged, occupied};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
-use crate::flow::{FlowError, flow_params, refinement, tree};
+use crate::flow::{FlowError, lubrication, refinement, tree};
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::{Sharing, available};
 use crate::progress::Progress;
@@ -87,19 +87,7 @@ fn check(case: &Case) -> Result<(), RunError> {
     let refused = [
         (case.flow.hydrodynamics != Hydrodynamics::Stokes, "hydrodynamics other than stokes"),
         (case.flow.formulation == Formulation::Paper, "the formulation paper"),
-        (
-            case.is_sheared() && case.flow.formulation != Formulation::Unfitted,
-            "a box that is sheared for ever, but by unfitted",
-        ),
         (case.flow.solver == Solver::Direct, "the direct solver"),
-        (
-            case.gives_motions() && case.flow.formulation != Formulation::Unfitted,
-            "particles that are held or driven, but by unfitted",
-        ),
-        (
-            case.body_force.is_some() && case.flow.formulation != Formulation::Unfitted,
-            "a force on the fluid, but by unfitted",
-        ),
     ];
     match refused.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, what)) => Err(RunError::NotShared { what }),
@@ -122,7 +110,7 @@ where
         roots,
         periods: std::array::from_fn(|axis| case.period(axis)),
         refinement: refinement(case, level),
-        formulation: flow_params::<D>(case).formulation,
+        lubrication: lubrication(case),
         radii: case.particles.iter().map(|particle| particle.radius).collect(),
         wrenches: case.wrenches(),
         given: case.given_twists(),

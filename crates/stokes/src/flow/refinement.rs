@@ -1,8 +1,8 @@
-//! Meshes refined near bodies and in the gaps between them.
+//! Meshes refined near bodies.
 
 use gluey_fem::{MeshError, TreeMesh, half_diagonal};
 use gluey_geom::{Aabb, Vector};
-use gluey_levelset::{Ball, BallTree, Body, LevelSet};
+use gluey_levelset::{Ball, BallTree, Body};
 
 /// Part of its size by which a cell may be too far away and still counts as near: where bodies have round
 /// places and sizes many distances are equal to the band, and rounding must not decide.
@@ -21,17 +21,12 @@ pub struct Refinement {
     /// coarse interior would save is little, see `docs/decisions/0018-band.md`), and where they touch one
     /// that meets it.
     pub band: f64,
-    /// Narrow gaps get cells smaller than this fraction of the local distance between the surfaces; zero for
-    /// none.
-    pub gap_fraction: f64,
-    /// Levels beyond `surface` that gaps may use.
-    pub gap_levels: u8,
 }
 
 impl Refinement {
-    /// Cells of this level in bodies and two cell sizes around them, none finer in gaps.
+    /// Cells of this level in bodies and two cell sizes around them.
     pub fn to_level(surface: u8) -> Self {
-        Self { coarsest: surface.min(3), surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
+        Self { coarsest: surface.min(3), surface, band: 2.0 }
     }
 
     /// The mesh of `domain` around `bodies`, sheared like the lattice that repeats these.
@@ -48,17 +43,10 @@ impl Refinement {
         let shear = bodies.first().map_or(0.0, |body| body.lattice().shear());
         let bodies = &BallTree::new(bodies);
         let wants = |lower: &Vector<D>, h: f64, level: u8| self.wants(lower, h, level, bodies);
-        let deepest = self.deepest();
-        let mesh = TreeMesh::refine(domain, roots, periodic, deepest, wants)?;
+        let mesh = TreeMesh::refine(domain, roots, periodic, self.surface, wants)?;
         let mesh = mesh.sheared(shear);
         let used = mesh.cells().iter().map(|c| c.level).max().unwrap_or(0);
-        Ok(if used < deepest { mesh.coarsened(used) } else { mesh })
-    }
-
-    /// Level of the smallest cells that there may be.
-    pub fn deepest(&self) -> u8 {
-        let gap_levels = if self.gap_fraction > 0.0 { self.gap_levels } else { 0 };
-        self.surface.saturating_add(gap_levels)
+        Ok(if used < self.surface { mesh.coarsened(used) } else { mesh })
     }
 
     /// Whether a cell with this lower corner, size and level is to be refined.
@@ -70,9 +58,7 @@ impl Refinement {
         bodies: &BallTree<'_, D>,
     ) -> bool {
         let center = lower + Vector::repeat(0.5 * h);
-        level < self.coarsest
-            || (level < self.surface && self.is_near_surface(&center, h, bodies))
-            || (level >= self.surface && self.is_in_gap(&center, h, bodies))
+        level < self.coarsest || (level < self.surface && self.is_near_surface(&center, h, bodies))
     }
 
     /// Whether a cell of size `h` comes closer to a body than the band of its children, or one of their size
@@ -91,30 +77,6 @@ impl Refinement {
                 is_near |= outside < radius + band || distance_from_cell(arm, h, shear) < radius;
             });
             is_near
-        })
-    }
-
-    /// Whether a cell of size `h` lies in a gap that it is too large for. The sum of the distances to two
-    /// surfaces is their distance from each other there, for points between them and not far inside.
-    fn is_in_gap<const D: usize>(&self, center: &Vector<D>, h: f64, bodies: &BallTree<'_, D>) -> bool {
-        let reach = half_diagonal::<D>(h, shear_of(bodies));
-        // What a gap that is too narrow for the cell leaves of either distance.
-        let farthest = h / self.gap_fraction + 2.0 * reach;
-        let mut near: Vec<f64> = Vec::new();
-        bodies.any_within(center, ENOUGH * farthest, |body| {
-            let body = &bodies.balls()[body];
-            let distance = -body.value(center);
-            if distance < body.bounding_radius() {
-                near.push(distance);
-            }
-            false
-        });
-        near.iter().enumerate().any(|(i, &d1)| {
-            near[i + 1..].iter().any(|&d2| {
-                let width = (d1 + d2 - 2.0 * reach).max(0.0);
-                let between = d1.max(d2) <= width + 2.0 * reach;
-                between && h > self.gap_fraction * width
-            })
         })
     }
 }
@@ -147,7 +109,7 @@ mod tests {
     /// farther ones are not.
     fn fine_cells_fill_bodies_and_their_bands<const D: usize>() {
         let ball = Ball::new(Vector::<D>::repeat(0.47), 0.2);
-        let refinement = Refinement { coarsest: 2, surface: 5, band: 1.5, gap_fraction: 0.0, gap_levels: 0 };
+        let refinement = Refinement { coarsest: 2, surface: 5, band: 1.5 };
         let mesh = refinement.mesh(Aabb::unit(), [1; D], [false; D], &[ball]).unwrap();
         let mut deepest = 0.0f64;
         for cell in mesh.cells() {
@@ -179,7 +141,7 @@ mod tests {
             let ball = Ball::in_space(&edges.map(|edge| edge * number(3)), radius, &lattice, 0.0);
             let surface = [3, 4, 5][trial as usize % 3] - D as u8 / 3;
             let band = [2.0, 0.0, 0.7, 4.0][trial as usize % 4];
-            let refinement = Refinement { coarsest: 1, surface, band, gap_fraction: 0.0, gap_levels: 0 };
+            let refinement = Refinement { coarsest: 1, surface, band };
             let mesh = refinement.mesh(domain, roots, [true; D], &[ball]).expect("a mesh");
             let h = mesh.size(surface);
             for cell in mesh.cells() {
@@ -226,22 +188,5 @@ mod tests {
     fn the_band_of_fine_cells_is_outside_and_the_interior_is_as_fine() {
         fine_cells_fill_bodies_and_their_bands::<2>();
         fine_cells_fill_bodies_and_their_bands::<3>();
-    }
-
-    #[test]
-    fn gaps_are_resolved_and_the_rest_is_not() {
-        let balls = [0.449, 0.551].map(|x| Ball::new(Vector::<2>::new(x, 0.5), 0.05));
-        let refinement = Refinement { coarsest: 3, surface: 6, band: 2.0, gap_fraction: 0.5, gap_levels: 8 };
-        let mesh = refinement.mesh(Aabb::unit(), [1, 1], [false; 2], &balls).unwrap();
-        let size_at = |x: f64| {
-            let cell = mesh.cells().iter().find(|c| {
-                let (lower, h) = (mesh.lower_corner(c), mesh.size(c.level));
-                lower[0] <= x && x < lower[0] + h && lower[1] <= 0.5 && 0.5 < lower[1] + h
-            });
-            mesh.size(cell.unwrap().level)
-        };
-        assert!(size_at(0.5) <= 0.5 * 0.002);
-        assert_eq!(size_at(0.4), 1.0 / 64.0);
-        assert!(mesh.cell_count() < 3000, "{}", mesh.cell_count());
     }
 }

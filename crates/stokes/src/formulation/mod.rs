@@ -6,7 +6,6 @@
 mod load;
 mod paper;
 mod problem;
-mod rigid_dofs;
 mod unfitted;
 
 use std::sync::Arc;
@@ -18,23 +17,15 @@ use gluey_levelset::Ball;
 use crate::dimension::in_dimension;
 use crate::error::StokesError;
 use crate::film::Lubrication;
-use crate::space::{CutCellPressures, Discretisation};
+use crate::space::Discretisation;
 
 pub use paper::{PaperParams, ParticleVelocity};
 pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
-pub use rigid_dofs::default_offset;
 pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formulation {
-    /// Elimination of the solid degrees of freedom.
-    RigidDofs {
-        /// Nodes with `alpha >= offset h` are rigid; slightly negative is best, see `docs/theory`.
-        offset: f64,
-        /// Treatment of the pressures in cut cells.
-        cut_cell_pressures: CutCellPressures,
-    },
     /// Penalty and Uzawa multiplier of the paper.
     Paper(PaperParams),
     /// Nitsche's conditions on the true surfaces, with aggregated elements.
@@ -70,9 +61,6 @@ impl Formulation {
         Dim<D>: Space<D>,
     {
         match *self {
-            Self::RigidDofs { offset, cut_cell_pressures } => {
-                Arc::new(rigid_dofs::RigidDofs { offset, cut_cell_pressures })
-            }
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
             Self::Unfitted { lubrication } => Arc::new(unfitted::Unfitted::new(lubrication)),
         }
@@ -82,7 +70,6 @@ impl Formulation {
     /// [`StokesError::Parameter`] for a value out of range.
     pub(crate) fn check(&self) -> Result<(), StokesError> {
         match self {
-            Self::RigidDofs { offset, .. } => rigid_dofs::check(*offset),
             Self::Paper(params) => params.check(),
             Self::Unfitted { .. } => Ok(()),
         }

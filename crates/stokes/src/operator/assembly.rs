@@ -339,7 +339,7 @@ impl Reduction {
 mod tests {
     use super::*;
     use crate::operator::system::SystemOperator;
-    use crate::space::{CutCellPressures, Discretisation, solid_nodes};
+    use crate::space::{Discretisation, solid_nodes};
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
@@ -358,7 +358,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, CutCellPressures::Aggregate);
+        let system = StokesSystem::new(space, 1.5);
         let assembled = assemble_stokes(&system).unwrap();
         let unknowns = &assembled.unknowns;
         let x: Vec<f64> = (0..unknowns.len()).map(|i| (0.37 * i as f64).sin()).collect();

@@ -16,8 +16,7 @@ use super::cells::cell_operator;
 use crate::film::{Film, FilmCorrection, FilmCoupling, FilmNetwork, FilmRow, Heights};
 use crate::solid::Penalty;
 use crate::space::{
-    ActiveCell, CutCellPressures, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells,
-    own_cells,
+    ActiveCell, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells, own_cells,
 };
 use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace, flows_through_films};
 
@@ -45,13 +44,13 @@ where
     Dim<D>: Space<D>,
 {
     /// The system with fluid viscosity `viscosity` on the velocities of `space`.
-    pub fn new(space: VelocitySpace<D>, viscosity: f64, cut: CutCellPressures) -> Self {
-        Self::with_penalty(space, viscosity, cut, None)
+    pub fn new(space: VelocitySpace<D>, viscosity: f64) -> Self {
+        Self::with_penalty(space, viscosity, None)
     }
 
     /// The system with a penalised solid beside the fluid.
     pub(crate) fn penalised(space: VelocitySpace<D>, viscosity: f64, penalty: Penalty<D>) -> Self {
-        Self::with_penalty(space, viscosity, CutCellPressures::Keep, Some(penalty))
+        Self::with_penalty(space, viscosity, Some(penalty))
     }
 
     /// The system in `fluid` cells that nothing cuts and in those that `surfaces` cut.
@@ -87,15 +86,10 @@ where
         Self { films: Some(Arc::new(films)), ..self }
     }
 
-    fn with_penalty(
-        space: VelocitySpace<D>,
-        viscosity: f64,
-        cut: CutCellPressures,
-        penalty: Option<Penalty<D>>,
-    ) -> Self {
+    fn with_penalty(space: VelocitySpace<D>, viscosity: f64, penalty: Option<Penalty<D>>) -> Self {
         let cells = active_cells(&space, viscosity);
         let (pressure, operator) = rayon::join(
-            || PressureSpace::new(&space, &cells, cut),
+            || PressureSpace::new(&space, &cells),
             || cell_operator(&space, &cells, penalty.as_ref()),
         );
         Self { pressure, operator, space, cells, penalty, surfaces: None, films: None, viscosity }
@@ -202,18 +196,6 @@ where
     fn wall_velocity(&self, film: &Film<D>, u: &[f64]) -> Vector<D> {
         let mesh = &self.discretisation().mesh;
         Evaluator::new(mesh).motion_at(self.space.nodes(), u, &film.far_point()).velocity
-    }
-
-    /// Forces of the fluid on all nodes, those inside bodies one by one: `-(A u - B^T p)` for nodal
-    /// velocities and pressures, with the forces on hanging nodes moved to their masters.
-    pub(crate) fn nodal_forces(&self, u: &[f64], p: &[f64]) -> Vec<f64> {
-        let nowhere = vec![None; self.space.nodes().node_count()];
-        let loose = VelocitySpace::new::<Ball<D>>(self.discretisation(), &[], &nowhere);
-        let operator: CellOperator<f64, D> = cell_operator(&loose, &self.cells, self.penalty.as_ref());
-        let mut forces = vec![0.0; loose.dim()];
-        operator.stokes_of_field(u, p, &mut forces, &mut [], &mut Workspace::default());
-        vector::scale(-1.0, &mut forces);
-        forces
     }
 
     /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made
@@ -358,7 +340,7 @@ mod tests {
     use gluey_geom::{Aabb, Vector};
 
     /// Constant pressures do no work on any admissible velocity.
-    fn constants_are_in_the_kernel<const D: usize>(cut: CutCellPressures)
+    fn constants_are_in_the_kernel<const D: usize>()
     where
         Dim<D>: Space<D>,
     {
@@ -370,7 +352,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5, cut);
+        let system = StokesSystem::new(space, 1.5);
         let mut x = vec![0.0f64; system.dim()];
         for q in (0..system.pressure.dim()).filter(|&q| system.pressure.is_free(q)) {
             x[system.velocity_dim() + q] = 1.0;
@@ -383,9 +365,7 @@ mod tests {
 
     #[test]
     fn constant_pressures_do_no_work() {
-        for cut in [CutCellPressures::Keep, CutCellPressures::Aggregate] {
-            constants_are_in_the_kernel::<2>(cut);
-            constants_are_in_the_kernel::<3>(cut);
-        }
+        constants_are_in_the_kernel::<2>();
+        constants_are_in_the_kernel::<3>();
     }
 }

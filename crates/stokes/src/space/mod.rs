@@ -1,5 +1,5 @@
-//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, poorly supported pressures
-//! aggregated; the marking of nodes and cells.
+//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures; the marking of nodes
+//! and cells.
 
 mod cells;
 mod discretisation;
@@ -14,5 +14,5 @@ pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{
     CellKind, around_films, around_finest_cells, cell_kind, cells_touching, nodes_of_cells_with, solid_nodes,
 };
-pub use pressure::{CutCellPressures, PressureSpace};
+pub use pressure::PressureSpace;
 pub use velocity::{SolidNodes, VelocitySpace};

@@ -5,13 +5,11 @@
 //! is taken to be `T = W^1/2 M W^1/2 / (2 eta)`: the eigenvalues then gather at one, where those of the
 //! velocity block are. The weights `W` are one but for pressures next to walls and bodies, which act on
 //! fewer velocities ([`weights`]). `T^-1` is Chebyshev iteration on the matrix scaled by its
-//! diagonal (Wathen and Rees 2009), in `f32`. Two kinds of pressures are still far from `T`: those as large
-//! as the box, which are corrected on a small mesh ([`coarse`]), and those in gaps narrower
-//! than a cell, where the inverses of small exact Schur complements are added ([`gap`]).
+//! diagonal (Wathen and Rees 2009), in `f32`. Pressures as large as the box are still far from `T`: they are
+//! corrected on a small mesh ([`coarse`]).
 
 mod cells;
 mod coarse;
-mod gap;
 mod mass;
 mod weights;
 
@@ -19,12 +17,12 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max};
 
 pub use coarse::BoxCorrection;
+pub use weights::ratio_inside;
 
 use crate::error::StokesError;
 use crate::operator::Elements;
 use crate::space::{Discretisation, PressureSpace};
 use coarse::CoarseSchur;
-use gap::GapInverse;
 use mass::pressure_matrix;
 
 /// Bound of the relative error of `M^-1`.
@@ -37,7 +35,7 @@ const LANCZOS_STEPS: usize = 15;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
 
-/// `T^-1`, up to Chebyshev's error, with the corrections for the box and for gaps.
+/// `T^-1`, up to Chebyshev's error, with the correction for the box.
 pub struct SchurInverse<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -46,7 +44,6 @@ where
     mass: SellMatrix<f32>,
     jacobi: Jacobi<f32>,
     chebyshev: Chebyshev<f32>,
-    gaps: GapInverse,
     coarse: Option<CoarseSchur<D>>,
 }
 
@@ -64,7 +61,6 @@ where
         let system = elements.system();
         let viscosity = system.viscosity();
         let mass = pressure_matrix(elements, viscosity)?;
-        let gaps = GapInverse::new(system, &mass)?;
         let coarse = CoarseSchur::new(meshes, viscosity, before.and_then(|before| before.coarse))?;
         let diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
         let mut mass = SellMatrix::new(&mass);
@@ -72,14 +68,13 @@ where
         let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
         let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
         let chebyshev = Chebyshev::new(mass.dim(), steps(interval), interval);
-        Ok(Self { mass, jacobi, chebyshev, gaps, coarse })
+        Ok(Self { mass, jacobi, chebyshev, coarse })
     }
 
     /// `z` close to `S^-1 r`, up to a constant. `r` is zero but at unknowns, where its sum vanishes; so is
     /// `z`.
     pub fn apply(&mut self, space: &PressureSpace<D>, r: &[f32], z: &mut [f32]) {
         self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
-        self.gaps.add(r, z);
         if let Some(coarse) = &mut self.coarse {
             coarse.add(r, z);
             space.clear_fixed(z);

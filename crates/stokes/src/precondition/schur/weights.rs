@@ -25,7 +25,7 @@ use rustc_hash::FxHashMap;
 
 use super::cells::PressureMatrices;
 use crate::operator::{Elements, StokesSystem, viscous_diagonal};
-use crate::space::{CutCellPressures, Discretisation, VelocitySpace, pressure_expansion};
+use crate::space::{Discretisation, VelocitySpace, pressure_expansion};
 
 /// The least weight, for pressures that act on hardly any velocity.
 const LEAST: f64 = 0.05;
@@ -76,8 +76,8 @@ where
     weights
 }
 
-/// `s_q / m_q` in the middle of a mesh without bodies.
-fn ratio_inside<const D: usize>() -> f64
+/// `s_q / m_q` in the middle of a mesh without bodies: what weights are relative to.
+pub fn ratio_inside<const D: usize>() -> f64
 where
     Dim<D>: Space<D>,
 {
@@ -101,7 +101,7 @@ where
     let bodies: [Ball<D>; 0] = [];
     let solid = vec![None; discretisation.velocity.node_count()];
     let space = VelocitySpace::new(discretisation, &bodies, &solid);
-    StokesSystem::new(space, viscosity, CutCellPressures::Keep)
+    StokesSystem::new(space, viscosity)
 }
 
 /// The nodes whose velocity is that of the boundary or of a body.
@@ -309,7 +309,7 @@ mod tests {
         assert!(!discretisation.pressure.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], 0.0);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
-        let system = StokesSystem::new(space, 1.0, CutCellPressures::Keep);
+        let system = StokesSystem::new(space, 1.0);
         let weights = weights_in(&system, 1.0);
         let mut least = 1.0f64;
         for (q, &weight) in weights.iter().enumerate() {

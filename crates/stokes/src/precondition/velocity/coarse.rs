@@ -5,7 +5,7 @@ use gluey_linalg::{DirectSpd, Ordering, Preconditioner, Subset};
 
 use crate::error::StokesError;
 use crate::operator::{StokesSystem, assemble_viscous, factorised};
-use crate::space::{CutCellPressures, VelocitySpace};
+use crate::space::VelocitySpace;
 
 /// Direct solver of the coarsest level.
 pub struct CoarseSolver {
@@ -21,7 +21,7 @@ impl CoarseSolver {
     where
         Dim<D>: Space<D>,
     {
-        let system = StokesSystem::new(space, viscosity, CutCellPressures::Keep);
+        let system = StokesSystem::new(space, viscosity);
         let assembled = assemble_viscous(&system)?;
         let factor = factorised(&assembled.matrix, Ordering::Amd)?;
         let count = assembled.unknowns.len();

@@ -20,7 +20,7 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// In `rigid-dofs`: one sweep after the correction damps more than two of half its degree, at as many
+    /// One sweep after the correction damps more than two of half its degree, at as many
     /// applications, and the restriction needs no residual.
     pub fn of_eliminated(is_finest: bool) -> Self {
         Self { sweep: sweep(if is_finest { 4 } else { 5 }, 5.0), before: false }

@@ -1,13 +1,11 @@
 //! Flows on several ranks beside those of the serial solver, which has another numbering of unknowns, other
 //! preconditioners and, in 2D, none.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use gluey_distributed::{BoxFlow, equal_cuts};
 use gluey_fem::{ImplicitTree, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::Threads;
-use gluey_stokes::{CutCellPressures, FlowParams, FlowSolver, Formulation, SolverKind};
+use gluey_stokes::{FlowParams, FlowSolver, Formulation, Lubrication, SolverKind};
 
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 120 };
 
@@ -27,7 +25,7 @@ where
         !is_adaptive || level < 2 || distance.abs() < h
     };
     let mesh = TreeMesh::refine(Aabb::unit(), [1; D], [false; D], level, wants).unwrap();
-    let formulation = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Keep };
+    let formulation = Formulation::Unfitted { lubrication: Lubrication::None };
     let params = FlowParams { viscosity: FLOW.viscosity, formulation, solver, tolerance: 1e-11 };
     let serial = FlowSolver::<D>::new(params).unwrap().solve(mesh, &[], &walls).unwrap();
     let scale = serial.velocity.iter().fold(0.0f64, |m, u| m.max(u.abs()));

@@ -1,7 +1,5 @@
 //! Fields that ranks have of their own cells: together those of the serial solver, each cell once.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use std::collections::BTreeMap;
 
 use gluey_distributed::{
@@ -13,8 +11,7 @@ use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Fields, Hydrodynamics};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
-    Conditions, CutCellPressures, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement,
-    SolverKind,
+    Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
 };
 
 /// Places and radii; the third lies across the border of the box in the first direction.
@@ -22,11 +19,7 @@ const BODIES: [([f64; 3], f64); 3] =
     [([0.4, 0.35, 0.52], 0.14), ([0.5, 0.76, 0.7], 0.1), ([0.98, 0.6, 0.4], 0.16)];
 const FRAME: FrameName = FrameName { stream: 3, step: 70 };
 
-const RIGID_DOFS: Formulation =
-    Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
-const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
-
-fn suspension<const D: usize>(formulation: Formulation) -> Suspension<D>
+fn suspension<const D: usize>(lubrication: Lubrication) -> Suspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -36,14 +29,8 @@ where
         domain: Aabb::unit(),
         roots: [1; D],
         periods: std::array::from_fn(|d| (d == 0).then_some(1.0)),
-        refinement: Refinement {
-            coarsest: surface - 2,
-            surface,
-            band: 2.0,
-            gap_fraction: 0.0,
-            gap_levels: 0,
-        },
-        formulation,
+        refinement: Refinement { coarsest: surface - 2, surface, band: 2.0 },
+        lubrication,
         radii: BODIES.map(|body| body.1).to_vec(),
         wrenches: Vec::new(),
         given: Vec::new(),
@@ -74,10 +61,11 @@ fn serial<const D: usize>(suspension: &Suspension<D>) -> Flow<D>
 where
     Dim<D>: Space<D>,
 {
-    let &Suspension { domain, roots, periods, ref refinement, formulation, .. } = suspension;
+    let &Suspension { domain, roots, periods, ref refinement, lubrication, .. } = suspension;
     let balls = balls(suspension);
     let mesh = refinement.mesh(domain, roots, periods.map(|p| p.is_some()), &balls).unwrap();
     let viscosity = suspension.flow.viscosity;
+    let formulation = Formulation::Unfitted { lubrication };
     let params = FlowParams { viscosity, formulation, solver: SolverKind::Multigrid, tolerance: 1e-12 };
     let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
     FlowSolver::new(params).unwrap().solve_under(mesh, &balls, &Conditions::boundary(&shear)).unwrap()
@@ -152,11 +140,11 @@ where
     found
 }
 
-fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(formulation: Formulation, limits: [f64; 2])
+fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(lubrication: Lubrication, limits: [f64; 2])
 where
     Dim<D>: Space<D>,
 {
-    let suspension = suspension::<D>(formulation);
+    let suspension = suspension::<D>(lubrication);
     let flow = serial(&suspension);
     for size in [1, 2, 3, 8] {
         let pieces = shown(&suspension, size);
@@ -172,21 +160,19 @@ where
 
 #[test]
 fn pieces_are_the_fields_of_the_serial_solver_in_2d() {
-    pieces_are_the_fields_of_the_serial_solver::<2>(RIGID_DOFS, [1e-9, 1e-8]);
-    pieces_are_the_fields_of_the_serial_solver::<2>(UNFITTED, [2.2e-8, 2.5e-7]);
+    pieces_are_the_fields_of_the_serial_solver::<2>(Lubrication::Deficit, [2.2e-8, 2.5e-7]);
 }
 
 #[test]
 fn pieces_are_the_fields_of_the_serial_solver_in_3d() {
-    pieces_are_the_fields_of_the_serial_solver::<3>(RIGID_DOFS, [1e-9, 1e-8]);
-    pieces_are_the_fields_of_the_serial_solver::<3>(UNFITTED, [1.2e-8, 2.1e-8]);
+    pieces_are_the_fields_of_the_serial_solver::<3>(Lubrication::Deficit, [1.2e-8, 2.1e-8]);
 }
 
 /// More ranks than cells: some have none.
 #[test]
 fn a_rank_without_cells_has_an_empty_piece() {
-    for formulation in [RIGID_DOFS, UNFITTED] {
-        let mut suspension = suspension::<2>(formulation);
+    for lubrication in [Lubrication::None, Lubrication::Deficit] {
+        let mut suspension = suspension::<2>(lubrication);
         suspension.refinement = Refinement { coarsest: 3, surface: 3, ..suspension.refinement };
         suspension.radii = vec![0.14, 0.13, 0.16];
         let pieces = shown(&suspension, 70);
@@ -198,7 +184,7 @@ fn a_rank_without_cells_has_an_empty_piece() {
 /// There is nothing to show of a flow that failed.
 #[test]
 fn a_flow_that_failed_has_no_fields() {
-    let suspension = Suspension { radii: vec![0.001; 3], ..suspension::<2>(UNFITTED) };
+    let suspension = Suspension { radii: vec![0.001; 3], ..suspension::<2>(Lubrication::Deficit) };
     let found = Threads::run(2, |ranks| {
         if ranks.rank() > 0 {
             let mut seen = Vec::new();

@@ -1,19 +1,14 @@
 //! A rank that fails, wherever it is: all ranks end, and say the same.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use std::sync::Arc;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
 use gluey_distributed::{BoxFlow, ContactFollower, FlowError, SharedContact, Suspension, SuspensionError};
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_parallel::{Communicator, Threads};
-use gluey_stokes::{CutCellPressures, Formulation, Lubrication, Refinement};
+use gluey_stokes::{Lubrication, Refinement};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 
-const RIGID_DOFS: Formulation =
-    Formulation::RigidDofs { offset: 0.0, cut_cell_pressures: CutCellPressures::Aggregate };
-const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
 const RANKS: usize = 3;
 /// Agreements of one computation; nothing here takes as many.
 const MANY: usize = 100;
@@ -51,7 +46,7 @@ fn fail_in_turn(
 }
 
 /// Two particles, between walls or in a box that is sheared for ever.
-fn suspension<const D: usize>(formulation: Formulation, is_sheared: bool) -> Suspension<D>
+fn suspension<const D: usize>(lubrication: Lubrication, is_sheared: bool) -> Suspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -60,8 +55,8 @@ where
         domain: Aabb::unit(),
         roots: [1; D],
         periods: std::array::from_fn(|d| (is_sheared || d == 0).then_some(1.0)),
-        refinement: Refinement { coarsest: 3, surface: 4, band: 2.0, gap_fraction: 0.0, gap_levels: 0 },
-        formulation,
+        refinement: Refinement { coarsest: 3, surface: 4, band: 2.0 },
+        lubrication,
         radii: vec![0.14; 2],
         wrenches: vec![Wrench::default(); 2],
         given: Vec::new(),
@@ -85,13 +80,17 @@ where
 /// Levels, matrices of pressures, surfaces, data, what is measured of the flow.
 #[test]
 fn a_rank_that_fails_anywhere_in_a_flow_ends_all() {
-    a_flow_fails_as_one("rigid-dofs", 6, suspension::<2>(RIGID_DOFS, false));
-    a_flow_fails_as_one("between walls", 10, suspension::<2>(UNFITTED, false));
-    a_flow_fails_as_one("spheres", 10, suspension::<3>(UNFITTED, false));
-    let stressed = Suspension { shear_stress: Some(1.0), ..suspension::<2>(UNFITTED, true) };
+    a_flow_fails_as_one("without films", 10, suspension::<2>(Lubrication::None, false));
+    a_flow_fails_as_one("between walls", 10, suspension::<2>(Lubrication::Deficit, false));
+    a_flow_fails_as_one("spheres", 10, suspension::<3>(Lubrication::Deficit, false));
+    let stressed = Suspension { shear_stress: Some(1.0), ..suspension::<2>(Lubrication::Deficit, true) };
     a_flow_fails_as_one("at a given stress", 11, stressed);
     let held = vec![Some(Twist::default()), None];
-    a_flow_fails_as_one("held", 33, Suspension { given: held, ..suspension::<2>(UNFITTED, true) });
+    a_flow_fails_as_one(
+        "held",
+        33,
+        Suspension { given: held, ..suspension::<2>(Lubrication::Deficit, true) },
+    );
 }
 
 /// A line of discs that are pressed together.
@@ -122,7 +121,7 @@ fn a_rank_that_fails_anywhere_in_contact_ends_all() {
 /// What follows from what all know is the same error on all.
 #[test]
 fn bodies_that_are_too_small_are_so_on_all_ranks() {
-    let small = Suspension { radii: vec![0.001; 2], ..suspension::<2>(UNFITTED, false) };
+    let small = Suspension { radii: vec![0.001; 2], ..suspension::<2>(Lubrication::Deficit, false) };
     let run = move || {
         let places = [Vector::<2>::new(0.3, 0.5), Vector::<2>::new(0.7, 0.5)];
         Threads::run(RANKS, |ranks| small.solve(ranks, &places, &small.wrenches, 1.0).unwrap_err()).unwrap()

@@ -1,7 +1,5 @@
 //! Contact that ranks share: the pairs, forces, memory, velocities and errors of one rank.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 mod course;
 
 use gluey_contact::{
@@ -9,7 +7,7 @@ use gluey_contact::{
 };
 use gluey_geom::{Dim, Space, Vector};
 
-use course::{Course, RADIUS, SIZES, Setting, consistent, differences, floor_and_ceiling, packed};
+use self::course::{Course, RADIUS, SIZES, Setting, consistent, differences, floor_and_ceiling, packed};
 
 /// Largest differences from one rank: of velocities, forces and memory.
 type Limits = [f64; 3];

@@ -1,8 +1,6 @@
 //! Bodies whose surfaces cut the mesh: flows on ranks beside those of the serial solver of `unfitted`, at its
 //! tolerance and in as many iterations.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use gluey_distributed::{BoxFlow, MyFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
@@ -44,7 +42,7 @@ where
 {
     fn refinement(&self) -> Refinement {
         let [coarsest, surface] = self.levels;
-        Refinement { coarsest, surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
+        Refinement { coarsest, surface, band: 2.0 }
     }
 
     fn balls(&self) -> Vec<Ball<D>> {
@@ -88,7 +86,7 @@ where
         let (balls, refinement) = (self.balls(), self.refinement());
         let tree_of_balls = BallTree::new(&balls);
         let wants = |lower: &Vector<D>, h: f64, level: u8| refinement.wants(lower, h, level, &tree_of_balls);
-        let deepest = refinement.deepest();
+        let deepest = refinement.surface;
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), deepest, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
         let bodies = SurfaceBodies { balls: &balls, lubrication: self.lubrication };

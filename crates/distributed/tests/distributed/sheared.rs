@@ -1,7 +1,5 @@
 //! Boxes that are sheared for ever on ranks: motions and stresses are those of the serial solver.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use std::rc::Rc;
 
 use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, Suspension};
@@ -36,7 +34,7 @@ where
         roots: [1; D],
         periods: [Some(1.0); D],
         refinement: Refinement::to_level(level),
-        formulation: Formulation::Unfitted { lubrication: Lubrication::Deficit },
+        lubrication: Lubrication::Deficit,
         radii: PARTICLES.map(|particle| particle.1).to_vec(),
         wrenches,
         given: Vec::new(),
@@ -71,7 +69,7 @@ where
     Dim<D>: Space<D>,
 {
     let solver = SolverKind::Multigrid;
-    let formulation = suspension.formulation;
+    let formulation = Formulation::Unfitted { lubrication: suspension.lubrication };
     let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: TOLERANCE };
     let mut solver = FlowSolver::<D>::new(params).unwrap();
     strains().map(|strain| serial_flow(suspension, &mut solver, strain)).collect()
