@@ -1,7 +1,7 @@
 //! Times the solvers of the projection on clusters of touching particles, and prints a table.
 //!
 //! `cargo run --release -p gluey-contact --example solvers [seconds a solve may take]`;
-//! `docs/decisions/0020-contact-solver.md` has a table of a run.
+//! `docs/archive/experiments/0020-contact-solver.md` has a table of a run.
 
 use std::time::Instant;
 

@@ -25,10 +25,10 @@
 //! # Ok::<(), gluey_parallel::RankFailure>(())
 //! ```
 //!
-//! Contacts between particles are shared too ([`SharedContact`], `docs/decisions/0038-contact-on-ranks.md`).
+//! Contacts between particles are shared too ([`SharedContact`], `docs/design/ranks.md`).
 //!
 //! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
-//! (`docs/decisions/0036-surfaces-on-ranks.md`); held bodies, forces on the fluid and boxes without a wall
+//! (`docs/design/ranks.md`); held bodies, forces on the fluid and boxes without a wall
 //! are for these only. Not for viscosities that vary.
 
 mod agreement;

@@ -1,5 +1,5 @@
 //! The solver for any number of contacts: which of the others is best was measured
-//! (docs/decisions/0020-contact-solver.md).
+//! (docs/design/contact.md).
 
 use super::newton::improve;
 use super::{

@@ -18,7 +18,7 @@ pub struct Refinement {
     /// Level of the cells at the surfaces.
     pub surface: u8,
     /// Cells of each level are kept to this many cell sizes outside a body, everywhere inside it (what a
-    /// coarse interior would save is little, see `docs/decisions/0018-band.md`), and where they touch one
+    /// coarse interior would save is little, see `docs/design/mesh-and-kernels.md`), and where they touch one
     /// that meets it.
     pub band: f64,
 }

@@ -224,7 +224,7 @@ where
 /// The matrix of a [`StokesSystem`] with the workspace to apply it, to vectors in either precision.
 ///
 /// Stresses of cells are always computed in double precision: they are small differences of velocities, and
-/// their rounding errors cost iterations (`docs/experiments/0010-krylov-vectors.md`).
+/// their rounding errors cost iterations (`docs/archive/experiments/0010-krylov-vectors.md`).
 #[derive(Debug)]
 pub struct SystemOperator<'a, const D: usize>
 where

@@ -25,7 +25,7 @@ use crate::solid::Penalty;
 use crate::space::{VelocitySpace, solid_nodes};
 
 /// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
-/// iterations, see `docs/experiments/0010-krylov-vectors.md`.
+/// iterations, see `docs/archive/experiments/0010-krylov-vectors.md`.
 const MOST_NOISE: f64 = 1.0;
 
 /// Generalised conjugate residuals (GCR) with a block triangular preconditioner: one V-cycle of multigrid on

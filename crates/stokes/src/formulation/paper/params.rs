@@ -7,7 +7,7 @@ use crate::error::StokesError;
 /// The default, r = 100 with two Uzawa steps and a ramp of one cell, is one setting for every mesh and
 /// dimension. The paper has r = 1e3 and says neither the number of steps nor the ramp; with that ratio cells
 /// cut by two particles lock the pair on meshes of three to six cells per radius
-/// (`docs/decisions/0019-one-setting-of-paper.md`).
+/// (`docs/design/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperParams {
     /// `r = eta_s / eta_f`.

@@ -84,7 +84,7 @@ where
 
 /// The smallest even number of Chebyshev steps whose error is small enough, or [`MOST_STEPS`]. An odd number
 /// would take too much of the smooth pressures, at the upper end of the spectrum, where an even one takes too
-/// little (`docs/decisions/0014-relaxation-near-bodies.md`).
+/// little (`docs/archive/decisions/0014-relaxation-near-bodies.md`).
 fn steps(interval: SpectralInterval) -> usize {
     let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
     (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)

@@ -8,7 +8,7 @@
 //!
 //! the *weight* of a pressure is the ratio `s_q / m_q` over the same ratio away from all walls, where the
 //! mesh is uniform. Symmetric scaling of the mass matrix by the weights raises the smallest eigenvalues of
-//! `M^-1 S` and leaves the largest (`docs/decisions/0015-weights-of-pressures.md`). Smooth pressures hardly
+//! `M^-1 S` and leaves the largest (`docs/design/preconditioner.md`). Smooth pressures hardly
 //! change: the part of them next to walls is of the order of a cell.
 //!
 //! In cells that a penalised solid cuts, `m_q` is the sum of the cells' own Schur complements

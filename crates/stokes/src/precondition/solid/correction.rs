@@ -31,7 +31,7 @@ use crate::space::{
 };
 
 /// Where the solid is less stiff a sweep around films saves no iterations, see
-/// `docs/decisions/0017-pressures-in-cut-cells-and-films.md`.
+/// `docs/design/paper.md`.
 const LEAST_CONTRAST_OF_FILMS: f64 = 300.0;
 
 /// The correction of the velocity cycle for the penalised solid: the approximate inverse on its nodes, the

@@ -27,7 +27,7 @@ impl Smoothing {
     }
 
     /// Below a penalised solid, where one sweep after the correction loses robustness at high contrast, see
-    /// `docs/decisions/0012-passes-over-memory.md`.
+    /// `docs/archive/decisions/0012-passes-over-memory.md`.
     pub fn of_penalised(is_finest: bool) -> Self {
         Self { sweep: sweep(if is_finest { 2 } else { 3 }, 4.0), before: true }
     }

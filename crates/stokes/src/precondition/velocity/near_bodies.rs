@@ -3,7 +3,7 @@
 //! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it
 //! cannot correct: errors that reach over two or three cells from a body, too smooth for the sweep of a
 //! level. Of all errors the V-cycle reduces these the least
-//! (`docs/decisions/0014-relaxation-near-bodies.md`). As Brandt (1984) advises for boundaries, some more
+//! (`docs/design/preconditioner.md`). As Brandt (1984) advises for boundaries, some more
 //! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
 //! are most of the cells of the finest mesh, and the iterations saved do not pay for it.
 //!
