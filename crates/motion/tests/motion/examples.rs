@@ -1,6 +1,6 @@
 //! The example runs, and what it asserts holds.
 
-#[path = "../examples/encounter.rs"]
+#[path = "../../examples/encounter.rs"]
 mod encounter;
 
 #[test]

@@ -2,8 +2,6 @@
 //! known here, and drag and films are all there is: steps of films in balance stand beside a dense Newton's
 //! method for the displacements, and trajectories beside small steps of a scheme that knows nothing of films.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
 use gluey_motion::{Film, FilmError, Integrator, Scheme};
 use nalgebra::{DMatrix, DVector};

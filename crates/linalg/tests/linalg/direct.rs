@@ -1,14 +1,12 @@
 //! Direct solvers: exact answers, reuse of the symbolic part, refinement, and every way to fail.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d, stokes_2d_around};
 use gluey_linalg::{
     DirectError, DirectIndefinite, DirectSpd, IndefiniteParams, Ordering, Pattern, RefinementParams,
     Regularise, SparseMatrix, Symbolic,
 };
-use support::{laplacian_2d, pseudo_random, relative_residual, stokes_2d, stokes_2d_around};
 
 fn symbolic(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Arc<Symbolic> {
     Arc::new(Symbolic::new(matrix.pattern().clone(), ordering).expect("symmetric pattern"))

@@ -1,5 +1,4 @@
 //! Set-up that the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
-#![allow(dead_code)]
 
 use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
 use gluey_geom::{Particle, Twist, Vector};

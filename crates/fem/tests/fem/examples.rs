@@ -1,6 +1,6 @@
 //! The examples run, and what they assert holds.
 
-#[path = "../examples/poisson.rs"]
+#[path = "../../examples/poisson.rs"]
 mod poisson;
 
 use gluey_testkit::convergence_order;

@@ -4,7 +4,7 @@ use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, PairMobilityError, Scheme};
 
 const RADIUS: f64 = 0.05;
-const REFERENCE: &str = include_str!("../../../data/reference/pair3d_trajectory_unbounded.csv");
+const REFERENCE: &str = include_str!("../../../../data/reference/pair3d_trajectory_unbounded.csv");
 
 fn start() -> [Particle<3>; 2] {
     [[0.3, 0.525, 0.5], [0.7, 0.475, 0.5]].map(|x| Particle::new(Vector::<3>::from(x), RADIUS))
@@ -96,6 +96,6 @@ fn bad_pairs_are_named() {
 /// The package carries a copy of the table, for it cannot reach outside its folder.
 #[test]
 fn the_packaged_table_is_the_reference() {
-    let packaged = include_str!("../data/sphere_pair_mobility_unbounded.csv");
-    assert!(packaged == include_str!("../../../data/reference/sphere_pair_mobility_unbounded.csv"));
+    let packaged = include_str!("../../data/sphere_pair_mobility_unbounded.csv");
+    assert!(packaged == include_str!("../../../../data/reference/sphere_pair_mobility_unbounded.csv"));
 }

@@ -1,6 +1,6 @@
 //! The examples run, and what they assert holds.
 
-#[path = "../examples/two_grid.rs"]
+#[path = "../../examples/two_grid.rs"]
 mod two_grid;
 
 #[test]

@@ -1,8 +1,6 @@
 //! Parts of a tree, each found without the others: their union is the whole mesh, cell by cell, node by node
 //! and constraint by constraint.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use std::collections::HashMap;
 
 use gluey_fem::{Constraint, Cuts, ImplicitTree, NodeMap, Part, TreeMesh};

@@ -1,14 +1,12 @@
 //! Krylov methods against the direct solver, in mixed precision, and every way to fail.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{Rounded, laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 use gluey_linalg::{
     DirectSpd, FnOp, Gcr, GcrParams, Identity, Jacobi, KrylovError, KrylovReport, LinOp, Ordering,
     Preconditioner, Reference, RefinementParams, SparseMatrix, Symbolic, vector,
 };
-use support::{Rounded, laplacian_2d, pseudo_random, relative_residual, stokes_2d};
 
 fn gcr(
     params: GcrParams,

@@ -5,10 +5,10 @@
 
 // Their `main` functions are not called here.
 #[allow(dead_code)]
-#[path = "../examples/settle.rs"]
+#[path = "../../examples/settle.rs"]
 mod settle;
 #[allow(dead_code)]
-#[path = "../examples/shear.rs"]
+#[path = "../../examples/shear.rs"]
 mod shear;
 
 /// The values of an attribute in all elements of one kind.

@@ -1,14 +1,12 @@
 //! Chebyshev smoothing against its bound, on a matrix whose eigenvalues and eigenvectors are known.
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::{laplacian_2d, pseudo_random};
 use gluey_linalg::{
     Chebyshev, ChebyshevParams, FnOp, Guess, Identity, Jacobi, KrylovError, LinOp, Preconditioner, Scalar,
     SparseMatrix, SpectralInterval, estimate_lambda_max, vector,
 };
-use support::{laplacian_2d, pseudo_random};
 
 /// Eigenvector of the five-point Laplacian with the wave numbers `k`, `l`, and its eigenvalue over the
 /// diagonal.

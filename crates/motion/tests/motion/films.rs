@@ -1,7 +1,5 @@
 //! Films stay open, and at the order of the scheme.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::{
     Film, FilmClosed, FilmError, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme,

@@ -1,7 +1,5 @@
 //! Meshes refined at random: balance, hanging nodes and transfers hold whatever the tree.
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, Workspace};

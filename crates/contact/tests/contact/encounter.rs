@@ -2,9 +2,7 @@
 //! does not resolve (the mobility is evaluated at `gap + offset`). Exact: smallest gap 7.370e-3 a, gap
 //! 6.024769 a at t = 15.75.
 
-mod common;
-
-use common::{Encounter, RADIUS};
+use crate::common::{Encounter, RADIUS};
 use gluey_contact::{ContactLaw, ContactModel, ContactParams, ContactState, GammaUpdate, SolverKind};
 use gluey_motion::Scheme;
 

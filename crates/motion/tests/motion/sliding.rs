@@ -1,7 +1,5 @@
 //! Films to images that slide, as in simple shear for ever (Lees and Edwards 1972).
 
-#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
-
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
 use gluey_motion::{Film, Integrator, LinearFlow, Scheme};
 

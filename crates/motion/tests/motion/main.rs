@@ -1,0 +1,10 @@
+//! Integrators, films and mobilities beside exact trajectories and small steps.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+
+mod crowds;
+mod examples;
+mod films;
+mod integrator;
+mod pair_mobility;
+mod sliding;
