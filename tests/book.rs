@@ -174,7 +174,7 @@ fn every_block_of_code_is_executed_or_compared() {
                 }
                 // Compared there, or in the test of an example.
                 Some("text") if commands.is_some() && runs_here(&page) => Ok(2),
-                Some("text") => is_named(&path, "tests/examples.rs").map(|()| 2),
+                Some("text") => is_named(&path, "tests/program/examples.rs").map(|()| 2),
                 Some("rust" | "rust,no_run") => is_a_doctest(&path).map(|()| 3),
                 Some("rust,ignore") => is_of_an_example(&page, &code).map(|()| 4),
                 Some("python") => is_named(&path, "crates/python/tests/test_documents.py")
@@ -389,7 +389,7 @@ fn is_sensible(line: &str) -> bool {
                 && has("--path", &|path| vec![format!("{path}/Cargo.toml")])
                 && has("--example", &within("examples"))
                 && has("--bench", &within("benches"))
-                && has("--test", &|name| vec![format!("tests/{name}.rs")])
+                && has("--test", &|name| vec![format!("tests/{name}/main.rs"), format!("tests/{name}.rs")])
         }
         ["pip", "install", path] => root.join(path).join("pyproject.toml").exists(),
         ["mdbook", "build" | "serve", folder] => root.join(folder).join("book.toml").exists(),

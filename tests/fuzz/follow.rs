@@ -1,4 +1,4 @@
-//! How far a case file that may hold anything is followed: by the tests (`tests/fuzz.rs`) and by the targets
+//! How far a case file that may hold anything is followed: by the tests (`cases.rs`) and by the targets
 //! of cargo-fuzz (`fuzz`).
 
 use gluey::Case;

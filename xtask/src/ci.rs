@@ -51,7 +51,7 @@ const STEPS: &[Step] = &[
     Step::new("package --workspace --exclude gluey-verify --exclude xtask --no-verify --allow-dirty"),
     Step::new("test --release --workspace"),
     // What the feature of MPI builds on, with threads as ranks.
-    Step::new("test --release --workspace --features gluey/ranks --test pieces --test ranks"),
+    Step::new("test --release --workspace --features gluey/ranks --test ranks"),
 ];
 
 /// The last steps, which take longest. The verification fails where a number is beyond its limit, the

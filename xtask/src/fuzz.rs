@@ -26,7 +26,7 @@ pub fn run(root: &Path, options: &Options) -> io::Result<()> {
     let Options { cases, checkpoints, tables, seed } = options;
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["test", "--release", "--workspace", "--test", "fuzz", "--test", "fuzz_files"]);
+    command.args(["test", "--release", "--workspace", "--test", "fuzz"]);
     command.args(["--", "--nocapture"]).current_dir(root);
     for (name, value) in [("CASES", cases), ("CHECKPOINTS", checkpoints), ("TABLES", tables), ("SEED", seed)]
     {

@@ -6,7 +6,7 @@
 //! `pi R^2 + 4 R + 1` squares or `4/3 pi R^3 + 3 pi R^2 + 6 R + 1` cubes of edge `h`,
 //!
 //! and no more than fill the box. The mesh that is built has 0.6 to 1.6 times as many cells
-//! (`tests/estimate.rs`: the shipped cases, and sixty at random).
+//! (`tests/physics/estimate.rs`: the shipped cases, and sixty at random).
 
 use std::f64::consts::PI;
 

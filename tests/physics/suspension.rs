@@ -1,12 +1,10 @@
 //! Particles that a case does not list, frames in extended XYZ, and what is made of them.
 
-mod program;
-
 use std::fs;
 
+use crate::program::gluey;
 use gluey::case::Case;
 use gluey::output::xyz::{XyzFrame, read_text};
-use program::gluey;
 use tempfile::TempDir;
 
 /// A case around the table or key that says where its particles come from.

@@ -3,9 +3,6 @@
 //! stopped.
 #![cfg(unix)]
 
-mod program;
-mod stopped;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -15,9 +12,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::program::told;
+use crate::stopped::{DISCS, numbers, rows, same_results};
 use gluey::CheckpointSummary;
-use program::told;
-use stopped::{DISCS, numbers, rows, same_results};
 use tempfile::TempDir;
 
 const STEM: &str = "discs-gluey-unfitted";

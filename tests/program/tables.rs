@@ -1,14 +1,12 @@
 //! Tables of runs and of `gluey analyse`: what they say where there is nothing to say, means of the rheology,
 //! studies, and whether docs/files.md has every column.
 
-mod program;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use crate::program::{fails, told};
 use gluey::table::Table;
-use program::{fails, told};
 use tempfile::TempDir;
 
 fn read(folder: &Path, name: &str) -> String {
@@ -314,7 +312,7 @@ fn every_column_is_in_the_page_of_files() {
     all_tables(folder.path());
     let mut columns = Vec::new();
     written(folder.path(), &mut columns);
-    let page = include_str!("../docs/files.md");
+    let page = include_str!("../../docs/files.md");
     let mut faults = BTreeSet::new();
     for (heading, end) in SECTIONS {
         let names = documented(page, heading);

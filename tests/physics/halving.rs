@@ -5,11 +5,8 @@ use std::fs;
 
 use gluey::{Case, RunError, RunOptions, Silent, StepError, Tally, run};
 
-#[path = "program/mod.rs"]
-mod program;
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{beside, case, column, failure, resumes_bit_by_bit};
+use crate::program;
+use crate::runs::{beside, case, column, failure, resumes_bit_by_bit};
 
 /// Discs so crowded in a small box that films of one pair over several borders are in each other's way.
 fn crowd(halvings: u32) -> Case {

@@ -1,14 +1,12 @@
 //! The page that shows a run in a browser, and the forces of contacts in its frames.
 
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process;
 
+use crate::program::{fails, told};
 use assert_cmd::Command;
 use gluey::output::xyz::{XyzFrame, read_text};
-use program::{fails, told};
 use serde_json::Value;
 use tempfile::TempDir;
 

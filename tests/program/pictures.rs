@@ -1,11 +1,10 @@
 //! Pictures of a run: charts of its tables, its particles, its flow.
 
-mod program;
-
 use std::fs;
 use std::io::Read;
 use std::path::Path;
 
+use crate::program::{fails, gluey, told};
 use assert_cmd::Command;
 use flate2::read::ZlibDecoder;
 use gluey::output::vtk::{Frame, VtkWriter};
@@ -13,7 +12,6 @@ use gluey_contact::Domain;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_pictures::{Rgb, color_scale};
-use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";

@@ -1,11 +1,9 @@
 //! Commands beside `gluey run`: what they tell and what they refuse.
 
-mod program;
-
 use std::fs;
 use std::path::Path;
 
-use program::{fails, gluey, told};
+use crate::program::{fails, gluey, told};
 use serde_json::Value;
 use tempfile::TempDir;
 

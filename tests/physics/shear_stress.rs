@@ -3,9 +3,7 @@
 use gluey::Case;
 use gluey_geom::Vector;
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{beside, case, centers, column, failure, ran};
+use crate::runs::{self, beside, case, centers, column, failure, ran};
 
 /// Discs at 0.3 or spheres at 0.15 in a sheared box, which may repel each other.
 fn suspension(dimension: usize, rest: &str) -> Case {

@@ -5,9 +5,7 @@ use gluey_geom::Vector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{beside, centers, column, ran, rms_distance};
+use crate::runs::{self, beside, centers, column, ran, rms_distance};
 
 /// Six discs at 0.2, or three spheres, in a box that is sheared.
 fn case(dimension: usize, rest: &str) -> Case {

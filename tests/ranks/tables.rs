@@ -9,9 +9,7 @@ use gluey_parallel::Threads;
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 use tempfile::TempDir;
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{case, column, run_named};
+use crate::runs::{case, column, run_named};
 
 /// A case that steps twice.
 fn in_steps(dimension: usize, rest: &str) -> Case {

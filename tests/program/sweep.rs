@@ -1,15 +1,13 @@
 //! `gluey sweep`: a study of several points, complete, interrupted, failing and in the way of another.
 
-mod program;
-
 use std::fs;
 use std::path::Path;
 use std::process;
 use std::thread;
 use std::time::Duration;
 
+use crate::program::{fails, gluey, told};
 use gluey::{RunRecord, RunState};
-use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";

@@ -1,7 +1,5 @@
 //! What is left of runs that are stopped, and whether it is what there was.
 
-#![allow(dead_code, reason = "each test that shares this needs another part of it")]
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

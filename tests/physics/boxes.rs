@@ -1,11 +1,9 @@
 //! Sheared boxes of any shape: they run at every tilt, and gaps are those of the nearest of all images.
 
-#[path = "runs/mod.rs"]
-mod runs;
-#[path = "../crates/gluey/examples/sheared_boxes.rs"]
+#[path = "../../crates/gluey/examples/sheared_boxes.rs"]
 mod sheared_boxes;
 
-use runs::{beside, case, column, ran, run_named};
+use crate::runs::{beside, case, column, ran, run_named};
 use sheared_boxes::{COUNT, END, Swept, edges, gaps_of_all_images, numbers, sheared_box, swept};
 use tempfile::TempDir;
 

@@ -147,7 +147,7 @@ fn no_list_of_particles_and_no_table_panics() {
     let (list, case) = (folder.path().join("list.csv"), folder.path().join("case.toml"));
     let text = "name = \"x\"\ndimension = 2\nparticles_file = \"list.csv\"\n[time]\nstep = 0.1\nend = 1.0\n";
     let particles = "# discs\nx,y,radius\n0.1,0.2,0.05\n3e-1,0.4,0.06\n0.5,0.5,0.05\n\n0.8,0.8,0.02\n";
-    let table = include_str!("../data/reference/pair2d_trajectory.csv");
+    let table = include_str!("../../data/reference/pair2d_trajectory.csv");
     let start: String = table.lines().take(12).flat_map(|line| [line, "\n"]).collect();
     let (mut random, mut read) = (random(), [0; 2]);
     for number in 0..count {

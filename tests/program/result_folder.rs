@@ -1,12 +1,10 @@
 //! A folder of results says what was run and how it went, and is not written over.
 
-mod program;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::program::{fails, gluey, told};
 use gluey::{Case, CheckpointSummary, RunRecord, RunState};
-use program::{fails, gluey, told};
 use tempfile::TempDir;
 
 const STEM: &str = "pair-3d-mobility-gluey";

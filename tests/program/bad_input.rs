@@ -1,10 +1,8 @@
 //! The command refuses every kind of bad input, and says where it is and what would be right.
 
-mod program;
-
 use std::fs;
 
-use program::{fails, gluey};
+use crate::program::{fails, gluey};
 use tempfile::TempDir;
 
 /// A good case, one key a line: the tests break one line each.

@@ -7,9 +7,7 @@ use gluey_geom::Vector;
 use gluey_motion::approach_mobility;
 use gluey_suspension::{Container, Repulsion, for_each_pair};
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{beside, case, centers, column, ran};
+use crate::runs::{self, beside, case, centers, column, ran};
 
 /// Six discs at 0.2 in a box that is sheared, which repel each other.
 fn discs(cells_per_radius: f64, rest: &str) -> Case {

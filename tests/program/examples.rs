@@ -1,7 +1,7 @@
 //! The examples run, and what the tutorial (docs/tutorial/suspension-solver.md) says of them holds for the
 //! first steps.
 
-#[path = "../crates/gluey/examples/suspension_solver.rs"]
+#[path = "../../crates/gluey/examples/suspension_solver.rs"]
 mod suspension_solver;
 
 use suspension_solver::{Instant, encounter, methods};
@@ -10,7 +10,7 @@ use suspension_solver::{Instant, encounter, methods};
 const ROUNDING: f64 = 1e-12;
 
 /// What the program prints in full, in the tutorial.
-const PAGE: &str = include_str!("../docs/tutorial/suspension-solver.md");
+const PAGE: &str = include_str!("../../docs/tutorial/suspension-solver.md");
 
 /// The numbers below the name of a method on the page, row by row.
 fn rows(name: &str) -> Vec<Vec<f64>> {

@@ -1,13 +1,11 @@
 //! A case in any unit of length: the same gaps and effort, and pictures that tell its numbers.
 
-mod program;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use crate::program::told;
 use gluey::table::Table;
-use program::told;
 use tempfile::TempDir;
 
 /// Three discs in a channel of this height, at round places: surfaces are just as far from cells as finer

@@ -4,23 +4,20 @@
 //! `cargo xtask fuzz --cases 1000000` tries more of them than usual, `--seed` others: the same seed gives the
 //! same texts on every machine. What came of long runs is in `docs/robustness.md`.
 
-#[path = "fuzz/follow.rs"]
-mod follow;
-
 use std::panic::catch_unwind;
 use std::time::Instant;
 
-use follow::{case_text, generates_many};
+use crate::follow::{case_text, generates_many};
 use gluey::Case;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SHIPPED: [&str; 6] = [
-    include_str!("../data/cases/pair-2d.toml"),
-    include_str!("../data/cases/pair-3d.toml"),
-    include_str!("../data/cases/pair-3d-mobility.toml"),
-    include_str!("../data/cases/trio-2d.toml"),
-    include_str!("../data/cases/trio-2d-couette.toml"),
+    include_str!("../../data/cases/pair-2d.toml"),
+    include_str!("../../data/cases/pair-3d.toml"),
+    include_str!("../../data/cases/pair-3d-mobility.toml"),
+    include_str!("../../data/cases/trio-2d.toml"),
+    include_str!("../../data/cases/trio-2d-couette.toml"),
     SUSPENSION,
 ];
 

@@ -1,8 +1,6 @@
 //! Runs that are killed, told to stop or started twice lose no row that was written.
 #![cfg(unix)]
 
-mod stopped;
-
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -10,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use stopped::{DISCS, numbers, results, rows, same_results};
+use crate::stopped::{DISCS, numbers, results, rows, same_results};
 use tempfile::TempDir;
 
 const STEM: &str = "out/pair-3d-mobility-gluey";

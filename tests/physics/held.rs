@@ -8,9 +8,7 @@ use gluey_geom::Vector;
 use gluey_motion::approach_mobility;
 use gluey_testkit::reference::Table;
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::{beside, case, centers, column, failure, ran, rms_distance, vectors};
+use crate::runs::{self, beside, case, centers, column, failure, ran, rms_distance, vectors};
 
 /// A case without contact in `unfitted`.
 fn unfitted(dimension: usize, cells_per_radius: f64, rest: &str) -> Case {
@@ -95,7 +93,7 @@ fn two_that_are_driven_together_resist_as_they_should() {
     // Gaps of 0.3, 0.2 and 0.1 radii.
     let discs = unfitted(2, 6.4, &text(0.04, ["0.454, 0.5", "0.546, 0.5"], ["0.5, 0.0", "-0.5, 0.0"]));
     let forces = ran(&discs, |csv| column(&beside(csv, "forces"), "force1x"));
-    let table = Table::parse(include_str!("../data/reference/pair2d_resistance.csv")).expect("a table");
+    let table = Table::parse(include_str!("../../data/reference/pair2d_resistance.csv")).expect("a table");
     let of_gap = |gap: f64| {
         let gaps = table.column("xi").expect("gaps");
         let row = gaps.iter().position(|xi| (xi - gap).abs() < 1e-9).expect("a row");

@@ -8,9 +8,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-#[path = "runs/mod.rs"]
-mod runs;
-use runs::centers;
+use crate::runs::centers;
 
 /// Time step, and how many.
 const STEP: f64 = 0.01;
