@@ -1,5 +1,5 @@
 //! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings,
-//! an allocation counter, ranks that are told to fail, and programs outside this workspace.
+//! counters of allocations and CPU time, ranks that are told to fail, and programs outside this workspace.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
@@ -13,6 +13,7 @@
 //! A dev-dependency only: nothing here belongs in a program that users run.
 
 pub mod allocation;
+mod clock;
 mod convergence;
 pub mod exact;
 pub mod failing;
@@ -20,5 +21,6 @@ pub mod packing;
 pub mod reference;
 mod stranger;
 
+pub use clock::CpuClock;
 pub use convergence::{convergence_order, convergence_orders};
 pub use stranger::Stranger;

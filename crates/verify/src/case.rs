@@ -7,9 +7,9 @@ use gluey_motion::{FilmError, PairMobilityError};
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
 use gluey_suspension::packing::PackingError;
+use gluey_testkit::CpuClock;
 use gluey_testkit::reference::TableError;
 
-use crate::clock::CpuClock;
 use crate::number::Number;
 use crate::plot::Plot;
 

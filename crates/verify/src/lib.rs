@@ -20,7 +20,6 @@
 
 mod case;
 mod cases;
-mod clock;
 mod limits;
 pub mod literature;
 mod method;

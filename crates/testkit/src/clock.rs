@@ -1,4 +1,4 @@
-//! The CPU time of a thread.
+//! The CPU time of a thread, which others on the machine do not change.
 
 /// Measures the CPU time of the thread that started it; where the system has no such clock, the wall time.
 pub struct CpuClock {
