@@ -126,12 +126,8 @@ fn mesh<const D: usize>(options: &Options, balls: &[Ball<D>]) -> Result<TreeMesh
     if !options.adaptive {
         return TreeMesh::uniform(Aabb::unit(), roots, periodic, options.level());
     }
-    Refinement { coarsest: COARSEST_LEVEL.min(options.level()), surface: options.level(), band: BAND }.mesh(
-        Aabb::unit(),
-        roots,
-        periodic,
-        balls,
-    )
+    let (coarsest, surface) = (COARSEST_LEVEL.min(options.level()), options.level());
+    Refinement { coarsest, surface, band: BAND }.mesh(Aabb::unit(), roots, periodic, balls)
 }
 
 fn solve<const D: usize>(

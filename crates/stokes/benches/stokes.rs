@@ -11,7 +11,7 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_linalg::{LinOp, Preconditioner};
 use gluey_stokes::{
-    CutCellPressures, DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, MultigridSolver,
+    DirectSolver, Discretisation, FlowParams, FlowSolver, Formulation, Lubrication, MultigridSolver,
     PaperParams, PointMatrices, Problem, Refinement, SaddleSolver, SolidRegion, SolverKind, SystemOperator,
     solid_nodes,
 };
@@ -22,8 +22,7 @@ const OFFSET: f64 = -0.1;
 /// Relative tolerance of a solve.
 const TOLERANCE: f64 = 1e-8;
 const VISCOSITY: f64 = 1.0;
-const RIGID: Formulation =
-    Formulation::RigidDofs { offset: OFFSET, cut_cell_pressures: CutCellPressures::Aggregate };
+const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
 
 fn pair_2d() -> Vec<Ball<2>> {
     [(0.451, 0.51), (0.549, 0.49)].map(|(x, y)| Ball::new(Vector::<2>::new(x, y), 0.05)).to_vec()
@@ -39,8 +38,8 @@ fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
     u
 }
 
-fn mesh<const D: usize>(surface: u8, gap_fraction: f64, balls: &[Ball<D>]) -> TreeMesh<D> {
-    Refinement { coarsest: 3, surface, band: 2.0, gap_fraction, gap_levels: 9 }
+fn mesh<const D: usize>(surface: u8, balls: &[Ball<D>]) -> TreeMesh<D> {
+    Refinement { coarsest: 3, surface, band: 2.0 }
         .mesh(Aabb::unit(), [1; D], [false; D], balls)
         .expect("the unit box is a cube and the levels are few")
 }
@@ -61,15 +60,15 @@ where
     /// A uniform mesh without bodies.
     fn empty(level: u8) -> Self {
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level);
-        Self::new(&[], mesh.expect("the unit box is a cube and the levels are few"), RIGID)
+        Self::new(&[], mesh.expect("the unit box is a cube and the levels are few"), UNFITTED)
     }
 
-    fn rigid(balls: &[Ball<D>], surface: u8) -> Self {
-        Self::new(balls, mesh(surface, 0.0, balls), RIGID)
+    fn unfitted(balls: &[Ball<D>], surface: u8) -> Self {
+        Self::new(balls, mesh(surface, balls), UNFITTED)
     }
 
     fn penalised(balls: &[Ball<D>], surface: u8) -> Self {
-        Self::new(balls, mesh(surface, 0.0, balls), Formulation::Paper(paper()))
+        Self::new(balls, mesh(surface, balls), Formulation::Paper(paper()))
     }
 
     fn new(balls: &[Ball<D>], mesh: TreeMesh<D>, formulation: Formulation) -> Self {
@@ -145,14 +144,14 @@ fn step<const D: usize>(
     name: &str,
     params: FlowParams,
     balls: Vec<Ball<D>>,
-    (surface, gap_fraction): (u8, f64),
+    surface: u8,
     dt: f64,
 ) where
     Dim<D>: Space<D>,
 {
     let mut solver = FlowSolver::<D>::new(params).expect("the parameters are in range");
     let mut flow = |balls: &[Ball<D>]| {
-        solver.solve(mesh(surface, gap_fraction, balls), balls, &couette).expect("the bodies are resolved")
+        solver.solve(mesh(surface, balls), balls, &couette).expect("the bodies are resolved")
     };
     let twists = flow(&balls).twists;
     let moved: Vec<Ball<D>> =
@@ -171,27 +170,27 @@ fn step<const D: usize>(
 fn operators(criterion: &mut Criterion) {
     operator(criterion, "constant", &Case::<2>::empty(8));
     operator(criterion, "constant", &Case::<3>::empty(5));
-    operator(criterion, "rigid-dofs", &Case::rigid(&pair_2d(), 8));
+    operator(criterion, "unfitted", &Case::unfitted(&pair_2d(), 8));
     operator(criterion, "paper", &Case::penalised(&pair_2d(), 7));
-    operator(criterion, "rigid-dofs", &Case::rigid(&pair_3d(), 6));
+    operator(criterion, "unfitted", &Case::unfitted(&pair_3d(), 6));
     operator(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn cycles(criterion: &mut Criterion) {
-    cycle(criterion, "rigid-dofs", &Case::rigid(&pair_2d(), 8));
+    cycle(criterion, "unfitted", &Case::unfitted(&pair_2d(), 8));
     cycle(criterion, "paper", &Case::penalised(&pair_2d(), 7));
-    cycle(criterion, "rigid-dofs", &Case::rigid(&pair_3d(), 6));
+    cycle(criterion, "unfitted", &Case::unfitted(&pair_3d(), 6));
     cycle(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn solvers(criterion: &mut Criterion) {
-    let (rigid, soft) = (Case::rigid(&pair_2d(), 8), Case::penalised(&pair_2d(), 7));
-    solver::<2, DirectSolver>(criterion, "rigid-dofs-direct", &rigid);
-    solver::<2, MultigridSolver<2>>(criterion, "rigid-dofs-multigrid", &rigid);
+    let (unfitted, soft) = (Case::unfitted(&pair_2d(), 8), Case::penalised(&pair_2d(), 7));
+    solver::<2, DirectSolver>(criterion, "unfitted-direct", &unfitted);
+    solver::<2, MultigridSolver<2>>(criterion, "unfitted-multigrid", &unfitted);
     // A further step of Uzawa's iteration is one more solve with what is prepared.
     solver::<2, DirectSolver>(criterion, "paper-direct-uzawa-step", &soft);
     solver::<2, MultigridSolver<2>>(criterion, "paper-multigrid-uzawa-step", &soft);
-    solver::<3, MultigridSolver<3>>(criterion, "rigid-dofs-multigrid", &Case::rigid(&pair_3d(), 6));
+    solver::<3, MultigridSolver<3>>(criterion, "unfitted-multigrid", &Case::unfitted(&pair_3d(), 6));
     solver::<3, MultigridSolver<3>>(criterion, "paper-multigrid-uzawa-step", &Case::penalised(&pair_3d(), 6));
 }
 
@@ -205,10 +204,10 @@ fn steps(criterion: &mut Criterion) {
     let paper = Formulation::Paper(paper());
     let params =
         |formulation, solver| FlowParams { viscosity: VISCOSITY, formulation, solver, tolerance: TOLERANCE };
-    step(criterion, "pair-2d-paper", params(paper, SolverKind::Direct), pair_2d(), (7, 0.0), 0.025);
-    step(criterion, "pair-2d-rigid-dofs", params(RIGID, SolverKind::Direct), pair_2d(), (8, 1.0), 0.025);
-    step(criterion, "pair-3d-paper", params(paper, SolverKind::Multigrid), pair_3d(), (6, 0.0), 0.05);
-    step(criterion, "pair-3d-rigid-dofs", params(RIGID, SolverKind::Multigrid), pair_3d(), (7, 0.0), 0.05);
+    step(criterion, "pair-2d-paper", params(paper, SolverKind::Direct), pair_2d(), 7, 0.025);
+    step(criterion, "pair-2d-unfitted", params(UNFITTED, SolverKind::Direct), pair_2d(), 8, 0.025);
+    step(criterion, "pair-3d-paper", params(paper, SolverKind::Multigrid), pair_3d(), 6, 0.05);
+    step(criterion, "pair-3d-unfitted", params(UNFITTED, SolverKind::Multigrid), pair_3d(), 7, 0.05);
 }
 
 /// Fifty spheres in a periodic cube, and as many copies of it as it takes; `docs/benchmarks.md` names the
@@ -229,7 +228,7 @@ fn suspensions(criterion: &mut Criterion) {
     for copies in [1, 2, 4, 8] {
         let (balls, roots, extent) = suspension(copies);
         let domain = Aabb { lower: Vector::zeros(), upper: extent };
-        let refinement = Refinement { coarsest: 3, surface: 5, band: 2.0, gap_fraction: 0.0, gap_levels: 0 };
+        let refinement = Refinement { coarsest: 3, surface: 5, band: 2.0 };
         let mesh = || refinement.mesh(domain, roots, [true, false, true], &balls).expect("a box of cubes");
         let discretisation = Discretisation::new(mesh());
         let (nodes, ramp) = (&discretisation.velocity, Ramp::new(discretisation.mesh.size(5)));

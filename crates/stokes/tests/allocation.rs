@@ -5,8 +5,7 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::Preconditioner;
 use gluey_stokes::{
-    CutCellPressures, Formulation, MultigridSolver, PaperParams, Problem, Refinement, SaddleSolver,
-    SolveReport,
+    Formulation, Lubrication, MultigridSolver, PaperParams, Problem, Refinement, SaddleSolver, SolveReport,
 };
 use gluey_testkit::allocation::{CountingAllocator, count_in_all_threads};
 
@@ -63,8 +62,8 @@ fn steady_work_of_the_preconditioner_allocates_nothing() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let film = Formulation::Paper(PaperParams { viscosity_ratio: 1e3, ..PaperParams::default() });
     one.install(|| {
-        let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
-        for formulation in [rigid, film] {
+        let unfitted = Formulation::Unfitted { lubrication: Lubrication::Deficit };
+        for formulation in [unfitted, film] {
             steady_work_allocates_nothing::<2>(formulation);
             steady_work_allocates_nothing::<3>(formulation);
         }

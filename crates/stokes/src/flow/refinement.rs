@@ -102,6 +102,7 @@ fn shear_of<const D: usize>(bodies: &BallTree<'_, D>) -> f64 {
 #[cfg(test)]
 mod tests {
     use gluey_geom::Lattice;
+    use gluey_levelset::LevelSet;
 
     use super::*;
 

@@ -4,12 +4,10 @@ use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::KrylovError;
-use gluey_stokes::{
-    CutCellPressures, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError,
-};
+use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams, SolverKind, StokesError};
 
 use crate::support::{
-    RADIUS, RIGID, SOLVERS, balls, bands, bump, couette, mesh, pair_at, paper, params, try_solve,
+    RADIUS, SOLVERS, UNFITTED, balls, bands, bump, couette, mesh, pair_at, paper, params, try_solve,
     twist_distance,
 };
 
@@ -20,7 +18,7 @@ fn one_disc() -> Vec<Ball<2>> {
 #[test]
 fn a_body_smaller_than_a_cell_is_refused() {
     let pair = balls(&[Vector::<2>::new(0.3, 0.5), Vector::<2>::new(0.5, 0.5)]);
-    for formulation in [RIGID, paper(1e3, 1)] {
+    for formulation in [UNFITTED, paper(1e3, 1)] {
         for solver in SOLVERS {
             let refused =
                 try_solve(params(formulation, solver, 1e-8), mesh(&bands(3), &pair), &pair, &couette);
@@ -29,15 +27,19 @@ fn a_body_smaller_than_a_cell_is_refused() {
         }
     }
     let spheres = balls(&[Vector::<3>::repeat(0.5)]);
-    let refused =
-        try_solve(params(RIGID, SolverKind::Multigrid, 1e-8), mesh(&bands(3), &spheres), &spheres, &couette);
+    let refused = try_solve(
+        params(UNFITTED, SolverKind::Multigrid, 1e-8),
+        mesh(&bands(3), &spheres),
+        &spheres,
+        &couette,
+    );
     assert!(matches!(refused, Err(StokesError::Unresolved { body: 0, .. })));
 }
 
 #[test]
 fn a_body_that_is_nowhere_is_refused() {
     for at in [Vector::<2>::repeat(f64::NAN), Vector::<2>::repeat(3.0)] {
-        for formulation in [RIGID, paper(1e3, 1)] {
+        for formulation in [UNFITTED, paper(1e3, 1)] {
             let mut bodies = one_disc();
             bodies.push(Ball::new(at, RADIUS));
             let mesh = mesh(&bands(6), &one_disc());
@@ -66,11 +68,7 @@ fn a_body_that_another_hides_is_refused() {
 
 #[test]
 fn parameters_out_of_range_are_named() {
-    let good = params(RIGID, SolverKind::Direct, 1e-8);
-    let rigid = |offset| FlowParams {
-        formulation: Formulation::RigidDofs { offset, cut_cell_pressures: CutCellPressures::Keep },
-        ..good
-    };
+    let good = params(UNFITTED, SolverKind::Direct, 1e-8);
     let soft = |p: PaperParams| FlowParams { formulation: Formulation::Paper(p), ..good };
     let usual = PaperParams::default();
     let cases: Vec<(&str, FlowParams)> = vec![
@@ -81,9 +79,6 @@ fn parameters_out_of_range_are_named() {
         ("tolerance", FlowParams { tolerance: 0.0, ..good }),
         ("tolerance", FlowParams { tolerance: 1.0, ..good }),
         ("tolerance", FlowParams { tolerance: f64::NAN, ..good }),
-        ("offset", rigid(1.01)),
-        ("offset", rigid(-1.01)),
-        ("offset", rigid(f64::NAN)),
         ("viscosity_ratio", soft(PaperParams { viscosity_ratio: 1.0, ..usual })),
         ("viscosity_ratio", soft(PaperParams { viscosity_ratio: -5.0, ..usual })),
         ("viscosity_ratio", soft(PaperParams { viscosity_ratio: f64::NAN, ..usual })),
@@ -108,7 +103,7 @@ fn parameters_out_of_range_are_named() {
 #[test]
 fn without_convergence_the_residuals_are_handed_back() {
     let disc = one_disc();
-    for formulation in [RIGID, paper(1e3, 1)] {
+    for formulation in [UNFITTED, paper(1e3, 1)] {
         let run = |solver| {
             try_solve(params(formulation, solver, 1e-30), mesh(&bands(6), &disc), &disc, &couette).err()
         };
@@ -129,7 +124,7 @@ fn without_convergence_the_residuals_are_handed_back() {
 #[test]
 fn a_viscosity_beyond_single_precision_is_noticed() {
     let disc = one_disc();
-    let thick = FlowParams { viscosity: 1e45, ..params(RIGID, SolverKind::Multigrid, 1e-8) };
+    let thick = FlowParams { viscosity: 1e45, ..params(UNFITTED, SolverKind::Multigrid, 1e-8) };
     let refused = try_solve(thick, mesh(&bands(5), &disc), &disc, &couette).err().unwrap();
     assert!(matches!(refused, StokesError::PressureMass(_)), "{refused:?}");
     assert!(refused.to_string().starts_with("the mass of the pressures: diagonal entry"), "{refused}");
@@ -138,7 +133,7 @@ fn a_viscosity_beyond_single_precision_is_noticed() {
 #[test]
 fn boundary_data_that_are_no_numbers_are_noticed() {
     let disc = one_disc();
-    for formulation in [RIGID, paper(1e3, 1)] {
+    for formulation in [UNFITTED, paper(1e3, 1)] {
         for solver in SOLVERS {
             let torn = |x: &Vector<2>| if x[0] == 0.0 { Vector::repeat(f64::NAN) } else { couette(x) };
             let refused = try_solve(params(formulation, solver, 1e-8), mesh(&bands(5), &disc), &disc, &torn);
@@ -149,9 +144,8 @@ fn boundary_data_that_are_no_numbers_are_noticed() {
 
 #[test]
 fn a_mesh_beyond_the_finest_lattice_is_refused() {
-    for (surface, gap_levels) in [(30, 0), (40, 9), (250, 9)] {
-        let refinement = Refinement { gap_fraction: 1.0, gap_levels, ..bands(surface) };
-        let refused = refinement.mesh(Aabb::unit(), [1; 2], [false; 2], &one_disc());
+    for surface in [30, 40, 250] {
+        let refused = bands(surface).mesh(Aabb::unit(), [1; 2], [false; 2], &one_disc());
         assert!(matches!(refused, Err(MeshError::TooFine { .. })), "{:?}", refused.map(|m| m.cell_count()));
     }
 }
@@ -161,7 +155,7 @@ fn a_mesh_beyond_the_finest_lattice_is_refused() {
 fn touching_bodies_that_share_cells_are_no_obstacle() {
     for gap in [0.0, -0.05] {
         let pair = pair_at(Vector::<2>::new(0.503, 0.497), gap, 30.0);
-        for formulation in [RIGID, paper(1e3, 1)] {
+        for formulation in [UNFITTED, paper(1e3, 1)] {
             let [direct, multigrid] = SOLVERS.map(|solver| {
                 try_solve(params(formulation, solver, 1e-10), mesh(&bands(6), &pair), &pair, &couette)
                     .unwrap()
@@ -180,7 +174,7 @@ fn meshes_that_cannot_be_coarsened_are_solved_on() {
         let [direct, multigrid] = SOLVERS.map(|solver| {
             let mesh = TreeMesh::uniform(Aabb::unit(), roots, [false; 2], level).unwrap();
             let start = |x: &Vector<2>| couette(x) + bump(x);
-            try_solve(params(RIGID, solver, 1e-10), mesh, &[], &start).unwrap()
+            try_solve(params(UNFITTED, solver, 1e-10), mesh, &[], &start).unwrap()
         });
         let difference = direct.velocity.iter().zip(&multigrid.velocity).map(|(a, b)| (a - b).abs());
         let difference = difference.fold(0.0, f64::max);

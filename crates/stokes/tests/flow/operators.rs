@@ -6,7 +6,7 @@ use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Preconditioner, vector};
 use gluey_stokes::{Formulation, MultigridSolver, Problem, SaddleSolver, SystemOperator};
 
-use crate::support::{RIGID, balls, graded, paper};
+use crate::support::{UNFITTED, balls, graded, paper};
 
 fn problem<const D: usize>(mesh: TreeMesh<D>, balls: &[Ball<D>], formulation: Formulation) -> Problem<D>
 where
@@ -43,7 +43,7 @@ where
 
 #[test]
 fn the_operator_is_symmetric_to_round_off() {
-    for formulation in [RIGID, paper(1e3, 1)] {
+    for formulation in [UNFITTED, paper(1e3, 1)] {
         operator_is_symmetric::<2>(formulation);
         operator_is_symmetric::<3>(formulation);
     }
@@ -79,7 +79,7 @@ where
     Dim<D>: Space<D>,
 {
     let uniform = |level| TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
-    levels.iter().map(|&level| contraction(&problem(uniform(level), balls, RIGID))).collect()
+    levels.iter().map(|&level| contraction(&problem(uniform(level), balls, UNFITTED))).collect()
 }
 
 /// Smallest and largest factor over the levels.

@@ -9,7 +9,7 @@ use gluey_testkit::exact::{
     InclusionViscosity, PolynomialFlow, RigidSphere, StokesSolution, ViscousInclusion, WavyPressure,
 };
 
-use crate::support::{RIGID, SOLVERS, graded, l2_errors, mesh, params, resolved_gaps, solve};
+use crate::support::{SOLVERS, UNFITTED, bands, graded, l2_errors, mesh, params, solve};
 
 fn disc(center: Vector<2>, radius: f64) -> ViscousInclusion {
     ViscousInclusion {
@@ -40,7 +40,7 @@ where
 {
     let sizes: Vec<f64> = levels.iter().map(|&level| 0.5f64.powi(level.into())).collect();
     let errors = levels.iter().map(|&level| {
-        let mut solver = FlowSolver::new(params(RIGID, solver, 1e-9)).unwrap();
+        let mut solver = FlowSolver::new(params(UNFITTED, solver, 1e-9)).unwrap();
         let force = |x: &Vector<D>| exact.body_force(x);
         let boundary = |x: &Vector<D>| exact.velocity(x);
         let flow = solver.solve_forced(mesh(level), &[], &boundary, Some(&force)).unwrap();
@@ -92,8 +92,8 @@ where
     Dim<D>: Space<D>,
 {
     use gluey_levelset::Body;
-    let mesh = mesh(&resolved_gaps(level), &[ball]);
-    let flow = solve(params(RIGID, solver, 1e-8), mesh, &[ball], &|x| exact.velocity(x));
+    let mesh = mesh(&bands(level), &[ball]);
+    let flow = solve(params(UNFITTED, solver, 1e-8), mesh, &[ball], &|x| exact.velocity(x));
     let twist = flow.twists[0];
     let turned = Dim::<D>::spin_slice(&(twist.spin - spin)).iter().fold(0.0, |m: f64, w| m.max(w.abs()));
     turned.max(twist.velocity.amax() / ball.bounding_radius())

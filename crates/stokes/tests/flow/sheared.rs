@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, Refinement, SolverKind, StokesError};
-use gluey_stokes::{CutCellPressures, Formulation};
+use gluey_stokes::{
+    Conditions, Flow, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError,
+};
 use gluey_testkit::reference::{Table, cells_of_discs, sheared_simple_cubic_lattice, sheared_square_lattice};
 
 /// A box of unit height.
@@ -311,10 +312,10 @@ fn forces_on_held_bodies_sum_to_zero() {
 
 #[test]
 fn other_formulations_say_that_they_cannot() {
-    let rigid = Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
+    let paper = Formulation::Paper(PaperParams::default());
     let balls = Box::<2>::unit(0.0, 4).balls(&[somewhere(0.0)], 0.2);
     let mesh = Refinement::to_level(4).mesh(Aabb::unit(), [1, 1], [true; 2], &balls).unwrap();
-    let params = FlowParams { formulation: rigid, ..FlowParams::for_dimension(2) };
+    let params = FlowParams { formulation: paper, ..FlowParams::for_dimension(2) };
     let refused = FlowSolver::<2>::new(params).unwrap().solve_under(
         mesh,
         &balls,

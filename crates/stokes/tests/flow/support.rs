@@ -5,8 +5,8 @@ use gluey_fem::element::{gauss_cube, value};
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::{
-    CutCellPressures, Flow, FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, ParticleVelocity,
-    Refinement, SolverKind, StokesError,
+    Flow, FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, ParticleVelocity, Refinement,
+    SolverKind, StokesError,
 };
 use gluey_testkit::exact::StokesSolution;
 
@@ -16,10 +16,6 @@ pub const RADIUS: f64 = 0.05;
 pub const SOLVERS: [SolverKind; 2] = [SolverKind::Direct, SolverKind::Multigrid];
 /// `unfitted` as cases have it by default.
 pub const UNFITTED: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
-/// `rigid-dofs` with the offset that cases have by default in 2D. In 3D the default is -0.2, chosen on one
-/// encounter of two spheres; `tests/accuracy.rs` at the root measures what cases get there.
-pub const RIGID: Formulation =
-    Formulation::RigidDofs { offset: -0.1, cut_cell_pressures: CutCellPressures::Aggregate };
 
 /// The paper's formulation with a viscosity ratio and a number of Uzawa steps.
 pub fn paper(viscosity_ratio: f64, uzawa_steps: usize) -> Formulation {
@@ -38,14 +34,9 @@ pub fn params(formulation: Formulation, solver: SolverKind, tolerance: f64) -> F
     FlowParams { viscosity: 1.0, formulation, solver, tolerance }
 }
 
-/// A mesh with cells of `2^-surface` at the surfaces and no extra refinement in gaps.
+/// A mesh with cells of `2^-surface` at the surfaces.
 pub fn bands(surface: u8) -> Refinement {
-    Refinement { coarsest: 3, surface, band: 2.0, gap_fraction: 0.0, gap_levels: 0 }
-}
-
-/// A mesh as [`bands`] whose cells in narrow gaps are smaller than the gap.
-pub fn resolved_gaps(surface: u8) -> Refinement {
-    Refinement { gap_fraction: 1.0, gap_levels: 9, ..bands(surface) }
+    Refinement { coarsest: 3, surface, band: 2.0 }
 }
 
 /// The mesh of the unit box.
