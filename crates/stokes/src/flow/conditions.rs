@@ -12,7 +12,7 @@ pub type Field<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 ///
 /// Wrenches are those that something other than the fluid exerts on the bodies (weight, contact, a hand that
 /// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the bodies: on the
-/// nodes inside in `rigid-dofs` and `paper`, on the body as the mesh sees it in `unfitted`.
+/// nodes inside in `paper`, on the body as the mesh sees it in `unfitted`.
 #[derive(Clone, Copy)]
 pub struct Conditions<'a, const D: usize>
 where

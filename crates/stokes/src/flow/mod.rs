@@ -72,7 +72,7 @@ where
     pub velocity: Vec<f64>,
     /// Pressure at the pressure nodes; its mean over the nodes is zero.
     pub pressure: Vec<f64>,
-    /// Multiplier of the rigidity, a nodal velocity field; empty in `rigid-dofs`.
+    /// Multiplier of the rigidity, a nodal velocity field; empty but in `paper`.
     pub multiplier: Vec<f64>,
     /// Velocity and spin of each body.
     pub twists: Vec<Twist<D>>,
@@ -335,7 +335,6 @@ where
     ) {
         if self.params.solver == SolverKind::Multigrid {
             let last = NodalFields::of(&problem.system, x, pressure.to_vec());
-            let before = before.filter(|_| problem.rigidity.is_smooth_in_time());
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }
     }

@@ -4,10 +4,7 @@
 //! to the new mesh. `d^(n-1)` was already moved to the mesh of `d^n` one step before, so both live on one
 //! mesh. The extrapolation assumes equal steps; others only make it a worse guess. Motions of bodies and
 //! forces of films are guessed alike: in `unfitted` no node has them. A film that was not there before has
-//! the force that belongs to the motions.
-//!
-//! In `rigid-dofs` the guess is `d^n`: nodes enter and leave the bodies one by one, and extrapolation doubles
-//! the jumps this makes. Iterations from these and from other guesses are in
+//! the force that belongs to the motions. Iterations from these and from other guesses are in
 //! `docs/archive/experiments/0010-krylov-vectors.md`.
 
 use gluey_fem::Evaluator;

@@ -113,9 +113,6 @@ where
         system.residual(u, p, b);
     }
 
-    /// Whether the deviation from the undisturbed flow is smooth enough in time to be extrapolated.
-    fn is_smooth_in_time(&self) -> bool;
-
     /// Offset in cells of the nodes that are rigid on the coarser levels of the velocity cycle, see
     /// [`crate::solid_nodes`].
     fn coarse_offset(&self) -> f64;

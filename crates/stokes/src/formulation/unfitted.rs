@@ -191,11 +191,6 @@ where
         surfaces.map_or_else(Vec::new, |surfaces| weak_cells(surfaces, velocity, strain))
     }
 
-    /// Aggregates change from step to step, but what they change is small.
-    fn is_smooth_in_time(&self) -> bool {
-        true
-    }
-
     fn coarse_offset(&self) -> f64 {
         OFFSET
     }
@@ -208,7 +203,7 @@ where
 
     /// The smoother of the finest mesh is that of the surfaces.
     fn smoothing(&self, _: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing> {
-        (!is_finest).then(|| Smoothing::of_eliminated(is_finest))
+        (!is_finest).then(Smoothing::of_eliminated)
     }
 
     fn correction(

@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space};
 
 use super::discretisation::Discretisation;
-use super::marking::{CellKind, cell_kind};
+use super::marking::moves_as_one;
 use super::velocity::VelocitySpace;
 
 /// A cell that is not rigid.
@@ -25,11 +25,9 @@ where
     Dim<D>: Space<D>,
 {
     let discretisation = space.discretisation();
-    let kind = |cell: usize| {
-        cell_kind(discretisation.velocity.cell(cell).iter().map(|&n| space.body_of(n as usize)))
-    };
+    let nodes = |cell: &ActiveCell| discretisation.velocity.cell(cell.cell as usize).iter();
     let mut cells = all_cells(discretisation, viscosity);
-    cells.retain(|cell| kind(cell.cell as usize) != CellKind::Rigid);
+    cells.retain(|cell| !moves_as_one(nodes(cell).map(|&n| space.body_of(n as usize))));
     cells
 }
 

@@ -32,30 +32,10 @@ pub fn solid_nodes<const D: usize>(
     (0..nodes.node_count()).into_par_iter().with_min_len(LEAST_SHARE).map(at).collect()
 }
 
-/// How the cells of a mesh are made of free and rigid nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellKind {
-    /// Every node belongs to one body: no strain, no flow.
-    Rigid,
-    /// Every node belongs to a body, but not to the same one: it is strained, but nothing flows.
-    Bridge,
-    /// Some nodes are free.
-    Fluid,
-}
-
-/// Kind of a cell from the bodies its nodes belong to.
-pub fn cell_kind(bodies: impl Iterator<Item = Option<u32>>) -> CellKind {
-    let mut first = None;
-    let mut kind = CellKind::Rigid;
-    for body in bodies {
-        match (body, first) {
-            (None, _) => return CellKind::Fluid,
-            (Some(b), None) => first = Some(b),
-            (Some(b), Some(f)) if b != f => kind = CellKind::Bridge,
-            _ => {}
-        }
-    }
-    kind
+/// Whether all nodes of a cell, with these bodies, belong to one body: no strain, no flow.
+pub fn moves_as_one(mut bodies: impl Iterator<Item = Option<u32>>) -> bool {
+    let first = bodies.next().flatten();
+    first.is_some() && bodies.all(|body| body == first)
 }
 
 /// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those

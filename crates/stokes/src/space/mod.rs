@@ -12,7 +12,7 @@ pub use cells::{ActiveCell, active_cells, all_cells, own_cells};
 pub use discretisation::Discretisation;
 pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{
-    CellKind, around_films, around_finest_cells, cell_kind, cells_touching, nodes_of_cells_with, solid_nodes,
+    around_films, around_finest_cells, cells_touching, moves_as_one, nodes_of_cells_with, solid_nodes,
 };
 pub use pressure::PressureSpace;
 pub use velocity::{SolidNodes, VelocitySpace};

@@ -2,8 +2,6 @@
 //!
 //! A pressure node that touches no cell in which something flows acts on nothing and is dropped.
 
-use std::sync::Arc;
-
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
@@ -15,7 +13,6 @@ use super::velocity::VelocitySpace;
 /// free.
 #[derive(Clone, Debug)]
 pub struct PressureSpace<const D: usize> {
-    nodes: Arc<NodeMap<D>>,
     free: Vec<bool>,
     free_count: usize,
     constraints: Vec<Constraint>,
@@ -38,7 +35,7 @@ where
 
     /// The pressures of the cells in which `seen` holds; `ghosts` take their values from others.
     pub fn around_surfaces(
-        nodes: &Arc<NodeMap<D>>,
+        nodes: &NodeMap<D>,
         seen: impl Fn(usize) -> bool,
         ghosts: &[Constraint],
     ) -> Self {
@@ -46,12 +43,7 @@ where
         let free = self::seen(nodes, &cells);
         let constraints = nodes.constraints().iter().chain(ghosts).cloned().collect();
         let free_count = free.iter().filter(|&&f| f).count();
-        Self { nodes: nodes.clone(), free, free_count, constraints }
-    }
-
-    /// The nodes.
-    pub fn nodes(&self) -> &NodeMap<D> {
-        &self.nodes
+        Self { free, free_count, constraints }
     }
 
     /// Length of a vector.

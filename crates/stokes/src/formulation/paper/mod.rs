@@ -115,10 +115,6 @@ where
         Ok(())
     }
 
-    fn is_smooth_in_time(&self) -> bool {
-        true
-    }
-
     fn coarse_offset(&self) -> f64 {
         0.0
     }
@@ -132,7 +128,7 @@ where
         match levels.are_factorised() {
             true => Some(Smoothing::of_penalised(is_finest)),
             // The smoother of the finest mesh is that of the solid.
-            false => (!is_finest).then(|| Smoothing::of_eliminated(is_finest)),
+            false => (!is_finest).then(Smoothing::of_eliminated),
         }
     }
 

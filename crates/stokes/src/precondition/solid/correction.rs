@@ -26,9 +26,7 @@ use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscou
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::{Correction, CycleLevels};
-use crate::space::{
-    CellKind, VelocitySpace, around_films, around_finest_cells, cell_kind, nodes_of_cells_with,
-};
+use crate::space::{VelocitySpace, around_films, around_finest_cells, moves_as_one, nodes_of_cells_with};
 
 /// Where the solid is less stiff a sweep around films saves no iterations, see
 /// `docs/design/paper.md`.
@@ -97,7 +95,7 @@ where
         // meet there.
         let mut strained = acting(discretisation, &system.cells, &swept);
         let body_of = |&n: &u32| rigid.body_of(n as usize);
-        strained.retain(|c| cell_kind(nodes.cell(c.cell as usize).iter().map(body_of)) != CellKind::Rigid);
+        strained.retain(|c| !moves_as_one(nodes.cell(c.cell as usize).iter().map(body_of)));
         let (space, cell_count) = (&system.space, system.cells.len());
         block.iter_mut().zip(films.iter().flatten()).for_each(|(is_in, film)| *is_in |= film);
         let solid = acting(discretisation, &system.cells, &block);

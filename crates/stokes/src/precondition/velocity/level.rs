@@ -20,10 +20,10 @@ pub struct Smoothing {
 }
 
 impl Smoothing {
-    /// One sweep after the correction damps more than two of half its degree, at as many
-    /// applications, and the restriction needs no residual.
-    pub fn of_eliminated(is_finest: bool) -> Self {
-        Self { sweep: sweep(if is_finest { 4 } else { 5 }, 5.0), before: false }
+    /// Below the finest level: one sweep after the correction damps more than two of half its degree, at as
+    /// many applications, and the restriction needs no residual.
+    pub fn of_eliminated() -> Self {
+        Self { sweep: sweep(5, 5.0), before: false }
     }
 
     /// Below a penalised solid, where one sweep after the correction loses robustness at high contrast, see
@@ -236,7 +236,7 @@ mod tests {
         assert!(!discretisation.velocity.constraints().is_empty());
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, -0.1);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let level = Level::new(space, 1.7, Some(Smoothing::of_eliminated(true))).unwrap();
+        let level = Level::new(space, 1.7, Some(Smoothing::of_eliminated())).unwrap();
         let mut relaxation = level.relaxation.unwrap();
         let largest = estimate_lambda_max(&mut relaxation.operator, &mut relaxation.diagonal, 40).unwrap();
         let upper = relaxation.chebyshev.interval().upper;
@@ -252,7 +252,7 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], -0.1);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
-        Level::new(space, 1.0, Some(Smoothing::of_eliminated(true))).unwrap()
+        Level::new(space, 1.0, Some(Smoothing::of_eliminated())).unwrap()
     }
 
     #[test]
