@@ -69,7 +69,7 @@ impl Animation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::Stroke;
+    use crate::curve::Stroke;
 
     #[test]
     fn frames_come_back_in_order_with_their_colours() {

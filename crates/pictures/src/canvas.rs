@@ -9,8 +9,8 @@ use base64::engine::general_purpose::STANDARD;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg;
 
-use crate::chart::Stroke;
 use crate::color::{Rgb, hex};
+use crate::curve::Stroke;
 use crate::raster::{Placed, Raster};
 use crate::text;
 

@@ -9,7 +9,8 @@ use kuva::render::render::render_multiple;
 
 use crate::axis::{Axis, TICK_SIZE, scaled, tenth};
 use crate::canvas::{Canvas, FONT_FAMILY};
-use crate::legend::{Legend, shared_entries};
+use crate::curve::{Curve, Stroke};
+use crate::legend::Legend;
 use crate::text;
 
 /// Width of a figure, in SVG pixels.
@@ -28,28 +29,6 @@ const POWER_WIDTH: f64 = 52.0;
 const GAP: f64 = 6.0;
 /// Radius of points without neighbours.
 const POINT: f64 = 2.0;
-
-/// How a curve is drawn; one style means the same thing in every figure.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stroke {
-    /// CSS colour.
-    pub color: &'static str,
-    /// Width in SVG pixels.
-    pub width: f64,
-    /// SVG dash pattern; `None` is a solid line.
-    pub dashes: Option<&'static str>,
-}
-
-/// A curve as pieces of consecutive points (it may be interrupted).
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Legend text with the markup of the [crate]; `None` keeps it out of the legend.
-    pub label: Option<String>,
-    /// How it is drawn.
-    pub stroke: Stroke,
-    /// Pieces of points `(x, y)`.
-    pub pieces: Vec<Vec<(f64, f64)>>,
-}
 
 /// A chart: curves over a pair of axes.
 #[derive(Clone, Debug)]
@@ -85,9 +64,9 @@ pub fn stack(charts: &[Chart], frame_height: impl Fn(&Chart) -> f64) -> Canvas {
 pub fn stack_to_width(charts: &[Chart], width: f64, frame_height: impl Fn(&Chart, f64) -> f64) -> Canvas {
     let sides = Sides::around(charts);
     let frame_width = sides.frame_width(width);
-    let shared = if charts.len() > 1 { shared_entries(charts) } else { Vec::new() };
-    let of_all = Legend { entries: shared, notes: &[] };
-    let legends: Vec<Legend<'_>> = charts.iter().map(|chart| chart.legend(&of_all.entries)).collect();
+    let of_all = Legend::shared(&charts.iter().map(|chart| &chart.curves[..]).collect::<Vec<_>>());
+    let legends: Vec<Legend<'_>> =
+        charts.iter().map(|chart| Legend::of(&chart.curves, &chart.notes, &of_all.entries)).collect();
     let frame = |chart: &Chart| {
         let height = frame_height(chart, frame_width);
         chart.margin_top() + height + chart.margin_bottom(frame_width)

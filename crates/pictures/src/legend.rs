@@ -1,7 +1,7 @@
 //! What the curves of a chart are called, above its frame.
 
 use crate::canvas::Canvas;
-use crate::chart::{Chart, Stroke};
+use crate::curve::{Curve, Stroke};
 use crate::text;
 
 const ROW: f64 = 19.0;
@@ -18,17 +18,9 @@ pub(crate) struct Legend<'a> {
     pub notes: &'a [String],
 }
 
-impl Chart {
-    /// What its curves are called, once each, but for entries that stand elsewhere.
-    pub(crate) fn legend(&self, elsewhere: &[(&str, Stroke)]) -> Legend<'_> {
-        let entries = entries(self).into_iter().filter(|entry| !elsewhere.contains(entry));
-        Legend { entries: entries.collect(), notes: &self.notes }
-    }
-}
-
-fn entries(chart: &Chart) -> Vec<(&str, Stroke)> {
+fn entries(curves: &[Curve]) -> Vec<(&str, Stroke)> {
     let mut entries: Vec<(&str, Stroke)> = Vec::new();
-    for curve in &chart.curves {
+    for curve in curves {
         if let Some(label) = &curve.label
             && !entries.iter().any(|(name, _)| name == label)
         {
@@ -38,12 +30,20 @@ fn entries(chart: &Chart) -> Vec<(&str, Stroke)> {
     entries
 }
 
-/// The entries of charts that all have the same ones; none if they differ.
-pub(crate) fn shared_entries(charts: &[Chart]) -> Vec<(&str, Stroke)> {
-    let Some((first, others)) = charts.split_first() else { return Vec::new() };
-    let shared = entries(first);
-    let is_same = |chart: &Chart| entries(chart) == shared;
-    if others.iter().all(is_same) { shared } else { Vec::new() }
+impl<'a> Legend<'a> {
+    /// What curves are called, once each, but for entries that stand elsewhere, and remarks.
+    pub fn of(curves: &'a [Curve], notes: &'a [String], elsewhere: &[(&str, Stroke)]) -> Self {
+        let entries = entries(curves).into_iter().filter(|entry| !elsewhere.contains(entry));
+        Legend { entries: entries.collect(), notes }
+    }
+
+    /// The entries of several charts, given by their curves, that all have the same ones; none if they
+    /// differ, or if there is one chart only.
+    pub fn shared(charts: &[&'a [Curve]]) -> Self {
+        let shared = charts.first().map_or_else(Vec::new, |curves| entries(curves));
+        let is_shared = charts.len() > 1 && charts.iter().all(|curves| entries(curves) == shared);
+        Legend { entries: if is_shared { shared } else { Vec::new() }, notes: &[] }
+    }
 }
 
 impl Legend<'_> {
@@ -78,25 +78,23 @@ impl Legend<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Axis, Curve, PALETTE};
+    use crate::PALETTE;
 
-    fn chart(labels: &[&str]) -> Chart {
+    fn curves(labels: &[&str]) -> Vec<Curve> {
         let curve = |(label, stroke): (&&str, &Stroke)| Curve {
             label: Some((*label).to_owned()),
             stroke: *stroke,
             pieces: vec![vec![(0.0, 0.0), (1.0, 1.0)]],
         };
-        let curves = labels.iter().zip(&PALETTE).map(curve).collect();
-        let [x, y] = [Axis::around("*x*", [0.0, 1.0]), Axis::around("*y*", [0.0, 1.0])];
-        Chart { x, y, curves, notes: Vec::new(), marks: Vec::new() }
+        labels.iter().zip(&PALETTE).map(curve).collect()
     }
 
     #[test]
     fn legends_stand_at_their_panel_or_once_on_top() {
-        assert_eq!(shared_entries(&[chart(&["a", "b"]), chart(&["a", "b"])]).len(), 2);
-        let different = [chart(&["a", "b"]), chart(&["a"])];
-        assert!(shared_entries(&different).is_empty());
-        assert_eq!(different[0].legend(&[]).entries.len(), 2);
-        assert!(different[1].legend(&[("a", PALETTE[0])]).entries.is_empty());
+        let (both, one) = (curves(&["a", "b"]), curves(&["a"]));
+        assert_eq!(Legend::shared(&[&both, &both]).entries.len(), 2);
+        assert!(Legend::shared(&[&both, &one]).entries.is_empty());
+        assert_eq!(Legend::of(&both, &[], &[]).entries.len(), 2);
+        assert!(Legend::of(&one, &[], &[("a", PALETTE[0])]).entries.is_empty());
     }
 }

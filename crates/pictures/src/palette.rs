@@ -1,6 +1,6 @@
 //! Strokes that stay apart for colour-blind readers and in grey.
 
-use crate::chart::Stroke;
+use crate::curve::Stroke;
 
 /// Strokes of curves that belong together, in this order; each has a colour and dashes of its own.
 pub const PALETTE: [Stroke; 6] = [
