@@ -1,7 +1,7 @@
 //! The solver for any number of contacts: which of the others is best was measured
 //! (docs/design/contact.md).
 
-use super::newton::improve;
+use super::whole::improve;
 use super::{
     ActiveSet, Projection, ProjectionSolver, SolveFailure, SolveReport, Uzawa, largest_eigenvalue, split,
 };

@@ -14,7 +14,7 @@
 //! other carry forces (a jammed cluster), some ten or a hundred of these do.
 
 use super::envelope::Envelope;
-use super::{DelassusOperator, Factor, Projection, SolveReport, gaps_under, residual, whole};
+use super::{Factor, Projection, SolveReport, gaps_under, residual};
 
 /// Smallest and largest `sigma ||A||`.
 const SIGMAS: (f64, f64) = (1e3, 1e14);
@@ -175,18 +175,4 @@ fn root(function: impl Fn(f64) -> f64, small: f64) -> f64 {
         }
     }
     low
-}
-
-/// Improves `forces` by Newton steps, if the factor of the operator is known and small enough.
-pub(super) fn improve(
-    problem: &mut Projection<'_>,
-    forces: &mut [f64],
-    norm: f64,
-    step_limit: usize,
-) -> Option<SolveReport> {
-    if problem.operator.is_shared() {
-        return whole::improve(problem, forces, norm, step_limit);
-    }
-    let factor = DelassusOperator::factor(problem.operator)?;
-    Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
 }

@@ -1,5 +1,5 @@
-//! Newton steps where several ranks hold the contacts: the first of them takes the steps for all, of as many
-//! contacts as it can hold.
+//! Newton steps of a whole problem. Where several ranks hold the contacts the first of them takes the steps
+//! for all, of as many contacts as it can hold.
 
 use super::newton::Newton;
 use super::{DelassusOperator, Factor, Projection, SolveReport};
@@ -7,9 +7,23 @@ use super::{DelassusOperator, Factor, Projection, SolveReport};
 /// Most contacts that one rank takes from all others.
 const MOST_CONTACTS: usize = 100_000;
 
+/// Improves `forces` by Newton steps, if the factor of the operator is known and small enough.
+pub(super) fn improve(
+    problem: &mut Projection<'_>,
+    forces: &mut [f64],
+    norm: f64,
+    step_limit: usize,
+) -> Option<SolveReport> {
+    if problem.operator.is_shared() {
+        return improve_on_ranks(problem, forces, norm, step_limit);
+    }
+    let factor = DelassusOperator::factor(problem.operator)?;
+    Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
+}
+
 /// Improves `forces` by Newton steps, on all ranks; `None`, on all, if there are too many contacts or their
 /// system is too large to be factorised.
-pub(super) fn improve(
+fn improve_on_ranks(
     problem: &mut Projection<'_>,
     forces: &mut [f64],
     norm: f64,
