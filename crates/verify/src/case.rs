@@ -159,6 +159,23 @@ impl Table {
         values
     }
 
+    /// The places at which a method was computed, each once and in the order of the rows: values of these
+    /// keys.
+    pub fn places<const N: usize>(
+        &self,
+        method: &str,
+        keys: [&'static str; N],
+    ) -> Vec<[(&'static str, f64); N]> {
+        let mut places = Vec::new();
+        for row in self.rows.iter().filter(|row| row.method == method) {
+            let place = keys.map(|key| (key, self.value(row, key).unwrap_or(f64::NAN)));
+            if !places.contains(&place) {
+                places.push(place);
+            }
+        }
+        places
+    }
+
     /// The table as comma-separated values.
     pub fn csv(&self) -> String {
         let names = self.keys.iter().chain(self.measures);

@@ -40,6 +40,12 @@ const UNFITTED_BARE: Method = Method {
 /// are lines of `limits.csv`.
 pub const METHODS: &[Method] = &[PAPER, UNFITTED];
 
+/// Those that know boxes that are sheared for ever.
+pub const IN_SHEARED_BOXES: &[Method] = &[UNFITTED];
+
+/// Those that can hold bodies.
+pub const HOLDING: &[Method] = &[UNFITTED, UNFITTED_BARE];
+
 /// What chapters with thin films compare.
 pub const FILM_METHODS: &[Method] = &[PAPER, UNFITTED, UNFITTED_BARE];
 

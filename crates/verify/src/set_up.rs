@@ -1,14 +1,17 @@
 //! Set-ups and measures that several cases share.
 
+use std::f64::consts::PI;
+
 use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::fem::TreeMesh;
 use gluey_stokes::{Flow, FlowSolver, Refinement, Stress};
 use gluey_testkit::exact::{InclusionViscosity, RigidSphere, ViscousInclusion};
 use gluey_testkit::reference::{self, TableError};
+use itertools::iproduct;
 
 use crate::case::{Extent, Table, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::norms::Lattice;
 use crate::number::Number;
 use crate::statistics::{mean, scatter};
@@ -43,16 +46,22 @@ pub fn level(radius: f64, cells_per_radius: f64) -> u8 {
     (cells_per_radius / radius).log2().round() as u8
 }
 
+/// The mesh of a box with periodic borders, its edges one long, whose cells are of one size.
+pub fn periodic_mesh<const D: usize>(level: u8, balls: &[Ball<D>]) -> Result<TreeMesh<D>, VerifyError> {
+    let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
+    Ok(refinement.mesh(Aabb::unit(), [1; D], [true; D], balls)?)
+}
+
+/// The radius of a body that takes this share of the unit box.
+pub fn radius_of(dimension: usize, phi: f64) -> f64 {
+    if dimension == 2 { (phi / PI).sqrt() } else { (0.75 * phi / PI).cbrt() }
+}
+
 /// Couette flow `(y - 1/2) e_x`.
 pub fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
     let mut u = Vector::zeros();
     u[0] = x[1] - 0.5;
     u
-}
-
-/// The methods that know boxes that are sheared for ever.
-pub fn methods_in_sheared_boxes() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.name == "unfitted")
 }
 
 /// The gradient of simple shear at the rate one, `y e_x`.
@@ -175,12 +184,19 @@ pub fn mean_and_scatter(
     Number::mean_and_scatter(name, method, mean(&values), scatter(&values))
 }
 
-/// The cells of these names in a row of a table of exact values.
-pub fn cells_of_row<const N: usize>(
+/// The cells of these names in the row of a table of exact values where columns have these values.
+///
+/// # Errors
+/// [`VerifyError::NoReference`] if there is no such row.
+pub fn exact_row<const N: usize>(
     table: &reference::Table,
-    row: usize,
+    at: &[(&str, f64)],
     names: [&str; N],
-) -> Result<[f64; N], TableError> {
+) -> Result<[f64; N], VerifyError> {
+    let keys = at.iter().map(|&(name, value)| Ok((table.column(name)?, value)));
+    let keys = keys.collect::<Result<Vec<_>, TableError>>()?;
+    let row = (0..table.row_count()).find(|&row| keys.iter().all(|(column, value)| column[row] == *value));
+    let row = row.ok_or_else(|| VerifyError::NoReference(format!("{at:?}")))?;
     let mut values = [0.0; N];
     for (value, name) in values.iter_mut().zip(names) {
         *value = table.column(name)?[row];
@@ -202,39 +218,22 @@ pub struct SpherePairs {
 impl SpherePairs {
     /// A computation for each mesh, gap and position, by the methods that know such boxes.
     pub fn tasks(&self, extent: Extent, measure: PairMeasure) -> Vec<Task> {
-        let positions = match extent {
-            Extent::Quick => 2,
-            Extent::Full => 8,
+        let positions = if extent == Extent::Quick { 2 } else { 8 };
+        let places = iproduct!(IN_SHEARED_BOXES, self.meshes, self.gaps, 0..positions);
+        let task = |(method, &cells, &gap, k): (&'static Method, &f64, &f64, usize)| {
+            Task::new(method.name, &[cells, gap, k as f64], move || measure(method, cells, gap, k))
         };
-        let mut tasks = Vec::new();
-        for method in methods_in_sheared_boxes() {
-            for &cells in self.meshes {
-                for &gap in self.gaps {
-                    tasks.extend((0..positions).map(|k| {
-                        let at = [cells, gap, k as f64];
-                        Task::new(method.name, &at, move || measure(method, cells, gap, k))
-                    }));
-                }
-            }
-        }
-        tasks
+        places.map(task).collect()
     }
 
     /// Mean and scatter of each measure over the positions; names begin with `what`.
     pub fn numbers(&self, table: &Table, measures: &[&str], what: &str) -> Vec<Number> {
-        let mut numbers = Vec::new();
-        for method in methods_in_sheared_boxes() {
-            for &cells in self.meshes {
-                for &gap in self.gaps {
-                    let at = [("a/h", cells), ("gap", gap)];
-                    for measure in measures {
-                        let name = format!("{what}{measure}, a/h = {cells}, gap {gap} a");
-                        numbers.extend(mean_and_scatter(table, method.name, measure, &at, &name));
-                    }
-                }
-            }
-        }
-        numbers
+        let places = iproduct!(IN_SHEARED_BOXES, self.meshes, self.gaps, measures);
+        let of_place = |(method, cells, gap, measure): (&Method, &f64, &f64, &&str)| {
+            let name = format!("{what}{measure}, a/h = {cells}, gap {gap} a");
+            mean_and_scatter(table, method.name, measure, &[("a/h", *cells), ("gap", *gap)], &name)
+        };
+        places.flat_map(of_place).collect()
     }
 }
 

@@ -1,15 +1,16 @@
 //! Several free discs in a periodic cell in shear.
 
-use gluey_geom::{Aabb, Lattice, Vector};
+use gluey_geom::{Lattice, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Conditions, FlowSolver, Refinement};
+use gluey_stokes::{Conditions, FlowSolver};
 use gluey_testkit::reference::cells_of_discs;
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::Method;
+use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{methods_in_sheared_boxes, simple_shear, stress_of};
+use crate::set_up::{periodic_mesh, simple_shear, stress_of};
 
 /// Cells in the table, by their number of discs.
 const CELLS: [usize; 2] = [2, 8];
@@ -25,29 +26,24 @@ pub const CASE: Case = Case {
     keys: &["discs", "cells"],
     measures: &["velocity", "spin", "viscosity", "normal"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let levels: &[u8] = if extent == Extent::Quick { &[4, 5] } else { &[4, 5, 6, 7] };
-    let mut tasks = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for (index, discs) in CELLS.into_iter().enumerate() {
-            tasks.extend(levels.iter().map(|&level| {
-                let at = [discs as f64, 2f64.powi(level.into())];
-                Task::new(method.name, &at, move || measure(method, index, level))
-            }));
-        }
-    }
-    tasks
+    let places = iproduct!(IN_SHEARED_BOXES, CELLS.into_iter().enumerate(), levels);
+    let task = |(method, (index, discs), &level): (&'static Method, (usize, usize), &u8)| {
+        let at = [discs as f64, 2f64.powi(level.into())];
+        Task::new(method.name, &at, move || measure(method, index, level))
+    };
+    places.map(task).collect()
 }
 
 fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyError> {
     let table = cells_of_discs()?;
-    let rows: Vec<usize> = (0..table.row_count()).collect();
     let numbers = table.column("cell")?;
-    let rows: Vec<usize> = rows.into_iter().filter(|&row| numbers[row] == index as f64).collect();
+    let rows: Vec<usize> = (0..table.row_count()).filter(|&row| numbers[row] == index as f64).collect();
     let column = |name: &str| -> Result<Vec<f64>, VerifyError> {
         let column = table.column(name)?;
         Ok(rows.iter().map(|&row| column[row]).collect())
@@ -57,8 +53,7 @@ fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyE
     let lattice = Lattice::new([Some(1.0); 2]).tilted(strain);
     let ball = |(x, y): (&f64, &f64)| Ball::in_space(&Vector::<2>::new(*x, *y), radius, &lattice, 0.0);
     let balls: Vec<Ball<2>> = x.iter().zip(&y).map(ball).collect();
-    let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
-    let mesh = refinement.mesh(Aabb::unit(), [1; 2], [true; 2], &balls)?;
+    let mesh = periodic_mesh(level, &balls)?;
     let conditions = Conditions::in_linear_flow(&simple_shear::<2>()).with_stress();
     let flow = FlowSolver::new(method.params::<2>(1e-9))?.solve_under(mesh, &balls, &conditions)?;
     let of_bodies = stress_of(&flow)?.of_bodies(1.0);
@@ -72,27 +67,20 @@ fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyE
     Ok(vec![velocity, turn, (1.0 + of_bodies[(0, 1)]) / eta - 1.0, normal / (eta - 1.0)])
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for discs in CELLS {
-            for cells in table.steps("cells", method.name, &[("discs", discs as f64)]) {
-                let at = [("discs", discs as f64), ("cells", cells)];
-                for &measure in CASE.measures {
-                    let kind = if matches!(measure, "velocity" | "spin") { Kind::Size } else { Kind::Error };
-                    let name = format!("{measure}, {discs} discs, {cells} cells");
-                    let value = table.values(measure, method.name, &at)[0];
-                    numbers.push(Number::new(kind, name, method.name, value));
-                }
-            }
+    for method in IN_SHEARED_BOXES {
+        for (at, &measure) in iproduct!(table.places(method.name, ["discs", "cells"]), CASE.measures) {
+            let [(_, discs), (_, cells)] = at;
+            let kind = if matches!(measure, "velocity" | "spin") { Kind::Size } else { Kind::Error };
+            let name = format!("{measure}, {discs} discs, {cells} cells");
+            numbers.push(Number::new(kind, name, method.name, table.values(measure, method.name, &at)[0]));
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["2 discs, velocity", "2 discs, spin", "8 discs, velocity", "8 discs, spin"];
     Plot::of_methods("cells per edge of the box", "largest error", &things, |method, thing| {
         let at = [("discs", CELLS[thing / 2] as f64)];

@@ -1,5 +1,7 @@
 //! What an error costs: CPU time of a solve against the error of the speed of approach at a gap of a radius.
 
+use itertools::iproduct;
+
 use crate::case::{CPU_TIME, Case, Table, Tables};
 use crate::method::METHODS;
 use crate::number::{Kind, Number};
@@ -35,24 +37,18 @@ fn points(table: &Table, method: &str, at: &[(&str, f64)]) -> Vec<(f64, f64, f64
 
 fn numbers(tables: &Tables) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for (name, at) in SOURCES {
-        let table = tables.of(name);
-        for method in METHODS {
-            for (cells, seconds, error) in points(&table, method.name, at) {
-                let number = |kind, what: &str, value| {
-                    Number::new(kind, format!("{name}, a/h = {cells}, {what}"), method.name, value)
-                };
-                numbers.push(number(Kind::Remark, "CPU seconds per solve", seconds));
-                numbers.push(number(Kind::Size, "rms error", error));
-            }
+    for ((name, at), method) in iproduct!(SOURCES, METHODS) {
+        for (cells, seconds, error) in points(&tables.of(name), method.name, at) {
+            let what = |what: &str| format!("{name}, a/h = {cells}, {what}");
+            numbers.push(Number::new(Kind::Remark, what("CPU seconds per solve"), method.name, seconds));
+            numbers.push(Number::new(Kind::Size, what("rms error"), method.name, error));
         }
     }
     let spheres = tables.of("spheres");
     let enough = "spheres, CPU seconds for 1 % at a gap of a and 5 % at 0.2 a";
     let reached = METHODS.iter().filter_map(|method| Some((method.name, cheapest(&spheres, method.name)?)));
-    numbers.extend(
-        reached.map(|(method, seconds)| Number::new(Kind::Remark, enough.to_owned(), method, seconds)),
-    );
+    let number = |(method, seconds)| Number::new(Kind::Remark, enough.to_owned(), method, seconds);
+    numbers.extend(reached.map(number));
     numbers
 }
 
@@ -71,16 +67,10 @@ fn cheapest(table: &Table, method: &str) -> Option<f64> {
 }
 
 fn plot(tables: &Tables) -> Plot {
-    Plot::of_methods(
-        "CPU seconds per solve",
-        "rms relative error of the approach",
-        &["discs", "spheres"],
-        |method, thing| {
-            let (name, at) = SOURCES[thing];
-            points(&tables.of(name), method, at)
-                .into_iter()
-                .map(|(_, seconds, error)| (seconds, error))
-                .collect()
-        },
-    )
+    let (x, y) = ("CPU seconds per solve", "rms relative error of the approach");
+    Plot::of_methods(x, y, &["discs", "spheres"], |method, thing| {
+        let (name, at) = SOURCES[thing];
+        let points = points(&tables.of(name), method, at).into_iter();
+        points.map(|(_, seconds, error)| (seconds, error)).collect()
+    })
 }

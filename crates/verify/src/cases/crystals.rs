@@ -6,13 +6,14 @@ use gluey_geom::{Aabb, Dim, Matrix, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, Stress};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::Method;
+use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::norms::superficial_velocity;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{cells_of_row, methods_in_sheared_boxes, shift, simple_shear, stress_of};
+use crate::set_up::{exact_row, radius_of, shift, simple_shear, stress_of};
 
 /// A crystal: bodies in a box with the edges of `cells`, places in shares of the box.
 struct Crystal {
@@ -76,7 +77,7 @@ const CRYSTALS: &[Crystal] = &[
 const SQUARES: &[[u32; 3]] = &[[4, 4, 4], [5, 5, 5], [6, 6, 6]];
 
 /// Cells in a radius, about: boxes have whole numbers of them.
-const RESOLUTIONS: [&[f64]; 2] = [&[3.2], &[3.2]];
+const RESOLUTION: f64 = 3.2;
 
 /// The chapter.
 pub const CASE: Case = Case {
@@ -92,46 +93,31 @@ pub const CASE: Case = Case {
     keys: &["crystal", "resolution", "phi"],
     measures: &["drag", "strained", "sheared", "cells in a radius"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let which = usize::from(extent == Extent::Full);
     let mut tasks = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for (index, crystal) in CRYSTALS.iter().enumerate() {
-            for &resolution in RESOLUTIONS[crystal.dimension - 2] {
-                for &phi in crystal.fractions[which] {
-                    tasks.push(Task::new(
-                        method.name,
-                        &[index as f64, resolution, phi],
-                        move || match crystal.dimension {
-                            2 => measure::<2>(method, crystal, resolution, phi),
-                            _ => measure::<3>(method, crystal, resolution, phi),
-                        },
-                    ));
-                }
-            }
-        }
+    for (method, (index, crystal)) in iproduct!(IN_SHEARED_BOXES, CRYSTALS.iter().enumerate()) {
+        tasks.extend(crystal.fractions[which].iter().map(|&phi| {
+            let measure = if crystal.dimension == 2 { measure::<2> } else { measure::<3> };
+            Task::new(method.name, &[index as f64, RESOLUTION, phi], move || measure(method, crystal, phi))
+        }));
     }
     tasks
 }
 
 /// Errors of drag and viscosities, and the cells in a radius.
-fn measure<const D: usize>(
-    method: &Method,
-    crystal: &Crystal,
-    resolution: f64,
-    phi: f64,
-) -> Result<Vec<f64>, VerifyError>
+fn measure<const D: usize>(method: &Method, crystal: &Crystal, phi: f64) -> Result<Vec<f64>, VerifyError>
 where
     Dim<D>: Space<D>,
 {
     // One body in a unit of volume.
     let count = crystal.sites.len() as f64;
-    let radius = if D == 2 { (phi / PI).sqrt() } else { (0.75 * phi / PI).cbrt() };
-    let (cells, level) = crystal.cells::<D>(resolution / radius);
+    let radius = radius_of(D, phi);
+    let (cells, level) = crystal.cells::<D>(RESOLUTION / radius);
     let edge = (count / cells.iter().map(|&n| f64::from(n)).product::<f64>()).powf(1.0 / D as f64);
     let edges = Vector::<D>::from_fn(|d, _| edge * f64::from(cells[d]));
     let h = edge * 0.5f64.powi(level.into());
@@ -209,45 +195,35 @@ impl Crystal {
             2 => (lattices_of_discs()?, ["drag_F_over_muU", "eta_axes_strain", "eta_shear"]),
             _ => (lattices_of_spheres()?, ["K", "alpha", "beta"]),
         };
-        let mut rows = table.column("lattice")?.iter().zip(table.column("phi")?);
-        let row = rows.position(|(&number, &x)| number == self.number && x == phi);
-        let row = row.ok_or_else(|| VerifyError::NoReference(format!("{}, phi = {phi}", self.name)))?;
-        Ok(cells_of_row(&table, row, names)?)
+        exact_row(&table, &[("lattice", self.number), ("phi", phi)], names)
     }
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for (index, crystal) in CRYSTALS.iter().enumerate() {
-            for &resolution in RESOLUTIONS[crystal.dimension - 2] {
-                let at = [("crystal", index as f64), ("resolution", resolution)];
-                for phi in table.steps("phi", method.name, &at) {
-                    let at = [&at[..], &[("phi", phi)]].concat();
-                    // The viscosities of an isotropic one are one number.
-                    let measures =
-                        if crystal.is_isotropic() { &CASE.measures[..2] } else { &CASE.measures[..3] };
-                    for &measure in measures {
-                        let said = match measure {
-                            "drag" => "drag",
-                            _ if crystal.is_isotropic() => "viscosity",
-                            "strained" => "viscosity under strain along the axes",
-                            _ => "viscosity under shear",
-                        };
-                        let name = format!("{said}, {}, phi = {phi}", crystal.name);
-                        let value = table.values(measure, method.name, &at)[0];
-                        numbers.push(Number::new(Kind::Error, name, method.name, value));
-                    }
-                }
+    for method in IN_SHEARED_BOXES {
+        for at in table.places(method.name, ["crystal", "phi"]) {
+            let [(_, index), (_, phi)] = at;
+            let crystal = &CRYSTALS[index as usize];
+            // The viscosities of an isotropic one are one number.
+            let count = if crystal.is_isotropic() { 2 } else { 3 };
+            for &measure in &CASE.measures[..count] {
+                let said = match measure {
+                    "drag" => "drag",
+                    _ if crystal.is_isotropic() => "viscosity",
+                    "strained" => "viscosity under strain along the axes",
+                    _ => "viscosity under shear",
+                };
+                let name = format!("{said}, {}, phi = {phi}", crystal.name);
+                let value = table.values(measure, method.name, &at)[0];
+                numbers.push(Number::new(Kind::Error, name, method.name, value));
             }
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things: Vec<&str> = CRYSTALS.iter().map(|crystal| crystal.name).collect();
     Plot::of_methods("solid fraction", "relative error of the drag", &things, |method, thing| {
         let at = [("crystal", thing as f64)];

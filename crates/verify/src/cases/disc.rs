@@ -4,8 +4,9 @@ use gluey_geom::Vector;
 use gluey_levelset::Ball;
 use gluey_stokes::Refinement;
 use gluey_testkit::reference::single_2d_velocities;
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -27,21 +28,16 @@ pub const CASE: Case = Case {
     keys: &["a/h", "shift x", "shift y"],
     measures: &["velocity", "spin"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(_: Extent) -> Vec<Task> {
-    let mut tasks = Vec::new();
-    for method in METHODS {
-        for cells in CELLS_PER_RADIUS {
-            tasks.extend((0..POSITIONS).map(|k| {
-                let shift = shift::<2>(k);
-                Task::new(method.name, &[cells, shift[0], shift[1]], move || measure(method, cells, shift))
-            }));
-        }
-    }
-    tasks
+    let task = |(method, cells, k): (&'static Method, f64, usize)| {
+        let shift = shift::<2>(k);
+        Task::new(method.name, &[cells, shift[0], shift[1]], move || measure(method, cells, shift))
+    };
+    iproduct!(METHODS, CELLS_PER_RADIUS, 0..POSITIONS).map(task).collect()
 }
 
 fn measure(method: &Method, cells: f64, shift: Vector<2>) -> Result<Vec<f64>, VerifyError> {
@@ -54,19 +50,12 @@ fn measure(method: &Method, cells: f64, shift: Vector<2>) -> Result<Vec<f64>, Ve
     Ok(vec![(twist.velocity[0] - shift[1] - exact("Ux")?) / RADIUS, twist.spin[0] - exact("omega")?])
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
-    let mut numbers = Vec::new();
-    for cells in CELLS_PER_RADIUS {
-        for measure in CASE.measures {
-            for method in METHODS {
-                let (mean, scatter) = mean_and_scatter(&table, method.name, measure, cells);
-                let name = format!("{measure}, a/h = {cells}");
-                numbers.extend(Number::mean_and_scatter(&name, method.name, mean, scatter));
-            }
-        }
-    }
-    numbers
+fn numbers(table: &Table) -> Vec<Number> {
+    let number = |(cells, measure, method): (f64, &&str, &Method)| {
+        let (mean, scatter) = mean_and_scatter(table, method.name, measure, cells);
+        Number::mean_and_scatter(&format!("{measure}, a/h = {cells}"), method.name, mean, scatter)
+    };
+    iproduct!(CELLS_PER_RADIUS, CASE.measures, METHODS).flat_map(number).collect()
 }
 
 /// Of the errors less what the walls make of the shift.
@@ -78,12 +67,11 @@ fn mean_and_scatter(table: &Table, method: &str, measure: &str, cells: f64) -> (
     (coefficients[0], scatter)
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["velocity, mean", "velocity, scatter", "spin, mean", "spin, scatter"];
     Plot::of_methods("cells per radius *a*/*h*", "error", &things, |method, thing| {
         let point = |cells| {
-            let (mean, scatter) = mean_and_scatter(&table, method, CASE.measures[thing / 2], cells);
+            let (mean, scatter) = mean_and_scatter(table, method, CASE.measures[thing / 2], cells);
             (cells, if thing % 2 == 0 { mean.abs() } else { scatter })
         };
         CELLS_PER_RADIUS.map(point).to_vec()

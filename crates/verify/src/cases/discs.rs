@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 use gluey_geom::Vector;
 use gluey_stokes::Refinement;
 use gluey_testkit::reference::{pair_2d_resistance, pair_2d_velocities};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{FILM_METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -37,8 +38,8 @@ pub const CASE: Case = Case {
     keys: &["a/h", "gap", "angle", "position"],
     measures: &["approach", "line rotation", "spin"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Cells per radius of the meshes of an extent.
@@ -50,35 +51,21 @@ fn cells_per_radius(extent: Extent) -> &'static [f64] {
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {
-    let mut tasks = Vec::new();
-    for method in FILM_METHODS {
-        for &cells in cells_per_radius(extent) {
-            tasks.extend(of_mesh(method, cells));
-        }
-    }
-    tasks
-}
-
-fn of_mesh(method: &'static Method, cells: f64) -> Vec<Task> {
-    let pressed = pressed_gaps(method).map(|gap| (gap, PRESSED));
-    let level = level_gaps(method).map(|gap| (gap, 0.0));
-    let places = pressed.chain(level).flat_map(|(gap, angle)| (0..POSITIONS).map(move |k| (gap, angle, k)));
-    let task = |(gap, angle, k)| {
-        let at = [cells, gap, angle, k as f64];
-        Task::new(method.name, &at, move || measure(method, &at))
+    let of_mesh = |(method, &cells): (&'static Method, &f64)| {
+        let places = places(method).flat_map(|place| (0..POSITIONS).map(move |k| (place, k)));
+        places.map(move |((gap, angle), k)| {
+            let at = [cells, gap, angle, k as f64];
+            Task::new(method.name, &at, move || measure(method, &at))
+        })
     };
-    places.map(task).collect()
+    iproduct!(FILM_METHODS, cells_per_radius(extent)).flat_map(of_mesh).collect()
 }
 
-/// Gaps at which the pair is pressed together.
-fn pressed_gaps(method: &Method) -> impl Iterator<Item = f64> + use<> {
-    GAPS.into_iter().chain(FILMS.into_iter().take(if method.lubricates { FILMS.len() } else { 0 }))
-}
-
-/// Gaps at which the pair lies along the flow.
-fn level_gaps(method: &Method) -> impl Iterator<Item = f64> + use<> {
-    let films = if method.lubricates { FILM_ALONG.len() } else { 0 };
-    GAPS_ALONG.into_iter().chain(FILM_ALONG.into_iter().take(films))
+/// Gaps and angles: those at which the pair is pressed together, then those at which it lies along the flow.
+fn places(method: &Method) -> impl Iterator<Item = (f64, f64)> + use<> {
+    let films = |films: &'static [f64]| if method.lubricates { films } else { &[] };
+    let pressed = GAPS.iter().chain(films(&FILMS)).map(|&gap| (gap, PRESSED));
+    pressed.chain(GAPS_ALONG.iter().chain(films(&FILM_ALONG)).map(|&gap| (gap, 0.0)))
 }
 
 fn measure(method: &Method, &[cells, gap, angle, position]: &[f64; 4]) -> Result<Vec<f64>, VerifyError> {
@@ -141,29 +128,22 @@ fn normal_resistance(gap: f64) -> Result<f64, VerifyError> {
         .ok_or_else(|| VerifyError::NoReference(format!("the resistance at a gap of {gap} radii")))
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
+    let measures = [("approach", PRESSED), ("line rotation", 0.0), ("spin", 0.0)];
     for method in FILM_METHODS {
-        for cells in table.steps("a/h", method.name, &[]) {
-            for (measure, angle, gaps) in [
-                ("approach", PRESSED, pressed_gaps(method).collect::<Vec<_>>()),
-                ("line rotation", 0.0, level_gaps(method).collect()),
-                ("spin", 0.0, level_gaps(method).collect()),
-            ] {
-                for gap in gaps {
-                    let at = [("a/h", cells), ("gap", gap), ("angle", angle)];
-                    let name = format!("{measure}, a/h = {cells}, gap {gap} a");
-                    numbers.extend(mean_and_scatter(&table, method.name, measure, &at, &name));
-                }
+        for (cells, (measure, angle)) in iproduct!(table.steps("a/h", method.name, &[]), measures) {
+            for (gap, _) in places(method).filter(|place| place.1 == angle) {
+                let at = [("a/h", cells), ("gap", gap), ("angle", angle)];
+                let name = format!("{measure}, a/h = {cells}, gap {gap} a");
+                numbers.extend(mean_and_scatter(table, method.name, measure, &at, &name));
             }
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let cells = [3.2, 6.4, 12.8, 25.6];
     let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8", "*a*/*h* = 25.6"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {

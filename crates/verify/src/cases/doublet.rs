@@ -5,7 +5,7 @@ use gluey_levelset::Ball;
 use gluey_motion::{Film, Integrator, Scheme};
 use gluey_stokes::{FlowSolver, Refinement};
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
@@ -30,8 +30,8 @@ pub const CASE: Case = Case {
     keys: &["start", "a/h", "time step"],
     measures: &["gap", "half a turn", "smallest gap"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Cells per radius and time step.
@@ -119,8 +119,7 @@ fn sine(first: &Vector<2>, line: &Vector<2>) -> f64 {
     (first[0] * line[1] - first[1] * line[0]) / (first.norm() * line.norm())
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in METHODS.iter().map(|method| method.name) {
         for (start, name) in [(0.0, "half a radius apart"), (1.0, "figure 5")] {
@@ -143,8 +142,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["half a radius apart", "figure 5"];
     Plot::of_methods("cells per radius *a*/*h*", "change of the gap in radii", &things, |method, start| {
         let at = [("start", start as f64), ("time step", 0.1)];

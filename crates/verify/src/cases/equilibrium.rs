@@ -6,13 +6,13 @@ use gluey_levelset::{Ball, Body};
 use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, StokesError};
 use gluey_suspension::Container;
 use gluey_suspension::packing::{Amount, Arrangement, Packing, PackingParams};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::literature::{settling_lost_in_box, settling_of_spheres, viscosity_of_spheres};
-use crate::method::Method;
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::methods_in_sheared_boxes;
 use crate::statistics::{mean, scatter};
 
 /// Fractions of the box that particles fill.
@@ -45,32 +45,21 @@ pub const CASE: Case = Case {
     keys: &["dimension", "phi", "seed"],
     measures: &["viscosity", "settling"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(extent: Extent) -> Vec<Task> {
-    let fractions = match extent {
-        Extent::Quick => &FRACTIONS[..1],
-        Extent::Full => &FRACTIONS[..],
+    let fractions = if extent == Extent::Quick { &FRACTIONS[..1] } else { &FRACTIONS };
+    let of_fraction = |(method, &phi): (&'static Method, &f64)| {
+        let task = move |dimension: usize, seed: usize| {
+            let measure = if dimension == 2 { measure::<2> } else { measure::<3> };
+            let at = [dimension as f64, phi, seed as f64];
+            Task::new(method.name, &at, move || measure(method, phi, seed))
+        };
+        [2, 3].into_iter().flat_map(move |d| (0..CONFIGURATIONS[d - 2]).map(move |seed| task(d, seed)))
     };
-    let [plane, space] = CONFIGURATIONS;
-    let mut tasks = Vec::new();
-    for (method, &phi) in
-        methods_in_sheared_boxes().flat_map(|method| fractions.iter().map(move |phi| (method, phi)))
-    {
-        tasks.extend((0..plane).map(|seed| task::<2>(method, phi, seed)));
-        tasks.extend((0..space).map(|seed| task::<3>(method, phi, seed)));
-    }
-    tasks
-}
-
-/// The formulation that knows the stress in periodic boxes.
-fn task<const D: usize>(method: &'static Method, phi: f64, seed: usize) -> Task
-where
-    Dim<D>: Space<D>,
-{
-    Task::new(method.name, &[D as f64, phi, seed as f64], move || measure::<D>(method, phi, seed))
+    iproduct!(IN_SHEARED_BOXES, fractions).flat_map(of_fraction).collect()
 }
 
 fn measure<const D: usize>(method: &Method, phi: f64, seed: usize) -> Result<Vec<f64>, VerifyError>
@@ -178,14 +167,13 @@ fn standard_error(values: &[f64]) -> f64 {
     scatter(values) / (values.len() as f64).sqrt()
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for (method, dimension) in methods_in_sheared_boxes().flat_map(|method| [(method, 2), (method, 3)]) {
+    for (method, dimension) in iproduct!(IN_SHEARED_BOXES, [2, 3]) {
         for phi in table.steps("phi", method.name, &[("dimension", dimension as f64)]) {
             let at = [("dimension", dimension as f64), ("phi", phi)];
             let scale = [expected(dimension, phi), 1.0];
-            let errors = errors(&table, method.name, dimension, phi);
+            let errors = errors(table, method.name, dimension, phi);
             for (k, measure) in CASE.measures.iter().enumerate().take(dimension - 1) {
                 let name = format!("{measure}, {dimension}D, phi = {phi}");
                 let scatter = standard_error(&table.values(measure, method.name, &at)) / scale[k];
@@ -197,13 +185,12 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["2D, viscosity", "3D, viscosity", "3D, settling"];
     Plot::of_methods("fraction", "error of the mean", &things, |method, thing| {
         let dimension = if thing == 0 { 2 } else { 3 };
         let fractions = table.steps("phi", method, &[("dimension", dimension as f64)]);
-        let error = |phi| errors(&table, method, dimension, phi)[thing / 2].abs();
+        let error = |phi| errors(table, method, dimension, phi)[thing / 2].abs();
         fractions.into_iter().map(|phi| (phi, error(phi))).collect()
     })
 }
@@ -236,7 +223,7 @@ mod tests {
         let lattice = Lattice::new([Some(1.0); 3]);
         let body = [Ball::in_space(&Vector::repeat(0.5), radius, &lattice, 0.0)];
         let mesh = Refinement::to_level(3).mesh(Aabb::unit(), [1; 3], [true; 3], &body).unwrap();
-        let method = methods_in_sheared_boxes().next().unwrap();
+        let method = IN_SHEARED_BOXES[0];
         let mut solver = FlowSolver::new(method.params::<3>(1e-7)).unwrap();
         let settling = settling(&mut solver.prepared(mesh, &body).unwrap(), &body).unwrap();
         assert!((settling - exact).abs() < 2e-3, "{settling} instead of {exact}");
@@ -255,7 +242,7 @@ mod tests {
             let place = Vector::from_fn(|d, _| 0.41 + 0.013 * d as f64);
             let body = [Ball::in_space(&place, radius, &Lattice::new([Some(1.0); D]), 0.0)];
             let mesh = Refinement::to_level(level).mesh(Aabb::unit(), [1; D], [true; D], &body).unwrap();
-            let method = methods_in_sheared_boxes().next().unwrap();
+            let method = IN_SHEARED_BOXES[0];
             let mut solver = FlowSolver::new(method.params::<D>(1e-7)).unwrap();
             (viscosity(&mut solver.prepared(mesh, &body).unwrap()).unwrap() - 1.0) / phi
         }

@@ -3,8 +3,9 @@
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
 use crate::number::{Kind, Number};
@@ -27,8 +28,8 @@ pub const CASE: Case = Case {
     keys: &["dimension", "flow", "tolerance"],
     measures: &["velocity", "pressure"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// The flow, its pressure gradient along x.
@@ -59,20 +60,18 @@ impl<const D: usize> StokesSolution<D> for Channel {
 }
 
 fn tasks(_: Extent) -> Vec<Task> {
-    let mut tasks = Vec::new();
-    for method in METHODS {
-        for (number, channel) in [(0.0, Channel::Couette), (1.0, Channel::Poiseuille)] {
-            for tolerance in TOLERANCES {
-                let at = |dimension| [dimension, number, tolerance];
-                let work = move || measure::<2>(method, channel, tolerance);
-                tasks.push(Task::new(method.name, &at(2.0), work));
-                let work = move || measure::<3>(method, channel, tolerance);
-                tasks.push(Task::new(method.name, &at(3.0), work));
-            }
-        }
-    }
-    tasks
+    let channels = [Channel::Couette, Channel::Poiseuille];
+    let places = iproduct!(METHODS, channels, TOLERANCES, [measure::<2> as Measure, measure::<3>]);
+    let dimensions = [2.0, 3.0].into_iter().cycle();
+    let task =
+        |((method, channel, tolerance, measure), dimension): ((&'static Method, _, _, Measure), f64)| {
+            let at = [dimension, f64::from(channel as u8), tolerance];
+            Task::new(method.name, &at, move || measure(method, channel, tolerance))
+        };
+    places.zip(dimensions).map(task).collect()
 }
+
+type Measure = fn(&Method, Channel, f64) -> Result<Vec<f64>, VerifyError>;
 
 fn measure<const D: usize>(method: &Method, channel: Channel, tolerance: f64) -> Result<Vec<f64>, VerifyError>
 where
@@ -88,38 +87,24 @@ where
     Ok(vec![errors.largest, errors.pressure])
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for (dimension, (flow, name)) in
-        [2.0, 3.0].into_iter().flat_map(|d| [(d, (0.0, "Couette")), (d, (1.0, "Poiseuille"))])
-    {
+    for (dimension, (flow, name)) in iproduct!([2.0, 3.0], [(0.0, "Couette"), (1.0, "Poiseuille")]) {
         let at = [("dimension", dimension), ("flow", flow), ("tolerance", TOLERANCES[2])];
-        for measure in CASE.measures.iter().take(1 + flow as usize) {
-            numbers.extend(METHODS.iter().map(|method| {
-                let value = largest(&table.values(measure, method.name, &at));
-                Number::new(
-                    Kind::Size,
-                    format!("{name} flow, {dimension}D, {measure}, tolerance 1e-12"),
-                    method.name,
-                    value,
-                )
-            }));
+        for (measure, method) in iproduct!(&CASE.measures[..1 + flow as usize], METHODS) {
+            let what = format!("{name} flow, {dimension}D, {measure}, tolerance 1e-12");
+            let value = largest(&table.values(measure, method.name, &at));
+            numbers.push(Number::new(Kind::Size, what, method.name, value));
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
-    Plot::of_methods(
-        "tolerance of the solver",
-        "largest relative error",
-        &["*u* 3D", "*p* 3D"],
-        |method, thing| {
-            let at = [("dimension", 3.0), ("flow", 1.0)];
-            let errors = table.values(CASE.measures[thing], method, &at);
-            table.values("tolerance", method, &at).into_iter().zip(errors).collect()
-        },
-    )
+fn plot(table: &Table) -> Plot {
+    let (x, y) = ("tolerance of the solver", "largest relative error");
+    Plot::of_methods(x, y, &["*u* 3D", "*p* 3D"], |method, thing| {
+        let at = [("dimension", 3.0), ("flow", 1.0)];
+        let errors = table.values(CASE.measures[thing], method, &at);
+        table.values("tolerance", method, &at).into_iter().zip(errors).collect()
+    })
 }

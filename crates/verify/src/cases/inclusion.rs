@@ -5,8 +5,9 @@ use gluey_levelset::Ball;
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams};
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, StokesSolution, ViscousSphere};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::norms::errors;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
@@ -29,8 +30,8 @@ pub const CASE: Case = Case {
     keys: &["dimension", "a/h", "ratio", "position"],
     measures: &["velocity", "stresslet"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Cells per radius and positions, in 2D and 3D.
@@ -44,14 +45,12 @@ fn meshes(extent: Extent) -> [&'static [(f64, usize)]; 2] {
 fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
     for (dimension, meshes) in [2, 3].into_iter().zip(meshes(extent)) {
-        for &(cells, count) in meshes {
-            for (ratio, k) in RATIOS.into_iter().flat_map(|ratio| (0..count).map(move |k| (ratio, k))) {
+        for (&(cells, count), ratio) in iproduct!(meshes, RATIOS) {
+            let measure = if dimension == 2 { disc } else { sphere };
+            tasks.extend((0..count).map(|k| {
                 let at = [f64::from(dimension), cells, ratio, k as f64];
-                tasks.push(Task::new(METHOD, &at, move || match dimension {
-                    2 => disc(cells, ratio, k),
-                    _ => sphere(cells, ratio, k),
-                }));
-            }
+                Task::new(METHOD, &at, move || measure(cells, ratio, k))
+            }));
         }
     }
     tasks
@@ -101,15 +100,14 @@ fn statistic(table: &Table, measure: &str, at: &[(&str, f64)]) -> f64 {
     over_positions(measure, &table.values(measure, METHOD, at))
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for (dimension, ratio) in [2.0, 3.0].into_iter().flat_map(|d| RATIOS.map(|ratio| (d, ratio))) {
+    for (dimension, ratio) in iproduct!([2.0, 3.0], RATIOS) {
         let at = [("dimension", dimension), ("ratio", ratio)];
         let computed = table.steps("a/h", METHOD, &at);
         for &measure in CASE.measures {
             let kind = if measure == "stresslet" { Kind::Error } else { Kind::Size };
-            let of = |cells: f64| statistic(&table, measure, &[&at[..], &[("a/h", cells)]].concat());
+            let of = |cells: f64| statistic(table, measure, &[&at[..], &[("a/h", cells)]].concat());
             let name = format!("{measure}, {dimension}D, {ratio} times");
             for &cells in &computed {
                 numbers.push(Number::new(kind, format!("{name}, a/h = {cells}"), METHOD, of(cells)));
@@ -125,15 +123,14 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["2D, 2 times", "2D, 100 times", "3D, 2 times", "3D, 100 times"];
     Plot::of_methods("cells per radius *a*/*h*", "error of the velocity", &things, |method, thing| {
         if method != METHOD {
             return Vec::new();
         }
         let at = [("dimension", (2 + thing / 2) as f64), ("ratio", if thing % 2 == 0 { 2.0 } else { 100.0 })];
-        let point = |cells| (cells, statistic(&table, "velocity", &[&at[..], &[("a/h", cells)]].concat()));
+        let point = |cells| (cells, statistic(table, "velocity", &[&at[..], &[("a/h", cells)]].concat()));
         table.steps("a/h", method, &at).into_iter().map(point).collect()
     })
 }

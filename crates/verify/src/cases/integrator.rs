@@ -4,10 +4,12 @@ use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 use gluey_testkit::convergence_order;
 use gluey_testkit::reference::pair_3d_trajectory_unbounded;
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::number::{Kind, Number};
 use crate::plot::{Curve, Plot};
+use crate::set_up::exact_row;
 
 const RADIUS: f64 = 0.05;
 /// Before the closest approach: errors made on the way in are not undone on the way out.
@@ -27,24 +29,22 @@ pub const CASE: Case = Case {
     keys: &["time step"],
     measures: &["end", "return"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(_: Extent) -> Vec<Task> {
-    let all = SCHEMES.into_iter().flat_map(|scheme| STEPS.map(|steps| (scheme, steps)));
-    all.map(|((name, scheme), steps)| {
+    let task = |((name, scheme), steps)| {
         let step = END / f64::from(steps);
         Task::new(name, &[step], move || measure(scheme, step, steps))
-    })
-    .collect()
+    };
+    iproduct!(SCHEMES, STEPS).map(task).collect()
 }
 
 fn measure(scheme: Scheme, step: f64, steps: u32) -> Result<Vec<f64>, VerifyError> {
     let reference = pair_3d_trajectory_unbounded()?;
-    let row = reference.column("t")?.iter().position(|&t| t == END);
-    let row = row.ok_or_else(|| VerifyError::NoReference(format!("t = {END}")))?;
-    let exact = Vector::<3>::new(reference.column("x1")?[row], reference.column("y1")?[row], 0.5);
+    let [x, y] = exact_row(&reference, &[("t", END)], ["x1", "y1"])?;
+    let exact = Vector::<3>::new(x, y, 0.5);
     let starts = [Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)];
     let mut particles = starts.map(|x| Particle::new(x, RADIUS));
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
@@ -78,29 +78,25 @@ fn points(table: &Table, measure: &str, scheme: &str) -> Vec<(f64, f64)> {
     table.values("time step", scheme, &[]).into_iter().zip(table.values(measure, scheme, &[])).collect()
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for measure in CASE.measures {
-        for (method, _) in SCHEMES {
-            let (steps, errors): (Vec<f64>, Vec<f64>) = points(&table, measure, method).into_iter().unzip();
-            let what = format!("order of the error at the {measure}");
-            numbers.push(Number::new(Kind::Order, what, method, convergence_order(&steps, &errors)));
-            let what = format!("error at the {measure}, smallest step");
-            let smallest = errors.last().copied().unwrap_or(f64::NAN);
-            numbers.push(Number::new(Kind::Size, what, method, smallest));
-        }
+    for (measure, (method, _)) in iproduct!(CASE.measures, SCHEMES) {
+        let (steps, errors): (Vec<f64>, Vec<f64>) = points(table, measure, method).into_iter().unzip();
+        let what = format!("order of the error at the {measure}");
+        numbers.push(Number::new(Kind::Order, what, method, convergence_order(&steps, &errors)));
+        let what = format!("error at the {measure}, smallest step");
+        let smallest = errors.last().copied().unwrap_or(f64::NAN);
+        numbers.push(Number::new(Kind::Size, what, method, smallest));
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let curve = |color: usize, dashes: usize| Curve {
         label: format!("{}, {}", SCHEMES[color].0, CASE.measures[dashes]),
         color,
         dashes,
-        points: points(&table, CASE.measures[dashes], SCHEMES[color].0).into_iter().rev().collect(),
+        points: points(table, CASE.measures[dashes], SCHEMES[color].0).into_iter().rev().collect(),
     };
     let curves = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(color, dashes)| curve(color, dashes));
     Plot { x: "time step", y: "error in radii", curves: curves.to_vec() }

@@ -6,13 +6,14 @@ use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::superficial_velocity;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::shift;
+use crate::set_up::{exact_row, radius_of, shift};
 use crate::statistics::{mean, rms};
 
 /// Solid fractions on the square and on the simple cubic lattice. At the last one gaps are 0.12 a and 0.03 a.
@@ -31,11 +32,15 @@ pub const CASE: Case = Case {
     keys: &["dimension", "cells", "phi", "position"],
     measures: &["drag", "force"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 const POSITIONS: usize = 2;
+
+fn methods() -> impl Iterator<Item = &'static Method> {
+    METHODS.iter().filter(|method| method.holds_bodies)
+}
 
 /// Finest levels in 2D and 3D.
 fn levels(extent: Extent) -> [&'static [u8]; 2] {
@@ -46,28 +51,15 @@ fn levels(extent: Extent) -> [&'static [u8]; 2] {
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {
-    let [plane, space] = levels(extent);
     let mut tasks = Vec::new();
-    for method in METHODS.iter().filter(|method| method.holds_bodies) {
-        plane.iter().for_each(|&level| tasks.extend(of_mesh::<2>(method, level, FRACTIONS[0])));
-        space.iter().for_each(|&level| tasks.extend(of_mesh::<3>(method, level, FRACTIONS[1])));
+    for (method, d) in iproduct!(methods(), [2, 3]) {
+        let measure = if d == 2 { measure::<2> } else { measure::<3> };
+        for (&level, &phi, k) in iproduct!(levels(extent)[d - 2], FRACTIONS[d - 2], 0..POSITIONS) {
+            let at = [d as f64, 2f64.powi(level.into()), phi, k as f64];
+            tasks.push(Task::new(method.name, &at, move || measure(method, level, phi, k)));
+        }
     }
     tasks
-}
-
-fn of_mesh<const D: usize>(
-    method: &'static Method,
-    level: u8,
-    fractions: &[f64],
-) -> impl Iterator<Item = Task>
-where
-    Dim<D>: Space<D>,
-{
-    let places = fractions.iter().flat_map(|&phi| (0..POSITIONS).map(move |k| (phi, k)));
-    places.map(move |(phi, k)| {
-        let at = [D as f64, 2f64.powi(level.into()), phi, k as f64];
-        Task::new(method.name, &at, move || measure::<D>(method, level, phi, k))
-    })
 }
 
 fn measure<const D: usize>(
@@ -79,7 +71,7 @@ fn measure<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let radius = radius(D, phi);
+    let radius = radius_of(D, phi);
     let center = Vector::repeat(0.5) + shift::<D>(position) * 0.5f64.powi(level.into());
     let ball = [Ball::periodic(center, radius, [Some(1.0); D])];
     let refinement = Refinement { coarsest: level.min(3), ..Refinement::to_level(level) };
@@ -98,60 +90,44 @@ fn along_x<const D: usize>() -> Vector<D> {
     Vector::from_fn(|d, _| if d == 0 { 1.0 } else { 0.0 })
 }
 
-/// Radius of a body that takes this share of the unit box.
-fn radius(dimension: usize, phi: f64) -> f64 {
-    if dimension == 2 { (phi / PI).sqrt() } else { (0.75 * phi / PI).cbrt() }
-}
-
 fn exact(dimension: usize, phi: f64) -> Result<f64, VerifyError> {
-    let (table, name) = match dimension {
-        2 => (lattices_of_discs()?, "drag_F_over_muU"),
-        _ => (lattices_of_spheres()?, "K"),
-    };
     // The first lattice of each table.
-    let lattices = table.column("lattice")?.iter();
-    let row = lattices.zip(table.column("phi")?).position(|(&lattice, &x)| lattice == 0.0 && x == phi);
-    let row = row.ok_or_else(|| VerifyError::NoReference(format!("a solid fraction of {phi}")))?;
-    Ok(table.column(name)?[row])
+    let at = [("lattice", 0.0), ("phi", phi)];
+    let [drag] = match dimension {
+        2 => exact_row(&lattices_of_discs()?, &at, ["drag_F_over_muU"])?,
+        _ => exact_row(&lattices_of_spheres()?, &at, ["K"])?,
+    };
+    Ok(drag)
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in METHODS.iter().filter(|method| method.holds_bodies) {
-        for dimension in [2.0, 3.0] {
-            for cells in table.steps("cells", method.name, &[("dimension", dimension)]) {
-                let at = [("dimension", dimension), ("cells", cells)];
-                for phi in table.steps("phi", method.name, &at) {
-                    let at = [&at[..], &[("phi", phi)]].concat();
-                    let name = format!("drag, {dimension}D, {cells} cells, phi = {phi}");
-                    let drag = mean(&table.values("drag", method.name, &at));
-                    numbers.push(Number::new(Kind::Error, name, method.name, drag));
-                }
+    for (method, dimension) in iproduct!(methods(), [2.0, 3.0]) {
+        for at in table.places(method.name, ["dimension", "cells", "phi"]) {
+            let [(_, own), (_, cells), (_, phi)] = at;
+            if own == dimension {
+                let name = format!("drag, {dimension}D, {cells} cells, phi = {phi}");
+                let drag = mean(&table.values("drag", method.name, &at));
+                numbers.push(Number::new(Kind::Error, name, method.name, drag));
             }
-            let forces = table.values("force", method.name, &[("dimension", dimension)]);
-            let name = format!("force on the body and on the box, {dimension}D");
-            numbers.push(Number::new(Kind::Size, name, method.name, rms(&forces)));
         }
+        let forces = table.values("force", method.name, &[("dimension", dimension)]);
+        let name = format!("force on the body and on the box, {dimension}D");
+        numbers.push(Number::new(Kind::Size, name, method.name, rms(&forces)));
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["2D, *φ* = 0.1", "2D, *φ* = 0.7", "3D, *φ* = 0.064", "3D, *φ* = 0.5"];
-    Plot::of_methods(
-        "cells per edge of the box",
-        "rms relative error of the drag",
-        &things,
-        |method, thing| {
-            let fractions = FRACTIONS[thing / 2];
-            let phi = fractions[if thing % 2 == 0 { 0 } else { fractions.len() - 1 }];
-            let at = [("dimension", (2 + thing / 2) as f64), ("phi", phi)];
-            let error = |cells| rms(&table.values("drag", method, &[&at[..], &[("cells", cells)]].concat()));
-            table.steps("cells", method, &at).into_iter().map(|cells| (cells, error(cells))).collect()
-        },
-    )
+    let (x, y) = ("cells per edge of the box", "rms relative error of the drag");
+    Plot::of_methods(x, y, &things, |method, thing| {
+        let fractions = FRACTIONS[thing / 2];
+        let phi = fractions[if thing % 2 == 0 { 0 } else { fractions.len() - 1 }];
+        let at = [("dimension", (2 + thing / 2) as f64), ("phi", phi)];
+        let error = |cells| rms(&table.values("drag", method, &[&at[..], &[("cells", cells)]].concat()));
+        table.steps("cells", method, &at).into_iter().map(|cells| (cells, error(cells))).collect()
+    })
 }
 
 #[cfg(test)]

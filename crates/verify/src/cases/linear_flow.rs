@@ -4,6 +4,7 @@ use gluey_geom::{Dim, Matrix, Space, Spin};
 use gluey_levelset::Ball;
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, StokesSolution};
+use itertools::iproduct;
 
 use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
@@ -63,12 +64,11 @@ fn sphere_meshes(extent: Extent) -> Meshes {
 type Measure = fn(&'static Method, f64, usize) -> Result<Vec<f64>, VerifyError>;
 
 fn tasks(measure: Measure, meshes: Meshes) -> Vec<Task> {
-    let places = meshes.iter().flat_map(|&(cells, count)| (0..count).map(move |k| (cells, k)));
-    let places: Vec<(f64, usize)> = places.collect();
-    let task = |method: &'static Method, (cells, k): (f64, usize)| {
-        Task::new(method.name, &[cells, k as f64], move || measure(method, cells, k))
+    let of_mesh = |(method, &(cells, count)): (&'static Method, &(f64, usize))| {
+        let task = move |k| Task::new(method.name, &[cells, k as f64], move || measure(method, cells, k));
+        (0..count).map(task)
     };
-    METHODS.iter().flat_map(|method| places.iter().map(move |&place| task(method, place))).collect()
+    iproduct!(METHODS, meshes).flat_map(of_mesh).collect()
 }
 
 fn disc(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
@@ -128,22 +128,17 @@ fn statistic(table: &Table, method: &str, measure: &str, cells: f64) -> f64 {
 
 fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for measure in MEASURES {
-        let kind = if *measure == "stresslet" { Kind::Error } else { Kind::Size };
-        for method in METHODS {
-            let computed = table.steps("a/h", method.name, &[]);
-            let errors: Vec<f64> =
-                computed.iter().map(|&cells| statistic(table, method.name, measure, cells)).collect();
-            for (cells, &value) in computed.iter().zip(&errors) {
-                let what = format!("{measure}, a/h = {cells}");
-                numbers.push(Number::new(kind, what, method.name, value));
-            }
-            let (sizes, magnitudes): (Vec<f64>, Vec<f64>) =
-                computed.iter().zip(&errors).map(|(cells, e)| (1.0 / cells, e.abs())).unzip();
-            let value = convergence_order(&sizes, &magnitudes);
-            let what = format!("{measure}, order");
-            numbers.push(Number::new(Kind::Order, what, method.name, value));
+    for (&measure, method) in iproduct!(MEASURES, METHODS) {
+        let kind = if measure == "stresslet" { Kind::Error } else { Kind::Size };
+        let (mut sizes, mut magnitudes) = (Vec::new(), Vec::new());
+        for cells in table.steps("a/h", method.name, &[]) {
+            let value = statistic(table, method.name, measure, cells);
+            numbers.push(Number::new(kind, format!("{measure}, a/h = {cells}"), method.name, value));
+            sizes.push(1.0 / cells);
+            magnitudes.push(value.abs());
         }
+        let value = convergence_order(&sizes, &magnitudes);
+        numbers.push(Number::new(Kind::Order, format!("{measure}, order"), method.name, value));
     }
     numbers
 }

@@ -5,8 +5,9 @@ use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::{MeshError, TreeMesh};
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution, WavyPressure};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
 use crate::number::{Kind, Number};
@@ -25,21 +26,16 @@ pub const CASE: Case = Case {
     keys: &["dimension", "hanging nodes", "h"],
     measures: &["velocity", "pressure"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn tasks(extent: Extent) -> Vec<Task> {
-    let (plane, space): (&[u8], &[u8]) = match extent {
-        Extent::Quick => (&[3, 4, 5], &[2, 3, 4]),
-        Extent::Full => (&[3, 4, 5, 6], &[2, 3, 4, 5]),
-    };
+    let finest = if extent == Extent::Quick { 5 } else { 6 };
     let mut tasks = Vec::new();
-    for method in METHODS {
-        for hanging in [false, true] {
-            tasks.extend(plane.iter().map(|&level| task::<2>(method, hanging, level)));
-            tasks.extend(space.iter().map(|&level| task::<3>(method, hanging, level)));
-        }
+    for (method, hanging) in iproduct!(METHODS, [false, true]) {
+        tasks.extend((3..=finest).map(|level| task::<2>(method, hanging, level)));
+        tasks.extend((2..finest).map(|level| task::<3>(method, hanging, level)));
     }
     tasks
 }
@@ -76,47 +72,27 @@ where
     Ok(vec![errors.velocity, errors.pressure / errors.pressure_scale])
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
-    let mut numbers = Vec::new();
-    for (dimension, hanging) in [(2.0, 0.0), (2.0, 1.0), (3.0, 0.0), (3.0, 1.0)] {
+fn numbers(table: &Table) -> Vec<Number> {
+    let order = |(dimension, hanging, &measure, method): (f64, f64, &&str, &Method)| {
         let mesh = if hanging == 0.0 { "uniform" } else { "hanging nodes" };
-        for measure in CASE.measures {
-            numbers.extend(METHODS.iter().map(|method| {
-                let points = points(
-                    &table,
-                    measure,
-                    method.name,
-                    &[("dimension", dimension), ("hanging nodes", hanging)],
-                );
-                let finest = &points[points.len().saturating_sub(2)..];
-                let (sizes, errors): (Vec<f64>, Vec<f64>) = finest.iter().copied().unzip();
-                let what = format!("order of the {measure}, {dimension}D, {mesh}");
-                Number::new(Kind::Order, what, method.name, convergence_order(&sizes, &errors))
-            }));
-        }
-    }
-    numbers
+        let at = [("dimension", dimension), ("hanging nodes", hanging)];
+        let points = points(table, measure, method.name, &at);
+        let finest = &points[points.len().saturating_sub(2)..];
+        let (sizes, errors): (Vec<f64>, Vec<f64>) = finest.iter().copied().unzip();
+        let what = format!("order of the {measure}, {dimension}D, {mesh}");
+        Number::new(Kind::Order, what, method.name, convergence_order(&sizes, &errors))
+    };
+    iproduct!([2.0, 3.0], [0.0, 1.0], CASE.measures, METHODS).map(order).collect()
 }
 
 fn points(table: &Table, measure: &str, method: &str, at: &[(&str, f64)]) -> Vec<(f64, f64)> {
     table.values("h", method, at).into_iter().zip(table.values(measure, method, at)).collect()
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
-    Plot::of_methods(
-        "cell size *h*",
-        "relative error",
-        &["*u* 2D", "*u* 3D", "*p* 2D", "*p* 3D"],
-        |method, thing| {
-            let dimension = [2.0, 3.0][thing % 2];
-            points(
-                &table,
-                CASE.measures[thing / 2],
-                method,
-                &[("dimension", dimension), ("hanging nodes", 1.0)],
-            )
-        },
-    )
+fn plot(table: &Table) -> Plot {
+    let things = ["*u* 2D", "*u* 3D", "*p* 2D", "*p* 3D"];
+    Plot::of_methods("cell size *h*", "relative error", &things, |method, thing| {
+        let at = [("dimension", [2.0, 3.0][thing % 2]), ("hanging nodes", 1.0)];
+        points(table, CASE.measures[thing / 2], method, &at)
+    })
 }

@@ -4,7 +4,6 @@ mod cells;
 mod cost;
 mod crystals;
 mod disc;
-mod disc_wall;
 mod discs;
 mod doublet;
 mod equilibrium;
@@ -36,8 +35,8 @@ pub const CASES: &[Case] = &[
     spheres::CASE,
     pair_stresslets::CASE,
     unequal_pairs::CASE,
-    disc_wall::CASE,
-    wall::CASE,
+    wall::DISC,
+    wall::SPHERE,
     lattices::CASE,
     crystals::CASE,
     sheared::CASE,

@@ -7,7 +7,7 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::exact::{PairStrain, pair_in_strain};
 
-use crate::case::{Case, Tables, VerifyError};
+use crate::case::{Case, Table, VerifyError};
 use crate::method::Method;
 use crate::plot::Plot;
 use crate::set_up::{SpherePairs, level, shift, stress_of};
@@ -36,7 +36,7 @@ pub const CASE: Case = Case {
     measures: &["along", "tilting", "across"],
     tasks: |extent| PAIRS.tasks(extent, measure),
     numbers: |tables| PAIRS.numbers(&tables.of(CASE.name), CASE.measures, "stresslet, "),
-    plot,
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
@@ -75,8 +75,7 @@ pub(super) fn axes(position: usize) -> [Vector<3>; 3] {
     [side * turn_cos + other * turn_sin, other * turn_cos - side * turn_sin, line]
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things =
         ["along, *a*/*h* = 1.6", "along, *a*/*h* = 3.2", "tilting, *a*/*h* = 3.2", "across, *a*/*h* = 3.2"];
     Plot::of_methods("gap in radii", "rms relative error of the stresslet", &things, |method, thing| {

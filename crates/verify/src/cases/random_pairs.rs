@@ -5,12 +5,13 @@ use std::f64::consts::PI;
 use gluey_geom::{Aabb, Matrix, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::Method;
+use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{level, methods_in_sheared_boxes, shift, stress_of};
+use crate::set_up::{level, shift, stress_of};
 use crate::statistics::mean;
 
 /// Radius in the unit box, which is periodic.
@@ -36,23 +37,16 @@ pub const CASE: Case = Case {
     keys: &["pair"],
     measures: &["r^-3", "J r^6"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
-fn pair_count(extent: Extent) -> usize {
-    match extent {
-        Extent::Quick => 4,
-        Extent::Full => 12,
-    }
-}
-
 fn tasks(extent: Extent) -> Vec<Task> {
-    let count = pair_count(extent);
-    let task = |method: &'static Method, k: usize| {
+    let count = if extent == Extent::Quick { 4 } else { 12 };
+    let task = |(method, k): (&'static Method, usize)| {
         Task::new(method.name, &[k as f64], move || measure(method, k, count))
     };
-    methods_in_sheared_boxes().flat_map(|method| (0..count).map(move |k| task(method, k))).collect()
+    iproduct!(IN_SHEARED_BOXES, 0..count).map(task).collect()
 }
 
 /// A place in the unit cube and one more number, different for each pair.
@@ -124,10 +118,9 @@ fn coefficient(values: &[f64]) -> [f64; 2] {
     [2.5 + 7.5 * integral, 7.5 / 3.0 * (near - far) * error]
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
+    for method in IN_SHEARED_BOXES {
         let [found, error] = coefficient(&table.values("J r^6", method.name, &[]));
         let miss = "second coefficient less 5.002".to_owned();
         numbers.push(Number::new(Kind::Error, miss, method.name, found - COEFFICIENT));
@@ -136,8 +129,7 @@ fn numbers(tables: &Tables) -> Vec<Number> {
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     Plot::of_methods("r^-3 of the pair", "J r^6", &["pairs"], |method, _| {
         let of = |measure| table.values(measure, method, &[]);
         of("r^-3").into_iter().zip(of("J r^6")).collect()

@@ -1,17 +1,16 @@
 //! Lattices of free bodies in boxes that are sheared.
 
-use std::f64::consts::PI;
-
-use gluey_geom::{Aabb, Dim, Lattice, Space, Vector};
+use gluey_geom::{Dim, Lattice, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Conditions, Flow, FlowSolver, Refinement};
-use gluey_testkit::reference::{Table, sheared_simple_cubic_lattice, sheared_square_lattice};
+use gluey_stokes::{Conditions, Flow, FlowSolver};
+use gluey_testkit::reference::{sheared_simple_cubic_lattice, sheared_square_lattice};
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
-use crate::method::Method;
+use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
-use crate::set_up::{methods_in_sheared_boxes, shift, simple_shear, stress_of};
+use crate::set_up::{exact_row, periodic_mesh, radius_of, shift, simple_shear, stress_of};
 use crate::statistics::rms;
 
 /// Solid fractions of the square and of the simple cubic lattice.
@@ -32,8 +31,8 @@ pub const CASE: Case = Case {
     keys: &["dimension", "cells", "phi", "strain"],
     measures: &["viscosity", "normal", "spin", "routes"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Finest levels in 2D and 3D.
@@ -45,29 +44,15 @@ fn levels(extent: Extent) -> [&'static [u8]; 2] {
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {
-    let [plane, space] = levels(extent);
     let mut tasks = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        plane.iter().for_each(|&level| tasks.extend(of_mesh::<2>(method, level, FRACTIONS[0])));
-        space.iter().for_each(|&level| tasks.extend(of_mesh::<3>(method, level, FRACTIONS[1])));
+    for (method, d) in iproduct!(IN_SHEARED_BOXES, [2, 3]) {
+        let measure = if d == 2 { measure::<2> } else { measure::<3> };
+        for (&level, &phi, strain) in iproduct!(levels(extent)[d - 2], FRACTIONS[d - 2], STRAINS) {
+            let at = [d as f64, 2f64.powi(level.into()), phi, strain];
+            tasks.push(Task::new(method.name, &at, move || measure(method, level, phi, strain)));
+        }
     }
     tasks
-}
-
-/// The formulation that knows boxes that are sheared.
-fn of_mesh<const D: usize>(
-    method: &'static Method,
-    level: u8,
-    fractions: &[f64],
-) -> impl Iterator<Item = Task>
-where
-    Dim<D>: Space<D>,
-{
-    let cells = fractions.iter().flat_map(|&phi| STRAINS.map(|strain| (phi, strain)));
-    cells.map(move |(phi, strain)| {
-        let at = [D as f64, 2f64.powi(level.into()), phi, strain];
-        Task::new(method.name, &at, move || measure::<D>(method, level, phi, strain))
-    })
 }
 
 fn measure<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Vec<f64>, VerifyError>
@@ -91,12 +76,10 @@ fn flow<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Re
 where
     Dim<D>: Space<D>,
 {
-    let radius = if D == 2 { (phi / PI).sqrt() } else { (0.75 * phi / PI).cbrt() };
     let place = Vector::repeat(0.5) + shift::<D>((100.0 * strain) as usize);
     let lattice = Lattice::new([Some(1.0); D]).tilted(strain);
-    let ball = [Ball::in_space(&place, radius, &lattice, 0.0)];
-    let refinement = Refinement { coarsest: level, ..Refinement::to_level(level) };
-    let mesh = refinement.mesh(Aabb::unit(), [1; D], [true; D], &ball)?;
+    let ball = [Ball::in_space(&place, radius_of(D, phi), &lattice, 0.0)];
+    let mesh = periodic_mesh(level, &ball)?;
     let conditions = Conditions::in_linear_flow(&simple_shear::<D>()).with_stress();
     let tolerance = if D == 2 { 1e-9 } else { 1e-7 };
     Ok(FlowSolver::new(method.params::<D>(tolerance))?.solve_under(mesh, &ball, &conditions)?)
@@ -104,40 +87,29 @@ where
 
 /// Relative viscosity, normal stress differences and spin.
 fn exact(dimension: usize, phi: f64, strain: f64) -> Result<[f64; 4], VerifyError> {
-    let (table, spin) = match dimension {
-        2 => (sheared_square_lattice()?, "omega"),
-        _ => (sheared_simple_cubic_lattice()?, "omega_z"),
-    };
-    let [fractions, strains] = [table.column("phi")?, table.column("strain")?];
-    let row = (0..table.row_count()).find(|&row| fractions[row] == phi && strains[row] == strain);
-    let row =
-        row.ok_or_else(|| VerifyError::NoReference(format!("a fraction of {phi} at a strain of {strain}")))?;
-    let value = |table: &Table, name: &str| Ok::<f64, VerifyError>(table.column(name)?[row]);
-    let n2 = if dimension == 3 { value(&table, "N2")? } else { 0.0 };
-    Ok([value(&table, "eta_r")?, value(&table, "N1")?, n2, value(&table, spin)?])
+    let at = [("phi", phi), ("strain", strain)];
+    if dimension == 3 {
+        return exact_row(&sheared_simple_cubic_lattice()?, &at, ["eta_r", "N1", "N2", "omega_z"]);
+    }
+    let [eta, n1, omega] = exact_row(&sheared_square_lattice()?, &at, ["eta_r", "N1", "omega"])?;
+    Ok([eta, n1, 0.0, omega])
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in methods_in_sheared_boxes() {
-        for dimension in [2.0, 3.0] {
-            for cells in table.steps("cells", method.name, &[("dimension", dimension)]) {
-                let at = [("dimension", dimension), ("cells", cells)];
-                for measure in CASE.measures {
-                    let name = format!("{measure}, {dimension}D, {cells} cells");
-                    let values = table.values(measure, method.name, &at);
-                    let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
-                    numbers.push(Number::new(Kind::Error, name, method.name, largest));
-                }
-            }
+    for method in IN_SHEARED_BOXES {
+        for (at, measure) in iproduct!(table.places(method.name, ["dimension", "cells"]), CASE.measures) {
+            let [(_, dimension), (_, cells)] = at;
+            let name = format!("{measure}, {dimension}D, {cells} cells");
+            let values = table.values(measure, method.name, &at);
+            let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+            numbers.push(Number::new(Kind::Error, name, method.name, largest));
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["2D, viscosity", "2D, normal stress", "3D, viscosity", "3D, normal stresses"];
     Plot::of_methods("cells per edge of the box", "rms error", &things, |method, thing| {
         let at = [("dimension", (2 + thing / 2) as f64)];

@@ -4,8 +4,9 @@ use gluey_geom::{Particle, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Hydrodynamics, LinearFlow, PairMobility};
 use gluey_stokes::Refinement;
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{FILM_METHODS, METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -35,8 +36,8 @@ pub const CASE: Case = Case {
     keys: &["a/h", "gap", "angle", "position"],
     measures: &["approach", "line rotation", "spin"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Cells per radius, and positions of the lattice.
@@ -49,17 +50,15 @@ fn meshes(extent: Extent) -> &'static [(f64, usize)] {
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
-    for method in FILM_METHODS {
-        for &(cells, count) in meshes(extent) {
-            for (gap, direction) in places(method) {
-                let is_first = direction == DIRECTIONS[0] && GAPS.contains(&gap);
-                let is_usual = METHODS.iter().any(|usual| usual.name == method.name);
-                let count = if is_first && is_usual { count } else { count.min(FEW) };
-                tasks.extend((0..count).map(|k| {
-                    let at = [cells, gap, direction[0], k as f64];
-                    Task::new(method.name, &at, move || measure(method, &at, direction))
-                }));
-            }
+    for (method, &(cells, count)) in iproduct!(FILM_METHODS, meshes(extent)) {
+        for (gap, direction) in places(method) {
+            let is_first = direction == DIRECTIONS[0] && GAPS.contains(&gap);
+            let is_usual = METHODS.iter().any(|usual| usual.name == method.name);
+            let count = if is_first && is_usual { count } else { count.min(FEW) };
+            tasks.extend((0..count).map(|k| {
+                let at = [cells, gap, direction[0], k as f64];
+                Task::new(method.name, &at, move || measure(method, &at, direction))
+            }));
         }
     }
     tasks
@@ -102,24 +101,20 @@ fn tolerance(gap: f64, direction: [f64; 2]) -> f64 {
     if FILMS.contains(&gap) || direction != DIRECTIONS[0] { 1e-8 } else { 1e-6 }
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in FILM_METHODS {
-        for cells in table.steps("a/h", method.name, &[]) {
-            for (gap, [angle, _]) in places(method) {
-                let oblique = if angle == DIRECTIONS[0][0] { "" } else { ", oblique" };
-                let name = format!("approach, a/h = {cells}, gap {gap} a{oblique}");
-                let at = [("a/h", cells), ("gap", gap), ("angle", angle)];
-                numbers.extend(mean_and_scatter(&table, method.name, "approach", &at, &name));
-            }
+        for at in table.places(method.name, ["a/h", "gap", "angle"]) {
+            let [(_, cells), (_, gap), (_, angle)] = at;
+            let oblique = if angle == DIRECTIONS[0][0] { "" } else { ", oblique" };
+            let name = format!("approach, a/h = {cells}, gap {gap} a{oblique}");
+            numbers.extend(mean_and_scatter(table, method.name, "approach", &at, &name));
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let cells = [1.6, 3.2, 6.4];
     let things = ["*a*/*h* = 1.6", "*a*/*h* = 3.2", "*a*/*h* = 6.4"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {

@@ -4,8 +4,9 @@ use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::TreeMesh;
+use itertools::iproduct;
 
-use crate::case::{Case, Extent, Tables, Task, VerifyError};
+use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
@@ -17,7 +18,7 @@ const TOLERANCES: [f64; 3] = [1e-6, 1e-8, 1e-10];
 /// Names of the operations, by their number in the table.
 const OPERATIONS: [&str; 3] = ["translation by cells", "quarter turn", "reciprocity"];
 /// The last of them, for what holds bodies.
-const RECIPROCITY: f64 = 2.0;
+const RECIPROCITY: usize = 2;
 
 /// The chapter.
 pub const CASE: Case = Case {
@@ -31,44 +32,31 @@ pub const CASE: Case = Case {
     keys: &["dimension", "operation", "tolerance"],
     measures: &["difference"],
     tasks,
-    numbers,
-    plot,
+    numbers: |tables| numbers(&tables.of(CASE.name)),
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 const RADIUS: f64 = 0.1;
 
 fn tasks(_: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
-    for method in METHODS {
-        for tolerance in TOLERANCES {
-            tasks.extend(of_dimension::<2>(method, 5, tolerance));
-            tasks.extend(of_dimension::<3>(method, 4, tolerance));
-            tasks.extend(of_pair::<2>(method, 5, tolerance));
-            tasks.extend(of_pair::<3>(method, 4, tolerance));
+    for (method, tolerance) in iproduct!(METHODS, TOLERANCES) {
+        let plane: [Measure; 3] = [translation::<2>, quarter_turn::<2>, asymmetry::<2>];
+        let space: [Measure; 3] = [translation::<3>, quarter_turn::<3>, asymmetry::<3>];
+        let task = |dimension: f64, level: u8, operation: usize, measure: Measure| {
+            let at = [dimension, operation as f64, tolerance];
+            Task::new(method.name, &at, move || Ok(vec![measure(method, level, tolerance)?]))
+        };
+        tasks.extend((0..2).map(|k| task(2.0, 5, k, plane[k])));
+        tasks.extend((0..2).map(|k| task(3.0, 4, k, space[k])));
+        if method.holds_bodies {
+            tasks.extend([task(2.0, 5, RECIPROCITY, plane[2]), task(3.0, 4, RECIPROCITY, space[2])]);
         }
     }
     tasks
 }
 
-fn of_dimension<const D: usize>(method: &'static Method, level: u8, tolerance: f64) -> [Task; 2]
-where
-    Dim<D>: Space<D>,
-{
-    let at = |operation: f64| [D as f64, operation, tolerance];
-    [
-        Task::new(method.name, &at(0.0), move || Ok(vec![translation::<D>(method, level, tolerance)?])),
-        Task::new(method.name, &at(1.0), move || Ok(vec![quarter_turn::<D>(method, level, tolerance)?])),
-    ]
-}
-
-fn of_pair<const D: usize>(method: &'static Method, level: u8, tolerance: f64) -> Option<Task>
-where
-    Dim<D>: Space<D>,
-{
-    let at = [D as f64, RECIPROCITY, tolerance];
-    let work = move || Ok(vec![asymmetry::<D>(method, level, tolerance)?]);
-    method.holds_bodies.then(|| Task::new(method.name, &at, work))
-}
+type Measure = fn(&Method, u8, f64) -> Result<f64, VerifyError>;
 
 /// Largest difference of the resistance matrix of two unequal bodies from its transpose, over its largest
 /// entry.
@@ -160,25 +148,22 @@ where
     largest(&a.iter().zip(b).flat_map(of_body).collect::<Vec<_>>())
 }
 
-fn numbers(tables: &Tables) -> Vec<Number> {
-    let table = tables.of(CASE.name);
+fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for dimension in [2.0, 3.0] {
-        for (operation, name) in OPERATIONS.iter().enumerate() {
-            let at =
-                [("dimension", dimension), ("operation", operation as f64), ("tolerance", TOLERANCES[2])];
-            let methods = METHODS.iter().filter(|m| m.holds_bodies || operation as f64 != RECIPROCITY);
-            numbers.extend(methods.map(|method| {
-                let value = largest(&table.values("difference", method.name, &at));
-                Number::new(Kind::Size, format!("{name}, {dimension}D, tolerance 1e-10"), method.name, value)
-            }));
+    for (dimension, (operation, name), method) in
+        iproduct!([2.0, 3.0], OPERATIONS.iter().enumerate(), METHODS)
+    {
+        let at = [("dimension", dimension), ("operation", operation as f64), ("tolerance", TOLERANCES[2])];
+        if method.holds_bodies || operation != RECIPROCITY {
+            let value = largest(&table.values("difference", method.name, &at));
+            let what = format!("{name}, {dimension}D, tolerance 1e-10");
+            numbers.push(Number::new(Kind::Size, what, method.name, value));
         }
     }
     numbers
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     Plot::of_methods("tolerance of the solver", "largest difference, 3D", &OPERATIONS, |method, operation| {
         let at = [("dimension", 3.0), ("operation", operation as f64)];
         let points = table.values("tolerance", method, &at).into_iter();

@@ -7,10 +7,10 @@ use gluey_testkit::exact::PairStrain;
 use gluey_testkit::reference::spheres_one_to_two;
 
 use super::pair_stresslets::axes;
-use crate::case::{Case, Tables, VerifyError};
+use crate::case::{Case, Table, VerifyError};
 use crate::method::Method;
 use crate::plot::Plot;
-use crate::set_up::{SpherePairs, cells_of_row, level, shift};
+use crate::set_up::{SpherePairs, exact_row, level, shift};
 use crate::statistics::rms;
 
 /// Radii in the unit box, which is periodic.
@@ -35,7 +35,7 @@ pub const CASE: Case = Case {
     measures: &["approach", "turning", "spin of the smaller", "spin of the larger", "pushed", "dragged"],
     tasks: |extent| PAIRS.tasks(extent, measure),
     numbers: |tables| PAIRS.numbers(&tables.of(CASE.name), CASE.measures, ""),
-    plot,
+    plot: |tables| plot(&tables.of(CASE.name)),
 };
 
 /// Columns of the reference, in the order of the measures.
@@ -86,14 +86,10 @@ fn wrenches(along: &Vector<3>, gap: f64, force: &Vector<3>) -> [Wrench<3>; 2] {
 }
 
 fn exact(gap: f64) -> Result<[f64; 6], VerifyError> {
-    let table = spheres_one_to_two()?;
-    let row = table.column("gap")?.iter().position(|&value| value == gap);
-    let row = row.ok_or_else(|| VerifyError::NoReference(format!("spheres at a gap of {gap}")))?;
-    Ok(cells_of_row(&table, row, COLUMNS)?)
+    exact_row(&spheres_one_to_two()?, &[("gap", gap)], COLUMNS)
 }
 
-fn plot(tables: &Tables) -> Plot {
-    let table = tables.of(CASE.name);
+fn plot(table: &Table) -> Plot {
     let things = ["approach", "turning", "pushed", "dragged"];
     Plot::of_methods("gap in smaller radii", "rms relative error, *a*/*h* = 3.2", &things, |method, thing| {
         let error = |gap| rms(&table.values(things[thing], method, &[("a/h", MESHES[1]), ("gap", gap)]));
