@@ -22,6 +22,13 @@ pub enum Extent {
     Full,
 }
 
+impl Extent {
+    /// What is for this extent.
+    pub fn pick<T>(self, quick: T, full: T) -> T {
+        if self == Self::Quick { quick } else { full }
+    }
+}
+
 /// Why a computation has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
@@ -100,9 +107,9 @@ impl Task {
     /// # Errors
     /// The errors of the work.
     pub fn run(&self) -> Result<Row, VerifyError> {
-        let clock = CpuClock::start();
+        let start = cpu_seconds();
         let values = (self.work)()?;
-        Ok(Row { method: self.method, at: self.at.clone(), values, cpu_s: clock.seconds() })
+        Ok(Row { method: self.method, at: self.at.clone(), values, cpu_s: cpu_seconds() - start })
     }
 }
 
@@ -146,14 +153,13 @@ impl Table {
     /// The values of a measure, or of [`CPU_TIME`], in the rows of a method where keys have these values.
     /// A name that the table does not have has no values.
     pub fn values(&self, measure: &str, method: &str, at: &[(&str, f64)]) -> Vec<f64> {
-        let rows = self.rows.iter().filter(|row| row.method == method && self.is_at(row, at));
-        rows.filter_map(|row| self.value(row, measure)).collect()
+        let is_there = |row: &&Row| row.method == method && self.is_at(row, at);
+        self.rows.iter().filter(is_there).filter_map(|row| self.value(row, measure)).collect()
     }
 
     /// The different values of a key in the rows of a method, in order.
     pub fn steps(&self, key: &str, method: &str, at: &[(&str, f64)]) -> Vec<f64> {
-        let rows = self.rows.iter().filter(|row| row.method == method && self.is_at(row, at));
-        let mut values: Vec<f64> = rows.filter_map(|row| self.value(row, key)).collect();
+        let mut values = self.values(key, method, at);
         values.sort_by(f64::total_cmp);
         values.dedup();
         values

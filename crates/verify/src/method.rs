@@ -36,18 +36,20 @@ const UNFITTED_BARE: Method = Method {
     formulation: || Formulation::Unfitted { lubrication: Lubrication::None },
 };
 
-/// What chapters without thin films compare. Another one is a line here and in [`FILM_METHODS`]; its limits
-/// are lines of `limits.csv`.
+/// What chapters without thin films compare. Another one is a line here and in [`FILM_METHODS`], and in
+/// [`IN_SHEARED_BOXES`] if it knows them; its limits are lines of `limits.csv`.
 pub const METHODS: &[Method] = &[PAPER, UNFITTED];
 
-/// Those that know boxes that are sheared for ever.
+/// Those of [`METHODS`] that know boxes that are sheared for ever.
 pub const IN_SHEARED_BOXES: &[Method] = &[UNFITTED];
-
-/// Those that can hold bodies.
-pub const HOLDING: &[Method] = &[UNFITTED, UNFITTED_BARE];
 
 /// What chapters with thin films compare.
 pub const FILM_METHODS: &[Method] = &[PAPER, UNFITTED, UNFITTED_BARE];
+
+/// Those of these that can hold bodies.
+pub fn holding(methods: &'static [Method]) -> impl Iterator<Item = &'static Method> + Clone {
+    methods.iter().filter(|method| method.holds_bodies)
+}
 
 impl Method {
     /// Parameters of its flows in `D` dimensions, in a fluid of viscosity one, by the usual solver.

@@ -11,7 +11,9 @@ use crate::case::{Case, Extent, Table, Task, VerifyError};
 use crate::method::{FILM_METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
-use crate::set_up::{PairMotion, RADIUS, couette, level, mean_and_scatter, mesh, pair, shift, solve};
+use crate::set_up::{
+    PairMotion, RADIUS, couette, exact_row, level, mean_and_scatter, mesh, pair, shift, solve,
+};
 use crate::statistics::rms;
 
 const POSITIONS: usize = 8;
@@ -44,10 +46,7 @@ pub const CASE: Case = Case {
 
 /// Cells per radius of the meshes of an extent.
 fn cells_per_radius(extent: Extent) -> &'static [f64] {
-    match extent {
-        Extent::Quick => &[3.2, 6.4, 12.8],
-        Extent::Full => &[3.2, 6.4, 12.8, 25.6],
-    }
+    extent.pick(&[3.2, 6.4, 12.8], &[3.2, 6.4, 12.8, 25.6])
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {
@@ -85,21 +84,16 @@ fn measure(method: &Method, &[cells, gap, angle, position]: &[f64; 4]) -> Result
 /// The exact motion. At 135 degrees it is that at 45 with the speed reversed; the line and the discs turn
 /// with the flow there.
 fn exact(gap: f64, angle: f64) -> Result<PairMotion, VerifyError> {
-    let table = pair_2d_velocities()?;
     let (degrees, sign) = if angle == PRESSED { (45.0, -1.0) } else { (angle, 1.0) };
-    let (gaps, angles) = (table.column("xi")?, table.column("theta_deg")?);
-    let row = (0..table.row_count()).find(|&row| gaps[row] == gap && angles[row] == degrees);
-    match row {
-        Some(row) => Ok(PairMotion {
-            normal_speed: sign * table.column("vn")?[row],
-            line_rotation: table.column("rot")?[row],
-            spin: table.column("omega1")?[row],
-        }),
-        None if angle == PRESSED && gap <= 0.2 => {
+    let at = [("xi", gap), ("theta_deg", degrees)];
+    match exact_row(&pair_2d_velocities()?, &at, ["vn", "rot", "omega1"]) {
+        Err(VerifyError::NoReference(_)) if angle == PRESSED && gap <= 0.2 => {
             let normal_speed = -holding_force(gap)? / normal_resistance(gap)? * RADIUS;
             Ok(PairMotion { normal_speed, line_rotation: -0.5, spin: -0.5 })
         }
-        None => Err(VerifyError::NoReference(format!("a gap of {gap} radii at {angle} degrees"))),
+        row => {
+            row.map(|[vn, line_rotation, spin]| PairMotion { normal_speed: sign * vn, line_rotation, spin })
+        }
     }
 }
 

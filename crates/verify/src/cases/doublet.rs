@@ -36,10 +36,7 @@ pub const CASE: Case = Case {
 
 /// Cells per radius and time step.
 fn runs(extent: Extent) -> &'static [(f64, f64)] {
-    match extent {
-        Extent::Quick => &[(6.4, 0.1), (12.8, 0.1)],
-        Extent::Full => &[(6.4, 0.1), (12.8, 0.1), (12.8, 0.05), (25.6, 0.1)],
-    }
+    extent.pick(&[(6.4, 0.1), (12.8, 0.1)], &[(6.4, 0.1), (12.8, 0.1), (12.8, 0.05), (25.6, 0.1)])
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {

@@ -36,10 +36,10 @@ pub const CASE: Case = Case {
 
 /// Cells per radius and positions, in 2D and 3D.
 fn meshes(extent: Extent) -> [&'static [(f64, usize)]; 2] {
-    match extent {
-        Extent::Quick => [&[(3.2, 4), (6.4, 4)], &[(1.6, 1)]],
-        Extent::Full => [&[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)], &[(1.6, 4), (3.2, 2)]],
-    }
+    extent.pick(
+        [&[(3.2, 4), (6.4, 4)], &[(1.6, 1)]],
+        [&[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)], &[(1.6, 4), (3.2, 2)]],
+    )
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {

@@ -9,7 +9,7 @@ use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
 use itertools::iproduct;
 
 use crate::case::{Case, Extent, Table, Task, VerifyError};
-use crate::method::{METHODS, Method};
+use crate::method::{METHODS, Method, holding};
 use crate::norms::superficial_velocity;
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
@@ -38,21 +38,14 @@ pub const CASE: Case = Case {
 
 const POSITIONS: usize = 2;
 
-fn methods() -> impl Iterator<Item = &'static Method> {
-    METHODS.iter().filter(|method| method.holds_bodies)
-}
-
 /// Finest levels in 2D and 3D.
 fn levels(extent: Extent) -> [&'static [u8]; 2] {
-    match extent {
-        Extent::Quick => [&[4, 5, 6], &[3, 4]],
-        Extent::Full => [&[4, 5, 6, 7], &[3, 4, 5]],
-    }
+    extent.pick([&[4, 5, 6], &[3, 4]], [&[4, 5, 6, 7], &[3, 4, 5]])
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
-    for (method, d) in iproduct!(methods(), [2, 3]) {
+    for (method, d) in iproduct!(holding(METHODS), [2, 3]) {
         let measure = if d == 2 { measure::<2> } else { measure::<3> };
         for (&level, &phi, k) in iproduct!(levels(extent)[d - 2], FRACTIONS[d - 2], 0..POSITIONS) {
             let at = [d as f64, 2f64.powi(level.into()), phi, k as f64];
@@ -102,7 +95,7 @@ fn exact(dimension: usize, phi: f64) -> Result<f64, VerifyError> {
 
 fn numbers(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for (method, dimension) in iproduct!(methods(), [2.0, 3.0]) {
+    for (method, dimension) in iproduct!(holding(METHODS), [2.0, 3.0]) {
         for at in table.places(method.name, ["dimension", "cells", "phi"]) {
             let [(_, own), (_, cells), (_, phi)] = at;
             if own == dimension {

@@ -48,17 +48,11 @@ pub const SPHERE: Case = Case {
 };
 
 fn disc_meshes(extent: Extent) -> Meshes {
-    match extent {
-        Extent::Quick => &[(3.2, 8), (6.4, 8), (12.8, 4)],
-        Extent::Full => &[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)],
-    }
+    extent.pick(&[(3.2, 8), (6.4, 8), (12.8, 4)], &[(3.2, 8), (6.4, 8), (12.8, 4), (25.6, 2)])
 }
 
 fn sphere_meshes(extent: Extent) -> Meshes {
-    match extent {
-        Extent::Quick => &[(1.6, 8), (3.2, 2)],
-        Extent::Full => &[(1.6, 16), (3.2, 4), (4.8, 1)],
-    }
+    extent.pick(&[(1.6, 8), (3.2, 2)], &[(1.6, 16), (3.2, 4), (4.8, 1)])
 }
 
 type Measure = fn(&'static Method, f64, usize) -> Result<Vec<f64>, VerifyError>;

@@ -37,10 +37,7 @@ pub const CASE: Case = Case {
 
 /// Finest levels in 2D and 3D.
 fn levels(extent: Extent) -> [&'static [u8]; 2] {
-    match extent {
-        Extent::Quick => [&[4, 5], &[3]],
-        Extent::Full => [&[4, 5, 6], &[3, 4]],
-    }
+    extent.pick([&[4, 5], &[3]], [&[4, 5, 6], &[3, 4]])
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {

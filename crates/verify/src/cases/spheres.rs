@@ -42,10 +42,7 @@ pub const CASE: Case = Case {
 
 /// Cells per radius, and positions of the lattice.
 fn meshes(extent: Extent) -> &'static [(f64, usize)] {
-    match extent {
-        Extent::Quick => &[(1.6, 8), (3.2, 6)],
-        Extent::Full => &[(1.6, 27), (3.2, 27), (6.4, 8)],
-    }
+    extent.pick(&[(1.6, 8), (3.2, 6)], &[(1.6, 27), (3.2, 27), (6.4, 8)])
 }
 
 fn tasks(extent: Extent) -> Vec<Task> {

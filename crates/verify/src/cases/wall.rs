@@ -7,8 +7,8 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
-use crate::method::{HOLDING, Method};
+use crate::case::{Case, Table, Task, VerifyError};
+use crate::method::{FILM_METHODS, Method, holding};
 use crate::number::{Kind, Number};
 use crate::plot::Plot;
 use crate::set_up::{level, mean_and_scatter, mesh, shift};
@@ -36,10 +36,7 @@ pub const DISC: Case = Case {
            what they have, over 4 pi mu a. The other walls are 160 radii away.",
     keys: &["a/h", "gap", "position"],
     measures: &["force across", "force along", "torque", "coupling"],
-    tasks: |extent| match extent {
-        Extent::Quick => tasks(disc, &[(3.2, 4), (6.4, 2)]),
-        Extent::Full => tasks(disc, &[(3.2, 8), (6.4, 4), (12.8, 4)]),
-    },
+    tasks: |extent| tasks(disc, extent.pick(&[(3.2, 4), (6.4, 2)], &[(3.2, 8), (6.4, 4), (12.8, 4)])),
     numbers: |tables| numbers_of_disc(&tables.of(DISC.name)),
     plot: |tables| plot(&tables.of(DISC.name), "rms relative error, *a*/*h* = 6.4", 6.4),
 };
@@ -55,10 +52,7 @@ pub const SPHERE: Case = Case {
            torque on the sphere that is moved along is the force on the one that turns: their difference over 6 pi mu a^2.",
     keys: &["a/h", "gap", "position"],
     measures: &["force across", "force along", "torque", "reciprocity"],
-    tasks: |extent| match extent {
-        Extent::Quick => tasks(sphere, &[(1.6, 3), (3.2, 2)]),
-        Extent::Full => tasks(sphere, &[(1.6, 6), (3.2, 4), (6.4, 2)]),
-    },
+    tasks: |extent| tasks(sphere, extent.pick(&[(1.6, 3), (3.2, 2)], &[(1.6, 6), (3.2, 4), (6.4, 2)])),
     numbers: |tables| numbers_of_sphere(&tables.of(SPHERE.name)),
     plot: |tables| plot(&tables.of(SPHERE.name), "rms relative error, *a*/*h* = 3.2", 3.2),
 };
@@ -92,7 +86,7 @@ type Measure = fn(&Method, f64, usize, usize) -> Result<Vec<f64>, VerifyError>;
 /// mesh here resolves, is asked only of what lubricates.
 fn tasks(measure: Measure, meshes: &[(f64, usize)]) -> Vec<Task> {
     let mut tasks = Vec::new();
-    for (method, &(cells, count)) in iproduct!(HOLDING, meshes) {
+    for (method, &(cells, count)) in iproduct!(holding(FILM_METHODS), meshes) {
         let places = if method.lubricates { ALPHAS.len() } else { ALPHAS.len() - 1 };
         tasks.extend(iproduct!(0..places, 0..count).map(|(place, k)| {
             let at = [cells, gap(ALPHAS[place]), k as f64];
@@ -169,7 +163,7 @@ fn of_place(table: &Table, method: &Method, at: &[(&'static str, f64); 2]) -> Ve
 
 fn numbers_of_disc(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in HOLDING {
+    for method in holding(FILM_METHODS) {
         for at in table.places(method.name, ["a/h", "gap"]) {
             numbers.extend(of_place(table, method, &at));
             let [(_, cells), (_, gap)] = at;
@@ -183,7 +177,7 @@ fn numbers_of_disc(table: &Table) -> Vec<Number> {
 
 fn numbers_of_sphere(table: &Table) -> Vec<Number> {
     let mut numbers = Vec::new();
-    for method in HOLDING {
+    for method in holding(FILM_METHODS) {
         let places = table.places(method.name, ["a/h", "gap"]);
         numbers.extend(places.iter().flat_map(|at| of_place(table, method, at)));
         let asymmetry = largest(&table.values("reciprocity", method.name, &[]));
