@@ -2,8 +2,9 @@
 
 use std::num::NonZeroUsize;
 
-use gluey::{Case, CaseError, RunError, RunOptions, RunReport, Silent};
-use serde::Serialize;
+use anyhow::Context;
+use gluey::{Case, CaseError, RunOptions, RunReport, Silent};
+use serde_json::{Map, json};
 
 /// Strain of a step.
 const STEP: f64 = 0.025;
@@ -37,50 +38,10 @@ pub struct Options {
     seed: u64,
 }
 
-/// Why there is no measurement.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// The options make no case.
-    #[error("these options make no case: {0}")]
-    Case(#[from] CaseError),
-    /// A run failed.
-    #[error("{0}: {cause}", cause = std::error::Error::source(.0).map_or_else(String::new, ToString::to_string))]
-    Run(#[from] RunError),
-    /// No folder for results.
-    #[error("no folder for the results: {0}")]
-    Folder(#[from] std::io::Error),
-    /// No threads.
-    #[error("no pool of threads: {0}")]
-    Pool(#[from] rayon::ThreadPoolBuildError),
-    /// The numbers could not be written.
-    #[error("the numbers cannot be written: {0}")]
-    Json(#[from] serde_json::Error),
-}
-
-/// The line. Seconds are wall time unless their name says CPU.
-#[derive(Serialize)]
-struct Measured {
-    dimension: usize,
-    particles: usize,
-    volume_fraction: f64,
-    cells: usize,
-    unknowns: usize,
-    threads: usize,
-    steps: usize,
-    first_step_s: f64,
-    step_s: f64,
-    step_cpu_s: f64,
-    step_cpu_s_per_million_unknowns: f64,
-    /// Of a step after the first.
-    phases_s: serde_json::Map<String, serde_json::Value>,
-    peak_memory_bytes: Option<u64>,
-    peak_bytes_per_unknown: Option<u64>,
-    steps_to_strain_1: f64,
-}
-
-/// Measures, and prints the line.
-pub fn run(options: &Options) -> Result<(), BenchError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build()?;
+/// Measures, and prints the line. Seconds are wall time unless their name says CPU.
+pub fn run(options: &Options) -> anyhow::Result<()> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
+    let pool = pool.context("no pool of threads")?;
     let (first, one) = pool.install(|| timed_run(options, 1))?;
     let (report, all) = pool.install(|| timed_run(options, 1 + options.steps.get()))?;
     let steps = options.steps.get() as f64;
@@ -88,31 +49,32 @@ pub fn run(options: &Options) -> Result<(), BenchError> {
     let per_step = |name: &str| (seconds(&report, name) - seconds(&first, name)) / steps;
     let phases = report.phases.iter().map(|(name, _)| (name.clone(), per_step(name).into()));
     let memory = gluey::memory::peak();
-    let measured = Measured {
-        dimension: options.dimension,
-        particles: options.count,
-        volume_fraction: options.fraction,
-        cells: report.cells,
-        unknowns: report.dofs,
-        threads: options.threads.get(),
-        steps: options.steps.get(),
-        first_step_s: first.wall_s,
-        step_s: (report.wall_s - first.wall_s) / steps,
-        step_cpu_s: cpu,
-        step_cpu_s_per_million_unknowns: cpu / (1e-6 * report.dofs as f64),
-        phases_s: phases.collect(),
-        peak_memory_bytes: memory,
-        peak_bytes_per_unknown: memory.map(|bytes| bytes / report.dofs.max(1) as u64),
-        steps_to_strain_1: 1.0 / STEP,
-    };
-    println!("{}", serde_json::to_string(&measured)?);
+    let measured = json!({
+        "dimension": options.dimension,
+        "particles": options.count,
+        "volume_fraction": options.fraction,
+        "cells": report.cells,
+        "unknowns": report.dofs,
+        "threads": options.threads,
+        "steps": options.steps,
+        "first_step_s": first.wall_s,
+        "step_s": (report.wall_s - first.wall_s) / steps,
+        "step_cpu_s": cpu,
+        "step_cpu_s_per_million_unknowns": cpu / (1e-6 * report.dofs as f64),
+        // Of a step after the first.
+        "phases_s": phases.collect::<Map<_, _>>(),
+        "peak_memory_bytes": memory,
+        "peak_bytes_per_unknown": memory.map(|bytes| bytes / report.dofs.max(1) as u64),
+        "steps_to_strain_1": 1.0 / STEP,
+    });
+    println!("{measured}");
     Ok(())
 }
 
 /// A run of so many steps, and its CPU seconds.
-fn timed_run(options: &Options, steps: usize) -> Result<(RunReport, f64), BenchError> {
-    let case = case(options, steps)?;
-    let folder = tempfile::tempdir()?;
+fn timed_run(options: &Options, steps: usize) -> anyhow::Result<(RunReport, f64)> {
+    let case = case(options, steps).context("these options make no case")?;
+    let folder = tempfile::tempdir().context("no folder for the results")?;
     let start = cpu_seconds();
     let report = gluey::run(&case, &RunOptions::csv(folder.path().join("bench.csv")), &Silent)?;
     Ok((report, cpu_seconds() - start))

@@ -1,8 +1,6 @@
 //! `cargo xtask fuzz`: the tests of mutated input, with more of it.
 
-use std::io;
-use std::path::Path;
-use std::process::Command;
+use crate::{program, workspace_root};
 
 /// How much is tried.
 #[derive(clap::Args)]
@@ -22,18 +20,13 @@ pub struct Options {
 }
 
 /// Runs the tests; their summaries go to standard output.
-pub fn run(root: &Path, options: &Options) -> io::Result<()> {
+pub fn run(options: &Options) -> anyhow::Result<()> {
     let Options { cases, checkpoints, tables, seed } = options;
-    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["test", "--release", "--workspace", "--test", "fuzz"]);
-    command.args(["--", "--nocapture"]).current_dir(root);
+    let mut cargo = program::cargo("test --release --workspace --test fuzz -- --nocapture");
+    cargo.current_dir(workspace_root());
     for (name, value) in [("CASES", cases), ("CHECKPOINTS", checkpoints), ("TABLES", tables), ("SEED", seed)]
     {
-        command.env(format!("GLUEY_FUZZ_{name}"), value.to_string());
+        cargo.env(format!("GLUEY_FUZZ_{name}"), value.to_string());
     }
-    match command.status()?.success() {
-        true => Ok(()),
-        false => Err(io::Error::other("a mutated file was not refused as it should be; see above")),
-    }
+    program::run(&mut cargo, "a mutated file was not refused as it should be; see above")
 }

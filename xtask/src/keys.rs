@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use gluey::Case;
@@ -28,8 +27,8 @@ pub fn files() -> BTreeMap<PathBuf, String> {
 }
 
 /// Writes the files.
-pub fn write(root: &Path) -> io::Result<()> {
-    files().into_iter().try_for_each(|(path, text)| fs::write(root.join(path), text))
+pub fn write(root: &Path) -> anyhow::Result<()> {
+    Ok(files().into_iter().try_for_each(|(path, text)| fs::write(root.join(path), text))?)
 }
 
 fn page() -> String {

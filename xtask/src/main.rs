@@ -2,14 +2,13 @@
 //! `cargo xtask bench-stokes`, `cargo xtask bench-suspension`, `cargo xtask keys`, `cargo xtask fuzz`,
 //! `cargo xtask python`, `cargo xtask test-mpi`, `cargo xtask mdbook`, `cargo xtask tidy`, `cargo xtask ci`.
 
-mod bench;
 mod bench_suspension;
 mod book;
 mod ci;
-mod figures;
 mod fuzz;
 mod keys;
 mod mdbook;
+mod program;
 mod python;
 mod reproduce;
 mod study;
@@ -22,11 +21,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use gluey_verify::Outcome;
-
-use reproduce::plan::FigureName;
-use reproduce::summary::Summary;
-use reproduce::verdict::{self, Kind};
 
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask", about = "Project tasks of gluey", max_term_width = 100)]
@@ -38,11 +32,11 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Task {
     /// Compute and draw the figures of Verdon et al. (2010).
-    ReproduceFigures(ReproduceArguments),
+    ReproduceFigures(reproduce::Options),
     /// Compute what has an exact solution, with all formulations, and hold it against limits.
-    Verify(VerifyArguments),
+    Verify(verify::Options),
     /// Compute a study of suspensions: a table, pictures and a page beside the literature.
-    Study(StudyArguments),
+    Study(study::Options),
     /// Time one solve of the Stokes core and print one line of JSON.
     #[command(disable_help_flag = true)]
     BenchStokes {
@@ -80,82 +74,31 @@ enum Task {
     },
 }
 
-#[derive(clap::Args)]
-struct ReproduceArguments {
-    /// A coarse mesh, large time steps and shorter runs: half the time.
-    #[arg(long)]
-    quick: bool,
-    /// Only these figures, separated by commas.
-    #[arg(long, value_delimiter = ',', value_name = "FIGURES")]
-    only: Vec<FigureName>,
-    /// Output folder.
-    #[arg(long, default_value = "target/figures", value_name = "DIR")]
-    out: PathBuf,
-    /// Runs at a time [default: number of cores].
-    #[arg(long, value_name = "N")]
-    jobs: Option<std::num::NonZeroUsize>,
-}
-
-#[derive(clap::Args)]
-struct VerifyArguments {
-    /// Fewer positions and coarser meshes: a minute.
-    #[arg(long)]
-    quick: bool,
-    /// Only these cases, separated by commas; `cost` needs `discs` and `spheres`.
-    #[arg(long, value_delimiter = ',', value_name = "CASES")]
-    only: Vec<String>,
-    /// Output folder.
-    #[arg(long, default_value = "target/verification", value_name = "DIR")]
-    out: PathBuf,
-}
-
-#[derive(clap::Args)]
-struct StudyArguments {
-    /// The study.
-    name: study::Name,
-    /// Few points and short runs: minutes.
-    #[arg(long)]
-    quick: bool,
-    /// Output folder [default: target/studies/NAME].
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Runs at a time [default: number of cores].
-    #[arg(long, value_name = "N")]
-    jobs: Option<std::num::NonZeroUsize>,
+/// Runs a task; whether what it checks holds.
+fn run(task: Task) -> anyhow::Result<bool> {
+    match task {
+        Task::ReproduceFigures(options) => return reproduce::run(options),
+        Task::Verify(options) => return verify::run(&options),
+        Task::Study(options) => return study::run(&options),
+        Task::Tidy => return tidy::run(&workspace_root()),
+        Task::BenchStokes { options } => bench_stokes(&options),
+        Task::BenchSuspension(options) => bench_suspension::run(&options),
+        Task::Keys => keys::write(&workspace_root()),
+        Task::Fuzz(options) => fuzz::run(&options),
+        Task::Python { python } => python::run(&workspace_root(), python.as_deref()),
+        Task::Mdbook { words } => mdbook::run(&words),
+        Task::TestMpi => test_mpi::run(&workspace_root()),
+        Task::Ci { full } => ci::run(&workspace_root(), full),
+    }
+    .map(|()| true)
 }
 
 fn main() -> ExitCode {
-    match Arguments::parse().task {
-        Task::ReproduceFigures(arguments) => reproduce_figures(arguments),
-        Task::Verify(arguments) => verify(arguments),
-        Task::Study(arguments) => study(arguments),
-        Task::BenchStokes { options } => outcome(bench::run(&workspace_root(), &options)),
-        Task::BenchSuspension(options) => outcome(bench_suspension::run(&options)),
-        Task::Keys => outcome(keys::write(&workspace_root())),
-        Task::Fuzz(options) => outcome(fuzz::run(&workspace_root(), &options)),
-        Task::Python { python } => outcome(python::run(&workspace_root(), python.as_deref())),
-        Task::Mdbook { words } => outcome(mdbook::run(&words)),
-        Task::TestMpi => outcome(test_mpi::run(&workspace_root())),
-        Task::Tidy => tidy(),
-        Task::Ci { full } => outcome(ci::run(&workspace_root(), full)),
-    }
-}
-
-fn tidy() -> ExitCode {
-    match tidy::offences(&workspace_root()) {
-        Ok(offences) => {
-            offences.iter().for_each(|offence| eprintln!("{offence}"));
-            if offences.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-        }
-        Err(error) => outcome(Err(error)),
-    }
-}
-
-fn outcome<E: std::error::Error>(result: Result<(), E>) -> ExitCode {
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
+    match run(Arguments::parse().task) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", book::chain(&*error));
             ExitCode::FAILURE
         }
     }
@@ -167,100 +110,9 @@ fn workspace_root() -> PathBuf {
     own.parent().expect("xtask lies in the workspace").to_owned()
 }
 
-fn verify(arguments: VerifyArguments) -> ExitCode {
-    let VerifyArguments { quick, only, out } = arguments;
-    let options = verify::Options { quick, only, root: workspace_root(), out };
-    match verify::verify(&options) {
-        Ok(book) => {
-            println!("{}", book.account());
-            println!("tables, pictures and index.html are in {}", options.out.display());
-            if book.holds() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-        }
-        Err(error) => outcome(Err(error)),
-    }
-}
-
-fn study(arguments: StudyArguments) -> ExitCode {
-    let StudyArguments { name, quick, out, jobs: wanted } = arguments;
-    let folder = if quick { "target/studies/quick" } else { "target/studies" };
-    let out = out.unwrap_or_else(|| Path::new(folder).join(name.as_str()));
-    let options = study::Options { name, quick, root: workspace_root(), out, jobs: jobs(wanted) };
-    match study::study(&options) {
-        Ok(failures) => {
-            println!("table.csv, pictures and index.html are in {}", options.out.display());
-            failures.iter().for_each(|failure| eprintln!("error: {}: {}", failure.what, failure.error));
-            if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-        }
-        Err(error) => outcome(Err(error)),
-    }
-}
-
-/// Runs at a time: as many as wanted, else one for each core.
-fn jobs(wanted: Option<std::num::NonZeroUsize>) -> usize {
-    wanted.or(std::thread::available_parallelism().ok()).map_or(1, usize::from)
-}
-
-fn reproduce_figures(arguments: ReproduceArguments) -> ExitCode {
-    let options = reproduce::Options {
-        quick: arguments.quick,
-        figures: chosen(arguments.only),
-        root: workspace_root(),
-        out: arguments.out,
-        jobs: jobs(arguments.jobs),
-    };
-    match reproduce::reproduce(&options) {
-        Ok(summary) => {
-            print_rows(&summary);
-            println!("\nfigures, runs, summary.json and index.html are in {}", options.out.display());
-            print_outcome(&summary)
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-/// The figures asked for, each once, in the paper's order; all if none was named.
-fn chosen(only: Vec<FigureName>) -> Vec<FigureName> {
-    FigureName::ALL.into_iter().filter(|figure| only.is_empty() || only.contains(figure)).collect()
-}
-
-fn print_rows(summary: &Summary) {
-    for row in &summary.rows {
-        let mark = match (row.outcome, row.reason().is_some(), row.kind) {
-            (Outcome::NotMeasured, _, _) => "MISSING",
-            (Outcome::No, true, _) => "no, known",
-            (Outcome::No, false, _) => "NO",
-            (Outcome::Yes, _, Kind::Guarantee) => "guaranteed",
-            (Outcome::Yes, _, _) => "yes",
-        };
-        let value = row.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
-        println!(
-            "{mark:10} {:5} {} {}: {} = {value} ({})",
-            row.figure, row.statement, row.run, row.measure, row.wanted
-        );
-    }
-}
-
-/// Counts what was found, and lists what did not work.
-fn print_outcome(summary: &Summary) -> ExitCode {
-    let (reproduced, statements) = verdict::count(&summary.rows, Kind::Paper);
-    let (held, comparisons) = verdict::count(&summary.rows, Kind::Exact);
-    println!(
-        "\nof {statements} statements of the paper {reproduced} are reproduced, {} are not; of {comparisons} comparisons \
-         with exact solutions {held} hold, {} do not",
-        statements - reproduced,
-        comparisons - held
-    );
-    for (row, reason) in summary.rows.iter().filter_map(|row| Some((row, row.reason()?))) {
-        println!("known disagreement: {}: {} {reason}", row.id, row.statement);
-    }
-    for (row, failure) in summary.rows.iter().filter_map(|row| Some((row, row.failure()?))) {
-        eprintln!("error: {} {failure}: {}", row.id, row.statement);
-    }
-    for failure in &summary.failures {
-        eprintln!("error: {}: {}", failure.what, failure.error);
-    }
-    if summary.succeeded() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+/// Builds the package that measures and hands it the options.
+fn bench_stokes(options: &[OsString]) -> anyhow::Result<()> {
+    let mut cargo = program::cargo("run --release --quiet --package gluey-bench --manifest-path");
+    cargo.arg(workspace_root().join("Cargo.toml")).arg("--").args(options);
+    program::run(&mut cargo, "bench-stokes failed")
 }

@@ -15,14 +15,14 @@ const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
 ///
 /// # Errors
 /// If it is not the JSON of a book.
-pub fn run(words: &[OsString]) -> serde_json::Result<()> {
+pub fn run(words: &[OsString]) -> anyhow::Result<()> {
     // A question, `supports RENDERER`: yes, all of them.
     if words.first().is_some_and(|word| word == "supports") {
         return Ok(());
     }
     let (_context, mut book): (Value, Value) = serde_json::from_reader(stdin().lock())?;
     visit(&mut book);
-    serde_json::to_writer(stdout().lock(), &book)
+    Ok(serde_json::to_writer(stdout().lock(), &book)?)
 }
 
 /// Changes all chapters, wherever they stand in the book.

@@ -2,7 +2,9 @@
 //! tests.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
+
+use crate::program::{self, Missing};
 
 /// The oldest Python that the package is for.
 const OLDEST: (u32, u32) = (3, 9);
@@ -14,75 +16,53 @@ const PACKAGE: &str = "crates/python";
 const ENVIRONMENT: &str = "target/python";
 /// What the package is built with: if it cannot be fetched, nothing can.
 const BUILDER: &str = "maturin";
-
-/// Why the package was not tested, or did not pass.
-#[derive(Debug, thiserror::Error)]
-pub enum PythonError {
-    /// Something is not there that is no part of the repository.
-    #[error("{0}")]
-    Missing(String),
-    /// A program could not be started.
-    #[error("cannot start {}: {source}", program.display())]
-    Start {
-        /// The program.
-        program: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// It said no.
-    #[error("`{0}` failed")]
-    Step(String),
-}
+/// How packages are installed.
+const INSTALL: &str = "-m pip install --quiet --disable-pip-version-check";
 
 /// Installs the package with the Python of this name, or the first that is found, and runs its tests.
 ///
 /// # Errors
-/// [`PythonError::Missing`] without Python or a package index, another one if installation or tests fail.
-pub fn run(root: &Path, python: Option<&Path>) -> Result<(), PythonError> {
-    let python = find(python)?;
+/// [`Missing`] without Python or a package index, another one if installation or tests fail.
+pub fn run(root: &Path, python: Option<&Path>) -> anyhow::Result<()> {
     let environment = root.join(ENVIRONMENT);
-    let python = make(&python, &environment)?;
-    check_index(root, &python)?;
-    let package = format!("./{PACKAGE}[test]");
-    step(root, &python, &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package])?;
+    let python = make(&find(python)?, &environment)?;
+    check_index(&environment, &python)?;
+    step(root, &python, INSTALL, &format!("./{PACKAGE}[test]"))?;
     let cache = format!("cache_dir={}", environment.join("pytest").display());
-    step(&root.join(PACKAGE), &python, &["-B", "-m", "pytest", "-o", &cache])
+    step(&root.join(PACKAGE), &python, "-B -m pytest -o", &cache)
 }
 
 /// The interpreter of an environment in a folder of the workspace that has these packages; makes it if it is
 /// not there.
 ///
 /// # Errors
-/// [`PythonError::Missing`] without Python or the packages.
-pub fn with_packages(root: &Path, folder: &str, packages: &[&str]) -> Result<PathBuf, PythonError> {
+/// [`Missing`] without Python or the packages.
+pub fn with_packages(root: &Path, folder: &str, packages: &[&str]) -> anyhow::Result<PathBuf> {
     let environment = root.join(folder);
-    let python = program_of(&environment);
     let import = format!("import {}", packages.join(", "));
     let has_all = |python: &Path| {
         let output = Command::new(python).args(["-c", &import]).output();
         output.is_ok_and(|output| output.status.success())
     };
+    let python = program_of(&environment);
     if has_all(&python) {
         return Ok(python);
     }
     let python = make(&find(None)?, &environment)?;
-    let mut install = Command::new(&python);
-    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(packages);
-    outcome(&python, install.output())?;
+    program::output(Command::new(&python).args(INSTALL.split(' ')).args(packages))?;
     match has_all(&python) {
         true => Ok(python),
-        false => Err(PythonError::Missing(format!("{} cannot be fetched", packages.join(" and ")))),
+        false => Err(Missing(format!("{} cannot be fetched", packages.join(" and "))).into()),
     }
 }
 
 /// Makes a fresh environment; returns its interpreter.
-fn make(python: &Path, environment: &Path) -> Result<PathBuf, PythonError> {
+fn make(python: &Path, environment: &Path) -> anyhow::Result<PathBuf> {
     eprintln!("a fresh environment of {} in {}", python.display(), environment.display());
-    let mut make = Command::new(python);
-    make.args(["-m", "venv", "--clear"]).arg(environment);
-    if !outcome(python, make.output())?.status.success() {
+    let made = program::output(Command::new(python).args(["-m", "venv", "--clear"]).arg(environment))?;
+    if !made.status.success() {
         let text = format!("{} makes no environments: install its module venv", python.display());
-        return Err(PythonError::Missing(text));
+        return Err(Missing(text).into());
     }
     Ok(program_of(environment))
 }
@@ -93,19 +73,13 @@ fn program_of(environment: &Path) -> PathBuf {
 }
 
 /// The interpreter to use.
-fn find(python: Option<&Path>) -> Result<PathBuf, PythonError> {
-    let named: Vec<PathBuf> = match python {
-        Some(python) => vec![python.to_owned()],
-        None => NAMES.map(PathBuf::from).into(),
-    };
+fn find(python: Option<&Path>) -> Result<PathBuf, Missing> {
+    let named = python.map_or_else(|| NAMES.map(PathBuf::from).into(), |python| vec![python.to_owned()]);
     let found = named.iter().find(|python| version(python).is_some_and(|version| version >= OLDEST));
     found.cloned().ok_or_else(|| {
         let names: Vec<_> = named.iter().map(|python| python.display().to_string()).collect();
-        let (major, minor) = OLDEST;
-        let names = names.join(", ");
-        PythonError::Missing(format!(
-            "no Python {major}.{minor} or newer is there ({names}); name one by --python"
-        ))
+        let ((major, minor), names) = (OLDEST, names.join(", "));
+        Missing(format!("no Python {major}.{minor} or newer is there ({names}); name one by --python"))
     })
 }
 
@@ -122,39 +96,25 @@ fn parse_version(text: &str) -> Option<(u32, u32)> {
 }
 
 /// Whether packages can be fetched.
-fn check_index(root: &Path, python: &Path) -> Result<(), PythonError> {
-    let fetched = root.join(ENVIRONMENT).join("fetched");
+fn check_index(environment: &Path, python: &Path) -> anyhow::Result<()> {
+    let words = "-m pip download --quiet --disable-pip-version-check --no-deps --retries 1 --dest";
     let mut fetch = Command::new(python);
-    fetch.args([
-        "-m",
-        "pip",
-        "download",
-        "--quiet",
-        "--disable-pip-version-check",
-        "--no-deps",
-        "--retries",
-        "1",
-    ]);
-    fetch.arg("--dest").arg(fetched).arg(BUILDER);
-    let output = outcome(python, fetch.output())?;
+    fetch.args(words.split(' ')).arg(environment.join("fetched")).arg(BUILDER);
+    let output = program::output(&mut fetch)?;
     if output.status.success() {
         return Ok(());
     }
-    let said = String::from_utf8_lossy(&output.stderr);
-    let last = said.trim().lines().last().unwrap_or("pip says nothing").to_owned();
-    Err(PythonError::Missing(format!("packages cannot be fetched, a network is needed: {last}")))
+    let said = program::complaint(&output);
+    let last = said.trim().lines().last().unwrap_or("pip says nothing");
+    Err(Missing(format!("packages cannot be fetched, a network is needed: {last}")).into())
 }
 
-fn step(folder: &Path, program: &Path, arguments: &[&str]) -> Result<(), PythonError> {
-    let words = arguments.join(" ");
-    eprintln!("python {words}");
-    let status = Command::new(program).args(arguments).current_dir(folder).status();
-    let status = status.map_err(|source| PythonError::Start { program: program.to_owned(), source })?;
-    if status.success() { Ok(()) } else { Err(PythonError::Step(format!("python {words}"))) }
-}
-
-fn outcome(program: &Path, output: std::io::Result<Output>) -> Result<Output, PythonError> {
-    output.map_err(|source| PythonError::Start { program: program.to_owned(), source })
+/// Python with words that blanks separate, and a last one.
+fn step(folder: &Path, python: &Path, words: &str, last: &str) -> anyhow::Result<()> {
+    eprintln!("python {words} {last}");
+    let mut command = Command::new(python);
+    command.args(words.split(' ')).arg(last).current_dir(folder);
+    program::run(&mut command, &format!("`python {words} {last}` failed"))
 }
 
 #[cfg(test)]

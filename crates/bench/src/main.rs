@@ -13,34 +13,24 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use options::Options;
-
 /// Time one solve of the Stokes core and print one line of JSON.
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask bench-stokes", max_term_width = 100)]
 struct Arguments {
     #[command(flatten)]
-    options: Options,
+    options: options::Options,
 }
 
 fn main() -> ExitCode {
-    match measure::run(&Arguments::parse().options) {
-        Ok(report) => print(&report),
-        Err(error) => fail(&error),
-    }
-}
-
-fn print(report: &report::Report) -> ExitCode {
-    match serde_json::to_string(report) {
+    let report = measure::run(&Arguments::parse().options);
+    match report.and_then(|report| Ok(serde_json::to_string(&report)?)) {
         Ok(line) => {
             println!("{line}");
             ExitCode::SUCCESS
         }
-        Err(error) => fail(&error),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
     }
-}
-
-fn fail(error: &dyn std::error::Error) -> ExitCode {
-    eprintln!("error: {error}");
-    ExitCode::FAILURE
 }

@@ -6,13 +6,13 @@
 
 use std::io::IsTerminal;
 
+use anyhow::anyhow;
 use gluey_fem::{MeshError, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Twist};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, parallel, vector};
 use gluey_stokes::{
-    MultigridSolver, Problem, Refinement, SaddleSolver, SolveReport, StokesError, StokesSystem,
-    SystemOperator,
+    MultigridSolver, Problem, Refinement, SaddleSolver, SolveReport, StokesSystem, SystemOperator,
 };
 
 use crate::machine::{Stopwatch, Times};
@@ -29,23 +29,10 @@ const BAND: f64 = 2.0;
 /// Timed applications of the operator, of which the median counts.
 const OPERATOR_SAMPLES: usize = 15;
 
-/// Why there is no measurement.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// The threads could not be started.
-    #[error("cannot start the threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// The mesh cannot be built.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// The flow could not be computed.
-    #[error(transparent)]
-    Stokes(#[from] StokesError),
-}
-
 /// Solves the case once, on as many threads as asked for.
-pub fn run(options: &Options) -> Result<Report, BenchError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build()?;
+pub fn run(options: &Options) -> anyhow::Result<Report> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
+    let pool = pool.map_err(|error| anyhow!("cannot start the threads: {error}"))?;
     pool.install(|| match options.case.dimension() {
         2 => measure::<2>(options),
         _ => measure::<3>(options),
@@ -63,7 +50,7 @@ where
     twists: Vec<Twist<D>>,
 }
 
-fn measure<const D: usize>(options: &Options) -> Result<Report, BenchError>
+fn measure<const D: usize>(options: &Options) -> anyhow::Result<Report>
 where
     Dim<D>: Space<D>,
 {
@@ -107,7 +94,7 @@ where
 }
 
 /// Everything up to the first iteration, but for the right-hand side.
-fn prepare<const D: usize>(options: &Options) -> Result<(Problem<D>, MultigridSolver<D>, Times), BenchError>
+fn prepare<const D: usize>(options: &Options) -> anyhow::Result<(Problem<D>, MultigridSolver<D>, Times)>
 where
     Dim<D>: Space<D>,
 {
@@ -134,7 +121,7 @@ fn solve<const D: usize>(
     options: &Options,
     problem: &Problem<D>,
     solver: &mut MultigridSolver<D>,
-) -> Result<Solved<D>, BenchError>
+) -> anyhow::Result<Solved<D>>
 where
     Dim<D>: Space<D>,
 {

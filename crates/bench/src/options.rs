@@ -1,7 +1,6 @@
 //! What the command line asks for.
 
 use std::num::NonZeroUsize;
-use std::str::FromStr;
 
 use clap::ValueEnum;
 use gluey_stokes::{Formulation, Lubrication, PaperParams};
@@ -16,8 +15,8 @@ pub struct Options {
     #[arg(long, value_name = "CASE", ignore_case = true)]
     pub case: Case,
     /// Cells per side of the uniform mesh, or of its finest level with --adaptive: a power of two.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    n: CellsPerSide,
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = level)]
+    n: u8,
     /// How rigidity is imposed.
     #[arg(long, value_name = "NAME", default_value = "unfitted")]
     pub formulation: FormulationName,
@@ -48,12 +47,12 @@ pub enum FormulationName {
 impl Options {
     /// Cells per side at the finest level.
     pub fn cells_per_side(&self) -> u64 {
-        1 << self.n.level
+        1 << self.n
     }
 
     /// The finest level.
     pub fn level(&self) -> u8 {
-        self.n.level
+        self.n
     }
 
     /// The formulation with its parameters.
@@ -75,35 +74,18 @@ impl Options {
     }
 }
 
-/// A power of two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct CellsPerSide {
-    level: u8,
+/// What is said of a number of cells that no mesh of halved cells has, and of a tolerance that no solve can.
+const NOT_A_POWER_OF_TWO: &str = "must be a power of two of at least 2, such as 64";
+const BAD_TOLERANCE: &str = "must lie between 0 and 1";
+
+/// The level of a mesh with this number of cells per side.
+fn level(text: &str) -> Result<u8, &'static str> {
+    let count = text.parse::<u64>().ok().filter(|n| n.is_power_of_two() && *n > 1);
+    count.map(|n| n.ilog2() as u8).ok_or(NOT_A_POWER_OF_TWO)
 }
 
-/// A number of cells that no mesh of halved cells has.
-#[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("must be a power of two of at least 2, such as 64")]
-struct NotAPowerOfTwo;
-
-impl FromStr for CellsPerSide {
-    type Err = NotAPowerOfTwo;
-
-    fn from_str(text: &str) -> Result<Self, NotAPowerOfTwo> {
-        match text.parse::<u64>() {
-            Ok(n) if n.is_power_of_two() && n > 1 => Ok(Self { level: n.ilog2() as u8 }),
-            _ => Err(NotAPowerOfTwo),
-        }
-    }
-}
-
-/// A tolerance that no solve can have.
-#[derive(Debug, PartialEq, thiserror::Error)]
-#[error("must lie between 0 and 1")]
-struct BadTolerance;
-
-fn tolerance(text: &str) -> Result<f64, BadTolerance> {
-    text.parse().ok().filter(|t| *t > 0.0 && *t < 1.0).ok_or(BadTolerance)
+fn tolerance(text: &str) -> Result<f64, &'static str> {
+    text.parse().ok().filter(|t| *t > 0.0 && *t < 1.0).ok_or(BAD_TOLERANCE)
 }
 
 #[cfg(test)]
@@ -112,9 +94,9 @@ mod tests {
 
     #[test]
     fn cells_per_side_are_powers_of_two() {
-        assert_eq!("64".parse(), Ok(CellsPerSide { level: 6 }));
+        assert_eq!(level("64"), Ok(6));
         for wrong in ["0", "1", "48", "-64", "64.0", "", "many", "18446744073709551616"] {
-            assert_eq!(wrong.parse::<CellsPerSide>(), Err(NotAPowerOfTwo), "{wrong}");
+            assert_eq!(level(wrong), Err(NOT_A_POWER_OF_TWO), "{wrong}");
         }
     }
 
@@ -122,7 +104,7 @@ mod tests {
     fn tolerances_lie_between_zero_and_one() {
         assert_eq!(tolerance("1e-6"), Ok(1e-6));
         for wrong in ["0", "1", "-1e-8", "NaN", "inf", "small"] {
-            assert_eq!(tolerance(wrong), Err(BadTolerance), "{wrong}");
+            assert_eq!(tolerance(wrong), Err(BAD_TOLERANCE), "{wrong}");
         }
     }
 }

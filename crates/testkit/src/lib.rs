@@ -21,6 +21,6 @@ pub mod packing;
 pub mod reference;
 mod stranger;
 
-pub use clock::CpuClock;
+pub use clock::cpu_seconds;
 pub use convergence::{convergence_order, convergence_orders};
 pub use stranger::Stranger;

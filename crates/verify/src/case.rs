@@ -7,7 +7,7 @@ use gluey_motion::{FilmError, PairMobilityError};
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
 use gluey_suspension::packing::PackingError;
-use gluey_testkit::CpuClock;
+use gluey_testkit::cpu_seconds;
 use gluey_testkit::reference::TableError;
 
 use crate::number::Number;

@@ -2,28 +2,19 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// A file or folder could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}", path = path.display())]
-pub struct WriteError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// Error of the system.
-    pub source: io::Error,
-}
+use anyhow::Context;
 
 /// Creates the folder and its parents, and proves that files can be created in it.
-pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
-    let error = |source| WriteError { path: folder.to_owned(), source };
-    fs::create_dir_all(folder).map_err(error)?;
-    tempfile::NamedTempFile::new_in(folder).map(drop).map_err(error)
+pub fn prepare_folder(folder: &Path) -> anyhow::Result<()> {
+    let made = fs::create_dir_all(folder).and_then(|()| tempfile::NamedTempFile::new_in(folder));
+    made.map(drop).with_context(|| format!("cannot write {}", folder.display()))
 }
 
 /// Writes a file so that readers see the old content or the new, never a part.
-pub fn write(path: &Path, content: &[u8]) -> Result<(), WriteError> {
-    write_whole(path, content).map_err(|source| WriteError { path: path.to_owned(), source })
+pub fn write(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    write_whole(path, content).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {

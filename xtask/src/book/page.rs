@@ -2,6 +2,8 @@
 
 use gluey_pictures::font_faces;
 
+use super::Failure;
+
 const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:66rem;margin:2rem auto;padding:0 1rem;\
 line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\
 table{border-collapse:collapse;margin:1rem 0;font-size:.9rem;display:block;overflow-x:auto}\
@@ -17,6 +19,29 @@ pub fn document(title: &str, body: &str) -> String {
          <style>{}{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n",
         font_faces()
     )
+}
+
+/// What stands under the title: a note on `--quick`, and what failed.
+pub fn notes(quick: Option<&str>, failures: &[Failure]) -> String {
+    let quick =
+        quick.map(|text| format!("<p class=\"note\">Computed with <code>--quick</code>: {text}</p>\n"));
+    let failures = failures.iter().map(|Failure { what, error }| {
+        format!("<p class=\"note bad\">{}: {}</p>\n", escape(what), escape(error))
+    });
+    quick.into_iter().chain(failures).collect()
+}
+
+/// Tags of cells with text.
+pub const TEXT: &str = "td class=\"t\"";
+/// The same where something is wrong.
+pub const BAD: &str = "td class=\"t bad\"";
+/// The same over a column.
+pub const TITLE: &str = "th class=\"t\"";
+
+/// A row of a table, of cells with their tags.
+pub fn row<S: AsRef<str>>(cells: impl IntoIterator<Item = (&'static str, S)>) -> String {
+    let cell = |(tag, text): (&str, S)| format!("<{tag}>{}</{}>", text.as_ref(), &tag[..2]);
+    format!("<tr>{}</tr>\n", cells.into_iter().map(cell).collect::<String>())
 }
 
 /// Four significant digits; a dash for what was not measured.

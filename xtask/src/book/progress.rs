@@ -4,13 +4,34 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use gluey::ProgressState;
+use gluey::progress::duration;
+use gluey::{ProgressState, RunReport};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use gluey::progress::duration;
+use super::chain;
 
-/// Time between two lines of a run where there is no terminal.
+/// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(20);
+
+/// Lines of which one is printed now and then.
+pub struct NowAndThen(Mutex<Instant>);
+
+impl Default for NowAndThen {
+    fn default() -> Self {
+        Self(Mutex::new(Instant::now()))
+    }
+}
+
+impl NowAndThen {
+    /// Prints this line if the last one is long ago.
+    pub fn print(&self, line: impl FnOnce() -> String) {
+        let mut last = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if last.elapsed() >= LINE_EVERY {
+            *last = Instant::now();
+            eprintln!("{}", line());
+        }
+    }
+}
 
 /// Shows all runs.
 pub struct Board {
@@ -21,7 +42,7 @@ pub struct Board {
 pub struct RunLine {
     name: String,
     bar: Option<ProgressBar>,
-    last_line: Mutex<Instant>,
+    lines: NowAndThen,
 }
 
 impl Board {
@@ -33,7 +54,7 @@ impl Board {
     /// A run begins.
     pub fn start(&self, name: &str) -> RunLine {
         let bar = self.bars.as_ref().map(|bars| bars.add(ProgressBar::new(0).with_style(style())));
-        let line = RunLine { name: name.to_owned(), bar, last_line: Mutex::new(Instant::now()) };
+        let line = RunLine { name: name.to_owned(), bar, lines: NowAndThen::default() };
         match &line.bar {
             Some(bar) => bar.set_prefix(line.name.clone()),
             None => eprintln!("{}: started", line.name),
@@ -43,19 +64,15 @@ impl Board {
 }
 
 impl RunLine {
-    /// The run is over; `outcome` says how.
-    pub fn finish(&self, outcome: &str) {
+    /// The run is over, with this result.
+    pub fn finish(&self, result: &anyhow::Result<RunReport>) {
+        let outcome = match result {
+            Ok(report) => format!("done in {}", duration(report.wall_s)),
+            Err(error) => format!("failed: {}", chain(&**error)),
+        };
         match &self.bar {
-            Some(bar) => bar.abandon_with_message(outcome.to_owned()),
+            Some(bar) => bar.abandon_with_message(outcome),
             None => eprintln!("{}: {outcome}", self.name),
-        }
-    }
-
-    fn print_now_and_then(&self, state: &ProgressState<'_>) {
-        let mut last = self.last_line.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if last.elapsed() >= LINE_EVERY {
-            *last = Instant::now();
-            eprintln!("{}: step {}/{}, {}", self.name, state.step, state.steps, describe(state));
         }
     }
 }
@@ -68,7 +85,9 @@ impl gluey::Progress for RunLine {
                 bar.set_position(state.step as u64);
                 bar.set_message(describe(state));
             }
-            None => self.print_now_and_then(state),
+            None => self
+                .lines
+                .print(|| format!("{}: step {}/{}, {}", self.name, state.step, state.steps, describe(state))),
         }
     }
 }

@@ -1,28 +1,29 @@
 //! `cargo xtask reproduce-figures`: makes the runs, draws the figures, says how they compare.
 
-pub mod findings;
-pub mod known;
-pub mod measures;
-pub mod page;
+mod figures;
+mod findings;
+mod measures;
+mod page;
 pub mod plan;
-pub mod reference;
-pub mod rows;
+mod reference;
+mod rows;
 mod runner;
 pub mod settings;
-pub mod summary;
+mod summary;
 pub mod trajectory;
-pub mod verdict;
+mod verdict;
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::Context;
 use gluey::RunReport;
 
-use crate::book::files::{self, WriteError};
 use crate::book::progress::Board;
-use crate::book::{Failure, schedule, write_drawing};
-use crate::figures::{self, Data};
+use crate::book::{Failure, files, jobs, keep, schedule, write_drawing};
+use figures::Data;
 use page::Section;
 use plan::{CaseName, FigureName, RunKey};
 use rows::Evidence;
@@ -34,63 +35,63 @@ use trajectory::Trajectory;
 const LATEST_END: f64 = 30.0;
 
 /// Figures to reproduce, and where to put them.
-#[derive(Clone, Debug)]
+#[derive(clap::Args)]
 pub struct Options {
-    /// Coarse and fast.
-    pub quick: bool,
-    /// The figures to make.
-    pub figures: Vec<FigureName>,
-    /// Folder of the workspace, where `data` lies.
-    pub root: PathBuf,
+    /// A coarse mesh, large time steps and shorter runs: half the time.
+    #[arg(long)]
+    quick: bool,
+    /// Only these figures, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "FIGURES", value_parser = FigureName::named)]
+    only: Vec<FigureName>,
     /// Output folder.
-    pub out: PathBuf,
-    /// Runs at a time.
-    pub jobs: usize,
+    #[arg(long, default_value = "target/figures", value_name = "DIR")]
+    out: PathBuf,
+    /// Runs at a time [default: number of cores].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
 }
 
-/// Makes the runs and figures. Failures of single runs or figures are part of the summary; an error means
-/// that nothing could be written.
-pub fn reproduce(options: &Options) -> Result<Summary, WriteError> {
+/// Makes the runs and figures; whether all is well. Failures of single runs or figures are part of the
+/// summary; an error means that nothing could be written.
+pub fn run(options: Options) -> anyhow::Result<bool> {
     let start = Instant::now();
-    let runs_folder = options.out.join("runs");
-    files::prepare_folder(&options.out)?;
+    let Options { quick, only, out, jobs: wanted } = options;
+    // Each once, in the paper's order.
+    let figures: Vec<FigureName> =
+        FigureName::all().filter(|figure| only.is_empty() || only.contains(figure)).collect();
+    let runs_folder = out.join("runs");
+    files::prepare_folder(&out)?;
     files::prepare_folder(&runs_folder)?;
 
     let mut failures = Vec::new();
-    let settings = settings(options, &mut failures);
-    let reports = make_runs(options, &runs_folder, &settings, &mut failures);
-    let data = Data { settings, ..load(options, &runs_folder, &reports, &mut failures) };
+    let keys = plan::runs_for(&figures, quick);
+    let settings = settings(&keys, quick, &mut failures);
+    let keys: Vec<RunKey> = keys.into_iter().filter(|key| settings.contains_key(key)).collect();
+    let reports = make_runs(&keys, quick, &runs_folder, jobs(wanted), &mut failures);
+    let data = Data { settings, quick, ..load(&figures, &runs_folder, &reports, &mut failures) };
     let evidence = Evidence { data: &data, reports: &reports };
-    let sections: Vec<Section> = options.figures.iter().map(|&figure| section(figure, &evidence)).collect();
-    let rows = rows::all(&options.figures, &evidence);
+    let sections: Vec<Section> = figures.iter().map(|&figure| section(figure, &evidence)).collect();
+    let rows = rows::all(&figures, &evidence);
     for section in &sections {
-        write_drawing(&options.out, section.figure.as_str(), &section.drawing, &mut failures)?;
+        write_drawing(&out, &section.figure.to_string(), &section.drawing, &mut failures)?;
     }
 
-    let summary = Summary {
-        version: env!("CARGO_PKG_VERSION"),
-        quick: options.quick,
-        wall_s: start.elapsed().as_secs_f64(),
-        figures: options.figures.clone(),
-        rows,
-        runs: runs(reports, &data.settings),
-        failures,
-    };
-    write_summary(&options.out, &summary)?;
-    files::write(&options.out.join("index.html"), page::html(&summary, &sections).as_bytes())?;
-    Ok(summary)
+    let wall_s = start.elapsed().as_secs_f64();
+    let runs = runs(reports, &data.settings);
+    let version = env!("CARGO_PKG_VERSION");
+    let summary = Summary { version, quick, wall_s, figures, runs, failures, rows };
+    let json = summary.to_json().context("cannot write summary.json")?;
+    files::write(&out.join("summary.json"), json.as_bytes())?;
+    files::write(&out.join("index.html"), page::html(&summary, &sections).as_bytes())?;
+    summary.print(&out);
+    Ok(summary.succeeded())
 }
 
 /// The settings of all runs whose case can be read.
-fn settings(options: &Options, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, Settings> {
-    let mut settings = BTreeMap::new();
-    for key in plan::runs_for(&options.figures, options.quick) {
-        match runner::case(&options.root, key, options.quick) {
-            Ok(case) => drop(settings.insert(key, Settings::of(&case))),
-            Err(error) => failures.push(Failure::new(format!("run {key}"), &error)),
-        }
-    }
-    settings
+fn settings(keys: &[RunKey], quick: bool, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, Settings> {
+    let case =
+        |&key| Some((key, Settings::of(&keep(format!("run {key}"), runner::case(key, quick), failures)?)));
+    keys.iter().filter_map(case).collect()
 }
 
 fn runs(reports: BTreeMap<RunKey, RunReport>, settings: &BTreeMap<RunKey, Settings>) -> Vec<Run> {
@@ -100,53 +101,40 @@ fn runs(reports: BTreeMap<RunKey, RunReport>, settings: &BTreeMap<RunKey, Settin
     reports.into_iter().filter_map(run).collect()
 }
 
-/// Makes the runs whose case could be read, the longest first.
+/// Makes the runs.
 fn make_runs(
-    options: &Options,
+    keys: &[RunKey],
+    quick: bool,
     folder: &Path,
-    settings: &BTreeMap<RunKey, Settings>,
+    jobs: usize,
     failures: &mut Vec<Failure>,
 ) -> BTreeMap<RunKey, RunReport> {
-    let mut keys = plan::runs_for(&options.figures, options.quick);
-    keys.retain(|key| settings.contains_key(key));
     let board = Board::new();
-    let results = schedule::in_parallel(&keys, options.jobs, |&key| {
-        runner::run(&options.root, folder, key, options.quick, &board)
-    });
-    let mut reports = BTreeMap::new();
-    for (key, result) in keys.into_iter().zip(results) {
-        match result {
-            Ok(report) => drop(reports.insert(key, report)),
-            Err(error) => failures.push(Failure::new(format!("run {key}"), &error)),
-        }
-    }
-    reports
+    let results = schedule::in_parallel(keys, jobs, |&key| runner::run(folder, key, quick, &board));
+    let report = |(&key, result)| Some((key, keep(format!("run {key}"), result, failures)?));
+    keys.iter().zip(results).filter_map(report).collect()
 }
 
 /// The trajectories of the runs that succeeded, and the exact ones.
 fn load(
-    options: &Options,
+    figures: &[FigureName],
     folder: &Path,
     reports: &BTreeMap<RunKey, RunReport>,
     failures: &mut Vec<Failure>,
 ) -> Data {
-    let mut data = Data { quick: options.quick, ..Data::default() };
-    let mut keep = |what: String, result: Result<Trajectory, trajectory::TrajectoryError>| {
-        result.map_err(|error| failures.push(Failure::new(what, &error))).ok()
+    let run = |&key| {
+        let run = Trajectory::read(&folder.join(format!("{key}.csv")));
+        Some((key, keep(format!("run {key}"), run, failures)?))
     };
-    for &key in reports.keys() {
-        let run = keep(format!("run {key}"), Trajectory::read(&folder.join(format!("{key}.csv"))));
-        data.runs.extend(run.map(|run| (key, run)));
-    }
-    let mut cases: Vec<CaseName> = options.figures.iter().map(|figure| figure.case()).collect();
+    let runs = reports.keys().filter_map(run).collect();
+    let mut cases: Vec<CaseName> = figures.iter().map(|figure| figure.case()).collect();
     cases.sort();
     cases.dedup();
-    for case in cases {
-        let exact =
-            keep(format!("exact solution of {case}"), reference::load(&options.root, case, LATEST_END));
-        data.exact.extend(exact.map(|exact| (case, exact)));
-    }
-    data
+    let exact = |case| {
+        let exact = reference::load(case, LATEST_END);
+        Some((case, keep(format!("exact solution of {case}"), exact, failures)?))
+    };
+    Data { runs, exact: cases.into_iter().filter_map(exact).collect(), ..Data::default() }
 }
 
 fn section(figure: FigureName, evidence: &Evidence<'_>) -> Section {
@@ -154,13 +142,5 @@ fn section(figure: FigureName, evidence: &Evidence<'_>) -> Section {
         figure,
         drawing: figures::draw(figure, evidence.data),
         table: findings::table(figure, evidence),
-    }
-}
-
-fn write_summary(out: &Path, summary: &Summary) -> Result<(), WriteError> {
-    let path = out.join("summary.json");
-    match summary.to_json() {
-        Ok(json) => files::write(&path, json.as_bytes()),
-        Err(error) => Err(WriteError { path, source: error.into() }),
     }
 }

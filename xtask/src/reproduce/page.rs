@@ -1,15 +1,14 @@
 //! `index.html`: one self-contained page with the figures, the runs and how they compare.
 
-use std::fmt::Write;
-
 use gluey::progress::duration;
 use gluey_verify::Outcome;
 
-use super::findings::{self, Table};
+use super::findings::Table;
 use super::plan::FigureName;
+use super::rows;
 use super::summary::{self, Summary};
-use super::verdict::{self, Kind, Row};
-use crate::book::page::{self, escape, number};
+use super::verdict::{self, Claim, Kind, Row};
+use crate::book::page::{self, BAD, TEXT, TITLE, escape, number};
 use gluey_pictures::Canvas;
 
 /// A figure with what is said about it.
@@ -31,186 +30,136 @@ and in 2D inelastic contact changes the orbit by less than 1 %.";
 
 /// The page.
 pub fn html(summary: &Summary, sections: &[Section]) -> String {
-    let mut body = String::new();
-    write_body(&mut body, summary, sections).expect("writing to a String cannot fail");
-    page::document("gluey: the paper's figures", &body)
+    let sections: String = sections.iter().map(|section| html_of(section, &summary.rows)).collect();
+    page::document("gluey: the paper's figures", &(head(summary) + &runs(&summary.runs) + &sections))
 }
 
-fn write_body(out: &mut String, summary: &Summary, sections: &[Section]) -> std::fmt::Result {
-    write_head(out, summary)?;
-    sections.iter().try_for_each(|section| write_section(out, summary, section))
-}
-
-fn write_head(out: &mut String, summary: &Summary) -> std::fmt::Result {
-    writeln!(
-        out,
+fn head(summary: &Summary) -> String {
+    let quick =
+        "a coarse mesh, large time steps and shorter runs. The statements about later times are left out.";
+    format!(
         "<h1>Contact problems for particles in a shear flow</h1>\n<p>The figures of Verdon, Lefebvre-Lepot, Lobry and \
          Laure (2010), computed by gluey {} in {}. Thin grey lines are exact solutions; the dotted line is the \
          formulation <code>unfitted</code>, in which lubrication keeps particles apart and no contact acts, as in the exact \
          solutions; all others are in the formulation <code>paper</code>. Lengths are in units of the box, times in units of \
-         1/shear rate.</p>",
+         1/shear rate.</p>\n{}<p>{SETTING_OF_PAPER}</p>\n{}",
         summary.version,
-        duration(summary.wall_s)
-    )?;
-    if summary.quick {
-        writeln!(
-            out,
-            "<p class=\"note\">Computed with <code>--quick</code>: a coarse mesh, large time steps and shorter runs. The \
-             statements about later times are left out.</p>"
-        )?;
-    }
-    for failure in &summary.failures {
-        writeln!(out, "<p class=\"note bad\">{}: {}</p>", escape(&failure.what), escape(&failure.error))?;
-    }
-    writeln!(out, "<p>{SETTING_OF_PAPER}</p>")?;
-    write_counts(out, &summary.rows)?;
-    write_runs(out, summary)
+        duration(summary.wall_s),
+        page::notes(summary.quick.then_some(quick), &summary.failures),
+        counts(&summary.rows)
+    )
 }
 
 /// How much was reproduced, with what was not by name.
-fn write_counts(out: &mut String, rows: &[Row]) -> std::fmt::Result {
+fn counts(rows: &[Row]) -> String {
     let groups = [
         (Kind::Paper, "statements of the paper", "are reproduced", "not reproduced"),
         (Kind::Exact, "comparisons with exact solutions", "hold", "not within its limit"),
     ];
+    let mut text = String::new();
     for (kind, what, hold, not) in groups {
         let (held, count) = verdict::count(rows, kind);
         if count > 0 {
-            writeln!(out, "<p>Of {count} {what} {held} {hold}, {} do not.</p>", count - held)?;
+            text += &format!("<p>Of {count} {what} {held} {hold}, {} do not.</p>\n", count - held);
         }
-        let missed = rows.iter().filter(|row| row.kind == kind && row.outcome != Outcome::Yes);
-        let missed: Vec<&Row> = missed.collect();
+        let missed = rows.iter().filter(|row| row.claim.kind == kind && row.outcome != Outcome::Yes);
+        let line = |row: &Row| {
+            let Claim { figure, statement, run, measure, .. } = row.claim;
+            let [statement, run, measure] = [statement, run, measure].map(|text| escape(text));
+            let measured = format!("{run}: {measure} = {}", number(row.value));
+            format!("<li><a href=\"#{figure}\">{figure}</a>, {not}: {statement} ({measured})</li>\n")
+        };
+        let missed: String = missed.map(line).collect();
         if !missed.is_empty() {
-            writeln!(out, "<ul>")?;
-            for row in missed {
-                let (figure, statement, run) = (row.figure, escape(row.statement), escape(row.run));
-                let measure = escape(row.measure);
-                let value = number(row.value);
-                writeln!(
-                    out,
-                    "<li><a href=\"#{figure}\">{figure}</a>, {not}: {statement} ({run}: {measure} = {value})</li>"
-                )?;
-            }
-            writeln!(out, "</ul>")?;
+            text += &format!("<ul>\n{missed}</ul>\n");
         }
     }
-    Ok(())
+    text
 }
 
-fn write_runs(out: &mut String, summary: &Summary) -> std::fmt::Result {
-    if summary.runs.is_empty() {
-        return Ok(());
+fn runs(runs: &[summary::Run]) -> String {
+    if runs.is_empty() {
+        return String::new();
     }
-    writeln!(
-        out,
-        "<h2>Runs</h2>\n<table><tr><th>run</th><th>steps</th><th>wall time</th><th>cells</th><th>unknowns</th>\
-         <th>smallest D/a</th><th>D/a at the end</th><th>reversibility error</th><th>end error</th>\
-         <th>largest error / a</th><th class=\"t\">settings</th></tr>"
-    )?;
-    for summary::Run { name, settings, report: run } in &summary.runs {
-        writeln!(
-            out,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td class=\"t\">{}</td></tr>",
-            escape(name),
-            run.steps,
-            duration(run.wall_s),
-            run.cells,
-            run.dofs,
-            number(run.min_gap_over_a),
-            number(run.end_gap_over_a),
-            number(run.reversibility_error),
-            number(run.end_gap_rel_error),
-            number(run.max_abs_error_over_a),
-            escape(&settings.line())
-        )?;
-    }
-    writeln!(out, "</table>")
+    let columns = "run|steps|wall time|cells|unknowns|smallest D/a|D/a at the end|reversibility error|end error|\
+                   largest error / a";
+    let columns = columns.split('|').map(|name| ("th", name));
+    let head = page::row(columns.chain([(TITLE, "settings")]));
+    let line = |summary::Run { name, settings, report }: &summary::Run| {
+        let counts = [report.cells, report.dofs].map(|count| count.to_string());
+        let numbers = [
+            report.min_gap_over_a,
+            report.end_gap_over_a,
+            report.reversibility_error,
+            report.end_gap_rel_error,
+            report.max_abs_error_over_a,
+        ];
+        let first = [escape(name), report.steps.to_string(), duration(report.wall_s)].into_iter();
+        let cells = first.chain(counts).chain(numbers.map(number)).map(|cell| ("td", cell));
+        page::row(cells.chain([(TEXT, escape(&settings.line()))]))
+    };
+    format!("<h2>Runs</h2>\n<table>{head}{}</table>\n", runs.iter().map(line).collect::<String>())
 }
 
-fn write_section(out: &mut String, summary: &Summary, section: &Section) -> std::fmt::Result {
+fn html_of(section: &Section, rows: &[Row]) -> String {
     let figure = section.figure;
-    writeln!(
-        out,
-        "<section id=\"{figure}\">\n<h2>{}</h2>\n{}",
-        findings::title(figure),
-        section.drawing.inline_svg()
-    )?;
-    for group in GROUPS {
-        let rows: Vec<&Row> =
-            summary.rows.iter().filter(|row| row.figure == figure && row.kind == group.kind).collect();
-        write_group(out, group, &rows)?;
-    }
-    if let Some(table) = &section.table {
-        write_table(out, table)?;
-    }
-    writeln!(out, "</section>")
+    let (title, svg) = (&rows::text(figure).title, section.drawing.inline_svg());
+    let of = |kind| rows.iter().filter(move |row| row.claim.figure == figure && row.claim.kind == kind);
+    let groups: String = GROUPS.iter().map(|names| group(names, of(names.0))).collect();
+    let table = section.table.as_ref().map_or_else(String::new, table);
+    format!("<section id=\"{figure}\">\n<h2>{title}</h2>\n{svg}\n{groups}{table}</section>\n")
 }
 
-/// Rows of one kind, and how their outcome reads.
-struct Group {
-    kind: Kind,
-    heading: &'static str,
-    yes: &'static str,
-    no: &'static str,
-}
+/// A kind of rows, its heading, and how what holds and what does not read.
+type Group = (Kind, &'static str, &'static str, &'static str);
 
 const GROUPS: &[Group] = &[
-    Group { kind: Kind::Paper, heading: "the paper says", yes: "reproduced", no: "not reproduced" },
-    Group { kind: Kind::Exact, heading: "against the exact solution", yes: "within", no: "not within" },
-    Group {
-        kind: Kind::Guarantee,
-        heading: "guaranteed by construction",
-        yes: "as it must be",
-        no: "broken",
-    },
+    (Kind::Paper, "the paper says", "reproduced", "not reproduced"),
+    (Kind::Exact, "against the exact solution", "within", "not within"),
+    (Kind::Guarantee, "guaranteed by construction", "as it must be", "broken"),
 ];
 
-fn write_group(out: &mut String, group: &Group, rows: &[&Row]) -> std::fmt::Result {
-    if rows.is_empty() {
-        return Ok(());
-    }
-    writeln!(
-        out,
-        "<table class=\"rows\"><tr><th class=\"t\">{}</th><th class=\"t\">run</th><th class=\"t\">measured</th>\
-         <th>value</th><th class=\"t\">limit</th><th></th></tr>",
-        group.heading
-    )?;
-    for row in rows {
+fn group<'a>((_, heading, yes, no): &Group, rows: impl Iterator<Item = &'a Row>) -> String {
+    let line = |row: &Row| {
         let (class, mark) = match row.outcome {
-            Outcome::Yes => ("t", group.yes),
-            Outcome::No => ("t bad", group.no),
-            Outcome::NotMeasured => ("t bad", "not measured"),
+            Outcome::Yes => (TEXT, *yes),
+            Outcome::No => (BAD, *no),
+            Outcome::NotMeasured => (BAD, "not measured"),
         };
-        writeln!(
-            out,
-            "<tr><td class=\"t\">{}</td><td class=\"t\">{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"t\">{}</td>\
-             <td class=\"{class}\">{mark}</td></tr>",
-            escape(row.statement),
-            escape(row.run),
-            escape(row.measure),
-            number(row.value),
-            escape(&row.wanted)
-        )?;
-        if let Some(reason) = row.reason() {
-            writeln!(out, "<tr><td class=\"t reason\" colspan=\"6\">Why not: {}</td></tr>", escape(reason))?;
-        } else if let Some(failure) = row.failure() {
-            writeln!(out, "<tr><td class=\"t bad\" colspan=\"6\">This row {}.</td></tr>", escape(&failure))?;
-        }
+        let Claim { statement, run, measure, .. } = row.claim;
+        let [statement, run, measure, wanted] =
+            [statement, run, measure, &row.wanted].map(|text| (TEXT, escape(text)));
+        let cells = [statement, run, measure, ("td", number(row.value)), wanted, (class, mark.to_owned())];
+        page::row(cells) + &remark(row)
+    };
+    let lines: String = rows.map(line).collect();
+    if lines.is_empty() {
+        return lines;
     }
-    writeln!(out, "</table>")
+    let head = [heading, "run", "measured", "value", "limit", ""];
+    let tags = [TITLE, TITLE, TITLE, "th", TITLE, "th"];
+    format!("<table class=\"rows\">{}{lines}</table>\n", page::row(tags.into_iter().zip(head)))
 }
 
-fn write_table(out: &mut String, table: &Table) -> std::fmt::Result {
-    write!(out, "<table><tr><th></th>")?;
-    table.columns.iter().try_for_each(|name| write!(out, "<th>{}</th>", escape(name)))?;
-    writeln!(out, "</tr>")?;
-    for (name, values) in &table.rows {
-        write!(out, "<tr><td>{}</td>", escape(name))?;
-        values.iter().try_for_each(|value| write!(out, "<td>{}</td>", number(*value)))?;
-        writeln!(out, "</tr>")?;
-    }
-    writeln!(out, "</table>")
+/// Why a row does not hold, or fails.
+fn remark(row: &Row) -> String {
+    let (class, text) = match (row.reason(), row.failure()) {
+        (Some(reason), _) => ("td class=\"t reason\" colspan=\"6\"", format!("Why not: {}", escape(reason))),
+        (_, Some(failure)) => ("td class=\"t bad\" colspan=\"6\"", format!("This row {}.", escape(&failure))),
+        _ => return String::new(),
+    };
+    page::row([(class, text)])
+}
+
+fn table(table: &Table) -> String {
+    let head = page::row(
+        [("th", String::new())].into_iter().chain(table.columns.iter().map(|name| ("th", escape(name)))),
+    );
+    let line = |(name, values): &(String, Vec<Option<f64>>)| {
+        let cells = [escape(name)].into_iter().chain(values.iter().map(|value| number(*value)));
+        page::row(cells.map(|cell| ("td", cell)))
+    };
+    format!("<table>{head}{}</table>\n", table.rows.iter().map(line).collect::<String>())
 }
 
 #[cfg(test)]

@@ -1,41 +1,39 @@
-//! Which runs a figure needs, in what order they go, and what `--quick` changes about them.
+//! Which runs a figure needs, and in what order they go.
 
 use std::fmt;
-use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
+use anyhow::anyhow;
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
 
 /// The cases of the paper, as named in `data/cases`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum CaseName {
     /// Two discs that nearly touch (paper, figures 5 and 6).
+    #[value(name = "pair-2d")]
     Pair2d,
     /// Two spheres that meet (figure 7).
+    #[value(name = "pair-3d")]
     Pair3d,
     /// The pair of discs and a third one (figures 9 to 11).
+    #[value(name = "trio-2d")]
     Trio2d,
 }
 
-impl CaseName {
-    /// Name of the case file without its extension.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Pair2d => "pair-2d",
-            Self::Pair3d => "pair-3d",
-            Self::Trio2d => "trio-2d",
-        }
-    }
+/// The name of one of a few things.
+fn name(thing: &impl ValueEnum) -> String {
+    thing.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 impl fmt::Display for CaseName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.as_str())
+        f.write_str(&name(self))
     }
 }
 
 /// The ways each case is computed: the paper's three strategies in its formulation, its gluey contact as
 /// printed, and the accurate formulation, in which lubrication keeps particles apart and no contact acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum Approach {
     /// No contact model, formulation `paper`.
     None,
@@ -52,20 +50,6 @@ pub enum Approach {
     Unfitted,
 }
 
-impl Approach {
-    /// Part of a run's name after the case.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Inelastic => "inelastic",
-            Self::Gluey => "gluey",
-            Self::GlueyAsPrinted => "gluey-as-printed",
-            Self::GlueyAsPrintedLargeStep => "gluey-as-printed-large-step",
-            Self::Unfitted => "unfitted",
-        }
-    }
-}
-
 /// One run: a case and the way it is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunKey {
@@ -78,7 +62,13 @@ pub struct RunKey {
 impl RunKey {
     /// Name of the run's CSV file without its extension.
     pub fn name(self) -> String {
-        format!("{}-{}", self.case, self.approach.as_str())
+        format!("{}-{}", self.case, name(&self.approach))
+    }
+
+    /// Every case in every way.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let of_case = |&case| Approach::value_variants().iter().map(move |&approach| Self { case, approach });
+        CaseName::value_variants().iter().flat_map(of_case)
     }
 
     /// A guess at the cost of the run relative to the others; only the order of the runs depends on it.
@@ -101,7 +91,8 @@ impl fmt::Display for RunKey {
 }
 
 /// The figures of the paper that show its results and set-ups.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum FigureName {
     /// Gluey contact as the limit of lubrication (section 2.5, which has no figure).
     Limit,
@@ -127,33 +118,15 @@ pub enum FigureName {
 
 impl FigureName {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 10] = [
-        Self::Limit,
-        Self::Fig4,
-        Self::Fig5,
-        Self::Fig6,
-        Self::Fig7a,
-        Self::Fig7b,
-        Self::Fig8,
-        Self::Fig9,
-        Self::Fig10,
-        Self::Fig11,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::value_variants().iter().copied()
+    }
 
-    /// Name of the figure's files without their extension.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Limit => "limit",
-            Self::Fig4 => "fig4",
-            Self::Fig5 => "fig5",
-            Self::Fig6 => "fig6",
-            Self::Fig7a => "fig7a",
-            Self::Fig7b => "fig7b",
-            Self::Fig8 => "fig8",
-            Self::Fig9 => "fig9",
-            Self::Fig10 => "fig10",
-            Self::Fig11 => "fig11",
-        }
+    /// The figure of this name.
+    pub fn named(name: &str) -> anyhow::Result<Self> {
+        let figures: Vec<String> = Self::all().map(|figure| figure.to_string()).collect();
+        let unknown = || anyhow!("there is no figure `{name}`; the figures are {}", figures.join(", "));
+        Self::all().zip(&figures).find(|(_, own)| *own == name).map(|(figure, _)| figure).ok_or_else(unknown)
     }
 
     /// The case whose set-up or runs it shows.
@@ -195,29 +168,7 @@ impl FigureName {
 
 impl fmt::Display for FigureName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.as_str())
-    }
-}
-
-impl Serialize for FigureName {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.as_str())
-    }
-}
-
-/// `--only` names a figure that does not exist.
-#[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is no figure `{0}`; the figures are limit, fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11"
-)]
-pub struct UnknownFigure(String);
-
-impl FromStr for FigureName {
-    type Err = UnknownFigure;
-
-    fn from_str(name: &str) -> Result<Self, UnknownFigure> {
-        let found = Self::ALL.into_iter().find(|figure| figure.as_str() == name);
-        found.ok_or_else(|| UnknownFigure(name.to_owned()))
+        f.write_str(&name(self))
     }
 }
 
@@ -235,43 +186,15 @@ pub fn runs_for(figures: &[FigureName], quick: bool) -> Vec<RunKey> {
 /// says nothing about smaller ones.
 const ONLY_IN_FULL: RunKey = RunKey { case: CaseName::Pair3d, approach: Approach::GlueyAsPrintedLargeStep };
 
-/// Changes of a case by `--quick`: the only place for these numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuickSettings {
-    /// Finest cells per radius, `a / h`.
-    pub cells_per_radius: f64,
-    /// The time step is multiplied by this.
-    pub step_factor: f64,
-    /// Relative tolerance of the linear solves of `paper`. Those of `unfitted` keep theirs.
-    pub paper_tolerance: f64,
-    /// The run ends at this time (units of 1/shear rate) unless the case ends earlier.
-    pub latest_end: f64,
-}
-
-/// The settings of `--quick` for a case.
-pub fn quick_settings(case: CaseName) -> QuickSettings {
-    match case {
-        CaseName::Pair2d | CaseName::Trio2d => {
-            QuickSettings { cells_per_radius: 6.4, step_factor: 2.0, paper_tolerance: 1e-6, latest_end: 16.0 }
-        }
-        CaseName::Pair3d => QuickSettings {
-            cells_per_radius: 3.2,
-            step_factor: 2.0,
-            paper_tolerance: 1e-3,
-            latest_end: 16.85,
-        },
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn all_figures_need_sixteen_runs_and_the_spheres_go_first() {
-        let runs = runs_for(&FigureName::ALL, false);
+        let runs = runs_for(FigureName::value_variants(), false);
         assert_eq!(runs.len(), 16);
-        assert_eq!(runs_for(&FigureName::ALL, true).len(), 15);
+        assert_eq!(runs_for(FigureName::value_variants(), true).len(), 15);
         assert!(runs[..6].iter().all(|run| run.case == CaseName::Pair3d));
     }
 
@@ -284,9 +207,13 @@ mod tests {
 
     #[test]
     fn figure_names_are_read_back_and_others_refused() {
-        for figure in FigureName::ALL {
-            assert_eq!(figure.as_str().parse(), Ok(figure));
+        for figure in FigureName::all() {
+            assert_eq!(FigureName::named(&figure.to_string()).ok(), Some(figure));
         }
-        assert!("fig7".parse::<FigureName>().is_err());
+        let error = FigureName::named("fig7").unwrap_err().to_string();
+        assert!(
+            error
+                .ends_with("the figures are limit, fig4, fig5, fig6, fig7a, fig7b, fig8, fig9, fig10, fig11")
+        );
     }
 }

@@ -1,9 +1,8 @@
 //! The exact solutions that stand beside the runs (`data/reference/README.md` says where each comes from).
 
-use std::path::Path;
-
 use super::plan::CaseName;
-use super::trajectory::{Trajectory, TrajectoryError};
+use super::trajectory::Trajectory;
+use crate::workspace_root;
 
 /// Time of half a turn of the 2D doublet, exact to 1e-6 (units of 1/shear rate).
 pub const HALF_TURN_TIME: f64 = 7.769130;
@@ -20,8 +19,8 @@ pub fn file_name(case: CaseName) -> &'static str {
 }
 
 /// The exact trajectory of a case; the 2D doublet, which repeats itself every half turn, to time `end`.
-pub fn load(root: &Path, case: CaseName, end: f64) -> Result<Trajectory, TrajectoryError> {
-    let exact = Trajectory::read(&root.join("data/reference").join(file_name(case)))?;
+pub fn load(case: CaseName, end: f64) -> anyhow::Result<Trajectory> {
+    let exact = Trajectory::read(&workspace_root().join("data/reference").join(file_name(case)))?;
     Ok(if case == CaseName::Pair2d { exact.continue_half_turns(end) } else { exact })
 }
 
@@ -34,7 +33,7 @@ mod tests {
     const DOUBLET_RADIUS: f64 = 0.05001;
 
     fn exact(case: CaseName) -> Trajectory {
-        load(&crate::workspace_root(), case, 30.0).unwrap()
+        load(case, 30.0).unwrap()
     }
 
     #[test]

@@ -3,21 +3,20 @@
 use std::path::Path;
 
 use gluey::case::{Memory, ParticleVelocity};
-use gluey::{Case, CaseError, Formulation, RunError, RunOptions, RunReport, Strategy};
+use gluey::{Case, Formulation, RunOptions, RunReport, Strategy};
 
-use super::plan::{Approach, CaseName, RunKey, quick_settings};
-use crate::book::chain;
+use super::plan::{Approach, CaseName, RunKey};
 use crate::book::progress::Board;
-use gluey::progress::duration;
+use crate::workspace_root;
 
 /// The case of a run, ready to go. The accurate run of the three discs is made in the box of the exact
 /// solution.
-pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
+pub fn case(key: RunKey, quick: bool) -> anyhow::Result<Case> {
     let file = match (key.case, key.approach) {
         (CaseName::Trio2d, Approach::Unfitted) => "trio-2d-couette".to_owned(),
         _ => key.case.to_string(),
     };
-    let mut case = Case::load(root.join("data/cases").join(format!("{file}.toml")))?;
+    let mut case = Case::load(workspace_root().join("data/cases").join(format!("{file}.toml")))?;
     case.name = key.case.to_string();
     case.contact.exact_gap = true;
     case.contact.strategy = match key.approach {
@@ -38,42 +37,27 @@ pub fn case(root: &Path, key: RunKey, quick: bool) -> Result<Case, CaseError> {
         case.time.step *= 2.0;
     }
     if quick {
-        let settings = quick_settings(key.case);
-        case.flow.mesh.cells_per_radius = Some(settings.cells_per_radius);
+        // Cells per radius, tolerance of `paper` (that of `unfitted` stays), end: the only place for these.
+        let (cells, tolerance, end) = match key.case {
+            CaseName::Pair2d | CaseName::Trio2d => (6.4, 1e-6, 16.0),
+            CaseName::Pair3d => (3.2, 1e-3, 16.85),
+        };
+        case.flow.mesh.cells_per_radius = Some(cells);
         if case.flow.formulation == Formulation::Paper {
-            case.flow.tolerance = settings.paper_tolerance;
+            case.flow.tolerance = tolerance;
         }
-        case.time.step *= settings.step_factor;
-        case.time.end = case.time.end.min(settings.latest_end);
+        case.time.step *= 2.0;
+        case.time.end = case.time.end.min(end);
     }
     Ok(case)
 }
 
 /// Runs it; `folder/<name>.csv` is there when it succeeded, `folder/<name>.csv.partial-1` holds what a failed
 /// run wrote.
-pub fn run(
-    root: &Path,
-    folder: &Path,
-    key: RunKey,
-    quick: bool,
-    board: &Board,
-) -> Result<RunReport, RunError> {
+pub fn run(folder: &Path, key: RunKey, quick: bool, board: &Board) -> anyhow::Result<RunReport> {
     let line = board.start(&key.name());
-    let result = run_to_files(root, folder, key, quick, &line);
-    match &result {
-        Ok(report) => line.finish(&format!("done in {}", duration(report.wall_s))),
-        Err(error) => line.finish(&format!("failed: {}", chain(error))),
-    }
+    let options = RunOptions::csv(folder.join(format!("{key}.csv")));
+    let result = case(key, quick).and_then(|case| Ok(gluey::run(&case, &options, &line)?));
+    line.finish(&result);
     result
-}
-
-fn run_to_files(
-    root: &Path,
-    folder: &Path,
-    key: RunKey,
-    quick: bool,
-    line: &dyn gluey::Progress,
-) -> Result<RunReport, RunError> {
-    let csv = folder.join(format!("{key}.csv"));
-    gluey::run(&case(root, key, quick)?, &RunOptions::csv(csv), line)
 }

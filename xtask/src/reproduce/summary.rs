@@ -1,11 +1,14 @@
 //! `summary.json`: everything a program may want to know about a reproduction.
 
+use std::path::Path;
+
 use gluey::RunReport;
+use gluey_verify::Outcome;
 use serde::Serialize;
 
 use super::plan::FigureName;
 use super::settings::Settings;
-use super::verdict::Row;
+use super::verdict::{Claim, Kind, Row, count};
 use crate::book::Failure;
 
 /// The content of `summary.json`.
@@ -47,5 +50,39 @@ impl Summary {
     /// As indented JSON.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
+
+    /// Says what was found: every row, counts, and what did not work.
+    pub fn print(&self, out: &Path) {
+        for row in &self.rows {
+            let Claim { figure, statement, run, measure, kind, .. } = row.claim;
+            let mark = match (row.outcome, row.reason().is_some(), kind) {
+                (Outcome::NotMeasured, _, _) => "MISSING",
+                (Outcome::No, true, _) => "no, known",
+                (Outcome::No, false, _) => "NO",
+                (Outcome::Yes, _, Kind::Guarantee) => "guaranteed",
+                (Outcome::Yes, _, _) => "yes",
+            };
+            let value = row.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
+            println!("{mark:10} {figure:5} {statement} {run}: {measure} = {value} ({})", row.wanted);
+        }
+        println!("\nfigures, runs, summary.json and index.html are in {}", out.display());
+        let (reproduced, statements) = count(&self.rows, Kind::Paper);
+        let (held, comparisons) = count(&self.rows, Kind::Exact);
+        println!(
+            "\nof {statements} statements of the paper {reproduced} are reproduced, {} are not; of {comparisons} comparisons \
+             with exact solutions {held} hold, {} do not",
+            statements - reproduced,
+            comparisons - held
+        );
+        let rows = || self.rows.iter().map(|row| (&row.claim.id, &row.claim.statement, row));
+        for (id, statement, reason) in rows().filter_map(|(id, said, row)| Some((id, said, row.reason()?))) {
+            println!("known disagreement: {id}: {statement} {reason}");
+        }
+        for (id, statement, failure) in rows().filter_map(|(id, said, row)| Some((id, said, row.failure()?)))
+        {
+            eprintln!("error: {id} {failure}: {statement}");
+        }
+        self.failures.iter().for_each(|failure| eprintln!("error: {}: {}", failure.what, failure.error));
     }
 }

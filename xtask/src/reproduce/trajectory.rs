@@ -1,7 +1,8 @@
 //! Trajectories read from CSV files: those of the runs and the exact ones of `data/reference`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use anyhow::Context;
 use gluey::table::{Table, TableError, linear};
 
 /// Centres and gaps over time.
@@ -24,34 +25,12 @@ pub struct PairGap {
     pub over_radius: Vec<f64>,
 }
 
-/// Why a trajectory could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum TrajectoryError {
-    /// The file cannot be opened or read.
-    #[error("{path}: {source}", path = path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// It is no table of a trajectory.
-    #[error("{path}: {source}", path = path.display())]
-    Table {
-        /// The file.
-        path: PathBuf,
-        /// Error of the table.
-        source: TableError,
-    },
-}
-
 impl Trajectory {
     /// Reads a CSV file with columns `t,x1,y1[,z1],x2,...` and gaps `gap12_over_a,...` or, for a pair,
     /// `D_over_a`.
-    pub fn read(path: &Path) -> Result<Self, TrajectoryError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
-        Self::parse(&text).map_err(|source| TrajectoryError::Table { path: path.to_owned(), source })
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let name = || path.display().to_string();
+        Self::parse(&std::fs::read_to_string(path).with_context(name)?).with_context(name)
     }
 
     /// Takes the columns of a table; a last line without its newline (a run cut short) is dropped.

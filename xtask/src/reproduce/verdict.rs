@@ -1,13 +1,12 @@
 //! Rows under the figures: what is claimed, the number that decides it, and whether it is so.
 
 use gluey_verify::{Outcome, Wanted};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::known::{self, Missed, Mode};
-use super::plan::FigureName;
+use super::plan::{FigureName, RunKey};
 
 /// Why a row is there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// A statement of the paper: reproduced or not.
@@ -19,48 +18,69 @@ pub enum Kind {
     Guarantee,
 }
 
-/// A statement with the number that decides it, before it is judged.
-#[derive(Clone, Debug)]
+/// A statement and the interval of its number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub struct Claim {
     /// Names the row for good, such as `fig9-third-joins`.
-    pub id: &'static str,
+    pub id: String,
+    /// The figure under which it is shown.
+    pub figure: FigureName,
     /// Why it is there.
     pub kind: Kind,
     /// The statement.
-    pub statement: &'static str,
+    pub statement: String,
     /// The run or runs it is about.
-    pub run: &'static str,
+    pub run: String,
     /// The measure.
-    pub measure: &'static str,
-    /// The number; `None` if it could not be measured.
-    pub value: Option<f64>,
+    pub measure: String,
+    /// The run that is measured, where `run` does not begin with its name.
+    #[serde(skip_serializing)]
+    own: Option<String>,
     /// Its wanted interval.
-    pub wanted: Wanted,
+    #[serde(flatten, skip_serializing)]
+    wanted: Wanted,
+    /// The wanted interval with `--quick`, where that is another one.
+    #[serde(skip_serializing)]
+    quick: Option<Wanted>,
     /// It needs the full computation: runs of `--quick` end earlier and take larger steps.
+    #[serde(default, skip_serializing)]
     pub full_only: bool,
+    /// That it does not hold, if this is known.
+    #[serde(skip_serializing)]
+    known: Option<Missed>,
+    /// The same with `--quick`.
+    #[serde(skip_serializing)]
+    known_quick: Option<Missed>,
+}
+
+/// Why a row does not hold, and where its number lies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Missed {
+    /// The reason.
+    pub why: String,
+    /// Smallest and largest number that is known: another one is something new.
+    pub between: (f64, f64),
 }
 
 impl Claim {
-    /// The same, but left out of `--quick`.
-    pub fn full_only(self) -> Self {
-        Self { full_only: true, ..self }
+    /// The run that is measured.
+    pub fn own_run(&self) -> Option<RunKey> {
+        let name = self.own.as_deref().or_else(|| self.run.split(' ').next())?;
+        RunKey::all().find(|key| key.name() == name)
     }
 
-    /// The row that stands under `figure`.
-    pub fn judge(self, figure: FigureName, mode: Mode) -> Row {
-        let value = self.value.filter(|value| value.is_finite());
-        let outcome = self.wanted.outcome(value);
+    /// The row that it becomes with its number.
+    pub fn judge(&'static self, value: Option<f64>, quick: bool) -> Row {
+        let value = value.filter(|value| value.is_finite());
+        let wanted = self.quick.filter(|_| quick).unwrap_or(self.wanted);
+        let known = if quick { &self.known_quick } else { &self.known };
         Row {
-            id: self.id,
-            figure,
-            kind: self.kind,
-            statement: self.statement,
-            run: self.run,
-            measure: self.measure,
+            claim: self,
             value,
-            wanted: self.wanted.to_string(),
-            outcome,
-            known: known::missed(self.id, mode),
+            wanted: wanted.to_string(),
+            outcome: wanted.outcome(value),
+            known: known.as_ref(),
         }
     }
 }
@@ -68,18 +88,9 @@ impl Claim {
 /// One judged row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Names the row for good.
-    pub id: &'static str,
-    /// The figure under which it is shown.
-    pub figure: FigureName,
-    /// Why it is there.
-    pub kind: Kind,
-    /// The statement.
-    pub statement: &'static str,
-    /// The run or runs it is about.
-    pub run: &'static str,
-    /// The measure.
-    pub measure: &'static str,
+    /// What is claimed.
+    #[serde(flatten)]
+    pub claim: &'static Claim,
     /// The number; `None` if it could not be measured.
     pub value: Option<f64>,
     /// Its wanted interval.
@@ -87,7 +98,7 @@ pub struct Row {
     /// Whether it is.
     pub outcome: Outcome,
     /// What is known of it, if it is a known disagreement.
-    pub known: Option<Missed>,
+    pub known: Option<&'static Missed>,
 }
 
 impl Row {
@@ -96,13 +107,12 @@ impl Row {
         match (self.outcome, self.known) {
             (Outcome::NotMeasured, _) => Some("was not measured".to_owned()),
             (Outcome::No, None) => Some("does not hold and is no known disagreement".to_owned()),
-            (Outcome::No, Some(known)) if !known.has(self.value) => {
-                let (least, most) = known.between;
-                let value = self.value.unwrap_or(f64::NAN);
+            (Outcome::No, Some(Missed { between: (least, most), .. })) => {
+                let value = self.value.filter(|value| !(*least..=*most).contains(value))?;
                 Some(format!("is {value:.4e}, known to disagree by {least:e} to {most:e}"))
             }
             (Outcome::Yes, Some(_)) => Some("holds, and is listed as a known disagreement".to_owned()),
-            (Outcome::Yes, None) | (Outcome::No, Some(_)) => None,
+            (Outcome::Yes, None) => None,
         }
     }
 
@@ -113,36 +123,43 @@ impl Row {
 
     /// For a known disagreement, the reason.
     pub fn reason(&self) -> Option<&'static str> {
-        self.known.filter(|_| self.outcome == Outcome::No && !self.is_failure()).map(|known| known.why)
+        let known = self.known.filter(|_| self.outcome == Outcome::No && !self.is_failure());
+        known.map(|known| known.why.as_str())
     }
 }
 
 /// How many rows of a kind hold, and how many there are.
 pub fn count(rows: &[Row], kind: Kind) -> (usize, usize) {
-    let own = rows.iter().filter(|row| row.kind == kind);
+    let own = rows.iter().filter(|row| row.claim.kind == kind);
     let held = own.clone().filter(|row| row.outcome == Outcome::Yes).count();
     (held, own.count())
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::rows::claims;
     use super::*;
 
-    fn claim(value: Option<f64>, wanted: Wanted) -> Claim {
-        Claim {
-            id: "fig5-test",
+    fn claim(wanted: Wanted, known: Option<Missed>) -> &'static Claim {
+        let text = |text: &str| text.to_owned();
+        Box::leak(Box::new(Claim {
+            id: text("fig5-test"),
+            figure: FigureName::Fig5,
             kind: Kind::Paper,
-            statement: "It is so.",
-            run: "pair-2d-none",
-            measure: "a number",
-            value,
+            statement: text("It is so."),
+            run: text("pair-2d-none"),
+            measure: text("a number"),
+            own: None,
             wanted,
+            quick: None,
             full_only: false,
-        }
+            known,
+            known_quick: None,
+        }))
     }
 
     fn outcome(value: Option<f64>, wanted: Wanted) -> Outcome {
-        claim(value, wanted).judge(FigureName::Fig5, Mode::Full).outcome
+        claim(wanted, None).judge(value, false).outcome
     }
 
     #[test]
@@ -158,7 +175,7 @@ mod tests {
 
     #[test]
     fn what_is_not_measured_or_unexpectedly_wrong_is_a_failure() {
-        let judged = |value| claim(value, Wanted::AtMost(1.0)).judge(FigureName::Fig5, Mode::Full);
+        let judged = |value| claim(Wanted::AtMost(1.0), None).judge(value, false);
         assert!(judged(None).is_failure());
         assert!(judged(Some(2.0)).is_failure());
         assert!(!judged(Some(0.0)).is_failure());
@@ -166,10 +183,10 @@ mod tests {
 
     #[test]
     fn known_disagreements_are_no_failures_but_stay_counted_as_no() {
-        let listed = known::KNOWN.iter().find(|known| known.full.is_some()).expect("there are some");
-        let (least, most) = listed.full.expect("this one is").between;
-        let of = |value| Claim { id: listed.id, ..claim(value, Wanted::AtMost(0.5 * least)) };
-        let judged = |value| of(value).judge(FigureName::Fig5, Mode::Full);
+        let listed = claims().iter().find_map(|claim| claim.known.clone()).expect("there are some");
+        let (least, most) = listed.between;
+        let claim = claim(Wanted::AtMost(0.5 * least), Some(listed));
+        let judged = |value| claim.judge(value, false);
         let row = judged(Some(0.5 * (least + most)));
         assert!(row.reason().is_some() && !row.is_failure());
         assert_eq!(count(&[row], Kind::Paper), (0, 1));

@@ -1,6 +1,7 @@
 //! Results with error bars beside curves of the literature.
 
-use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
+use crate::book;
+use gluey_pictures::{Axis, Canvas, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 340.0;
 
@@ -26,6 +27,19 @@ pub struct Series {
     pub label: String,
     /// Place, mean, and half the length of its error bar.
     pub points: Vec<(f64, f64, f64)>,
+}
+
+impl Series {
+    /// Without points so far.
+    pub fn new(label: &str) -> Self {
+        Self { label: label.to_owned(), points: Vec::new() }
+    }
+}
+
+/// A known curve: a function of fractions up to so many hundredths.
+pub fn curve(label: &str, function: fn(f64) -> f64, last: u32) -> (String, Vec<(f64, f64)>) {
+    let fractions = (0..=last).map(|k| f64::from(k) / 100.0);
+    (label.to_owned(), fractions.map(|phi| (phi, function(phi))).collect())
 }
 
 /// Series and known curves over a pair of axes; a logarithmic one leaves out what is not positive.
@@ -56,6 +70,5 @@ pub fn draw(
         true => Axis::decades(y, low.unwrap_or(0.1), high.unwrap_or(1.0)),
         false => Axis::around(y, points().map(|point| point.1)),
     };
-    let chart = Chart { x: across, y: up, curves, notes: Vec::new(), marks: Vec::new() };
-    stack(&[chart], |_| FRAME_HEIGHT)
+    stack(&[book::chart(across, up, curves)], |_| FRAME_HEIGHT)
 }

@@ -4,21 +4,23 @@
 //! stopped go on from their last checkpoint.
 
 mod drawing;
+mod findings;
 mod page;
 mod point;
 mod reversibility;
 mod settling;
 mod viscosity;
 
-use std::path::PathBuf;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use gluey_pictures::Canvas;
 
-use crate::book::files::{self, WriteError};
 use crate::book::progress::Board;
-use crate::book::{Failure, schedule, write_drawing};
+use crate::book::{files, jobs, keep, schedule, write_drawing};
+use crate::workspace_root;
+use findings::Study;
 use point::{Done, Point};
 
 /// The studies.
@@ -33,40 +35,19 @@ pub enum Name {
 }
 
 /// What to compute, and where to put it.
-#[derive(Clone, Debug)]
+#[derive(clap::Args)]
 pub struct Options {
     /// The study.
-    pub name: Name,
-    /// Few points and short runs.
-    pub quick: bool,
-    /// Folder of the workspace, where `data` lies.
-    pub root: PathBuf,
-    /// Output folder; `target/studies/NAME` when absent.
-    pub out: PathBuf,
-    /// Runs at a time.
-    pub jobs: usize,
-}
-
-/// A study.
-struct Study {
-    title: &'static str,
-    /// What is computed and beside what, as HTML.
-    text: &'static str,
-    /// The runs.
-    points: fn(quick: bool) -> Vec<Point>,
-    /// What comes out of the runs that succeeded.
-    findings: fn(&[Done]) -> Result<Findings, point::PointError>,
-}
-
-/// What comes out of a study.
-struct Findings {
-    /// Names of the columns, and rows.
-    columns: Vec<&'static str>,
-    rows: Vec<Vec<String>>,
-    /// Pictures with names.
-    drawings: Vec<(&'static str, Canvas)>,
-    /// What the numbers say, as HTML.
-    remarks: Vec<String>,
+    name: Name,
+    /// Few points and short runs: minutes.
+    #[arg(long)]
+    quick: bool,
+    /// Output folder [default: target/studies/NAME].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Runs at a time [default: number of cores].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
 }
 
 impl Name {
@@ -77,50 +58,40 @@ impl Name {
             Self::Settling => settling::STUDY,
         }
     }
-
-    /// Name of its folder.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Viscosity => "viscosity",
-            Self::Reversibility => "reversibility",
-            Self::Settling => "settling",
-        }
-    }
 }
 
-/// Makes the runs and writes `table.csv`, pictures and `index.html`. What failed is told and on the page.
+/// Makes the runs and writes `table.csv`, pictures and `index.html`; whether all is well. What failed is told
+/// and on the page.
 ///
 /// # Errors
 /// If nothing can be written.
-pub fn study(options: &Options) -> Result<Vec<Failure>, WriteError> {
+pub fn run(options: &Options) -> anyhow::Result<bool> {
     let start = Instant::now();
-    let study = options.name.study();
-    let out = &options.out;
+    let (study, quick) = (options.name.study(), options.quick);
+    let folder = Path::new(if quick { "target/studies/quick" } else { "target/studies" });
+    let name = options.name.to_possible_value().expect("every study has a name");
+    let out = &options.out.clone().unwrap_or_else(|| folder.join(name.get_name()));
     files::prepare_folder(out)?;
-    let points = (study.points)(options.quick);
-    let board = Board::new();
-    let results = schedule::in_parallel(&points, options.jobs, |point| {
-        point.run(&options.root.join("data/studies"), &out.join("runs"), &board)
-    });
-    let (mut done, mut failures) = (Vec::new(), Vec::new());
-    for (point, result) in points.iter().zip(results) {
-        match result {
-            Ok(run) => done.push(run),
-            Err(error) => failures.push(Failure::new(point.name.clone(), &error)),
-        }
-    }
-    let findings = (study.findings)(&done).unwrap_or_else(|error| {
-        failures.push(Failure::new("what comes out".to_owned(), &error));
-        Findings { columns: Vec::new(), rows: Vec::new(), drawings: Vec::new(), remarks: Vec::new() }
-    });
+    let (points, board) = ((study.points)(quick), Board::new());
+    let data = workspace_root().join("data/studies");
+    let run = |point: &Point| point.run(&data, &out.join("runs"), &board);
+    let results = schedule::in_parallel(&points, jobs(options.jobs), run);
+    let mut failures = Vec::new();
+    let results = points.iter().zip(results);
+    let done: Vec<Done> =
+        results.filter_map(|(point, result)| keep(point.name.clone(), result, &mut failures)).collect();
+    let findings = (study.findings)(&done);
+    let findings = keep("what comes out".to_owned(), findings, &mut failures).unwrap_or_default();
     files::write(&out.join("table.csv"), page::csv(&findings).as_bytes())?;
     for (name, drawing) in &findings.drawings {
         write_drawing(out, name, drawing, &mut failures)?;
     }
-    let effort = page::Effort::of(&done, start.elapsed().as_secs_f64());
-    let html = page::html(&study, &findings, &effort, &failures, options.quick);
+    let effort = page::effort(&done, start.elapsed().as_secs_f64());
+    let html = page::html(&study, &findings, &failures, quick, &effort);
     files::write(&out.join("index.html"), html.as_bytes())?;
-    Ok(failures)
+    println!("table.csv, pictures and index.html are in {}", out.display());
+    failures.iter().for_each(|failure| eprintln!("error: {}: {}", failure.what, failure.error));
+    Ok(failures.is_empty())
 }
 
 #[cfg(test)]

@@ -2,17 +2,12 @@
 
 use std::path::Path;
 
+use anyhow::{Context, anyhow};
 use gluey::case::Override;
-use gluey::table::{Table, TableError};
-use gluey::{
-    Case, CaseError, OccupiedError, RecordError, RecordOptions, ResultPaths, RunError, RunOptions, RunRecord,
-    RunReport,
-};
-use thiserror::Error;
+use gluey::table::Table;
+use gluey::{Case, OccupiedError, RecordOptions, ResultPaths, RunError, RunOptions, RunRecord, RunReport};
 
-use crate::book::chain;
 use crate::book::progress::Board;
-use gluey::progress::duration;
 
 /// Minutes between checkpoints.
 const CHECKPOINT_MINUTES: f64 = 2.0;
@@ -44,37 +39,6 @@ pub struct Done {
     pub rheology: Option<Table>,
 }
 
-/// A point has no results.
-#[derive(Debug, Error)]
-pub enum PointError {
-    /// A key cannot be set so.
-    #[error("`{0}` sets no key")]
-    Override(String),
-    /// The case is not good.
-    #[error(transparent)]
-    Case(#[from] CaseError),
-    /// The run failed.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The run that is there has no record.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    /// A run without a report.
-    #[error("the record of the run has no report")]
-    NoReport,
-    /// Results cannot be read.
-    #[error("{path} cannot be read")]
-    Read {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Results are no table, or not the expected one.
-    #[error(transparent)]
-    Table(#[from] TableError),
-}
-
 impl Point {
     /// A point of the study whose case is in `file`.
     pub fn new(name: String, model: &'static str, at: f64, file: &'static str) -> Self {
@@ -89,22 +53,19 @@ impl Point {
     }
 
     /// The case.
-    pub fn case(&self, data: &Path) -> Result<Case, PointError> {
-        let parse = |text: &String| text.parse::<Override>().map_err(|_| PointError::Override(text.clone()));
+    pub fn case(&self, data: &Path) -> anyhow::Result<Case> {
+        let parse = |text: &String| text.parse::<Override>().map_err(|_| anyhow!("`{text}` sets no key"));
         let set = self.set.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
         Ok(Case::load_with(data.join(self.file), &set)?)
     }
 
     /// Runs it in a folder of its own, or takes what is there.
-    pub fn run(&self, data: &Path, out: &Path, board: &Board) -> Result<Done, PointError> {
+    pub fn run(&self, data: &Path, out: &Path, board: &Board) -> anyhow::Result<Done> {
         let case = self.case(data)?;
         let paths = ResultPaths::new(out.join(&self.name), case.file_stem());
         let line = board.start(&self.name);
         let result = report(&case, &paths, &line);
-        match &result {
-            Ok(report) => line.finish(&format!("done in {}", duration(report.wall_s))),
-            Err(error) => line.finish(&format!("failed: {}", chain(error))),
-        }
+        line.finish(&result);
         let report = result?;
         let rheology =
             case.has_rheology().then(|| table(&gluey::output::rheology::rheology_path(&paths.csv())));
@@ -119,7 +80,7 @@ impl Point {
 }
 
 /// Runs, goes on, or reads what a complete run of this case left.
-fn report(case: &Case, paths: &ResultPaths, line: &dyn gluey::Progress) -> Result<RunReport, PointError> {
+fn report(case: &Case, paths: &ResultPaths, line: &dyn gluey::Progress) -> anyhow::Result<RunReport> {
     let checkpoint = paths.checkpoint();
     let options = RunOptions {
         checkpoint: Some(checkpoint.clone()),
@@ -127,22 +88,17 @@ fn report(case: &Case, paths: &ResultPaths, line: &dyn gluey::Progress) -> Resul
         record: Some(RecordOptions { force: false }),
         ..RunOptions::csv(paths.csv())
     };
-    let outcome = match RunRecord::read(&paths.record()) {
-        Ok(record) if record.report.is_none() && checkpoint.exists() => {
-            gluey::run(case, &RunOptions { resume: Some(checkpoint), ..options }, line)
-        }
-        _ => gluey::run(case, &options, line),
-    };
-    match outcome {
+    let was_stopped = RunRecord::read(&paths.record()).is_ok_and(|record| record.report.is_none());
+    let resume = (was_stopped && checkpoint.exists()).then_some(checkpoint);
+    match gluey::run(case, &RunOptions { resume, ..options }, line) {
         Err(RunError::Occupied(OccupiedError::Complete { record, .. })) => {
-            RunRecord::read(&record)?.report.ok_or(PointError::NoReport)
+            RunRecord::read(&record)?.report.context("the record of the run has no report")
         }
         other => Ok(other?),
     }
 }
 
-fn table(path: &Path) -> Result<Table, PointError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| PointError::Read { path: path.display().to_string(), source })?;
-    Ok(Table::parse(&text)?)
+fn table(path: &Path) -> anyhow::Result<Table> {
+    let text = std::fs::read_to_string(path);
+    Ok(Table::parse(&text.with_context(|| format!("{} cannot be read", path.display()))?)?)
 }

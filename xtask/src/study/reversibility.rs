@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use gluey::Tally;
 
 use super::drawing::{Series, draw};
-use super::point::{Done, Point, PointError};
-use super::{Findings, Study};
+use super::findings::{Findings, Study};
+use super::point::{Done, Point};
 
 const FILES: [&str; 2] = ["reversibility-2d.toml", "reversibility-3d.toml"];
 /// Amplitudes of the strain in 2D and 3D.
@@ -81,7 +81,7 @@ fn radius(place: usize) -> f64 {
 
 /// Share that did not come back in a cycle, and root mean square displacement in radii: means over the second
 /// half of the cycles.
-fn away(done: &Done) -> Result<(f64, f64), PointError> {
+fn away(done: &Done) -> anyhow::Result<(f64, f64)> {
     let (case, table) = (&done.case, &done.trajectory);
     let a = case.mean_radius();
     let length = case.cycle_length().unwrap_or(1);
@@ -105,10 +105,10 @@ fn away(done: &Done) -> Result<(f64, f64), PointError> {
     Ok((share / count, rms / count))
 }
 
-fn findings(done: &[Done]) -> Result<Findings, PointError> {
+fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     let (mut rows, mut drawings) = (Vec::new(), Vec::new());
     for (dimension, names) in [(2, ["away-2d", "distance-2d"]), (3, ["away-3d", "distance-3d"])] {
-        let (mut shares, mut distances) = (MODELS.map(series), MODELS.map(series));
+        let (mut shares, mut distances) = (MODELS.map(Series::new), MODELS.map(Series::new));
         for run in done.iter().filter(|run| run.case.dimension == dimension) {
             let (share, distance) = away(run)?;
             let smallest = run.report.min_gap_over_a.map_or(String::new(), |gap| format!("{gap:.1e}"));
@@ -130,21 +130,9 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         drawings.push((names[0], draw(x, &format!("share of {of} away"), false, &shares, Vec::new())));
         drawings.push((names[1], draw(x, "displacement in a cycle / *a*", true, &distances, Vec::new())));
     }
-    let columns = vec![
-        "dimension",
-        "model",
-        "amplitude",
-        "share_away",
-        "rms_over_a",
-        "min_gap_over_a",
-        "closed_films",
-        "halved_steps",
-    ];
+    let columns = "dimension,model,amplitude,share_away,rms_over_a,min_gap_over_a,\
+                   closed_films,halved_steps";
     Ok(Findings { columns, rows, drawings, remarks: Vec::new() })
-}
-
-fn series(model: &str) -> Series {
-    Series { label: model.to_owned(), points: Vec::new() }
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
 use gluey_verify::statistics::{mean, scatter};
 
-use super::drawing::{Series, draw};
-use super::point::{Done, Point, PointError};
-use super::{Findings, Study};
+use super::drawing::{Series, curve, draw};
+use super::findings::{Findings, Study};
+use super::point::{Done, Point};
 
 const FILE: &str = "settling.toml";
 const MODEL: &str = "equilibrium";
@@ -38,7 +38,7 @@ fn points(quick: bool) -> Vec<Point> {
 }
 
 /// Mean velocity of a first step along the weight over that of a single sphere.
-fn velocity(done: &Done) -> Result<f64, PointError> {
+fn velocity(done: &Done) -> anyhow::Result<f64> {
     let (case, table) = (&done.case, &done.trajectory);
     let weight = case.gravity.iter().flatten().copied().fold(0.0, |sum, x| sum + x.abs());
     let mut sum = 0.0;
@@ -51,7 +51,7 @@ fn velocity(done: &Done) -> Result<f64, PointError> {
     Ok(sum / case.particles.len() as f64)
 }
 
-fn findings(done: &[Done]) -> Result<Findings, PointError> {
+fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     let mut fractions: Vec<f64> = done.iter().map(|run| run.point.at).collect();
     fractions.dedup();
     let (mut rows, mut in_box, mut corrected) = (Vec::new(), Vec::new(), Vec::new());
@@ -69,18 +69,15 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         Series { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
         Series { label: "20 spheres in their box".to_owned(), points: in_box },
     ];
-    let columns = vec!["configurations", "phi", "in_box", "corrected", "standard_error", "polynomial"];
+    let columns = "configurations,phi,in_box,corrected,standard_error,polynomial";
     let drawing = draw("volume fraction *φ*", "settling velocity", false, &series, known());
     Ok(Findings { columns, rows, drawings: vec![("settling", drawing)], remarks: Vec::new() })
 }
 
 fn known() -> Vec<(String, Vec<(f64, f64)>)> {
-    let curve = |f: fn(f64) -> f64, last: u32| {
-        (0..=last).map(|k| (f64::from(k) / 100.0, f(f64::from(k) / 100.0))).collect()
-    };
     vec![
-        ("equilibrium".to_owned(), curve(settling_of_spheres, 45)),
-        ("1 − 6.55 *φ*".to_owned(), curve(|phi| 1.0 - 6.55 * phi, 12)),
-        ("(1 − *φ*)^{4.65}".to_owned(), curve(|phi| (1.0 - phi).powf(4.65), 45)),
+        curve("equilibrium", settling_of_spheres, 45),
+        curve("1 − 6.55 *φ*", |phi| 1.0 - 6.55 * phi, 12),
+        curve("(1 − *φ*)^{4.65}", |phi| (1.0 - phi).powf(4.65), 45),
     ]
 }

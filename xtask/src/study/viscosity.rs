@@ -6,9 +6,9 @@ use gluey::Tally;
 use gluey_suspension::statistics::{Estimate, mser};
 use gluey_verify::literature::viscosity_of_spheres;
 
-use super::drawing::{Series, draw};
-use super::point::{Done, Point, PointError};
-use super::{Findings, Study};
+use super::drawing::{Series, curve, draw};
+use super::findings::{Findings, Study};
+use super::point::{Done, Point};
 
 const FILE: &str = "viscosity.toml";
 const LUBRICATION: &str = "lubrication";
@@ -84,7 +84,7 @@ fn with_model(point: Point, radius: f64) -> Point {
 const COLUMNS: [&str; 4] = ["viscosity", "viscosity_of_contacts", "N1", "N2"];
 
 /// Means and half widths in the steady state, and the strain at which it begins.
-fn steady(done: &Done) -> Result<Option<(f64, Vec<Estimate>)>, PointError> {
+fn steady(done: &Done) -> anyhow::Result<Option<(f64, Vec<Estimate>)>> {
     let Some(table) = &done.rheology else { return Ok(None) };
     let skip = mser(table.column("viscosity")?).length;
     let strain = table.column("strain")?;
@@ -97,8 +97,15 @@ fn steady(done: &Done) -> Result<Option<(f64, Vec<Estimate>)>, PointError> {
     Ok(strain.get(skip).map(|&begin| (begin, estimates)))
 }
 
-fn findings(done: &[Done]) -> Result<Findings, PointError> {
-    let (mut rows, mut by_model) = (Vec::new(), MODELS.map(|_| (Vec::new(), Vec::new(), Vec::new())));
+/// Columns of the rheology with a picture, each with its label.
+const DRAWN: [(usize, &str, &str); 3] = [
+    (0, "viscosity", "relative viscosity"),
+    (2, "first-normal-stress", "*N*_{1} / viscous stress"),
+    (3, "second-normal-stress", "*N*_{2} / viscous stress"),
+];
+
+fn findings(done: &[Done]) -> anyhow::Result<Findings> {
+    let (mut rows, mut drawn) = (Vec::new(), DRAWN.map(|_| MODELS.map(Series::new)));
     for run in done {
         let Some((begin, estimates)) = steady(run)? else { continue };
         let [eta, contacts, n1, n2] = [0, 1, 2, 3].map(|k| &estimates[k]);
@@ -111,59 +118,25 @@ fn findings(done: &[Done]) -> Result<Findings, PointError> {
         let ends = [resolved.to_owned(), smallest, closed_films.to_string(), halved_steps.to_string()];
         rows.push([run.point.model.to_owned()].into_iter().chain(numbers).chain(ends).collect());
         if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
-            let (viscosities, firsts, seconds) = &mut by_model[place];
-            viscosities.push((run.point.at, eta.mean, eta.half_width));
-            firsts.push((run.point.at, n1.mean, n1.half_width));
-            seconds.push((run.point.at, n2.mean, n2.half_width));
+            for (series, (k, ..)) in drawn.iter_mut().zip(DRAWN) {
+                series[place].points.push((run.point.at, estimates[k].mean, estimates[k].half_width));
+            }
         }
     }
-    let series = |take: fn(&(Points, Points, Points)) -> &Points| -> Vec<Series> {
-        let one = |(model, points): (&str, &(Points, Points, Points))| Series {
-            label: model.to_owned(),
-            points: take(points).clone(),
-        };
-        MODELS.into_iter().zip(&by_model).map(one).collect()
+    let drawing = |(series, (k, name, label)): (&[Series; 4], (usize, &'static str, &str))| {
+        let known = if k == 0 { known() } else { Vec::new() };
+        (name, draw("volume fraction *φ*", label, k == 0, series, known))
     };
-    let (phi, excess) = ("volume fraction *φ*", "relative viscosity");
-    let first = draw(phi, "*N*_{1} / viscous stress", false, &series(|s| &s.1), Vec::new());
-    let second = draw(phi, "*N*_{2} / viscous stress", false, &series(|s| &s.2), Vec::new());
-    let columns = vec![
-        "model",
-        "phi",
-        "strain_skipped",
-        "viscosity",
-        "viscosity_half_width",
-        "viscosity_of_contacts",
-        "N1",
-        "N1_half_width",
-        "N2",
-        "N2_half_width",
-        "blocks_independent",
-        "min_gap_over_a",
-        "closed_films",
-        "halved_steps",
-    ];
-    Ok(Findings {
-        columns,
-        rows,
-        drawings: vec![
-            ("viscosity", draw(phi, excess, true, &series(|s| &s.0), known())),
-            ("first-normal-stress", first),
-            ("second-normal-stress", second),
-        ],
-        remarks: remarks(),
-    })
+    let drawings = drawn.iter().zip(DRAWN).map(drawing).collect();
+    let columns = "model,phi,strain_skipped,viscosity,viscosity_half_width,viscosity_of_contacts,N1,N1_half_width,N2,N2_half_width,\
+                   blocks_independent,min_gap_over_a,closed_films,halved_steps";
+    Ok(Findings { columns, rows, drawings, remarks: remarks() })
 }
 
-type Points = Vec<(f64, f64, f64)>;
-
 fn known() -> Vec<(String, Vec<(f64, f64)>)> {
-    let curve = |f: fn(f64) -> f64, last: u32| {
-        (0..=last).map(|k| (f64::from(k) / 100.0, f(f64::from(k) / 100.0))).collect()
-    };
     vec![
-        ("equilibrium".to_owned(), curve(viscosity_of_spheres, 46)),
-        ("1 + 2.5 *φ* + 7.6 *φ*^{2}".to_owned(), curve(|phi| 1.0 + 2.5 * phi + 7.6 * phi * phi, 30)),
+        curve("equilibrium", viscosity_of_spheres, 46),
+        curve("1 + 2.5 *φ* + 7.6 *φ*^{2}", |phi| 1.0 + 2.5 * phi + 7.6 * phi * phi, 30),
         ("sheared, frictionless".to_owned(), SHEARED.to_vec()),
     ]
 }

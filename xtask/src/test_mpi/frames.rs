@@ -3,12 +3,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use anyhow::{Context, ensure};
 use gluey::output::vtk::read_fields;
 use gluey_motion::Fields;
 
-use super::{Case, MpiError, RANKS, line, outcome, words};
-use crate::python::{self, PythonError};
+use super::{Case, RANKS, line, notices, within};
+use crate::{program, python};
 
 /// Its folder of frames.
 const FRAMES: &str = "near-gluey-unfitted-vtk";
@@ -27,70 +29,58 @@ const PACKAGES: [&str; 2] = ["meshio", "vtk"];
 
 impl Case {
     /// Pieces hold what one process writes, and others read them.
-    pub(super) fn write_frames(&self) -> Result<(), MpiError> {
+    pub(super) fn write_frames(&self) -> anyhow::Result<()> {
         let frames = self.folder().join(FRAMES);
         let alone = self.frames(RANKS[0], ".vtu")?;
         for ranks in [RANKS[1], RANKS[2]] {
             let found = self.frames(ranks, ".pvtu")?;
             for ((step, alone), found) in STEPS.iter().zip(&alone).zip(&found) {
                 let difference = largest_difference(alone, found);
-                if difference.is_none_or(|difference| difference > LIMIT) {
-                    let what = format!("fields of step {step} differ by {difference:?}, not {LIMIT}");
-                    return Err(MpiError::Case { ranks, what });
-                }
+                within(LIMIT, difference, || format!("{ranks} ranks, a case: fields of step {step}"))?;
             }
             let listed = std::fs::read_to_string(frames.join("fields.pvd")).unwrap_or_default();
-            if listed.matches(".pvtu\"").count() != STEPS.len() {
-                return Err(MpiError::Case { ranks, what: format!("the collection has {listed}") });
-            }
+            let count = listed.matches(".pvtu\"").count();
+            ensure!(count == STEPS.len(), "{ranks} ranks, a case: the collection has {listed}");
             println!("{ranks} ranks write the fields of one process in pieces");
-            self.read_back(ranks, &frames)?;
+            self.read_back(&frames)?;
         }
         self.refuse_a_piece()
     }
 
     /// The fields of all frames.
-    fn frames(&self, ranks: &'static str, ending: &str) -> Result<Vec<Fields<3>>, MpiError> {
+    fn frames(&self, ranks: &'static str, ending: &str) -> anyhow::Result<Vec<Fields<3>>> {
         line(self.command(ranks, END)?.args(EVERY))?;
         let read = |step: &usize| {
             let file = self.folder().join(FRAMES).join(format!("fields-{step:06}{ending}"));
-            read_fields::<3>(&file).map_err(|error| MpiError::Case { ranks, what: error.to_string() })
+            Ok(read_fields::<3>(&file)?)
         };
         STEPS.iter().map(read).collect()
     }
 
     /// By meshio and VTK, where these are or can be fetched; says so where they cannot.
-    fn read_back(&self, ranks: &'static str, frames: &Path) -> Result<(), MpiError> {
-        let python = match python::with_packages(&self.root, "target/read-back", &PACKAGES) {
-            Err(PythonError::Missing(what)) => {
-                println!("nothing is read back by {}: {what}", PACKAGES.join(" and "));
-                return Ok(());
-            }
-            other => other.map_err(|error| MpiError::Case { ranks, what: error.to_string() })?,
+    fn read_back(&self, frames: &Path) -> anyhow::Result<()> {
+        let read = || {
+            let mut python = Command::new(python::with_packages(&self.root, "target/read-back", &PACKAGES)?);
+            let said = line(python.arg(self.root.join(READER)).arg(frames))?;
+            println!("{} read back {} files", PACKAGES.join(" and "), said.lines().count());
+            Ok(())
         };
-        let mut command = std::process::Command::new(python);
-        let said = line(command.arg(self.root.join(READER)).arg(frames))?;
-        println!("{} read back {} files", PACKAGES.join(" and "), said.lines().count());
-        Ok(())
+        program::where_possible(read(), &format!("nothing is read back by {}", PACKAGES.join(" and ")))
     }
 
     /// A piece cannot be written: all ranks end with an error that names the file and the reason once.
-    fn refuse_a_piece(&self) -> Result<(), MpiError> {
+    fn refuse_a_piece(&self) -> anyhow::Result<()> {
         let (ranks, folder) = (RANKS[2], self.folder().join("unwritable"));
         let _ = std::fs::remove_dir_all(&folder);
         // Where a file should be there is a folder.
         let file: PathBuf = folder.join(FRAMES).join("fields-000002-0001.vtu");
-        std::fs::create_dir_all(&file)
-            .map_err(|error| MpiError::Case { ranks, what: format!("{}: {error}", file.display()) })?;
+        std::fs::create_dir_all(&file).with_context(|| file.display().to_string())?;
         let mut command = self.command_into(&folder, ranks, END)?;
         command.args(EVERY).env("NO_COLOR", "1");
-        let (said, output) = (words(&command), outcome(&mut command)?);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        let reason = "Is a directory (os error 21), on rank 1";
-        let names = text.matches("fields-000002-0001.vtu: cannot write the file").count();
-        if output.status.success() || names != 1 || text.matches(reason).count() != 1 {
-            return Err(MpiError::Unnoticed(said, text));
-        }
+        notices(&mut command, |said| {
+            let names = said.matches("fields-000002-0001.vtu: cannot write the file").count();
+            names == 1 && said.matches("Is a directory (os error 21), on rank 1").count() == 1
+        })?;
         println!("a piece that cannot be written ends all of {ranks} ranks, and they say why");
         Ok(())
     }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
+use anyhow::{Context, ensure};
 use serde::Deserialize;
 
-use super::TidyError;
 use super::law::Law;
+use crate::program;
 
 /// The crate that tests, and only tests, may use everywhere.
 const TEST_CRATE: &str = "gluey-testkit";
@@ -47,18 +47,19 @@ pub struct Dependency {
     pub kind: Option<String>,
 }
 
-/// Asks cargo for the members of the workspace.
-pub fn metadata(root: &Path) -> Result<Metadata, TidyError> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(cargo)
-        .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
-        .current_dir(root)
-        .output()
-        .map_err(|error| TidyError::Metadata(error.to_string()))?;
-    if !output.status.success() {
-        return Err(TidyError::Metadata(String::from_utf8_lossy(&output.stderr).into_owned()));
+impl Metadata {
+    /// The folders of all members, from the root of the workspace.
+    pub fn folders(&self, root: &Path) -> Vec<String> {
+        self.packages.iter().map(|package| package.folder(root)).collect()
     }
-    serde_json::from_slice(&output.stdout).map_err(|error| TidyError::Metadata(error.to_string()))
+}
+
+/// Asks cargo for the members of the workspace.
+pub fn metadata(root: &Path) -> anyhow::Result<Metadata> {
+    let mut cargo = program::cargo("metadata --format-version 1 --no-deps --offline");
+    let output = program::output(cargo.current_dir(root))?;
+    ensure!(output.status.success(), "cargo metadata: {}", program::complaint(&output));
+    serde_json::from_slice(&output.stdout).context("cargo metadata")
 }
 
 /// Arrows that the law does not know, crates it does not name and names that are no crates.

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::TidyError;
+use anyhow::Context;
+
+use super::sources;
 
 /// Rules of ARCHITECTURE.md.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -20,13 +22,11 @@ pub struct Law {
 
 impl Law {
     /// Reads the law.
-    pub fn read(path: &Path) -> Result<Self, TidyError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| TidyError::Read { path: path.to_owned(), source })?;
-        Self::parse(&text)
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        Self::parse(&sources::text(path)?).context("ARCHITECTURE.md")
     }
 
-    fn parse(text: &str) -> Result<Self, TidyError> {
+    fn parse(text: &str) -> anyhow::Result<Self> {
         let mut law = Self::default();
         for line in block(text, "arrows")? {
             let (map, mark) =
@@ -47,16 +47,16 @@ impl Law {
 }
 
 /// Lines that say something in the fenced block with this name.
-fn block<'a>(text: &'a str, name: &str) -> Result<Vec<&'a str>, TidyError> {
+fn block<'a>(text: &'a str, name: &str) -> anyhow::Result<Vec<&'a str>> {
     let fence = format!("```{name}");
     let mut lines = text.lines().skip_while(|line| *line != fence);
-    lines.next().ok_or_else(|| TidyError::Law(format!("there is no block `{fence}`")))?;
+    lines.next().with_context(|| format!("there is no block `{fence}`"))?;
     Ok(lines.take_while(|line| *line != "```").filter(|line| !line.trim().is_empty()).collect())
 }
 
-fn split(line: &str, mark: &str) -> Result<(String, Vec<String>), TidyError> {
-    let (name, rest) =
-        line.split_once(mark).ok_or_else(|| TidyError::Law(format!("`{line}` does not contain `{mark}`")))?;
+fn split(line: &str, mark: &str) -> anyhow::Result<(String, Vec<String>)> {
+    let parts = line.split_once(mark);
+    let (name, rest) = parts.with_context(|| format!("`{line}` does not contain `{mark}`"))?;
     Ok((name.trim().to_owned(), rest.split_whitespace().map(str::to_owned).collect()))
 }
 

@@ -10,54 +10,37 @@ mod sources;
 mod style;
 mod unused;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Why the check itself could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum TidyError {
-    /// A file or folder cannot be read.
-    #[error("cannot read {path}: {source}", path = path.display())]
-    Read {
-        /// The file or folder.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// A block of the law is missing or a line of it makes no sense.
-    #[error("ARCHITECTURE.md: {0}")]
-    Law(String),
-    /// A file is not Rust.
-    #[error("{path}: {error}")]
-    Syntax {
-        /// The file or the folder it lies in.
-        path: String,
-        /// Error of the parser.
-        error: syn::Error,
-    },
-    /// `cargo metadata` did not answer.
-    #[error("cargo metadata: {0}")]
-    Metadata(String),
+/// Prints all offences and how many tuples signatures take apart; whether the workspace is tidy.
+pub fn run(root: &Path) -> anyhow::Result<bool> {
+    let (offences, tuple_count) = offences(root)?;
+    println!("{tuple_count} parameters are tuples");
+    offences.iter().for_each(|offence| eprintln!("{offence}"));
+    Ok(offences.is_empty())
 }
 
-/// All offences, each with its place; an empty list is a tidy workspace.
-pub fn offences(root: &Path) -> Result<Vec<String>, TidyError> {
+/// All offences, each with its place, and the number of parameters that are tuples; an empty list is a tidy
+/// workspace.
+fn offences(root: &Path) -> anyhow::Result<(Vec<String>, usize)> {
     let law = law::Law::read(&root.join("ARCHITECTURE.md"))?;
     let sources = sources::all(root)?;
     let metadata = arrows::metadata(root)?;
     let mut offences = arrows::offences(&law, &metadata);
     offences.extend(unused::offences(root, &metadata, &sources));
     offences.extend(confined::offences(&law, &sources));
-    offences.extend(rooms::offences(&law, &sources)?);
+    offences.extend(rooms::offences(&law, &metadata.folders(root), &sources)?);
     offences.extend(style::offences(&sources));
-    offences.extend(shape::offences(&sources)?);
-    Ok(offences)
+    let (shapes, tuple_count) = shape::offences(&sources)?;
+    offences.extend(shapes);
+    Ok((offences, tuple_count))
 }
 
 #[cfg(test)]
 mod tests {
     #[test]
     fn the_workspace_is_tidy() {
-        let offences = super::offences(&crate::workspace_root()).unwrap();
+        let (offences, _) = super::offences(&crate::workspace_root()).unwrap();
         assert!(offences.is_empty(), "\n{}", offences.join("\n"));
     }
 }

@@ -21,12 +21,12 @@ pub struct Use {
 }
 
 /// All uses between the modules of a crate whose files lie under `folder`, such as `crates/geom/src`.
-pub fn uses(folder: &str, sources: &[Source]) -> Result<Vec<Use>, syn::Error> {
+pub fn uses(folder: &str, sources: &[Source]) -> anyhow::Result<Vec<Use>> {
     let mut modules = BTreeMap::new();
     for source in sources.iter().filter(|source| !source.is_test()) {
         let own = source.path.strip_prefix(folder).and_then(|path| path.strip_prefix('/'));
         if let Some(path) = own.and_then(module_path) {
-            modules.insert(path.clone(), Module::parse(&source.path, path, &source.text())?);
+            modules.insert(path.clone(), Module::parse(source, path)?);
         }
     }
     let crate_modules = Modules(modules);
@@ -52,7 +52,7 @@ struct Reference {
 }
 
 /// Names in a file.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Module {
     file: String,
     path: Vec<String>,
@@ -65,15 +65,9 @@ struct Module {
 }
 
 impl Module {
-    fn parse(file: &str, path: Vec<String>, text: &str) -> Result<Self, syn::Error> {
-        let mut module = Self {
-            file: file.to_owned(),
-            path,
-            imports: BTreeMap::new(),
-            globs: Vec::new(),
-            paths: Vec::new(),
-        };
-        module.visit_file(&syn::parse_file(text)?);
+    fn parse(source: &Source, path: Vec<String>) -> anyhow::Result<Self> {
+        let mut module = Self { file: source.path.clone(), path, ..Self::default() };
+        module.visit_file(&source.syntax()?);
         Ok(module)
     }
 

@@ -4,50 +4,57 @@ use proc_macro2::Span;
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
-use super::TidyError;
 use super::modules::is_test;
 use super::sources::Source;
 
 /// Most parameters of a function, the receiver and the parts of tuples included.
 const MOST_PARAMETERS: usize = 6;
+/// Most parameters of all functions that are tuples without a name: they may only become fewer.
+const MOST_TUPLES: usize = 75;
 /// Most lines of a function, from `fn` to the last brace.
 const LONGEST_FUNCTION: usize = 60;
 /// Most columns of a comment, as for code.
 const WIDEST_COMMENT: usize = 110;
 
-/// Offences against the limits.
-pub fn offences(sources: &[Source]) -> Result<Vec<String>, TidyError> {
-    let mut offences = Vec::new();
+/// Offences against the limits, and how many parameters take a tuple apart: `(a, b): (A, B)`.
+pub fn offences(sources: &[Source]) -> anyhow::Result<(Vec<String>, usize)> {
+    let (mut offences, mut tuple_count) = (Vec::new(), 0);
     for source in sources {
-        offences.extend(of_source(source)?);
+        let (own, tuples) = of_source(source)?;
+        offences.extend(own);
+        tuple_count += tuples;
     }
-    Ok(offences)
+    if tuple_count > MOST_TUPLES {
+        offences.push(format!("{tuple_count} parameters are tuples, more than {MOST_TUPLES}"));
+    }
+    Ok((offences, tuple_count))
 }
 
-fn of_source(source: &Source) -> Result<Vec<String>, TidyError> {
+/// Offences in a source, and the number of its tuples.
+fn of_source(source: &Source) -> anyhow::Result<(Vec<String>, usize)> {
     let path = &source.path;
     let comments = source.lines.iter().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"));
     let wide = comments.filter(|(_, line)| line.chars().count() > WIDEST_COMMENT);
     let mut offences: Vec<String> = wide
         .map(|(index, _)| format!("{path}:{}: a comment of more than {WIDEST_COMMENT} columns", index + 1))
         .collect();
+    let mut functions = Functions { path, offences: Vec::new(), tuple_count: 0 };
     if !source.is_test() {
-        let file = syn::parse_file(&source.text())
-            .map_err(|error| TidyError::Syntax { path: path.clone(), error })?;
-        let mut functions = Functions { path, offences: Vec::new() };
-        functions.visit_file(&file);
-        offences.extend(functions.offences);
+        functions.visit_file(&source.syntax()?);
     }
-    Ok(offences)
+    offences.extend(functions.offences);
+    Ok((offences, functions.tuple_count))
 }
 
 struct Functions<'a> {
     path: &'a str,
     offences: Vec<String>,
+    tuple_count: usize,
 }
 
 impl Functions<'_> {
     fn check(&mut self, signature: &syn::Signature, end: usize) {
+        self.tuple_count += signature.inputs.iter().filter(|argument| is_tuple(argument)).count();
         let start = signature.span().start().line;
         let (path, name) = (self.path, &signature.ident);
         let count: usize = signature.inputs.iter().map(parameters).sum();
@@ -65,6 +72,10 @@ impl Functions<'_> {
 
 fn last_line(span: Span) -> usize {
     span.end().line
+}
+
+fn is_tuple(argument: &syn::FnArg) -> bool {
+    matches!(argument, syn::FnArg::Typed(argument) if matches!(*argument.pat, syn::Pat::Tuple(_)))
 }
 
 /// Weight of an argument: a tuple for as many as it has parts.
@@ -110,7 +121,7 @@ mod tests {
     use super::*;
 
     fn found(text: &str) -> Vec<String> {
-        of_source(&Source::new("crates/a/src/a.rs".into(), text)).unwrap()
+        of_source(&Source::new("crates/a/src/a.rs".into(), text)).unwrap().0
     }
 
     #[test]
@@ -118,6 +129,16 @@ mod tests {
         assert!(found("fn f(a: u8, b: u8, c: u8, (d, e): (u8, u8), f: u8) {}").is_empty());
         let found = found("struct S;\nimpl S {\n fn f(&self, (a, (b, c)): T, d: u8, e: u8, f: u8) {}\n}");
         assert_eq!(found, ["crates/a/src/a.rs:3: `f` has 7 parameters, more than 6"]);
+    }
+
+    #[test]
+    fn tuples_without_a_name_are_counted() {
+        let text = "fn f((a, b): (u8, u8), c: (u8, u8)) {}\nimpl S {\n fn g((d, (e, h)): T) {}\n}\n";
+        let source = Source::new("crates/a/src/a.rs".into(), text);
+        assert_eq!(offences(&[source]).unwrap(), (Vec::new(), 2));
+        let many = "fn f((a, b): (u8, u8)) {}\n".repeat(MOST_TUPLES + 1);
+        let found = offences(&[Source::new("crates/a/src/a.rs".into(), &many)]).unwrap();
+        assert_eq!(found.0.len(), 1, "{found:?}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::TidyError;
+use anyhow::Context;
 
 /// Folders that hold Rust sources.
 const FOLDERS: [&str; 4] = ["crates", "xtask", "tests", "benches"];
@@ -46,9 +46,9 @@ impl Source {
         self.path.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
     }
 
-    /// The whole text.
-    pub fn text(&self) -> String {
-        self.lines.join("\n")
+    /// Its syntax.
+    pub fn syntax(&self) -> anyhow::Result<syn::File> {
+        syn::parse_file(&self.lines.join("\n")).with_context(|| self.path.clone())
     }
 
     /// Line numbers (from 1) and code outside tests and comments.
@@ -64,19 +64,22 @@ impl Source {
 }
 
 /// Every `.rs` file, ordered by path.
-pub fn all(root: &Path) -> Result<Vec<Source>, TidyError> {
+pub fn all(root: &Path) -> anyhow::Result<Vec<Source>> {
     let mut paths = Vec::new();
     for folder in FOLDERS.map(|folder| root.join(folder)).into_iter().filter(|folder| folder.is_dir()) {
-        collect(&folder, &mut paths)?;
+        collect(&folder, &mut paths).with_context(|| format!("cannot read {}", folder.display()))?;
     }
     paths.sort();
-    paths.iter().map(|path| read(root, path)).collect()
+    let source = |path: &PathBuf| {
+        let own = path.strip_prefix(root).unwrap_or(path);
+        Ok(Source::new(own.to_string_lossy().replace('\\', "/"), &text(path)?))
+    };
+    paths.iter().map(source).collect()
 }
 
-fn collect(folder: &Path, paths: &mut Vec<PathBuf>) -> Result<(), TidyError> {
-    let error = |source| TidyError::Read { path: folder.to_owned(), source };
-    for entry in std::fs::read_dir(folder).map_err(error)? {
-        let path = entry.map_err(error)?.path();
+fn collect(folder: &Path, paths: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
         if path.is_dir() {
             collect(&path, paths)?;
         } else if path.extension().is_some_and(|extension| extension == "rs") {
@@ -86,11 +89,9 @@ fn collect(folder: &Path, paths: &mut Vec<PathBuf>) -> Result<(), TidyError> {
     Ok(())
 }
 
-fn read(root: &Path, path: &Path) -> Result<Source, TidyError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| TidyError::Read { path: path.to_owned(), source })?;
-    let own = path.strip_prefix(root).unwrap_or(path);
-    Ok(Source::new(own.to_string_lossy().replace('\\', "/"), &text))
+/// What stands in a file.
+pub fn text(path: &Path) -> anyhow::Result<String> {
+    std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
 #[cfg(test)]

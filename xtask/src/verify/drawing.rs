@@ -2,6 +2,7 @@
 
 use gluey_verify::Plot;
 
+use crate::book;
 use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, Stroke, stack};
 
 /// Colours that stay apart for colour-blind readers, one for each formulation.
@@ -13,14 +14,9 @@ const FRAME_HEIGHT: f64 = 340.0;
 pub fn draw(plot: &Plot) -> Canvas {
     let curves: Vec<Curve> = plot.curves.iter().map(curve).collect();
     let points = || curves.iter().flat_map(|curve| curve.pieces.iter().flatten().copied());
-    let chart = Chart {
-        x: axis(plot.x, points().map(|p| p.0)),
-        y: axis(plot.y, points().map(|p| p.1)),
-        marks: points().map(|at| Mark { at, label: String::new() }).collect(),
-        curves,
-        notes: Vec::new(),
-    };
-    stack(&[chart], |_| FRAME_HEIGHT)
+    let (x, y) = (axis(plot.x, points().map(|p| p.0)), axis(plot.y, points().map(|p| p.1)));
+    let marks = points().map(|at| Mark { at, label: String::new() }).collect();
+    stack(&[Chart { marks, ..book::chart(x, y, curves) }], |_| FRAME_HEIGHT)
 }
 
 fn curve(curve: &gluey_verify::Curve) -> Curve {

@@ -1,138 +1,66 @@
 //! `cargo xtask verify`: computes the cases of `gluey-verify`, holds them against their limits, writes the
 //! book.
 
+mod book;
 mod drawing;
 mod page;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use gluey_verify::{
-    CASES, Case, Extent, Judged, Limit, LimitError, Outcome, Row, Table, Tables, Task, VerifyError,
-};
+use anyhow::bail;
+use gluey_verify::{CASES, Case, Extent, Limit, Table, Tables, Task};
 
-use crate::book::files::{self, WriteError};
-use crate::book::schedule::{self, JobError};
-use crate::book::{Failure, write_drawing};
-use gluey_pictures::Canvas;
-
-/// Time between two lines of progress.
-const LINE_EVERY: Duration = Duration::from_secs(20);
+use crate::book::progress::NowAndThen;
+use crate::book::{Failure, files, keep, schedule, write_drawing};
+use crate::workspace_root;
+use book::{Book, Chapter};
 
 /// What to verify, and where to put the book.
-#[derive(Clone, Debug)]
+#[derive(clap::Args)]
 pub struct Options {
-    /// Fewer positions and coarser meshes.
-    pub quick: bool,
-    /// Names of the cases; all if empty.
-    pub only: Vec<String>,
-    /// Folder of the workspace.
-    pub root: PathBuf,
+    /// Fewer positions and coarser meshes: a minute.
+    #[arg(long)]
+    quick: bool,
+    /// Only these cases, separated by commas; `cost` needs `discs` and `spheres`.
+    #[arg(long, value_delimiter = ',', value_name = "CASES")]
+    only: Vec<String>,
     /// Output folder.
-    pub out: PathBuf,
+    #[arg(long, default_value = "target/verification", value_name = "DIR")]
+    out: PathBuf,
 }
 
-/// Why there is no book.
-#[derive(Debug, thiserror::Error)]
-pub enum BookError {
-    /// A file could not be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// The limits could not be read.
-    #[error(transparent)]
-    Limits(#[from] LimitError),
-    /// There is no case of this name.
-    #[error("there is no case {0}; the cases are {names}", names = names())]
-    NoCase(String),
-}
-
-fn names() -> String {
-    CASES.iter().map(|case| case.name).collect::<Vec<_>>().join(", ")
-}
-
-/// A case with its results.
-pub struct Chapter {
-    /// The case.
-    pub case: &'static Case,
-    /// Its numbers with what is said of them.
-    pub judged: Vec<Judged>,
-    /// Lines for `limits.csv`, for the numbers that it does not have.
-    pub proposals: Vec<String>,
-    /// Its picture.
-    pub drawing: Canvas,
-}
-
-/// The whole book.
-pub struct Book {
-    /// Computed with `--quick`.
-    pub quick: bool,
-    /// The state of the sources, where git knows it.
-    pub commit: Option<String>,
-    /// Wall time of the computations, seconds.
-    pub wall_s: f64,
-    /// The cases.
-    pub chapters: Vec<Chapter>,
-    /// Computations and pictures that failed.
-    pub failures: Vec<Failure>,
-}
-
-impl Book {
-    /// Whether everything was computed and every number is within its limit.
-    pub fn holds(&self) -> bool {
-        self.failures.is_empty() && !self.judged().any(|(_, judged)| judged.is_failure())
-    }
-
-    /// All numbers, each with its case.
-    pub fn judged(&self) -> impl Iterator<Item = (&'static Case, &Judged)> {
-        self.chapters.iter().flat_map(|chapter| chapter.judged.iter().map(|judged| (chapter.case, judged)))
-    }
-
-    /// How many numbers have a limit, how many of them are within it, and how many have none.
-    pub fn counts(&self) -> (usize, usize, usize) {
-        let outcomes: Vec<_> =
-            self.judged().map(|(_, judged)| judged.verdict.map(|(_, outcome)| outcome)).collect();
-        let count = |wanted: &dyn Fn(&Option<Outcome>) -> bool| outcomes.iter().filter(|o| wanted(o)).count();
-        (count(&|o| o.is_some()), count(&|o| *o == Some(Outcome::Yes)), count(&|o| o.is_none()))
-    }
-
-    /// What the terminal is told: all that fails, then the counts.
-    pub fn account(&self) -> String {
-        let failures =
-            self.failures.iter().map(|failure| format!("error: {}: {}", failure.what, failure.error));
-        let missed = self.judged().filter(|(_, judged)| judged.is_failure());
-        let missed = missed.map(|(case, judged)| format!("error: {}, {}", case.name, page::sentence(judged)));
-        let (limits, held, free) = self.counts();
-        let counts = format!("of {limits} numbers with a limit {held} are within it; {free} have none");
-        failures.chain(missed).chain([counts]).collect::<Vec<_>>().join("\n")
-    }
-}
-
-/// Computes and writes the book. Failures of single computations are part of it.
-pub fn verify(options: &Options) -> Result<Book, BookError> {
+/// Computes and writes the book; whether all is well. Failures of single computations are part of it.
+pub fn run(options: &Options) -> anyhow::Result<bool> {
     let start = Instant::now();
-    files::prepare_folder(&options.out)?;
+    let Options { quick, only, out } = options;
+    files::prepare_folder(out)?;
     let limits = gluey_verify::limits()?;
-    let cases = chosen(&options.only)?;
-    let extent = if options.quick { Extent::Quick } else { Extent::Full };
+    let cases = chosen(only)?;
+    let extent = if *quick { Extent::Quick } else { Extent::Full };
     let mut failures = Vec::new();
     let tables = compute(&cases, extent, &mut failures);
     let chapters: Vec<Chapter> =
         cases.into_iter().map(|case| chapter(case, &tables, &limits, extent)).collect();
     for Chapter { case, drawing, .. } in &chapters {
-        files::write(&options.out.join(format!("{}.csv", case.name)), tables.of(case.name).csv().as_bytes())?;
-        write_drawing(&options.out, case.name, drawing, &mut failures)?;
+        files::write(&out.join(format!("{}.csv", case.name)), tables.of(case.name).csv().as_bytes())?;
+        write_drawing(out, case.name, drawing, &mut failures)?;
     }
     let wall_s = start.elapsed().as_secs_f64();
-    let book = Book { quick: options.quick, commit: commit(&options.root), wall_s, chapters, failures };
-    files::write(&options.out.join("numbers.csv"), page::csv(&book).as_bytes())?;
+    let book = Book { quick: *quick, commit: commit(&workspace_root()), wall_s, chapters, failures };
     let proposals = book.chapters.iter().flat_map(|chapter| &chapter.proposals);
     let proposals: String = proposals.map(|line| format!("{line}\n")).collect();
-    files::write(&options.out.join("proposed-limits.csv"), proposals.as_bytes())?;
-    files::write(&options.out.join("index.html"), page::html(&book).as_bytes())?;
-    Ok(book)
+    let texts = [
+        ("numbers.csv", page::csv(&book)),
+        ("proposed-limits.csv", proposals),
+        ("index.html", page::html(&book)),
+    ];
+    texts.iter().try_for_each(|(name, text)| files::write(&out.join(name), text.as_bytes()))?;
+    println!("{}", book.account());
+    println!("tables, pictures and index.html are in {}", out.display());
+    Ok(book.holds())
 }
 
 fn chapter(case: &'static Case, tables: &Tables, limits: &[Limit], extent: Extent) -> Chapter {
@@ -144,14 +72,12 @@ fn chapter(case: &'static Case, tables: &Tables, limits: &[Limit], extent: Exten
     Chapter { case, judged, proposals, drawing: drawing::draw(&(case.plot)(tables)) }
 }
 
-fn chosen(only: &[String]) -> Result<Vec<&'static Case>, BookError> {
-    let is_case = |name: &&String| CASES.iter().any(|case| case.name == **name);
-    match only.iter().find(|name| !is_case(name)) {
-        Some(name) => Err(BookError::NoCase(name.clone())),
-        None => {
-            Ok(CASES.iter().filter(|case| only.is_empty() || only.iter().any(|n| n == case.name)).collect())
-        }
+fn chosen(only: &[String]) -> anyhow::Result<Vec<&'static Case>> {
+    let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
+    if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
+        bail!("there is no case {name}; the cases are {}", names.join(", "));
     }
+    Ok(CASES.iter().filter(|case| only.is_empty() || only.iter().any(|name| name == case.name)).collect())
 }
 
 /// All computations of the cases, as many at a time as there are cores; the last cases, which have the
@@ -160,49 +86,24 @@ fn compute(cases: &[&'static Case], extent: Extent, failures: &mut Vec<Failure>)
     let of_case =
         |case: &&'static Case| (case.tasks)(extent).into_iter().map(|task| (*case, task)).collect::<Vec<_>>();
     let jobs: Vec<(&'static Case, Task)> = cases.iter().rev().flat_map(of_case).collect();
-    let progress = Progress::new(jobs.len());
+    let (done, line) = (AtomicUsize::new(0), NowAndThen::default());
     let results = schedule::in_parallel(&jobs, rayon::current_num_threads(), |(_, task)| {
         let row = task.run();
-        progress.step();
-        row
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        line.print(|| format!("{done} of {} computations", jobs.len()));
+        Ok(row?)
     });
-    let mut keep = |case: &Case, task: &Task, result: Result<Row, JobError<VerifyError>>| {
-        let what = || format!("{}, {} at {:?}", case.name, task.method, task.at);
-        result.map_err(|error| failures.push(Failure::new(what(), &error))).ok()
-    };
-    let rows: Vec<_> = jobs
-        .iter()
-        .zip(results)
-        .map(|((case, task), result)| (*case, task, keep(case, task, result)))
-        .collect();
+    let mut rows = Vec::new();
+    for ((case, task), result) in jobs.iter().zip(results) {
+        let what = format!("{}, {} at {:?}", case.name, task.method, task.at);
+        rows.push((case.name, task, keep(what, result, failures)));
+    }
     let mut tables = Tables::default();
     for case in cases {
-        let own = rows.iter().filter(|(of, _, _)| of.name == case.name);
+        let own = rows.iter().filter(|(of, _, _)| *of == case.name);
         tables.insert(case.name, Table::new(case, own.map(|(_, task, row)| (*task, row.clone()))));
     }
     tables
-}
-
-/// Tells now and then how many computations are done.
-struct Progress {
-    count: usize,
-    done: AtomicUsize,
-    last_line: Mutex<Instant>,
-}
-
-impl Progress {
-    fn new(count: usize) -> Self {
-        Self { count, done: AtomicUsize::new(0), last_line: Mutex::new(Instant::now()) }
-    }
-
-    fn step(&self) {
-        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        let mut last = self.last_line.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if last.elapsed() >= LINE_EVERY {
-            *last = Instant::now();
-            eprintln!("{done} of {} computations", self.count);
-        }
-    }
 }
 
 /// The commit of the sources, and whether they have changed since; `None` where git does not know.
@@ -218,7 +119,8 @@ fn commit(root: &Path) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use gluey_verify::Number;
+    use gluey_pictures::Canvas;
+    use gluey_verify::{Judged, Number, Outcome};
 
     use super::*;
 
@@ -239,7 +141,7 @@ mod tests {
         assert!(book(vec![good()], vec![]).holds());
         assert!(!book(vec![good(), judged(Some(2.0), Outcome::No)], vec![]).holds());
         assert!(!book(vec![judged(None, Outcome::NotMeasured)], vec![]).holds());
-        let failure = Failure { what: "disc".into(), error: "broke".into() };
+        let failure = crate::book::Failure { what: "disc".into(), error: "broke".into() };
         assert!(!book(vec![good()], vec![failure]).holds());
     }
 
@@ -256,7 +158,8 @@ mod tests {
 
     #[test]
     fn unknown_cases_are_refused() {
-        assert!(matches!(chosen(&["disk".to_owned()]), Err(BookError::NoCase(_))));
+        let error = chosen(&["disk".to_owned()]).err().expect("it is refused").to_string();
+        assert!(error.starts_with("there is no case disk; the cases are manufactured, "), "{error}");
         assert_eq!(chosen(&[]).unwrap().len(), CASES.len());
     }
 

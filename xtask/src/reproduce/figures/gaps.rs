@@ -1,6 +1,7 @@
 //! Gaps over time on a logarithmic scale: figures 5, 7a and 9.
 
-use super::{Data, exact_curve, legend, stroke};
+use super::data::{Data, EXACT_STROKE, exact_curve, legend, stroke};
+use crate::book;
 use crate::reproduce::plan::{Approach, CaseName, FigureName};
 use crate::reproduce::trajectory::Trajectory;
 use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
@@ -21,14 +22,8 @@ pub fn pair(figure: FigureName, data: &Data) -> Canvas {
     curves.extend(exact(data, figure.case(), (1, 2), floor));
     let mut notes = data.notes(figure);
     notes.extend(floor_note(&curves, floor));
-    let chart = Chart {
-        x: time_axis(&curves),
-        y: gap_axis("|*D*/*a*|", &curves, floor),
-        curves,
-        notes,
-        marks: Vec::new(),
-    };
-    stack(&[chart], |_| FRAME_HEIGHT)
+    let (x, y) = (time_axis(&curves), gap_axis("|*D*/*a*|", &curves, floor));
+    stack(&[Chart { notes, ..book::chart(x, y, curves) }], |_| FRAME_HEIGHT)
 }
 
 /// Figure 9: D/a of the three pairs, positive values only, one panel each.
@@ -40,13 +35,8 @@ pub fn trio(data: &Data) -> Canvas {
             curves.extend(gap_curves(approach, run, (i, j), floor, false));
         }
         curves.extend(exact(data, CaseName::Trio2d, (i, j), floor));
-        Chart {
-            x: time_axis(&curves),
-            y: gap_axis(&format!("*D*_{{{i}{j}}}/*a*"), &curves, floor),
-            curves,
-            notes: Vec::new(),
-            marks: Vec::new(),
-        }
+        let y = gap_axis(&format!("*D*_{{{i}{j}}}/*a*"), &curves, floor);
+        book::chart(time_axis(&curves), y, curves)
     };
     let mut charts = [(1, 2), (1, 3), (2, 3)].map(panel);
     for upper in &mut charts[..2] {
@@ -112,11 +102,10 @@ fn values(curves: &[Curve]) -> impl Iterator<Item = &(f64, f64)> {
 /// Times from 0 to the end of the longest curve, in units of 1/shear rate.
 fn time_axis(curves: &[Curve]) -> Axis {
     let end = values(curves).map(|(t, _)| *t).fold(1.0, f64::max);
-    let runs_end =
-        curves.iter().filter(|c| c.stroke != super::EXACT_STROKE).flat_map(|c| c.pieces.iter().flatten());
+    let runs_end = curves.iter().filter(|c| c.stroke != EXACT_STROKE).flat_map(|c| c.pieces.iter().flatten());
     let end = runs_end.map(|(t, _)| *t).reduce(f64::max).unwrap_or(end);
     let tick = if end > 20.0 { 5.0 } else { 2.0 };
-    Axis { label: "*t* (1/shear rate)".to_owned(), min: 0.0, max: (end - 1e-9).ceil(), tick, log: false }
+    book::linear("*t* (1/shear rate)", 0.0, (end - 1e-9).ceil(), tick)
 }
 
 /// From the floor (or the decade below the smallest value) to the decade above the largest value.

@@ -14,7 +14,8 @@ use gluey_contact::{ContactModel, ContactParams, GammaUpdate, PairContact, StepG
 use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Film, Integrator, Scheme};
 
-use gluey_pictures::{Axis, Canvas, Chart, Curve, Stroke, stack};
+use crate::book;
+use gluey_pictures::{Canvas, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 210.0;
 const STEP: f64 = 0.005;
@@ -47,19 +48,8 @@ pub fn limit() -> Canvas {
         };
         runs.iter().map(curve).collect()
     };
-    let axis = |label: &str, min: f64, max: f64, tick: f64| Axis {
-        label: label.to_owned(),
-        min,
-        max,
-        tick,
-        log: false,
-    };
-    let chart = |label: &str, [min, max]: [f64; 2], curves: Vec<Curve>| Chart {
-        x: axis("*t*", 0.0, 3.2, 0.5),
-        y: axis(label, min, max, 0.1),
-        curves,
-        notes: Vec::new(),
-        marks: Vec::new(),
+    let chart = |label: &str, [min, max]: [f64; 2], curves: Vec<Curve>| {
+        book::chart(book::linear("*t*", 0.0, 3.2, 0.5), book::linear(label, min, max, 0.1), curves)
     };
     let mut gaps = chart("*D*/*a*", [0.0, 0.5], curves(|run| &run.gap));
     gaps.notes =

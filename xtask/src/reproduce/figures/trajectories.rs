@@ -1,6 +1,7 @@
 //! Paths of the centres in the x-y plane, both axes to one scale: figures 6, 7b, 10 and 11.
 
-use super::{Data, exact_curve, legend, stroke};
+use super::data::{Data, exact_curve, legend, stroke};
+use crate::book;
 use crate::reproduce::plan::FigureName;
 use crate::reproduce::trajectory::Trajectory;
 use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, equal_aspect_height, stack};
@@ -45,19 +46,9 @@ fn enlarge_right_edge(canvas: &mut Canvas, chart: &Chart) {
     };
     let tick = if high - low > 0.004 { 0.005 } else { 0.001 };
     let pad = 0.3 * tick;
-    let inset = Chart {
-        x: Axis { label: String::new(), min: low - pad, max: high + pad, tick, log: false },
-        y: Axis {
-            label: String::new(),
-            min: 0.5 - half_height,
-            max: 0.5 + half_height,
-            tick: 0.01,
-            log: false,
-        },
-        curves: chart.curves.clone(),
-        notes: Vec::new(),
-        marks: Vec::new(),
-    };
+    let x = book::linear("", low - pad, high + pad, tick);
+    let y = book::linear("", 0.5 - half_height, 0.5 + half_height, 0.01);
+    let inset = book::chart(x, y, chart.curves.clone());
     let size = (300.0, 240.0);
     let (center_x, center_y) = chart.point_in_stack(canvas.height(), (0.5, 0.5));
     let corner = (center_x - 0.5 * size.0 - 20.0, center_y - 0.5 * size.1);
@@ -87,12 +78,12 @@ fn axis(label: &str, (low, high): (f64, f64)) -> Axis {
     let tick = [0.2, 0.1, 0.05, 0.02].into_iter().find(|tick| high - low > 3.5 * tick).unwrap_or(0.01);
     let half = 0.5 * tick;
     let (min, max) = ((low / half - 0.2).floor() * half, (high / half + 0.2).ceil() * half);
-    Axis { label: label.to_owned(), min, max, tick, log: false }
+    book::linear(label, min, max, tick)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::EXACT_STROKE;
+    use super::super::data::EXACT_STROKE;
     use super::*;
 
     #[test]

@@ -1,9 +1,15 @@
 //! Rows can fail: by a wrong run, by a missing one and by one that is too short.
 
+use std::collections::BTreeMap;
+
 use super::*;
-use crate::reproduce::known::KNOWN;
+use crate::reproduce::figures::Data;
+use crate::reproduce::plan::{Approach, CaseName, RunKey};
 use crate::reproduce::reference;
 use crate::reproduce::settings::Settings;
+use crate::reproduce::verdict::Kind;
+use clap::ValueEnum;
+use gluey::RunReport;
 use gluey_verify::Outcome;
 
 const RUNS: [(CaseName, f64); 3] =
@@ -21,7 +27,7 @@ impl Exact {
         let mut data = Data::default();
         for (case, end) in RUNS {
             let key = RunKey { case, approach: Approach::Unfitted };
-            let exact = reference::load(&crate::workspace_root(), case, 30.0).unwrap();
+            let exact = reference::load(case, 30.0).unwrap();
             let mut run = exact.clone();
             run.times.iter_mut().for_each(|t| *t *= 1.0 + shift);
             data.runs.insert(key, run);
@@ -39,9 +45,9 @@ impl Exact {
     /// report.
     fn rows(&self) -> Vec<Row> {
         let evidence = Evidence { data: &self.data, reports: &self.reports };
-        let mut rows = all(&FigureName::ALL, &evidence);
-        rows.retain(|row| row.kind == Kind::Exact && row.run.ends_with("unfitted"));
-        rows.retain(|row| row.id != "fig7a-reversibility-unfitted");
+        let mut rows = all(FigureName::value_variants(), &evidence);
+        rows.retain(|row| row.claim.kind == Kind::Exact && row.claim.run.ends_with("unfitted"));
+        rows.retain(|row| row.claim.id != "fig7a-reversibility-unfitted");
         rows
     }
 }
@@ -59,7 +65,7 @@ fn a_clock_ten_percent_slow_is_noticed() {
     // The shape of the orbit and the smallest gap do not know the time, and the doublet's gap varies by 4e-5
     // a only.
     let timeless = ["fig5-distance-unfitted", "fig6-circle-unfitted", "fig7a-smallest-unfitted"];
-    for row in rows.iter().filter(|row| !timeless.contains(&row.id)) {
+    for row in rows.iter().filter(|row| !timeless.contains(&&*row.claim.id)) {
         assert_eq!(row.outcome, Outcome::No, "{row:#?}");
     }
 }
@@ -74,20 +80,25 @@ fn a_run_that_ends_too_early_measures_nothing() {
 #[test]
 fn missing_runs_are_failures() {
     let (data, reports) = (Data::default(), BTreeMap::new());
-    let rows = all(&FigureName::ALL, &Evidence { data: &data, reports: &reports });
+    let rows = all(FigureName::value_variants(), &Evidence { data: &data, reports: &reports });
     assert!(rows.len() > 40 && rows.iter().all(Row::is_failure), "{rows:#?}");
 }
 
 #[test]
 fn every_figure_with_runs_has_statements_and_every_row_its_own_name() {
     let (data, reports) = (Data::default(), BTreeMap::new());
-    let rows = all(&FigureName::ALL, &Evidence { data: &data, reports: &reports });
-    for figure in FigureName::ALL.into_iter().filter(|figure| !figure.approaches().is_empty()) {
-        let statements = rows.iter().filter(|row| row.figure == figure && row.kind == Kind::Paper);
+    let rows = all(FigureName::value_variants(), &Evidence { data: &data, reports: &reports });
+    for figure in FigureName::all().filter(|figure| !figure.approaches().is_empty()) {
+        let statements =
+            rows.iter().filter(|row| row.claim.figure == figure && row.claim.kind == Kind::Paper);
         assert!(statements.count() >= 2, "{figure}");
     }
-    let mut names: Vec<&str> = rows.iter().map(|row| row.id).collect();
+    let mut names: Vec<&str> = rows.iter().map(|row| &*row.claim.id).collect();
     names.sort_unstable();
     assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
-    assert!(KNOWN.iter().all(|known| names.contains(&known.id)), "a known disagreement about no row");
+    let columns = FigureName::all().flat_map(|figure| &text(figure).columns).map(|name| &**name);
+    for name in claims().iter().map(|claim| &*claim.measure).chain(columns) {
+        assert!(measure(name).is_some(), "nothing measures `{name}`");
+    }
+    assert!(claims().iter().all(|claim| claim.own_run().is_some()), "a row without a run");
 }
