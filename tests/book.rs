@@ -265,7 +265,7 @@ fn lines_of(code: &str) -> Vec<String> {
 /// Arguments of a line that calls the program, installed or from the sources.
 fn arguments_of_gluey(line: &str) -> Option<Vec<&str>> {
     let called =
-        ["gluey ", "cargo run --release -p gluey -- "].iter().find_map(|call| line.strip_prefix(call))?;
+        ["gluey ", "cargo run --release -p gluey-cli -- "].iter().find_map(|call| line.strip_prefix(call))?;
     Some(called.split_whitespace().collect())
 }
 

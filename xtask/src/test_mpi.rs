@@ -68,7 +68,7 @@ const PACKAGES: &str = "on Debian and Ubuntu: apt-get install libopenmpi-dev ope
 /// [`Missing`] where MPI is, another one where a run fails or its result is not that of threads.
 pub fn run(root: &Path) -> anyhow::Result<()> {
     let launcher = Launcher::find()?;
-    let mut build = program::cargo("build --release --workspace --features gluey/mpi --bin gluey");
+    let mut build = program::cargo("build --release --workspace --features gluey-cli/mpi --bin gluey");
     build.args(["--example", "box_flow", "--example", "shear_contact"]).current_dir(root);
     let needs = "it needs the headers of MPI and libclang";
     program::run(&mut build, &format!("the build with the feature mpi failed; {needs}; {PACKAGES}"))?;

@@ -19,7 +19,6 @@
 //!
 //! Not for inertia (Stokes flow only), and not for particles that are not round.
 
-pub mod analyse;
 pub mod case;
 mod checkpoint;
 pub mod flow;
@@ -30,10 +29,10 @@ pub mod memory;
 mod near_pairs;
 pub mod output;
 mod phases;
-pub mod plot;
 pub mod progress;
 pub mod reference;
 mod report;
+pub mod rheology;
 mod run;
 mod sealed;
 mod shown;
@@ -44,7 +43,6 @@ pub mod table;
 mod tally;
 mod text;
 mod trajectory;
-pub mod view;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
 pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary, FlowPieces};
@@ -63,7 +61,7 @@ pub use run::{
     ResultPaths, ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
-pub use shown::shown;
+pub use shown::{shown, shown_to};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
 pub use tally::{Motion, Tally};

@@ -5,6 +5,7 @@ mod claim;
 pub mod csv;
 mod draft;
 pub mod forces;
+pub mod made;
 mod pair_forces;
 mod pvd;
 pub mod rheology;
@@ -56,7 +57,7 @@ fn draft_path(path: &Path, number: u32) -> PathBuf {
 }
 
 /// The name of the complete file, if `name` is that of a draft.
-pub(crate) fn undrafted(name: &str) -> Option<&str> {
+pub fn undrafted(name: &str) -> Option<&str> {
     let (complete, number) = name.rsplit_once(".partial-")?;
     number.parse::<u32>().is_ok().then_some(complete)
 }
@@ -102,7 +103,7 @@ pub(crate) fn sync_drafts(paths: &[PathBuf]) -> Result<(), OutputError> {
 }
 
 /// Where the rows of `path` are: in the complete file or, where there is none, in the last draft of it.
-pub(crate) fn rows_of(path: &Path) -> Option<PathBuf> {
+pub fn rows_of(path: &Path) -> Option<PathBuf> {
     if path.exists() {
         return Some(path.to_owned());
     }
@@ -111,7 +112,7 @@ pub(crate) fn rows_of(path: &Path) -> Option<PathBuf> {
 }
 
 /// The text of a table up to its last whole line: that of a run that goes on, or was killed, may be half.
-pub(crate) fn whole_lines(path: &Path) -> io::Result<String> {
+pub fn whole_lines(path: &Path) -> io::Result<String> {
     let mut text = crate::text::read(path)?;
     if path.to_str().is_some_and(|name| undrafted(name).is_some()) {
         text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
@@ -124,7 +125,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// Creates the folder of `path` if it is missing, and makes sure that `path` can be a file in it.
-pub(crate) fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
+pub fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
     if path.file_name().is_none() || path.is_dir() {
         let source = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file");
         return Err(OutputError::new(path, "write the file", source));
@@ -145,7 +146,7 @@ fn sync_folder_of(path: &Path) -> io::Result<()> {
 }
 
 /// Writes `bytes` so that `path` holds either all of them or what it held before.
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let write = || {
         let (number, mut file) = create_draft(path)?;
         let draft = draft_path(path, number);

@@ -5,10 +5,10 @@ use std::fmt;
 use gluey_motion::FlowStatistics;
 use serde::{Deserialize, Serialize};
 
-use crate::analyse::RheologyMeans;
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
 use crate::phases::PhaseTable;
+use crate::rheology::RheologyMeans;
 use crate::shown::shown_to;
 use crate::tally::Tally;
 use crate::trajectory::PairHistory;

@@ -45,8 +45,6 @@ pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 pub(crate) use recorded::TABLE_OF_STUDY;
 pub use recorded::{FolderError, recorded_runs};
-#[cfg(test)]
-pub(crate) use replaced::is_picture;
 pub use resumption::{ResumeError, Resumption};
 #[cfg(feature = "ranks")]
 pub use shared::run_shared;

@@ -7,7 +7,7 @@ pub fn shown(x: f64) -> String {
 }
 
 /// A number with at most so many digits, without a row of zeros.
-pub(crate) fn shown_to(x: f64, digits: usize) -> String {
+pub fn shown_to(x: f64, digits: usize) -> String {
     if x.is_subnormal() {
         // The shortest text that reads back as such a number is not near it.
         return format!("{x:.1e}");

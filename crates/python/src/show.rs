@@ -4,11 +4,10 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use gluey::analyse::AnalyseOptions;
-use gluey::plot::{
-    AnimationOptions, Coloring, FlowOptions, FrameChoice, Look, PlotOptions, Quantity, SliceChoice, Viewpoint,
+use gluey_view::{
+    AnalyseOptions, AnimationOptions, Coloring, FlowOptions, FrameChoice, Look, PlotOptions, Quantity,
+    SliceChoice, ViewOptions, Viewpoint,
 };
-use gluey::view::ViewOptions;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -55,14 +54,14 @@ pub fn plot(py: Python<'_>, plot: Plot) -> PyResult<Vec<PathBuf>> {
         formats: plot.formats.iter().map(|name| named("formats", name)).collect::<PyResult<_>>()?,
         width_mm: plot.width_mm,
     };
-    told(py, compute(py, None, || gluey::plot::plot(&options))?)
+    told(py, compute(py, None, || gluey_view::plot(&options))?)
 }
 
 /// Writes a page for the browser and gives its path.
 #[pyfunction]
 pub fn view(py: Python<'_>, folder: PathBuf, out: Option<PathBuf>, every: usize) -> PyResult<PathBuf> {
     let options = ViewOptions { folder, out, every };
-    let viewed = told(py, compute(py, None, || gluey::view::view(&options))?)?;
+    let viewed = told(py, compute(py, None, || gluey_view::view(&options))?)?;
     Ok(viewed.page)
 }
 
@@ -76,7 +75,7 @@ pub fn analyse(
     skip: Option<usize>,
 ) -> PyResult<String> {
     let options = AnalyseOptions { folder, out, reach_over_a: reach, skip };
-    let summary = told(py, compute(py, None, || gluey::analyse::analyse(&options))?)?;
+    let summary = told(py, compute(py, None, || gluey_view::analyse(&options))?)?;
     Ok(summary.to_string())
 }
 

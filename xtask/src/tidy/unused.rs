@@ -5,8 +5,8 @@ use std::path::Path;
 use super::arrows::{Dependency, Metadata, Package};
 use super::sources::Source;
 
-/// Folders at the root whose files belong to several packages.
-const SHARED: [&str; 2] = ["tests", "benches"];
+/// Folders whose files belong to several packages; the program tests the examples of the library, too.
+const SHARED: [&str; 3] = ["tests", "benches", "crates/gluey/examples"];
 
 /// Dependencies that are listed but not named, where they could be: under `src` for normal ones, anywhere in
 /// the package or in the shared folders for those of tests.

@@ -7,7 +7,7 @@ use super::Case;
 
 impl Case {
     /// The box with its periods, without tilt: axes that are not periodic are walled.
-    pub(crate) fn container<const D: usize>(&self) -> Container<D> {
+    pub fn container<const D: usize>(&self) -> Container<D> {
         let [lower, upper] = [self.lower(), self.upper()].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
         Container::new(Aabb { lower, upper }, std::array::from_fn(|axis| self.period(axis).is_some()))
     }

@@ -6,12 +6,12 @@ use thiserror::Error;
 
 use super::last_steps::Ended;
 use super::occupied::OccupiedError;
-use crate::analyse::RheologyError;
 use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::TooLarge;
 use crate::output::{ClaimError, OutputError, RowsError};
+use crate::rheology::RheologyError;
 use crate::shown::shown;
 use crate::simulation::StepError;
 

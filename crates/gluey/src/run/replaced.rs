@@ -6,16 +6,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::paths::ResultPaths;
-use crate::analyse::is_table;
+use crate::output::made::{PAGE_NAME, is_page, is_picture, is_table};
 use crate::output::{OutputError, drafts, is_claimed, undrafted};
-use crate::view::{PAGE_NAME, is_page};
 
 /// Series of frames, by the beginnings of their names.
 const SERIES: [&str; 3] = ["fields", "particles", "contacts"];
-
-/// What gluey draws of a run, by the beginnings of names; those of frames have the number of a step behind.
-const PICTURES: [&str; 8] =
-    ["gaps", "trajectories", "rheology", "solver", "contacts", "correlations", "profiles", "diffusion"];
 
 /// Removes all of the run at `paths`. Its record goes first: what is half removed is no run.
 pub(super) fn remove(paths: &ResultPaths) -> Result<(), OutputError> {
@@ -91,16 +86,6 @@ fn remove_shown(folder: &Path) -> Result<(), OutputError> {
         }
     }
     Ok(())
-}
-
-/// Whether a file has the name of a picture that `gluey plot` writes.
-pub(crate) fn is_picture(name: &str) -> bool {
-    let Some((stem, "svg" | "png" | "gif")) = name.rsplit_once('.') else { return false };
-    let is_step = |text: &str| text.len() >= 6 && text.bytes().all(|byte| byte.is_ascii_digit());
-    let is_of_frame = stem
-        .rsplit_once('-')
-        .is_some_and(|(what, step)| is_step(step) && (what == "particles" || what.starts_with("flow-")));
-    PICTURES.contains(&stem) || is_of_frame || name == "particles.gif"
 }
 
 fn is_lock(path: &Path) -> bool {

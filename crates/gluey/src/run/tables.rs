@@ -8,12 +8,12 @@ use gluey_motion::Hydrodynamics;
 use super::contacts::Contacts;
 use super::error::RunError;
 use super::stress::with_contacts;
-use crate::analyse::{RheologyError, RheologyMeans};
 use crate::case::Case;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::forces::{self, ForcesWriter};
 use crate::output::rheology::{self, Rheology, RheologyWriter};
 use crate::output::{Mark, OutputError, RowsError};
+use crate::rheology::{RheologyError, RheologyMeans};
 use crate::simulation::{Simulation, StepError};
 
 /// Means of the rheology that a run has written, if it writes any.

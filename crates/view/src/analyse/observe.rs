@@ -2,14 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use gluey::output::xyz::XyzFrame;
 use gluey_contact::ContactError;
 use gluey_geom::{Dim, Matrix, Space, Vector};
 use gluey_suspension::structure::{
     AngularDistribution, Diffusivity, Displacements, GapStatistics, Profile, ProximityNetwork,
     RadialDistribution, StructureFactor,
 };
-
-use crate::output::xyz::XyzFrame;
 
 /// Width of the bins of g(r), in mean radii.
 const RADIAL_WIDTH: f64 = 0.05;

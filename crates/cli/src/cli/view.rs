@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::view::ViewOptions;
+use gluey_view::ViewOptions;
 
 use super::Failure;
 use crate::terminal;
@@ -26,7 +26,7 @@ impl ViewArguments {
     /// Writes the page.
     pub fn run(&self) -> Result<(), Failure> {
         let viewed =
-            gluey::view::view(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
+            gluey_view::view(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_viewed(&viewed);
         Ok(())
     }

@@ -14,41 +14,24 @@
 //! gap by the rule MSER-5 unless it is given. The rheology that a sheared run wrote beside its frames has a
 //! transient of its own, that of its viscosity.
 
-pub(crate) mod frames;
-mod mean;
 mod observe;
-mod rheology;
 mod summary;
 mod tables;
 
 use std::path::{Path, PathBuf};
 
+use gluey::output::made::is_table;
+use gluey::output::{OutputError, prepare_folder_of, rows_of, write_atomically};
+use gluey::rheology::{RheologyError, RheologyMeans};
 use gluey_contact::ContactError;
 use gluey_geom::{Dim, Space};
 use gluey_suspension::statistics::mser;
 use thiserror::Error;
 
-pub use frames::FramesError;
-pub use mean::Mean;
-pub use rheology::{RheologyError, RheologyMeans};
 pub use summary::Summary;
 
-use crate::output::{OutputError, prepare_folder_of, rows_of, write_atomically};
-use frames::{dimension, frame_files, read_frames};
+use crate::frames::{FramesError, dimension, frame_files, read_frames};
 use observe::{Distributions, Instant};
-
-/// Whether a file has the name of a table that is written here, or of the summary.
-pub(crate) fn is_table(name: &str) -> bool {
-    let tables = [
-        "series.csv",
-        "g_of_theta.csv",
-        "structure_factor.csv",
-        "profile_y.csv",
-        "diffusion.csv",
-        "summary.txt",
-    ];
-    tables.contains(&name) || (name.starts_with("g_of_r") && name.ends_with(".csv"))
-}
 
 /// What to analyse, and how.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,12 +4,12 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::str::FromStr;
 
+use gluey::output::xyz::XyzFrame;
 use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::for_each_pair;
 
 use super::error::PlotError;
 use super::told::told;
-use crate::output::xyz::XyzFrame;
 
 /// Smallest gap that has a colour of its own, in mean radii.
 const SMALLEST_GAP: f64 = 1e-4;

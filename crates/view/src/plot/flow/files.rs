@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use gluey::case::Case;
+
 use super::super::error::PlotError;
 use super::super::snapshot::FrameChoice;
-use crate::case::Case;
 
 /// The files of a frame, and its case.
 pub struct FlowFrame {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use gluey::output::xyz::XyzFrame;
 use gluey_geom::{Dim, Space, Vector};
 use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Rgb, Stroke, color_scale};
 use gluey_suspension::Container;
@@ -10,8 +11,7 @@ use gluey_suspension::Container;
 use super::error::PlotError;
 use super::look::{Look, Viewpoint, near_pairs};
 use super::told::told_to;
-use crate::analyse::frames::{dimension, frame_files, read_frames};
-use crate::output::xyz::XyzFrame;
+use crate::frames::{dimension, frame_files, read_frames};
 
 pub(super) const EDGE: Stroke = Stroke { color: "#777777", width: 1.2, dashes: None };
 pub(super) const PERIODIC: Stroke = Stroke { color: "#777777", width: 1.2, dashes: Some("6 4") };

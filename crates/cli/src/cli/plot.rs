@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey::plot::{
+use gluey_view::{
     AnimationOptions, Coloring, Figure, FlowOptions, Format, FrameChoice, Look, PlotOptions, Quantity,
     SliceChoice, Viewpoint,
 };
@@ -72,7 +72,7 @@ impl PlotArguments {
     /// Draws.
     pub fn run(&self) -> Result<(), Failure> {
         let pictures =
-            gluey::plot::plot(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
+            gluey_view::plot(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         terminal::print_pictures(&pictures);
         Ok(())
     }

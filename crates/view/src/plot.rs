@@ -35,6 +35,8 @@ mod told;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use gluey::output::{prepare_folder_of, write_atomically};
+use gluey::sweep::StudyProgress;
 use gluey_pictures::Canvas;
 
 pub use animation::AnimationOptions;
@@ -44,8 +46,6 @@ pub use flow::{FlowOptions, Quantity, SliceChoice};
 pub use look::{Coloring, Look, Viewpoint};
 pub use snapshot::FrameChoice;
 
-use crate::output::{prepare_folder_of, write_atomically};
-use crate::sweep::StudyProgress;
 use read::{Results, Tables};
 
 /// How a picture is written.
@@ -200,7 +200,7 @@ fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::is_picture;
+    use gluey::output::made::is_picture;
 
     /// A run that replaces another one takes its pictures away, by their names.
     #[test]

@@ -3,16 +3,16 @@
 use std::io;
 use std::path::PathBuf;
 
+use gluey::case::CaseError;
+use gluey::output::OutputError;
+use gluey::output::vtk::VtkReadError;
+use gluey::sweep::SweepError;
+use gluey::table::TableError;
 use gluey_pictures::{EncodingError, PngError};
 use thiserror::Error;
 
 use super::figure::Figure;
-use crate::analyse::FramesError;
-use crate::case::CaseError;
-use crate::output::OutputError;
-use crate::output::vtk::VtkReadError;
-use crate::sweep::SweepError;
-use crate::table::TableError;
+use crate::frames::FramesError;
 
 /// Why results could not be drawn.
 #[derive(Debug, Error)]

@@ -4,15 +4,15 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use gluey::ResultPaths;
+use gluey::case::{Case, Hydrodynamics};
+use gluey::output::{rows_of, undrafted, whole_lines};
+use gluey::table::Table;
 use gluey_pictures::Curve;
 
 use super::error::PlotError;
 use super::figure::Figure;
 use super::snapshot::{EDGE, PERIODIC};
-use crate::case::{Case, Hydrodynamics};
-use crate::output::{rows_of, undrafted, whole_lines};
-use crate::run::ResultPaths;
-use crate::table::Table;
 
 /// How trajectories begin.
 const HEADER: &[u8] = b"t,x1,";

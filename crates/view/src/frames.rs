@@ -3,10 +3,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use gluey::output::xyz::{self, XyzError, XyzFrame, read_text};
 use gluey_geom::{Dim, Space};
 use thiserror::Error;
-
-use crate::output::xyz::{self, XyzError, XyzFrame, read_text};
 
 /// Frames could not be found or read.
 #[derive(Debug, Error)]
@@ -58,7 +57,7 @@ pub enum FramesError {
 
 /// The files of a run's frames, in the order of the steps: in `folder`, or in the only folder in it whose
 /// name ends in `-xyz`.
-pub(crate) fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
+pub fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
     let entries = list(folder)?;
     let is_series = |path: &&PathBuf| path.is_dir() && name(path).ends_with("-xyz");
     let mut folders = entries.iter().filter(is_series);
@@ -98,13 +97,13 @@ fn is_frame(path: &Path) -> bool {
 }
 
 /// The dimension of the first frame.
-pub(crate) fn dimension(files: &[PathBuf]) -> Result<usize, FramesError> {
+pub fn dimension(files: &[PathBuf]) -> Result<usize, FramesError> {
     let first = &files[0];
     Ok(xyz::dimension(first, &read_text(first)?)?)
 }
 
 /// All frames; each has the particles and the box of the first, whatever its tilt.
-pub(crate) fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError>
+pub fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError>
 where
     Dim<D>: Space<D>,
 {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use gluey::output::xyz::XyzFrame;
 use gluey_geom::{Dim, Space};
 use gluey_pictures::{Animation, Canvas, Still};
 use rayon::prelude::*;
@@ -9,8 +10,7 @@ use rayon::prelude::*;
 use super::error::PlotError;
 use super::look::Look;
 use super::snapshot::{Scene, View, beside_pictures};
-use crate::analyse::frames::{dimension, frame_files, read_frames};
-use crate::output::xyz::XyzFrame;
+use crate::frames::{dimension, frame_files, read_frames};
 
 /// Width of the drawings in SVG pixels: the size of their text, whatever their pixels.
 const WIDTH: f64 = 600.0;

@@ -1,5 +1,7 @@
 //! Means of the rheology of a sheared suspension behind its transient.
 
+mod mean;
+
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +9,8 @@ use gluey_suspension::statistics::mser;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::mean::Mean;
+pub use mean::Mean;
+
 use crate::output::{rows_of, whole_lines};
 use crate::table::{Table, TableError};
 

@@ -2,13 +2,12 @@
 
 use std::fmt;
 
+use gluey::rheology::{Mean, RheologyMeans};
+use gluey::shown_to;
 use gluey_geom::{Dim, Space};
 use serde::{Serialize, Serializer};
 
-use super::mean::Mean;
 use super::observe::{Distributions, Instant};
-use super::rheology::RheologyMeans;
-use crate::shown::shown_to;
 
 /// Means over the frames behind the transient.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use gluey::analyse::Summary;
 use gluey::output::solver_log::SolverRow;
 use gluey::progress::Ticker;
-use gluey::view::Viewed;
 use gluey::{Notice, Progress, ProgressState, ResultPaths, RunReport};
+use gluey_view::{Summary, Viewed};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 

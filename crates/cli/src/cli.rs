@@ -18,7 +18,7 @@ mod view;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use gluey::analyse::AnalyseOptions;
+use gluey_view::AnalyseOptions;
 
 use crate::terminal;
 use check::CheckArguments;
@@ -48,7 +48,7 @@ Exit codes:
 
 /// Rigid particles in a Stokes flow with the gluey contact model.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = AFTER_HELP)]
+#[command(name = "gluey", version, about, after_help = AFTER_HELP)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -123,8 +123,8 @@ pub struct AnalyseArguments {
 
 impl AnalyseArguments {
     fn run(&self) -> Result<(), Failure> {
-        let summary = gluey::analyse::analyse(&self.options())
-            .map_err(|error| Failure::of_results(error, &self.folder))?;
+        let summary =
+            gluey_view::analyse(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         match self.json {
             true => terminal::print_json(&summary),
             false => terminal::print_summary(&summary),

@@ -1,6 +1,6 @@
 //! Numbers at the ends of scales and in captions.
 
-use crate::shown::shown_to;
+use gluey::shown_to;
 
 /// Three digits, in any unit.
 pub(super) fn told(value: f64) -> String {

@@ -6,25 +6,18 @@
 
 use std::path::{Path, PathBuf};
 
+use gluey::output::made::PAGE_NAME;
+use gluey::output::xyz::XyzFrame;
+use gluey::output::{OutputError, prepare_folder_of, write_atomically};
 use gluey_geom::{Dim, Space};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::analyse::FramesError;
-use crate::analyse::frames::{dimension, frame_files, read_frames};
-use crate::output::xyz::XyzFrame;
-use crate::output::{OutputError, prepare_folder_of, write_atomically};
+use crate::frames::FramesError;
+use crate::frames::{dimension, frame_files, read_frames};
 
 const PAGE: &str = include_str!("view/viewer.html");
 const SCRIPTS: [&str; 2] = [include_str!("view/viewer.js"), include_str!("view/controls.js")];
-
-/// Name of a page that is given none.
-pub(crate) const PAGE_NAME: &str = "view.html";
-
-/// Whether a text is that of a page, whatever run is in it.
-pub(crate) fn is_page(text: &[u8]) -> bool {
-    PAGE.split("{{title}}").next().is_some_and(|head| text.starts_with(head.as_bytes()))
-}
 
 /// What to show, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -163,4 +156,18 @@ impl Frame {
 /// Three coordinates; the third of a plane is 0.
 fn triple(x: &[f64]) -> [f32; 3] {
     std::array::from_fn(|d| x.get(d).map_or(0.0, |x| *x as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use gluey::output::made::PAGE_HEAD;
+
+    use super::PAGE;
+
+    /// A run that replaces another one takes its page away, by how it begins.
+    #[test]
+    fn pages_are_known_by_their_beginning() {
+        let head = PAGE.split("{{title}}").next().map(str::as_bytes);
+        assert_eq!(head, Some(PAGE_HEAD));
+    }
 }

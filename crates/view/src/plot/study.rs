@@ -1,11 +1,11 @@
 //! The picture of a study: viscosities with their intervals against a swept key.
 
+use gluey::rheology::Mean;
+use gluey::sweep::{PointProgress, PointStage, StudyProgress};
 use gluey_pictures::{Axis, Canvas, Curve, PALETTE, Stroke};
 
 use super::error::PlotError;
 use super::figures::{FAINT, LOGARITHMIC, chart, ends, points, stacked};
-use crate::analyse::Mean;
-use crate::sweep::{PointProgress, PointStage, StudyProgress};
 
 /// How intervals are drawn, in the colour of their curve.
 const BAR: f64 = 1.2;

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use gluey::output::solver_log::PHASES;
+use gluey::table::TableError;
 use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, PALETTE, PIXELS_PER_MM, Stroke, stack_to_width};
 
 use super::error::PlotError;
 use super::figure::Figure;
 use super::read::{Borders, Results, Source};
-use crate::output::solver_log::PHASES;
-use crate::table::TableError;
 
 /// Many curves that are not told apart.
 pub(super) const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: None };

@@ -8,6 +8,9 @@ mod sample;
 
 use std::path::{Path, PathBuf};
 
+use choice::AXES;
+use gluey::case::Case;
+use gluey::output::vtk::{read_fields, read_particles};
 use gluey_geom::{Dim, Particle, Space};
 use gluey_pictures::{Canvas, PIXELS_PER_MM, Raster, Stroke, color_scale};
 use gluey_suspension::Container;
@@ -15,9 +18,6 @@ use gluey_suspension::Container;
 use super::error::PlotError;
 use super::snapshot::{EDGE, FrameChoice, PERIODIC, images};
 use super::told::{told, told_to};
-use crate::case::Case;
-use crate::output::vtk::{read_fields, read_particles};
-use choice::AXES;
 pub use choice::{FlowOptions, Quantity, SliceChoice};
 use files::FlowFrame;
 use plane::{Plane, View};
