@@ -50,7 +50,7 @@ pub use flow::FlowError;
 pub use hydrodynamics::HydrodynamicsError;
 pub use memory::TooLarge;
 pub use near_pairs::{NearPairs, PairGap};
-pub use output::{ClaimError, OutputError, RowsError};
+pub use output::{ClaimError, OutputError, ResultPaths, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
@@ -58,7 +58,7 @@ pub use report::RunReport;
 pub use run::run_shared;
 pub use run::{
     Ended, FolderError, LastSteps, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions,
-    ResultPaths, ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
+    ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
 pub use shown::{shown, shown_to};

@@ -7,6 +7,7 @@ mod draft;
 pub mod forces;
 pub mod made;
 mod pair_forces;
+mod paths;
 mod pvd;
 pub mod rheology;
 pub mod solver_log;
@@ -22,8 +23,10 @@ use thiserror::Error;
 
 pub use claim::ClaimError;
 pub(crate) use claim::{Claim, is_claimed};
+pub(crate) use draft::Draft;
 pub use draft::{Mark, RowsError};
 pub use pair_forces::PairForces;
+pub use paths::ResultPaths;
 
 /// A file could not be written.
 #[derive(Debug, Error)]
@@ -75,20 +78,25 @@ fn create_draft(path: &Path) -> io::Result<(u32, File)> {
 
 /// All drafts of `path`, sorted by name.
 pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    let Some(name) = path.file_name() else { return Ok(Vec::new()) };
-    let prefix = format!("{}.partial-", name.to_string_lossy());
-    let is_draft = |name: &OsStr| {
-        let number = name.to_str().and_then(|name| name.strip_prefix(&prefix));
-        number.is_some_and(|number| number.parse::<u32>().is_ok())
-    };
-    let list = || -> io::Result<Vec<PathBuf>> {
-        let entries = fs::read_dir(folder_of(path))?.collect::<io::Result<Vec<_>>>()?;
-        let names = entries.iter().map(fs::DirEntry::file_name).filter(|name| is_draft(name));
-        let mut drafts: Vec<PathBuf> = names.map(|name| path.with_file_name(name)).collect();
-        drafts.sort();
-        Ok(drafts)
-    };
-    list().map_err(|error| OutputError::new(folder_of(path), "list the folder", error))
+    let Some(complete) = path.file_name().map(OsStr::to_string_lossy) else { return Ok(Vec::new()) };
+    let failed = |error| OutputError::new(folder_of(path), "list the folder", error);
+    let entries = entries(folder_of(path)).map_err(failed)?;
+    let names = entries.iter().filter_map(|entry| entry.file_name()?.to_str());
+    let drafts = names.filter(|name| undrafted(name) == Some(&*complete));
+    Ok(drafts.map(|name| path.with_file_name(name)).collect())
+}
+
+/// What is in a folder, sorted.
+pub fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+    let mut paths = entries.collect::<io::Result<Vec<_>>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The name of a file or folder.
+pub fn name_of(path: &Path) -> String {
+    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Makes sure that all drafts of these files outlive a power failure.

@@ -14,7 +14,6 @@ mod leftovers;
 mod log;
 mod occupied;
 mod options;
-mod paths;
 #[cfg(feature = "ranks")]
 mod pieces;
 mod record;
@@ -41,7 +40,6 @@ pub use error::RunError;
 pub use last_steps::{Ended, LastSteps};
 pub use occupied::OccupiedError;
 pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
-pub use paths::ResultPaths;
 pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
 pub(crate) use recorded::TABLE_OF_STUDY;
 pub use recorded::{FolderError, recorded_runs};
@@ -53,9 +51,9 @@ use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
-use crate::output::csv::{CsvWriter, earlier_drafts};
-use crate::output::solver_log::{self, SolverLog, SolverRow};
-use crate::output::{Claim, OutputError};
+use crate::output::csv::CsvWriter;
+use crate::output::solver_log::{SolverLog, SolverRow};
+use crate::output::{Claim, OutputError, ResultPaths};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
@@ -69,7 +67,7 @@ use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
 use start::simulation;
-use tables::{TableMarks, Tables};
+use tables::{TableMarks, Tables, earlier_drafts};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -178,9 +176,7 @@ where
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics, contact);
         let (mut measures, mut tally, mut wall_before_s) = (Measures::new(case), Tally::default(), 0.0);
-        let mut drafts = earlier_drafts(&options.csv, case.particles.len())?;
-        drafts.extend(solver_log::earlier_drafts(&options.csv)?);
-        drafts.extend(Tables::earlier_drafts(case, &options.csv)?);
+        let drafts = earlier_drafts(case, &options.csv)?;
         let file = CheckpointFile::new(options, !drafts.is_empty());
         let (csv, tables, solver) = match &options.resume {
             None => {

@@ -19,9 +19,9 @@ pub use study::Study;
 pub use table::{PointResult, table};
 
 use crate::case::{Case, CaseError, Override};
-use crate::output::OutputError;
+use crate::output::{OutputError, ResultPaths};
 use crate::report::RunReport;
-use crate::run::{RecordError, ResultPaths, RunRecord, RunState};
+use crate::run::{RecordError, RunRecord, RunState};
 
 /// Longest name of the folder of a point.
 const LONGEST_NAME: usize = 150;

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use gluey::output::xyz::{self, XyzError, XyzFrame, read_text};
+use gluey::output::{entries, name_of};
 use gluey_geom::{Dim, Space};
 use thiserror::Error;
 
@@ -59,7 +60,7 @@ pub enum FramesError {
 /// name ends in `-xyz`.
 pub fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
     let entries = list(folder)?;
-    let is_series = |path: &&PathBuf| path.is_dir() && name(path).ends_with("-xyz");
+    let is_series = |path: &&PathBuf| path.is_dir() && name_of(path).ends_with("-xyz");
     let mut folders = entries.iter().filter(is_series);
     let own: Vec<PathBuf> = entries.iter().filter(|path| is_frame(path)).cloned().collect();
     let found = match (own.is_empty(), folders.next(), folders.next()) {
@@ -79,20 +80,14 @@ pub fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
 
 /// Sorted by the length of the names first, so that steps are in order however many digits they have.
 fn list(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
-    let list = || -> io::Result<Vec<PathBuf>> {
-        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
-    };
-    let mut paths = list().map_err(|source| FramesError::List { folder: folder.to_owned(), source })?;
-    paths.sort_by_key(|path| (name(path).len(), name(path)));
+    let listed = entries(folder);
+    let mut paths = listed.map_err(|source| FramesError::List { folder: folder.to_owned(), source })?;
+    paths.sort_by_key(|path| (name_of(path).len(), name_of(path)));
     Ok(paths)
 }
 
-fn name(path: &Path) -> String {
-    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
-}
-
 fn is_frame(path: &Path) -> bool {
-    let name = name(path);
+    let name = name_of(path);
     name.starts_with("particles-") && (name.ends_with(".xyz") || name.ends_with(".xyz.gz"))
 }
 

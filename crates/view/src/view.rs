@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use gluey::output::made::PAGE_NAME;
 use gluey::output::xyz::XyzFrame;
-use gluey::output::{OutputError, prepare_folder_of, write_atomically};
+use gluey::output::{OutputError, name_of, prepare_folder_of, write_atomically};
 use gluey_geom::{Dim, Space};
 use serde::Serialize;
 use thiserror::Error;
@@ -74,7 +74,7 @@ pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
 /// The name of the folder of a frame, without what says that frames are in it.
 fn title(frame: &Path) -> String {
     let absolute = std::path::absolute(frame).unwrap_or_else(|_| frame.to_owned());
-    let name = absolute.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+    let name = absolute.parent().map_or(String::new(), name_of);
     name.strip_suffix("-xyz").unwrap_or(&name).to_owned()
 }
 

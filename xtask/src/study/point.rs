@@ -67,8 +67,7 @@ impl Point {
         let result = report(&case, &paths, &line);
         line.finish(&result);
         let report = result?;
-        let rheology =
-            case.has_rheology().then(|| table(&gluey::output::rheology::rheology_path(&paths.csv())));
+        let rheology = case.has_rheology().then(|| table(&paths.rheology()));
         Ok(Done {
             point: self.clone(),
             report,

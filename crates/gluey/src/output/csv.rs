@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 use gluey_geom::{Dim, Space, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::draft::{Draft, Mark, RowsError};
+use super::draft::{Draft, Mark, RowsError, line_of};
 use super::pair_forces::{ContactForces, PairForces};
-use super::{OutputError, drafts};
+use super::{OutputError, ResultPaths};
 use crate::measures::Instant;
 use crate::near_pairs::{NearPairs, PairGap};
 use crate::trajectory::Row;
@@ -58,14 +58,9 @@ where
 {
     /// Starts the files of a run of so many particles.
     pub fn create(path: &Path, particle_count: usize) -> Result<Self, RowsError> {
-        let mut rows = Draft::create(path)?;
-        rows.write(&format!("{}\n", header::<D>(particle_count)))?;
-        let create = |path: PathBuf| -> Result<Draft, RowsError> {
-            let mut gaps = Draft::create(&path)?;
-            gaps.write(&format!("{GAPS_HEADER}\n"))?;
-            Ok(gaps)
-        };
-        let gaps = gaps_path(path, particle_count).map(create).transpose()?;
+        let rows = Draft::with_header(path, &header::<D>(particle_count))?;
+        let gaps = gaps_path(path, particle_count);
+        let gaps = gaps.map(|path| Draft::with_header(&path, GAPS_HEADER)).transpose()?;
         Ok(Self { rows, gaps, near: NearPairs::new() })
     }
 
@@ -125,20 +120,9 @@ where
     }
 }
 
-/// Drafts that earlier runs of so many particles left.
-pub(crate) fn earlier_drafts(path: &Path, particle_count: usize) -> Result<Vec<PathBuf>, OutputError> {
-    let mut earlier = drafts(path)?;
-    if let Some(gaps) = gaps_path(path, particle_count) {
-        earlier.extend(drafts(&gaps)?);
-    }
-    Ok(earlier)
-}
-
 /// The file of near pairs of so many particles, where pairs have no columns.
-fn gaps_path(path: &Path, particle_count: usize) -> Option<PathBuf> {
-    let mut name = path.file_stem()?.to_owned();
-    name.push("-gaps.csv");
-    (particle_count > MOST_WITH_PAIR_COLUMNS).then(|| path.with_file_name(name))
+pub(crate) fn gaps_path(path: &Path, particle_count: usize) -> Option<PathBuf> {
+    (particle_count > MOST_WITH_PAIR_COLUMNS).then(|| ResultPaths::of_csv(path).gaps())
 }
 
 /// The first line of the trajectory.
@@ -170,20 +154,13 @@ where
     Dim<D>: Space<D>,
 {
     let a = row.mean_radius();
-    let mut text = format!("{:.16e}", row.time);
-    let mut add = |number: f64| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, ",{number:.16e}");
+    let centers = row.particles.iter().flat_map(|particle| particle.pose.position.iter().copied());
+    let gaps: Vec<f64> = match row.particles.len() > MOST_WITH_PAIR_COLUMNS {
+        true => smallest_gap_over_a.into_iter().collect(),
+        false => row.pairs().map(|(first, second)| row.gap(first, second) / a).collect(),
     };
-    row.particles.iter().flat_map(|particle| particle.pose.position.iter()).for_each(|&x| add(x));
-    if row.particles.len() > MOST_WITH_PAIR_COLUMNS {
-        smallest_gap_over_a.into_iter().for_each(&mut add);
-    } else {
-        row.pairs().for_each(|(first, second)| add(row.gap(first, second) / a));
-    }
-    row.twists.iter().flat_map(|twist| Dim::<D>::spin_slice(&twist.spin)).for_each(|&w| add(w));
-    text.push('\n');
-    text
+    let spins = row.twists.iter().flat_map(|twist| Dim::<D>::spin_slice(&twist.spin).iter().copied());
+    line_of([row.time].into_iter().chain(centers).chain(gaps).chain(spins))
 }
 
 /// Reads a row of so many particles back.

@@ -4,6 +4,7 @@
 //! the mark: what it writes there is compared with them, byte by byte, until there are no more. One that
 //! cannot have the same bits leaves them where they are and goes on in a draft of its own.
 
+use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -70,7 +71,7 @@ pub enum RowsError {
 
 /// The growing file: draft `number` of `complete`.
 #[derive(Debug)]
-pub(super) struct Draft {
+pub(crate) struct Draft {
     complete: PathBuf,
     number: u32,
     path: PathBuf,
@@ -99,6 +100,13 @@ impl Draft {
             hasher: Hasher::new(),
             buffer: Vec::new(),
         })
+    }
+
+    /// The same for a table with this header.
+    pub fn with_header(complete: &Path, header: &str) -> Result<Self, RowsError> {
+        let mut draft = Self::create(complete)?;
+        draft.write(&format!("{header}\n"))?;
+        Ok(draft)
     }
 
     /// Goes on at `mark` with the draft that was marked, of which only half a last line is taken away. Where
@@ -227,6 +235,22 @@ impl Draft {
         };
         finish().map_err(|error| OutputError::new(&self.complete, "complete the file", error))
     }
+}
+
+/// A line of a table: numbers with 17 significant digits, so that they read back exactly, and empty cells
+/// where there is none.
+pub(super) fn line_of(numbers: impl IntoIterator<Item: Into<Option<f64>>>) -> String {
+    let mut text = String::new();
+    for number in numbers {
+        if let Some(number) = number.into() {
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{number:.16e}");
+        }
+        text.push(',');
+    }
+    text.pop();
+    text.push('\n');
+    text
 }
 
 /// Whether the file is there and begins as it was marked.

@@ -5,66 +5,12 @@
 //! that of the force density on the box. Before them stand the mean velocity of fluid and particles over the
 //! box and the force density.
 
-use std::path::{Path, PathBuf};
-
 use gluey_geom::{Dim, Space};
 use gluey_motion::Holding;
 
-use super::draft::{Draft, Mark, RowsError};
-use super::{OutputError, drafts};
+use super::draft::line_of;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-forces.csv` beside the trajectory.
-#[derive(Debug)]
-pub struct ForcesWriter(Draft);
-
-impl ForcesWriter {
-    /// Starts the file beside the trajectory `csv` for the particles of these indices.
-    pub fn create<const D: usize>(
-        csv: &Path,
-        particles: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, RowsError> {
-        let mut draft = Draft::create(&forces_path(csv))?;
-        draft.write(&format!("{}\n", header::<D>(particles)))?;
-        Ok(Self(draft))
-    }
-
-    /// Goes on with the file at `mark`.
-    pub(crate) fn resume(csv: &Path, mark: &Mark) -> Result<Self, RowsError> {
-        Ok(Self(Draft::resume(&forces_path(csv), mark)?))
-    }
-
-    /// Adds the row of a time, which is with the operating system when this returns.
-    pub fn write<const D: usize>(&mut self, time: f64, holding: &Holding<D>) -> Result<(), RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
-        self.0.write(&line(time, holding))
-    }
-
-    /// How far the file has come.
-    pub(crate) fn mark(&self) -> Mark {
-        self.0.mark()
-    }
-
-    /// Gives the complete file its name.
-    pub fn finish(self) -> Result<(), OutputError> {
-        self.0.finish()
-    }
-}
-
-/// Drafts that earlier runs left.
-pub(crate) fn earlier_drafts(csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    drafts(&forces_path(csv))
-}
-
-/// The file beside a trajectory.
-pub fn forces_path(csv: &Path) -> PathBuf {
-    let mut name = csv.file_stem().unwrap_or_default().to_owned();
-    name.push("-forces.csv");
-    csv.with_file_name(name)
-}
 
 /// The first line, for the particles of these indices.
 pub fn header<const D: usize>(particles: impl IntoIterator<Item = usize>) -> String {
@@ -82,7 +28,7 @@ pub fn header<const D: usize>(particles: impl IntoIterator<Item = usize>) -> Str
 }
 
 /// A row as text, with its end of line.
-fn line<const D: usize>(time: f64, holding: &Holding<D>) -> String
+pub fn line<const D: usize>(time: f64, holding: &Holding<D>) -> String
 where
     Dim<D>: Space<D>,
 {
@@ -90,9 +36,7 @@ where
         wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)).copied().collect::<Vec<f64>>()
     });
     let of_box = holding.mean_velocity.iter().chain(&holding.force_density).copied();
-    let numbers = std::iter::once(time).chain(of_box).chain(of_particles);
-    let cells: Vec<String> = numbers.map(|number| format!("{number:.16e}")).collect();
-    format!("{}\n", cells.join(","))
+    line_of([time].into_iter().chain(of_box).chain(of_particles))
 }
 
 #[cfg(test)]

@@ -8,12 +8,9 @@
 //! films too thin for the mesh, of contacts and of repulsion in the first. `particle_pressure` is
 //! `-tr S / (D V)`, relative to the mean pressure of the fluid.
 
-use std::path::{Path, PathBuf};
-
 use gluey_motion::MeanStress;
 
-use super::draft::{Draft, Mark, RowsError};
-use super::{OutputError, drafts};
+use super::draft::line_of;
 
 /// The first line in 3D; in 2D there is no `N2`, and forces of contacts have no unit of force.
 const NAMES: [&str; 11] = [
@@ -45,56 +42,11 @@ pub struct Rheology<'a, const D: usize> {
     pub time_and_rate: Option<[f64; 2]>,
 }
 
-/// Writes rows as they come, like [`super::csv::CsvWriter`], to `<stem>-rheology.csv` beside the trajectory.
-#[derive(Debug)]
-pub struct RheologyWriter(Draft);
-
-impl RheologyWriter {
-    /// Starts the file beside the trajectory `csv`.
-    pub fn create<const D: usize>(csv: &Path, is_at_given_stress: bool) -> Result<Self, RowsError> {
-        let mut draft = Draft::create(&rheology_path(csv))?;
-        let more = if is_at_given_stress { ",time,shear_rate" } else { "" };
-        draft.write(&format!("{}{more}\n", header::<D>()))?;
-        Ok(Self(draft))
-    }
-
-    /// Goes on with the file at `mark`.
-    pub(crate) fn resume(csv: &Path, mark: &Mark) -> Result<Self, RowsError> {
-        Ok(Self(Draft::resume(&rheology_path(csv), mark)?))
-    }
-
-    /// Adds one row, which is with the operating system when this returns.
-    pub fn write<const D: usize>(&mut self, row: &Rheology<'_, D>) -> Result<(), RowsError> {
-        self.0.write(&line(row))
-    }
-
-    /// How far the file has come.
-    pub(crate) fn mark(&self) -> Mark {
-        self.0.mark()
-    }
-
-    /// Gives the complete file its name.
-    pub fn finish(self) -> Result<(), OutputError> {
-        self.0.finish()
-    }
-}
-
-/// Drafts that earlier runs left.
-pub(crate) fn earlier_drafts(csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    drafts(&rheology_path(csv))
-}
-
-/// The file beside a trajectory.
-pub fn rheology_path(csv: &Path) -> PathBuf {
-    let mut name = csv.file_stem().unwrap_or_default().to_owned();
-    name.push("-rheology.csv");
-    csv.with_file_name(name)
-}
-
-/// The first line, but for time and shear rate where the stress is given.
-pub fn header<const D: usize>() -> String {
+/// The first line; `t` is the strain and time and shear rate have columns where the stress is given.
+pub fn header<const D: usize>(is_at_given_stress: bool) -> String {
     let is_there = |name: &&str| D == 3 || !["N2", "viscosity_of_contacts"].contains(name);
-    let names: Vec<&str> = NAMES.into_iter().filter(is_there).collect();
+    let more = if is_at_given_stress { &["time", "shear_rate"][..] } else { &[] };
+    let names: Vec<&str> = NAMES.iter().filter(|name| is_there(name)).chain(more).copied().collect();
     names.join(",")
 }
 
@@ -110,10 +62,7 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
     let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]).map(Some);
     let more = row.time_and_rate.into_iter().flatten().map(Some);
     let numbers = first.into_iter().chain(others).chain(shares).chain(normal);
-    let numbers = numbers.chain([row.smallest_gap_over_a]).chain(more);
-    let cells: Vec<String> =
-        numbers.map(|number| number.map_or(String::new(), |number| format!("{number:.16e}"))).collect();
-    format!("{}\n", cells.join(","))
+    line_of(numbers.chain([row.smallest_gap_over_a]).chain(more))
 }
 
 #[cfg(test)]
@@ -149,8 +98,8 @@ mod tests {
             line.trim_end().split(',').map(|cell| cell.parse().expect("a number")).collect();
         let expected = [1.0, -0.5, 4.0, 2.5, 0.15, 0.75, 0.75, -2.0, 4.0, 6.0, 0.25];
         assert!(numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{numbers:?}");
-        assert_eq!(numbers.len(), header::<3>().split(',').count());
-        assert_eq!(header::<2>().split(',').count(), numbers.len() - 2);
+        assert_eq!(numbers.len(), header::<3>(false).split(',').count());
+        assert_eq!(header::<2>(false).split(',').count(), numbers.len() - 2);
         let stress = MeanStress { work_of_forces: 1.0, ..stress };
         let line = self::line(&Rheology { stress: &stress, ..row });
         assert_eq!(line.split(',').nth(3), Some(""), "forces do more than the shear");

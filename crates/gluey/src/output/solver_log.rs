@@ -5,13 +5,13 @@
 //! run keeps the seconds of rows that an earlier one had written.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use gluey_contact::ContactReport;
 use gluey_motion::FlowStatistics;
 
 use super::draft::{Draft, Mark, RowsError};
-use super::{OutputError, drafts};
+use super::{OutputError, ResultPaths};
 use crate::phases::PhaseTable;
 use crate::tally::Motion;
 
@@ -74,14 +74,14 @@ pub struct SolverLog {
 impl SolverLog {
     /// Starts the file beside the trajectory `csv`.
     pub fn create(csv: &Path) -> Result<Self, RowsError> {
-        let mut draft = Draft::create(&solver_log_path(csv))?;
-        draft.write(&format!("{FACTS},{}\n", PHASES.map(|(_, column)| column).join(",")))?;
+        let header = format!("{FACTS},{}", PHASES.map(|(_, column)| column).join(","));
+        let draft = Draft::with_header(&ResultPaths::of_csv(csv).solver(), &header)?;
         Ok(Self { draft, before: Default::default() })
     }
 
     /// Goes on with the file at `mark`, after so much wall time.
     pub(crate) fn resume(csv: &Path, mark: &Mark, phases: &PhaseTable) -> Result<Self, RowsError> {
-        Ok(Self { draft: Draft::resume(&solver_log_path(csv), mark)?, before: seconds(phases) })
+        Ok(Self { draft: Draft::resume(&ResultPaths::of_csv(csv).solver(), mark)?, before: seconds(phases) })
     }
 
     /// Adds one row, which is with the operating system when this returns.
@@ -102,18 +102,6 @@ impl SolverLog {
     pub fn finish(self) -> Result<(), OutputError> {
         self.draft.finish()
     }
-}
-
-/// Drafts that earlier runs left.
-pub(crate) fn earlier_drafts(csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    drafts(&solver_log_path(csv))
-}
-
-/// The file beside a trajectory.
-pub fn solver_log_path(csv: &Path) -> PathBuf {
-    let mut name = csv.file_stem().unwrap_or_default().to_owned();
-    name.push("-solver.csv");
-    csv.with_file_name(name)
 }
 
 /// What is the same on every run, with the comma behind it.
@@ -158,7 +146,7 @@ mod tests {
             log.write(&row).expect("a row");
         }
         log.finish().expect("complete");
-        let text = std::fs::read_to_string(solver_log_path(&csv)).expect("a file");
+        let text = std::fs::read_to_string(ResultPaths::of_csv(&csv).solver()).expect("a file");
         let table = crate::table::Table::parse(&text).expect("a table");
         assert_eq!(table.column("solve_s"), Ok(&[1.5, 2.5][..]));
         assert_eq!(table.column("iterations"), Ok(&[9.0, 9.0][..]));

@@ -9,10 +9,9 @@ use gluey_geom::{Dim, Space};
 
 use super::frames::Others;
 use super::options::RunOptions;
-use super::paths::ResultPaths;
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
-use crate::output::{OutputError, set_aside};
+use crate::output::{OutputError, ResultPaths, set_aside};
 use crate::progress::Notice;
 
 /// Checkpoints that are there at a time.

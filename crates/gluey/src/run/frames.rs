@@ -9,12 +9,11 @@ use gluey_suspension::Container;
 use super::contacts::Contacts;
 use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
-use super::paths::ResultPaths;
 use crate::case::{Case, Interval, OutputKind};
 use crate::checkpoint::FlowPieces;
-use crate::output::OutputError;
 use crate::output::vtk::{Frame, FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
+use crate::output::{OutputError, ResultPaths};
 use crate::simulation::{Simulation, StepError};
 
 /// The other ranks that share the flow of a run.

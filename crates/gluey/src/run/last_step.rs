@@ -12,12 +12,11 @@ use super::frames::Others;
 use super::last_steps::{Ended, OfRun, locked};
 use super::log;
 use super::options::RunOptions;
-use super::paths::ResultPaths;
 use super::recorder::Recorder;
 use crate::case::Case;
 use crate::checkpoint::Checkpoint;
 use crate::output::vtk::OnTheirWay;
-use crate::output::{OutputError, sync_drafts};
+use crate::output::{OutputError, ResultPaths, sync_drafts};
 use crate::progress::Notice;
 
 /// The last whole step of a run, and the files that tell of it.

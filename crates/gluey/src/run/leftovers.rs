@@ -1,15 +1,12 @@
 //! Takes away what earlier runs of the same name left and nothing can use any more.
 
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use super::frames::StreamOptions;
 use super::options::RunOptions;
-use super::paths::ResultPaths;
-use super::replaced::{self, is_frame, remove_file};
+use super::replaced::{self, is_frame, list, remove_file};
 use crate::case::Case;
-use crate::output::{OutputError, drafts, undrafted};
+use crate::output::{OutputError, ResultPaths, drafts, name_of, undrafted};
 
 /// Removes half files that killed runs left, and all of a run that this one replaces. Otherwise rows are
 /// never among them. The results are claimed: no other run writes them now.
@@ -31,15 +28,9 @@ pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), OutputErro
 
 /// Removes half frames from a folder.
 fn remove_half_frames(folder: &Path) -> Result<(), OutputError> {
-    let list =
-        || -> io::Result<Vec<_>> { fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect() };
-    let names = match list() {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        listed => listed.map_err(|error| OutputError::new(folder, "list the folder", error))?,
-    };
-    for name in names.iter().filter_map(|name| name.to_str()) {
-        if undrafted(name).is_some_and(is_frame) {
-            remove_file(&folder.join(name))?;
+    for path in list(folder)? {
+        if undrafted(&name_of(&path)).is_some_and(is_frame) {
+            remove_file(&path)?;
         }
     }
     Ok(())

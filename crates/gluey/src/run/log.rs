@@ -10,12 +10,11 @@ use std::time::Duration;
 use super::error::RunError;
 use super::last_steps::locked;
 use super::options::RunOptions;
-use super::paths::ResultPaths;
 use super::record::{in_full, now};
 use crate::case::Case;
 use crate::memory;
-use crate::output::OutputError;
 use crate::output::solver_log::SolverRow;
+use crate::output::{OutputError, ResultPaths};
 use crate::progress::{Notice, Progress, ProgressState, Ticker};
 use crate::report::RunReport;
 

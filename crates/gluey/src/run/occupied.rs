@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::options::RunOptions;
-use super::paths::ResultPaths;
 use super::record::{RecordError, RunRecord, RunState};
 use crate::case::Case;
 use crate::checkpoint::{CaseDifference, canonical, difference};
+use crate::output::ResultPaths;
 
 /// Results of another run are where a run would write; they are as they were.
 #[derive(Debug, Error)]

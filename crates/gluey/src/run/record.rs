@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::options::{RunOptions, VtkOptions, XyzOptions};
-use super::paths::ResultPaths;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, ResultPaths, write_atomically};
 use crate::report::RunReport;
 
 /// Counts changes of the layout of [`RunRecord`].

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::paths::ResultPaths;
+use crate::output::ResultPaths;
 
 /// What `gluey sweep` leaves in its folder.
 pub(crate) const TABLE_OF_STUDY: &str = "sweep.csv";

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::error::RunError;
 use super::options::RunOptions;
-use super::paths::ResultPaths;
 use super::record::{RunRecord, RunState, in_full};
 use crate::case::Case;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, ResultPaths, write_atomically};
 use crate::progress::{Notice, Progress};
 use crate::report::RunReport;
 

@@ -5,9 +5,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::paths::ResultPaths;
 use crate::output::made::{PAGE_NAME, is_page, is_picture, is_table};
-use crate::output::{OutputError, drafts, is_claimed, undrafted};
+use crate::output::{OutputError, ResultPaths, drafts, entries, is_claimed, name_of, undrafted};
 
 /// Series of frames, by the beginnings of their names.
 const SERIES: [&str; 3] = ["fields", "particles", "contacts"];
@@ -23,17 +22,17 @@ pub(super) fn remove(paths: &ResultPaths) -> Result<(), OutputError> {
     // The tables and the page of a folder are of the only run in it that has frames.
     let others_have_frames = entries
         .iter()
-        .any(|path| name(path).ends_with("-xyz") && !of_run.contains(&path) && holds(path, is_frame));
+        .any(|path| name_of(path).ends_with("-xyz") && !of_run.contains(&path) && holds(path, is_frame));
     for table in &tables {
         remove_if_there(table)?;
         drafts(table)?.iter().try_for_each(|draft| remove_file(draft))?;
     }
-    let checkpoint = name(&paths.checkpoint());
+    let checkpoint = name_of(&paths.checkpoint());
     for path in of_run {
         match path.is_dir() {
             true => empty(path)?,
             false if is_lock(path) => remove_lock(path)?,
-            false if name(path).starts_with(&checkpoint) => remove_if_there(path)?,
+            false if name_of(path).starts_with(&checkpoint) => remove_if_there(path)?,
             false => {}
         }
     }
@@ -42,7 +41,7 @@ pub(super) fn remove(paths: &ResultPaths) -> Result<(), OutputError> {
 
 /// Whether a name begins with that of the run, and not with the longer one of another run that is recorded.
 fn is_of_run(path: &Path, paths: &ResultPaths, entries: &[PathBuf]) -> bool {
-    let (name, stem) = (name(path), paths.stem());
+    let (name, stem) = (name_of(path), paths.stem());
     let begins = |stem: &str| {
         let rest = name.strip_prefix(stem);
         rest.is_some_and(|rest| rest.starts_with(['-', '.']))
@@ -55,7 +54,7 @@ fn is_of_run(path: &Path, paths: &ResultPaths, entries: &[PathBuf]) -> bool {
 fn empty(folder: &Path) -> Result<(), OutputError> {
     remove_shown(folder)?;
     for path in list(folder)? {
-        let name = name(&path);
+        let name = name_of(&path);
         if path.is_dir() && name == "plots" {
             empty(&path)?;
         } else if is_frame(undrafted(&name).unwrap_or(&name)) || is_picture(&name) {
@@ -74,13 +73,13 @@ fn remove_shown(folder: &Path) -> Result<(), OutputError> {
     let tables = begins("series.csv", |text| text.starts_with(b"t,strain,"));
     let page = begins(PAGE_NAME, is_page);
     for path in list(folder)? {
-        let name = name(&path);
+        let name = name_of(&path);
         if (tables && is_table(&name)) || (page && name == PAGE_NAME) {
             remove_file(&path)?;
         } else if tables && name == "structure-plots" {
             list(&path)?
                 .iter()
-                .filter(|path| is_picture(&self::name(path)))
+                .filter(|path| is_picture(&name_of(path)))
                 .try_for_each(|path| remove_file(path))?;
             remove_if_empty(&path)?;
         }
@@ -127,24 +126,16 @@ fn remove_if_empty(folder: &Path) -> Result<(), OutputError> {
 }
 
 fn holds(folder: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
-    list(folder).is_ok_and(|entries| entries.iter().any(|path| is_wanted(&name(path))))
+    list(folder).is_ok_and(|entries| entries.iter().any(|path| is_wanted(&name_of(path))))
 }
 
 /// What is in a folder, sorted; nothing in one that is not there.
-fn list(folder: &Path) -> Result<Vec<PathBuf>, OutputError> {
+pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>, OutputError> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let list =
-        || -> io::Result<Vec<PathBuf>> { fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect() };
-    let mut entries = match list() {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-        listed => listed.map_err(|error| OutputError::new(folder, "list the folder", error))?,
-    };
-    entries.sort();
-    Ok(entries)
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+    match entries(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        listed => listed.map_err(|error| OutputError::new(folder, "list the folder", error)),
+    }
 }
 
 #[cfg(test)]

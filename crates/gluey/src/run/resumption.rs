@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::options::{RecordOptions, RunOptions};
-use super::paths::ResultPaths;
 use super::record::{RecordError, RunRecord, RunState};
 use super::recorded::{FolderError, recorded_runs};
+use crate::output::ResultPaths;
 
 /// How to go on with a run: its case file and its options, at the places where its results are now.
 #[derive(Clone, Debug)]

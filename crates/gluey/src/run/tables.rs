@@ -10,9 +10,9 @@ use super::error::RunError;
 use super::stress::with_contacts;
 use crate::case::Case;
 use crate::hydrodynamics::HydrodynamicsError;
-use crate::output::forces::{self, ForcesWriter};
-use crate::output::rheology::{self, Rheology, RheologyWriter};
-use crate::output::{Mark, OutputError, RowsError};
+use crate::output::csv::gaps_path;
+use crate::output::rheology::{self, Rheology};
+use crate::output::{Draft, Mark, OutputError, ResultPaths, RowsError, drafts, forces};
 use crate::rheology::{RheologyError, RheologyMeans};
 use crate::simulation::{Simulation, StepError};
 
@@ -24,14 +24,14 @@ pub(super) fn means_of_rheology(case: &Case, csv: &Path) -> Result<Option<Rheolo
     if !case.has_rheology() {
         return Ok(None);
     }
-    RheologyMeans::read(&rheology::rheology_path(csv), None)
+    RheologyMeans::read(&ResultPaths::of_csv(csv).rheology(), None)
 }
 
 /// The tables of a run in progress.
 #[derive(Debug)]
 pub(super) struct Tables {
-    rheology: Option<RheologyWriter>,
-    forces: Option<ForcesWriter>,
+    rheology: Option<Draft>,
+    forces: Option<Draft>,
 }
 
 /// How far the tables had come.
@@ -41,36 +41,42 @@ pub(super) struct TableMarks {
     pub forces: Option<Mark>,
 }
 
-impl Tables {
-    /// Drafts that earlier runs of a case left.
-    pub fn earlier_drafts(case: &Case, csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
-        let mut drafts = Vec::new();
-        if case.has_rheology() {
-            drafts.extend(rheology::earlier_drafts(csv)?);
-        }
-        if case.gives_motions() {
-            drafts.extend(forces::earlier_drafts(csv)?);
-        }
-        Ok(drafts)
-    }
+/// Drafts of the tables of a case that earlier runs left.
+pub(super) fn earlier_drafts(case: &Case, csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let solver = ResultPaths::of_csv(csv).solver();
+    let of_all = [Some(csv.to_owned()), gaps_path(csv, case.particles.len()), Some(solver)];
+    let tables = of_all.into_iter().chain(paths(case, csv)).flatten();
+    Ok(tables.map(|table| drafts(&table)).collect::<Result<Vec<_>, _>>()?.concat())
+}
 
+/// The files of rheology and forces, where a case has them.
+fn paths(case: &Case, csv: &Path) -> [Option<PathBuf>; 2] {
+    let paths = ResultPaths::of_csv(csv);
+    [case.has_rheology().then(|| paths.rheology()), case.gives_motions().then(|| paths.forces())]
+}
+
+impl Tables {
     /// Starts those that a case has.
     pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError> {
-        let (has_rheology, has_forces) = (case.has_rheology(), case.gives_motions());
-        let forces = || ForcesWriter::create::<D>(csv, case.given_particles());
+        let create = |path: Option<PathBuf>, header: String| {
+            path.map(|path| Draft::with_header(&path, &header)).transpose()
+        };
+        let [rheology, forces] = paths(case, csv);
         Ok(Self {
-            rheology: has_rheology
-                .then(|| RheologyWriter::create::<D>(csv, case.shear_stress.is_some()))
-                .transpose()?,
-            forces: has_forces.then(forces).transpose()?,
+            rheology: create(rheology, rheology::header::<D>(case.shear_stress.is_some()))?,
+            forces: create(forces, forces::header::<D>(case.given_particles()))?,
         })
     }
 
     /// Goes on with them at these marks.
     pub fn resume(csv: &Path, marks: &TableMarks) -> Result<Self, RowsError> {
+        let paths = ResultPaths::of_csv(csv);
+        let resume = |path: PathBuf, mark: &Option<Mark>| {
+            mark.as_ref().map(|mark| Draft::resume(&path, mark)).transpose()
+        };
         Ok(Self {
-            rheology: marks.rheology.as_ref().map(|mark| RheologyWriter::resume(csv, mark)).transpose()?,
-            forces: marks.forces.as_ref().map(|mark| ForcesWriter::resume(csv, mark)).transpose()?,
+            rheology: resume(paths.rheology(), &marks.rheology)?,
+            forces: resume(paths.forces(), &marks.forces)?,
         })
     }
 
@@ -91,16 +97,11 @@ impl Tables {
                 .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
             let time_and_rate = simulation.time_and_rate();
-            rheology.write(&Rheology {
-                time,
-                strain,
-                stress: &stress,
-                smallest_gap_over_a,
-                time_and_rate,
-            })?;
+            let row = Rheology { time, strain, stress: &stress, smallest_gap_over_a, time_and_rate };
+            rheology.write(&rheology::line(&row))?;
         }
         if let (Some(forces), Some(holding)) = (&mut self.forces, simulation.holding()) {
-            forces.write(time, &holding)?;
+            forces.write(&forces::line(time, &holding))?;
         }
         Ok(())
     }
@@ -108,14 +109,14 @@ impl Tables {
     /// How far they have come.
     pub fn marks(&self) -> TableMarks {
         TableMarks {
-            rheology: self.rheology.as_ref().map(RheologyWriter::mark),
-            forces: self.forces.as_ref().map(ForcesWriter::mark),
+            rheology: self.rheology.as_ref().map(Draft::mark),
+            forces: self.forces.as_ref().map(Draft::mark),
         }
     }
 
     /// Gives the complete files their names.
     pub fn finish(self) -> Result<(), OutputError> {
-        self.rheology.map_or(Ok(()), RheologyWriter::finish)?;
-        self.forces.map_or(Ok(()), ForcesWriter::finish)
+        self.rheology.map_or(Ok(()), Draft::finish)?;
+        self.forces.map_or(Ok(()), Draft::finish)
     }
 }

@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::SweepError;
 use super::study::Manifest;
+use crate::output::ResultPaths;
 use crate::report::RunReport;
-use crate::run::{ResultPaths, RunRecord, RunState};
+use crate::run::{RunRecord, RunState};
 
 /// A study and its points.
 #[derive(Clone, Debug, Serialize)]

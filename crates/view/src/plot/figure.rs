@@ -2,6 +2,16 @@
 
 use std::str::FromStr;
 
+/// That of all choices which has a name.
+pub(super) fn named<T: Copy, const N: usize>(
+    name: &str,
+    all: [T; N],
+    name_of: fn(T) -> &'static str,
+) -> Result<T, String> {
+    let found = all.into_iter().find(|one| name_of(*one) == name);
+    found.ok_or_else(|| format!("expected one of {}", all.map(name_of).join(", ")))
+}
+
 /// What can be drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Figure {
@@ -60,8 +70,6 @@ impl FromStr for Figure {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let names = || Self::ALL.map(Self::as_str).join(", ");
-        let found = Self::ALL.into_iter().find(|figure| figure.as_str() == text);
-        found.ok_or_else(|| format!("expected one of {}", names()))
+        named(text, Self::ALL, Self::as_str)
     }
 }

@@ -9,6 +9,7 @@ use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::for_each_pair;
 
 use super::error::PlotError;
+use super::figure::named;
 use super::told::told;
 
 /// Smallest gap that has a colour of its own, in mean radii.
@@ -92,9 +93,7 @@ impl FromStr for Coloring {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let names = || Self::ALL.map(Self::as_str).join(", ");
-        let found = Self::ALL.into_iter().find(|coloring| coloring.as_str() == text);
-        found.ok_or_else(|| format!("expected one of {}", names()))
+        named(text, Self::ALL, Self::as_str)
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use gluey::ResultPaths;
 use gluey::case::{Case, Hydrodynamics};
-use gluey::output::{rows_of, undrafted, whole_lines};
+use gluey::output::{entries, rows_of, undrafted, whole_lines};
 use gluey::table::Table;
 use gluey_pictures::Curve;
 
@@ -49,7 +49,7 @@ pub struct Results {
 impl Results {
     /// Folder of its pictures.
     pub fn plots(&self) -> PathBuf {
-        self.beside("-plots")
+        self.paths.frames("plots")
     }
 
     /// Where particles were.
@@ -60,29 +60,28 @@ impl Results {
 
     /// Near pairs, which runs of ten and more particles list.
     pub fn near_pairs(&self) -> Result<Option<Source>, PlotError> {
-        rows_of(&self.beside("-gaps.csv")).map(read).transpose()
+        rows_of(&self.paths.gaps()).map(read).transpose()
     }
 
     /// Stresses; an error where they are needed and not there.
     pub fn rheology(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
         let hint = "runs in boxes with domain.boundary = \"sheared\" write it";
-        self.table("-rheology.csv", Figure::Rheology, is_needed, hint)
+        self.table(self.paths.rheology(), Figure::Rheology, is_needed, hint)
     }
 
     /// What the steps cost; an error where it is needed and not there.
     pub fn solver(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
-        self.table("-solver.csv", Figure::Solver, is_needed, "a run writes it beside its trajectory")
+        self.table(self.paths.solver(), Figure::Solver, is_needed, "a run writes it beside its trajectory")
     }
 
     /// A table beside the trajectory; an error where it is needed and not there.
     fn table(
         &self,
-        suffix: &str,
+        path: PathBuf,
         figure: Figure,
         is_needed: bool,
         hint: &'static str,
     ) -> Result<Option<Source>, PlotError> {
-        let path = self.beside(suffix);
         match (rows_of(&path), is_needed) {
             (Some(rows), _) => Ok(Some(read(rows)?.with_rows(figure)?)),
             (None, false) => Ok(None),
@@ -103,10 +102,6 @@ impl Results {
     /// The trajectory.
     pub fn csv(&self) -> PathBuf {
         self.paths.csv()
-    }
-
-    fn beside(&self, suffix: &str) -> PathBuf {
-        self.paths.folder().join(format!("{}{suffix}", self.paths.stem()))
     }
 }
 
@@ -170,10 +165,8 @@ impl<'a> Tables<'a> {
 
 /// All runs with a trajectory in a folder, by name; one that is not complete has the rows that it wrote.
 pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
-    let failed = |source| PlotError::List { folder: folder.to_owned(), source };
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
+    for path in listed(folder)? {
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
         let complete = path.with_file_name(undrafted(name).unwrap_or(name));
         if complete.extension().is_some_and(|extension| extension == "csv") && is_trajectory(&path)? {
@@ -186,6 +179,11 @@ pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
         return Err(PlotError::NoResults { folder: folder.to_owned() });
     }
     Ok(found.iter().map(|csv| Results { paths: ResultPaths::of_csv(csv) }).collect())
+}
+
+/// What is in a folder, sorted.
+pub(super) fn listed(folder: &Path) -> Result<Vec<PathBuf>, PlotError> {
+    entries(folder).map_err(|source| PlotError::List { folder: folder.to_owned(), source })
 }
 
 /// Whether a file begins as trajectories do.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use gluey::output::name_of;
 use gluey::output::xyz::XyzFrame;
 use gluey_geom::{Dim, Space, Vector};
 use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Rgb, Stroke, color_scale};
@@ -99,15 +100,13 @@ fn step_of(file: &Path) -> Option<usize> {
 }
 
 fn stem(file: &Path) -> String {
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    name.split('.').next().unwrap_or_default().to_owned()
+    name_of(file).split('.').next().unwrap_or_default().to_owned()
 }
 
 /// Beside the other pictures of the run: `<stem>-plots/particles-<step>` for `<stem>-xyz`.
 pub(super) fn beside_pictures(file: &Path) -> PathBuf {
     let folder = file.parent().unwrap_or(Path::new(""));
-    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let plots = match name.strip_suffix("-xyz") {
+    let plots = match name_of(folder).strip_suffix("-xyz") {
         Some(run) => folder.with_file_name(format!("{run}-plots")),
         None => folder.join("plots"),
     };

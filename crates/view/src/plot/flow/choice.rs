@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use super::super::figure::named;
+
 /// Names of the axes.
 pub(super) const AXES: [char; 3] = ['x', 'y', 'z'];
 
@@ -46,9 +48,7 @@ impl FromStr for Quantity {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let names = || Self::ALL.map(Self::as_str).join(", ");
-        let found = Self::ALL.into_iter().find(|quantity| quantity.as_str() == text);
-        found.ok_or_else(|| format!("expected one of {}", names()))
+        named(text, Self::ALL, Self::as_str)
     }
 }
 

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use gluey::case::Case;
+use gluey::output::name_of;
 
 use super::super::error::PlotError;
+use super::super::read::listed;
 use super::super::snapshot::FrameChoice;
 
 /// The files of a frame, and its case.
@@ -52,7 +54,7 @@ fn frames(folder: &Path) -> Result<Vec<(usize, PathBuf)>, PlotError> {
         return Ok(own);
     }
     let mut found: Option<(PathBuf, Vec<(usize, PathBuf)>)> = None;
-    for path in entries(folder)?.into_iter().filter(|path| path.is_dir()) {
+    for path in listed(folder)?.into_iter().filter(|path| path.is_dir()) {
         let frames = own_frames(&path)?;
         match &found {
             _ if frames.is_empty() => {}
@@ -72,27 +74,18 @@ fn own_frames(folder: &Path) -> Result<Vec<(usize, PathBuf)>, PlotError> {
         let name = name.strip_prefix("fields-")?;
         name.strip_suffix(".vtu").or_else(|| name.strip_suffix(".pvtu"))?.parse().ok()
     };
-    let files = entries(folder)?.into_iter().filter_map(|path| Some((step(&path)?, path)));
+    let files = listed(folder)?.into_iter().filter_map(|path| Some((step(&path)?, path)));
     let mut frames: Vec<(usize, PathBuf)> = files.collect();
     frames.sort();
     Ok(frames)
 }
 
-fn entries(folder: &Path) -> Result<Vec<PathBuf>, PlotError> {
-    let failed = |source| PlotError::List { folder: folder.to_owned(), source };
-    let entries = std::fs::read_dir(folder).map_err(failed)?;
-    let mut paths =
-        entries.map(|entry| Ok(entry.map_err(failed)?.path())).collect::<Result<Vec<_>, PlotError>>()?;
-    paths.sort();
-    Ok(paths)
-}
-
 /// The case beside a folder of frames, and the name of its run: the longest that the folder's begins with.
 fn case_of(series: &Path) -> Result<(String, Case), PlotError> {
     let missing = || PlotError::NoCase { folder: series.to_owned() };
-    let name = series.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let name = name_of(series);
     let beside = series.parent().ok_or_else(missing)?;
-    let stems = entries(beside)?.into_iter().filter_map(|path| {
+    let stems = listed(beside)?.into_iter().filter_map(|path| {
         let stem = path.file_name()?.to_str()?.strip_suffix("-case.toml")?.to_owned();
         name.starts_with(&format!("{stem}-")).then_some(stem)
     });

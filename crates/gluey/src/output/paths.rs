@@ -1,11 +1,10 @@
 //! Names of the files of a run.
 
 use std::ffi::OsString;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::output::is_claimed;
+use super::{entries, is_claimed};
 
 /// What the name of a record ends with.
 const RECORD: &str = "-run.json";
@@ -40,10 +39,8 @@ impl ResultPaths {
     /// # Errors
     /// When the folder cannot be listed.
     pub fn in_folder(folder: &Path) -> io::Result<Vec<Self>> {
-        let entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
-        let names = entries.iter().filter_map(|entry| entry.file_name().into_string().ok());
-        let mut stems: Vec<String> =
-            names.filter_map(|name| name.strip_suffix(RECORD).map(str::to_owned)).collect();
+        let entries = entries(folder)?;
+        let mut stems: Vec<_> = entries.iter().filter_map(|path| Some(Self::of_record(path)?.stem)).collect();
         stems.sort();
         Ok(stems.into_iter().map(|stem| Self::new(folder, stem)).collect())
     }
@@ -68,11 +65,29 @@ impl ResultPaths {
         self.with(".csv")
     }
 
+    /// The near pairs, of runs of many particles.
+    pub fn gaps(&self) -> PathBuf {
+        self.with("-gaps.csv")
+    }
+
+    /// The rheology, of runs that are sheared for ever.
+    pub fn rheology(&self) -> PathBuf {
+        self.with("-rheology.csv")
+    }
+
+    /// What holds or drives particles.
+    pub fn forces(&self) -> PathBuf {
+        self.with("-forces.csv")
+    }
+
+    /// What each step cost.
+    pub fn solver(&self) -> PathBuf {
+        self.with("-solver.csv")
+    }
+
     /// All files of rows that a run may have, the trajectory first.
-    pub fn tables(&self) -> Vec<PathBuf> {
-        ["", "-gaps", "-rheology", "-forces", "-solver"]
-            .map(|table| self.with(&format!("{table}.csv")))
-            .to_vec()
+    pub fn tables(&self) -> [PathBuf; 5] {
+        [self.csv(), self.gaps(), self.rheology(), self.forces(), self.solver()]
     }
 
     /// The case as it was run.
