@@ -1,5 +1,7 @@
 //! The known name nearest to a misspelt one.
 
+use strsim::levenshtein;
+
 /// Names that other programs have for keys of a case.
 const SYNONYMS: [(&str, &str); 6] = [
     ("dt", "step"),
@@ -30,26 +32,10 @@ pub(crate) fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>)
     let limit = (found.chars().count() / 3).max(2);
     known
         .into_iter()
-        .map(|candidate| (edit_distance(found, candidate), candidate))
+        .map(|candidate| (levenshtein(found, candidate), candidate))
         .filter(|(distance, _)| *distance <= limit)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
-}
-
-/// Insertions, deletions and replacements that turn `a` into `b` (Levenshtein 1966).
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -58,8 +44,8 @@ mod tests {
 
     #[test]
     fn distance_of_kitten_and_sitting_is_three() {
-        assert_eq!(edit_distance("kitten", "sitting"), 3);
-        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(levenshtein("kitten", "sitting"), 3);
+        assert_eq!(levenshtein("", "abc"), 3);
     }
 
     #[test]
