@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-pub use crate::interpolate::{cubic, linear};
+pub use crate::interpolate::linear;
 
 /// Numbers in columns with names.
 ///
