@@ -3,9 +3,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use gluey::{Case, RunOptions, Silent, VtkOptions, run_shared};
-use gluey_parallel::Threads;
+use gluey_parallel::{Ranks, Threads};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 use tempfile::TempDir;
 
@@ -121,8 +122,9 @@ fn with_a_fault(fault: (usize, usize)) -> Vec<(Result<(), String>, usize)> {
     let case = line_of_discs(0.1);
     let done = Threads::run(3, |ranks| {
         let ranks = Failing::new(ranks, fault);
-        let said = run_shared(&case, &options, &Silent, &ranks).map(|_| ());
-        (said.map_err(|error| whole(&error)), ranks.agreements())
+        let agreements = ranks.agreements();
+        let said = run_shared(&case, &options, &Silent, &Ranks::new(ranks)).map(|_| ());
+        (said.map_err(|error| whole(&error)), agreements.load(Ordering::Relaxed))
     });
     done.expect("no rank panics")
 }

@@ -19,7 +19,7 @@ use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{Conditions, Lubrication, Refinement};
 use serde::Serialize;
 
@@ -56,7 +56,7 @@ fn main() {
 }
 
 /// The line of a run, the same on all ranks.
-fn run(options: &Options, ranks: &dyn Communicator) -> String {
+fn run(options: &Options, ranks: &Ranks) -> String {
     match options.dimension {
         2 => solve::<2>(options, ranks),
         3 => solve::<3>(options, ranks),
@@ -64,7 +64,7 @@ fn run(options: &Options, ranks: &dyn Communicator) -> String {
     }
 }
 
-fn solve<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
+fn solve<const D: usize>(options: &Options, ranks: &Ranks) -> String
 where
     Dim<D>: Space<D>,
 {
@@ -177,7 +177,7 @@ struct Record {
 }
 
 impl Record {
-    fn new<const D: usize>(options: &Options, ranks: &dyn Communicator, mine: &MyFlow<D>) -> Self
+    fn new<const D: usize>(options: &Options, ranks: &Ranks, mine: &MyFlow<D>) -> Self
     where
         Dim<D>: Space<D>,
     {
@@ -209,7 +209,7 @@ impl Record {
 }
 
 impl LevelRecord {
-    fn new(ranks: &dyn Communicator, own: &LevelSizes) -> Self {
+    fn new(ranks: &Ranks, own: &LevelSizes) -> Self {
         let sum = |own: usize| ranks.all_gather(&[own as u64]).into_iter().sum::<u64>();
         let (cells, nodes) = (sum(own.cells), sum(own.nodes));
         Self {

@@ -23,7 +23,7 @@ use gluey_contact::{
 };
 use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_parallel::{Communicator, Traffic};
+use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_testkit::packing::Packing;
 use serde::Serialize;
 
@@ -64,7 +64,7 @@ fn main() {
 }
 
 /// The line of a run, on rank zero.
-fn run(options: &Options, ranks: &dyn Communicator) -> String {
+fn run(options: &Options, ranks: &Ranks) -> String {
     // A rank has one thread, this one.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
     let _pool = pool.unwrap_or_else(|error| fail(&error.to_string()));
@@ -75,7 +75,7 @@ fn run(options: &Options, ranks: &dyn Communicator) -> String {
     }
 }
 
-fn steps<const D: usize>(options: &Options, ranks: &dyn Communicator) -> String
+fn steps<const D: usize>(options: &Options, ranks: &Ranks) -> String
 where
     Dim<D>: Space<D>,
 {
@@ -122,7 +122,7 @@ impl<'a, const D: usize> Shear<'a, D>
 where
     Dim<D>: Space<D>,
 {
-    fn new(options: &Options, ranks: &'a dyn Communicator) -> Self {
+    fn new(options: &Options, ranks: &'a Ranks) -> Self {
         let Packing { positions, side } = Packing::<D>::fluid(options.count, options.fraction, 1);
         let farthest = f64::max(0.5, options.dt * side);
         let params = ContactParams {

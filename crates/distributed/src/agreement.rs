@@ -3,12 +3,12 @@
 //! An error of a part is a [`PartError`], which no `?` makes a [`FlowError`]: that is one of all ranks, and
 //! comes of [`agreed`], or of numbers that are the same on all.
 
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 use crate::flow::{FlowError, PartError};
 
 /// A failure of one rank is one of all, who say what the first of them said. All ranks call this.
-pub fn agreed<T>(ranks: &dyn Communicator, outcome: Result<T, impl Into<PartError>>) -> Result<T, FlowError> {
+pub fn agreed<T>(ranks: &Ranks, outcome: Result<T, impl Into<PartError>>) -> Result<T, FlowError> {
     let outcome = outcome.map_err(Into::into);
     let own = outcome.as_ref().err().map(ToString::to_string);
     match (ranks.first_failure(own.clone()), outcome) {
@@ -19,7 +19,7 @@ pub fn agreed<T>(ranks: &dyn Communicator, outcome: Result<T, impl Into<PartErro
 }
 
 /// The records of all ranks, in their order.
-pub fn gathered<const N: usize>(ranks: &dyn Communicator, own: &[[u64; N]]) -> Vec<[u64; N]> {
+pub fn gathered<const N: usize>(ranks: &Ranks, own: &[[u64; N]]) -> Vec<[u64; N]> {
     let counts = ranks.all_gather(&[own.len() as u64]);
     let most = counts.iter().copied().max().unwrap_or(0) as usize;
     if most == 0 {

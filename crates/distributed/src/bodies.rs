@@ -9,7 +9,7 @@ use gluey_fem::{Cell, Cuts, ImplicitTree, Part};
 use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::Scalar;
-use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted};
 use nalgebra::DMatrix;
 
 use crate::space::Nodes;
@@ -30,7 +30,7 @@ pub const fn rigid<const D: usize>() -> usize {
 #[derive(Clone, Copy)]
 pub struct Shared<'a, 'b, const D: usize> {
     pub cuts: &'b Cuts,
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     pub bodies: &'b BallTree<'b, D>,
     /// Nodes with a level set of at least this many cells are rigid.
     pub offset: f64,
@@ -281,7 +281,7 @@ fn numbered<const D: usize>(
 
 /// Inverses of `sum R^T R`, at owners and ghosts.
 fn fits<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     plan: &GhostPlan,
     nodes: &[RigidNode<f64, D>],
     owned_nodes: &std::ops::Range<usize>,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::Vector;
 use gluey_levelset::BallTree;
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 /// Blocks of keys a rank counts, at least: a cut is searched in one of them.
 const BLOCKS_OF_A_RANK: usize = 16;
@@ -18,14 +18,14 @@ const OF_SOLID_CELL: u64 = 4;
 
 /// Cuts the whole tree into runs that differ by one leaf at most. Each rank counts its share of the tree; all
 /// know of the others are the numbers of leaves in some dozen blocks of each.
-pub fn equal_cuts<const D: usize>(tree: &ImplicitTree<'_, D>, ranks: &dyn Communicator) -> Cuts {
+pub fn equal_cuts<const D: usize>(tree: &ImplicitTree<'_, D>, ranks: &Ranks) -> Cuts {
     weighted_cuts(tree, ranks, &|_| 1)
 }
 
 /// Cuts it into runs of equal weight, as near as leaves allow.
 pub fn weighted_cuts<const D: usize>(
     tree: &ImplicitTree<'_, D>,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     weight: &dyn Fn(&Cell<D>) -> u64,
 ) -> Cuts {
     let (end, size) = (tree.end(), ranks.size());
@@ -57,7 +57,7 @@ pub fn weighted_cuts<const D: usize>(
 pub fn cuts_of_work<const D: usize>(
     tree: &ImplicitTree<'_, D>,
     bodies: &BallTree<'_, D>,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> Cuts {
     let frame = tree.frame();
     let weight = |cell: &Cell<D>| {

@@ -2,6 +2,7 @@
 //! as they are, and each level but the finest smooths once on the way up.
 
 use gluey_fem::ImplicitTree;
+use gluey_parallel::Communicator;
 
 use crate::agreement::agreed;
 use crate::bodies::Shared;

@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_linalg::{BadDiagonal, BlockError, DirectError, KrylovError, SparseError, vector};
 use gluey_motion::Fields;
-use gluey_parallel::{Communicator, Traffic};
+use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::{Conditions, Lubrication, RaisedPenalties, StokesError, Stress};
 
 use crate::cells::MyCells;
@@ -209,7 +209,7 @@ impl BoxFlow {
         &self,
         tree: &mut ImplicitTree<'_, D>,
         cuts: &Cuts,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         walls: &dyn Fn(&Vector<D>) -> Vector<D>,
     ) -> Result<MyFlow<D>, FlowError>
     where
@@ -234,7 +234,7 @@ pub fn sizes<const D: usize>(space: &LevelSpace<D>, plans: &Plans) -> LevelSizes
 }
 
 /// Cells and unknowns of all ranks.
-pub fn counts_of_all<const D: usize>(space: &LevelSpace<D>, ranks: &dyn Communicator) -> [f64; 2] {
+pub fn counts_of_all<const D: usize>(space: &LevelSpace<D>, ranks: &Ranks) -> [f64; 2] {
     let unknowns = space.owned_nodal_dim() + space.pressure.owned.len();
     let mut counts = [space.part.own().len() as f64, unknowns as f64];
     ranks.sum(&mut counts);

@@ -6,7 +6,7 @@ use gluey_fem::{ImplicitTree, ReferenceMatrices};
 use gluey_linalg::{
     BadDiagonal, Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, invert_spd, vector,
 };
-use gluey_parallel::{Communicator, GhostPlan};
+use gluey_parallel::{GhostPlan, Ranks};
 use gluey_stokes::part::cell_lambda_max;
 
 use crate::agreement::agreed;
@@ -21,7 +21,7 @@ const SWEEP: ChebyshevParams = ChebyshevParams { degree: 5, ratio: 5.0, safety: 
 
 /// The viscous operator on the owned nodes and twists.
 pub struct LevelOperator<'a, const D: usize> {
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     pub space: LevelSpace<D>,
     pub plans: Plans,
     pub cells: CellOperator<f32, D>,
@@ -169,7 +169,7 @@ pub struct Level<'a, const D: usize> {
 
 impl<'a, const D: usize> Level<'a, D> {
     pub fn new(
-        ranks: &'a dyn Communicator,
+        ranks: &'a Ranks,
         space: LevelSpace<D>,
         plans: Plans,
         viscosity: f64,

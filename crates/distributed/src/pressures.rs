@@ -3,7 +3,7 @@
 use gluey_fem::{Constraint, ImplicitTree};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
-use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted};
 use gluey_stokes::PressureSpace;
 
 use crate::bodies::Shared;
@@ -83,7 +83,7 @@ impl SharedPressures {
     }
 
     /// Makes the entries at owned nodes sum to zero over all ranks.
-    pub fn remove_mean<T: Scalar>(&self, ranks: &dyn Communicator, q: &mut [T]) {
+    pub fn remove_mean<T: Scalar>(&self, ranks: &Ranks, q: &mut [T]) {
         let mut sum = [q.iter().zip(&self.is_free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum()];
         ranks.sum(&mut sum);
         let mean = T::from_f64(sum[0] / self.free_count.max(1.0));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, CellScalar};
 use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part, ReferenceMatrices};
-use gluey_parallel::{GhostPlan, Wanted};
+use gluey_parallel::{Communicator, GhostPlan, Wanted};
 
 use crate::bodies::{LevelBodies, Shared, rigid};
 

@@ -4,7 +4,7 @@
 
 use gluey_distributed::{BoxFlow, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::{Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement};
 use gluey_testkit::allocation::{CountingAllocator, largest_in_thread};
 
@@ -22,7 +22,7 @@ where
     let [small, whole] = [4, level].map(|level| suspension::<D>(lubrication, level));
     // They nearly touch, so that there is a gap.
     let places = [[0.3, 0.4, 0.5], [0.651, 0.4, 0.5]].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
-    let solve = |suspension: &Suspension<D>, ranks: &dyn Communicator| {
+    let solve = |suspension: &Suspension<D>, ranks: &Ranks| {
         suspension.solve(ranks, &places, &[], 1.0).unwrap().iterations
     };
     let found = Threads::run(ranks, |ranks| {

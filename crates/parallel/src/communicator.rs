@@ -1,6 +1,6 @@
 //! What ranks say to each other.
 
-use std::cell::Cell;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::failure::RankFailure;
 use crate::number::{read_all, write_all};
@@ -44,7 +44,7 @@ impl Traffic {
 ///
 /// All ranks call the same methods in the same order. An implementation provides the first four; whatever
 /// adds numbers is built on them, in an order that depends on the number of ranks alone.
-pub trait Communicator {
+pub trait Communicator: Send + Sync {
     /// The number of this rank, from zero.
     fn rank(&self) -> usize;
 
@@ -56,11 +56,11 @@ pub trait Communicator {
     fn transfer(&self, send: &[Message], receive: &mut [Message]);
 
     /// Where this rank counts what it sends.
-    fn counter(&self) -> &Cell<Traffic>;
+    fn counter(&self) -> &Mutex<Traffic>;
 
     /// What this rank has sent so far.
     fn traffic(&self) -> Traffic {
-        self.counter().get()
+        *locked(self.counter())
     }
 
     /// [`Communicator::transfer`] between neighbours, counted.
@@ -206,10 +206,13 @@ fn receive(ranks: &(impl Communicator + ?Sized), rank: usize, length: usize) -> 
     message.bytes
 }
 
-fn count(counter: &Cell<Traffic>, change: impl FnOnce(&mut Traffic)) {
-    let mut traffic = counter.get();
-    change(&mut traffic);
-    counter.set(traffic);
+fn count(counter: &Mutex<Traffic>, change: impl FnOnce(&mut Traffic)) {
+    change(&mut locked(counter));
+}
+
+/// A counter is right whenever it can be read: nothing in between can panic.
+fn locked(counter: &Mutex<Traffic>) -> MutexGuard<'_, Traffic> {
+    counter.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn add_messages(traffic: &mut Traffic, messages: &[Message]) {

@@ -1,7 +1,7 @@
 //! Ranks that share a computation: alone, as threads of one process, or over MPI.
 //!
 //! [`Communicator`] is all that a distributed computation asks of those who run it. Implementations move
-//! bytes; whatever adds numbers is written once on top of that ([`Communicator::sum`], [`GhostPlan`]) in an
+//! bytes; whatever adds numbers is written once on top of that ([`Communicator::sum`], [`Halo`]) in an
 //! order that depends on the number of ranks alone. So the same program gives the same bits on every run,
 //! and the same bits by [`Threads`] as by MPI.
 //!
@@ -27,18 +27,22 @@ mod alone;
 mod communicator;
 mod failure;
 mod ghosts;
+mod halo;
 mod number;
 #[cfg(feature = "mpi")]
 mod processes;
+mod ranks;
 mod threads;
 
 pub use alone::Alone;
 pub use communicator::{Communicator, Message, Traffic};
 pub use failure::RankFailure;
 pub use ghosts::{GhostPlan, Wanted, route};
+pub use halo::Halo;
 pub use number::Number;
 #[cfg(feature = "mpi")]
 pub use processes::{Processes, StartError};
+pub use ranks::Ranks;
 pub use threads::Threads;
 
 #[cfg(doctest)]

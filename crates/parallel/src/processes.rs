@@ -1,19 +1,29 @@
 //! Ranks as processes, joined by MPI.
 
-use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::thread::ThreadId;
 
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator as _, Destination, Source};
 
 use crate::communicator::{Communicator, Message, Traffic};
+use crate::ranks::Ranks;
 
 /// A rank that is a process of `mpirun`.
 pub struct Processes {
     world: SimpleCommunicator,
-    traffic: Cell<Traffic>,
+    /// The only one that calls MPI.
+    thread: ThreadId,
+    traffic: Mutex<Traffic>,
 }
+
+// SAFETY: the communicator is the handle of all processes, a constant of the library, and MPI is called by the
+// thread that started it alone: `transfer` refuses any other.
+unsafe impl Send for Processes {}
+// SAFETY: as above.
+unsafe impl Sync for Processes {}
 
 /// MPI cannot be started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,10 +43,11 @@ impl Processes {
     ///
     /// # Errors
     /// If MPI has been started before.
-    pub fn run<R>(work: impl FnOnce(&Self) -> R) -> Result<R, StartError> {
+    pub fn run<R>(work: impl FnOnce(&Ranks) -> R) -> Result<R, StartError> {
         let (universe, _) = mpi::initialize_with_threading(Threading::Funneled).ok_or(StartError)?;
-        let ranks = Self { world: universe.world(), traffic: Cell::default() };
-        Ok(catch_unwind(AssertUnwindSafe(|| work(&ranks))).unwrap_or_else(|_| ranks.world.abort(1)))
+        let (world, thread) = (universe.world(), std::thread::current().id());
+        let ranks = Ranks::new(Self { world, thread, traffic: Mutex::default() });
+        Ok(catch_unwind(AssertUnwindSafe(|| work(&ranks))).unwrap_or_else(|_| universe.world().abort(1)))
     }
 }
 
@@ -51,6 +62,7 @@ impl Communicator for Processes {
 
     /// MPI aborts all processes by itself if a message fails.
     fn transfer(&self, send: &[Message], receive: &mut [Message]) {
+        assert_eq!(std::thread::current().id(), self.thread, "MPI is called by the thread that started it");
         let process = |rank: usize| self.world.process_at_rank(rank as i32);
         mpi::request::scope(|scope| {
             let mut pending = Vec::with_capacity(send.len() + receive.len());
@@ -66,7 +78,7 @@ impl Communicator for Processes {
         });
     }
 
-    fn counter(&self) -> &Cell<Traffic> {
+    fn counter(&self) -> &Mutex<Traffic> {
         &self.traffic
     }
 }

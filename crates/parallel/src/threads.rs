@@ -1,12 +1,13 @@
 //! Ranks as threads of one process, joined by channels.
 
 use std::any::Any;
-use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, PoisonError};
 
 use crate::communicator::{Communicator, Message, Traffic};
 use crate::failure::RankFailure;
+use crate::ranks::Ranks;
 
 /// A rank that is a thread.
 #[derive(Debug)]
@@ -15,8 +16,8 @@ pub struct Threads {
     /// To each rank.
     to: Vec<Sender<Vec<u8>>>,
     /// From each rank.
-    from: Vec<Receiver<Vec<u8>>>,
-    traffic: Cell<Traffic>,
+    from: Vec<Mutex<Receiver<Vec<u8>>>>,
+    traffic: Mutex<Traffic>,
 }
 
 /// Why a rank ended that waited for another one, which ended before.
@@ -29,10 +30,13 @@ impl Threads {
     ///
     /// # Errors
     /// If a rank panics. The others end as soon as they wait for it.
-    pub fn run<R: Send>(size: usize, work: impl Fn(&Self) -> R + Sync) -> Result<Vec<R>, RankFailure> {
+    pub fn run<R: Send>(size: usize, work: impl Fn(&Ranks) -> R + Sync) -> Result<Vec<R>, RankFailure> {
         let ended: Vec<_> = std::thread::scope(|scope| {
             let work = &work;
-            let start = |ranks: Self| scope.spawn(move || catch_unwind(AssertUnwindSafe(|| work(&ranks))));
+            let start = |ranks: Self| {
+                let ranks = Ranks::new(ranks);
+                scope.spawn(move || catch_unwind(AssertUnwindSafe(|| work(&ranks))))
+            };
             let threads: Vec<_> = joined(size.max(1)).into_iter().map(start).collect();
             threads.into_iter().map(|thread| thread.join().and_then(|ended| ended)).collect()
         });
@@ -56,11 +60,11 @@ fn joined(size: usize) -> Vec<Threads> {
         for to in &mut to {
             let (sender, end) = channel();
             to.push(sender);
-            from[receiver].push(end);
+            from[receiver].push(Mutex::new(end));
         }
     }
     let ends = to.into_iter().zip(from).enumerate();
-    ends.map(|(rank, (to, from))| Threads { rank, to, from, traffic: Cell::default() }).collect()
+    ends.map(|(rank, (to, from))| Threads { rank, to, from, traffic: Mutex::default() }).collect()
 }
 
 /// The text of a panic.
@@ -85,13 +89,14 @@ impl Communicator for Threads {
             self.to[*rank].send(bytes.clone()).unwrap_or_else(|_| lost(*rank));
         }
         for Message { rank, bytes } in receive {
-            let sent = self.from[*rank].recv().unwrap_or_else(|_| lost(*rank));
+            let from = self.from[*rank].lock().unwrap_or_else(PoisonError::into_inner);
+            let sent = from.recv().unwrap_or_else(|_| lost(*rank));
             assert_eq!(sent.len(), bytes.len(), "rank {rank} sent a message of another length");
             *bytes = sent;
         }
     }
 
-    fn counter(&self) -> &Cell<Traffic> {
+    fn counter(&self) -> &Mutex<Traffic> {
         &self.traffic
     }
 }

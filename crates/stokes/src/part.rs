@@ -9,6 +9,7 @@
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Aabb, Dim, Matrix, Space, Vector, Wrench};
 use gluey_levelset::Ball;
+use gluey_parallel::Halo;
 
 use crate::error::StokesError;
 use crate::film::{Film, FilmCoupling, Lubrication, thin_films};
@@ -21,7 +22,7 @@ use crate::space::Discretisation;
 pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::operator::PressureForces;
 pub use crate::precondition::schur::ratio_inside;
-pub use crate::precondition::surface::{SharedVelocities, SurfaceSmoother};
+pub use crate::precondition::surface::SurfaceSmoother;
 pub use crate::precondition::velocity::cell_lambda_max;
 pub use crate::surface::WeakCell;
 
@@ -126,12 +127,12 @@ where
         Ok(Self { elements, smoother })
     }
 
-    /// The smoother. All parts call this.
+    /// The smoother, with the halos of reduced velocities and of the blocks of twists. All parts call this.
     ///
     /// # Errors
     /// [`StokesError::AtSurface`] where penalties are too small, on all parts that have the body.
-    pub fn completed(self, shared: &mut dyn SharedVelocities) -> Result<SurfaceSmoother<D>, StokesError> {
-        self.smoother.completed(&self.elements, shared)
+    pub fn completed(self, halos: [Halo; 2]) -> Result<SurfaceSmoother<D>, StokesError> {
+        self.smoother.completed(&self.elements, halos)
     }
 }
 

@@ -1,35 +1,37 @@
 //! Ranks of which one is told to fail.
 
-use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use gluey_parallel::{Communicator, Message, RankFailure, Threads, Traffic};
+use gluey_parallel::{Communicator, Message, RankFailure, Ranks, Traffic};
 
 /// What the rank says that is told to fail.
 pub const TOLD: &str = "this rank was told to fail";
 
 /// A rank that may say, where ranks agree on failures for the `n`-th time, that it failed.
-pub struct Failing<'a> {
-    ranks: &'a Threads,
+#[derive(Debug)]
+pub struct Failing {
+    ranks: Ranks,
     fails_at: Option<usize>,
-    agreements: Cell<usize>,
+    agreements: Arc<AtomicUsize>,
 }
 
-impl<'a> Failing<'a> {
+impl Failing {
     /// Fails at the agreement `at`, counted from 0, if it is the rank `rank`.
-    pub fn new(ranks: &'a Threads, (rank, at): (usize, usize)) -> Self {
+    pub fn new(ranks: &Ranks, (rank, at): (usize, usize)) -> Self {
         let fails_at = Some(at).filter(|_| ranks.rank() == rank);
-        Self { ranks, fails_at, agreements: Cell::new(0) }
+        Self { ranks: ranks.clone(), fails_at, agreements: Arc::default() }
     }
 
-    /// How often ranks have agreed.
-    pub fn agreements(&self) -> usize {
-        self.agreements.get()
+    /// How often ranks have agreed, as it counts.
+    pub fn agreements(&self) -> Arc<AtomicUsize> {
+        self.agreements.clone()
     }
 }
 
-impl Communicator for Failing<'_> {
+impl Communicator for Failing {
     fn rank(&self) -> usize {
         self.ranks.rank()
     }
@@ -42,12 +44,12 @@ impl Communicator for Failing<'_> {
         self.ranks.transfer(send, receive);
     }
 
-    fn counter(&self) -> &Cell<Traffic> {
+    fn counter(&self) -> &Mutex<Traffic> {
         self.ranks.counter()
     }
 
     fn first_failure(&self, own: Option<String>) -> Option<RankFailure> {
-        let now = self.agreements.replace(self.agreements.get() + 1);
+        let now = self.agreements.fetch_add(1, Ordering::Relaxed);
         let told = || (self.fails_at == Some(now)).then(|| TOLD.to_owned());
         self.ranks.first_failure(own.or_else(told))
     }

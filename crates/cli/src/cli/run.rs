@@ -6,7 +6,7 @@ use clap::Args;
 use gluey::case::Override;
 use gluey::{Case, Formulation, ResultPaths, RunOptions, Strategy};
 #[cfg(feature = "mpi")]
-use gluey_parallel::{Communicator, RankFailure};
+use gluey_parallel::{Communicator, RankFailure, Ranks};
 
 use super::failure::Failure;
 use super::interrupt::Requests;
@@ -75,13 +75,13 @@ impl RunArguments {
 
     /// Rank zero speaks for all: what goes wrong before the first flow goes wrong on each of them.
     #[cfg(feature = "mpi")]
-    fn run_on(&self, ranks: &dyn Communicator) -> Result<(), Failure> {
+    fn run_on(&self, ranks: &Ranks) -> Result<(), Failure> {
         let outcome = self.share(ranks);
         if ranks.rank() == 0 { outcome } else { Ok(()) }
     }
 
     #[cfg(feature = "mpi")]
-    fn share(&self, ranks: &dyn Communicator) -> Result<(), Failure> {
+    fn share(&self, ranks: &Ranks) -> Result<(), Failure> {
         let case = self.manner.set_threads().and_then(|()| Ok(self.case()?));
         let failure = ranks.first_failure(case.as_ref().err().map(|failure| failure.diagnostic.to_string()));
         let case = case?;

@@ -1,7 +1,7 @@
 //! What the examples share: ranks as threads or as processes, what they said to each other, and a hash of
 //! results.
 
-use gluey_parallel::{Communicator, Threads, Traffic};
+use gluey_parallel::{Communicator, Ranks, Threads, Traffic};
 use serde::Serialize;
 
 /// Latency of a message and bytes a second of a rank, of the model.
@@ -10,7 +10,7 @@ const BANDWIDTH: f64 = 12e9;
 
 /// What `run` gives on rank zero, printed: on so many threads as each number says, or, without a number, on
 /// the processes of `mpirun`.
-pub fn on_ranks(numbers: &[usize], run: impl Fn(&dyn Communicator) -> String + Sync) {
+pub fn on_ranks(numbers: &[usize], run: impl Fn(&Ranks) -> String + Sync) {
     if numbers.is_empty() {
         return on_processes(run);
     }
@@ -23,7 +23,7 @@ pub fn on_ranks(numbers: &[usize], run: impl Fn(&dyn Communicator) -> String + S
 }
 
 #[cfg(feature = "mpi")]
-fn on_processes(run: impl Fn(&dyn Communicator) -> String) {
+fn on_processes(run: impl Fn(&Ranks) -> String) {
     let ended = gluey_parallel::Processes::run(|ranks| {
         let line = run(ranks);
         if ranks.rank() == 0 {
@@ -34,7 +34,7 @@ fn on_processes(run: impl Fn(&dyn Communicator) -> String) {
 }
 
 #[cfg(not(feature = "mpi"))]
-fn on_processes(_: impl Fn(&dyn Communicator) -> String) {
+fn on_processes(_: impl Fn(&Ranks) -> String) {
     fail("--ranks is needed: this program was built without the feature mpi");
 }
 
@@ -51,7 +51,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    pub fn new(ranks: &dyn Communicator, own: u64) -> Self {
+    pub fn new(ranks: &Ranks, own: u64) -> Self {
         let all = ranks.all_gather(&[own]);
         let largest = all.iter().copied().max().unwrap_or(0);
         Self { mean: all.iter().sum::<u64>() as f64 / all.len() as f64, largest }
@@ -68,7 +68,7 @@ pub struct TrafficRecord {
 }
 
 impl TrafficRecord {
-    pub fn new(ranks: &dyn Communicator, own: &Traffic) -> Self {
+    pub fn new(ranks: &Ranks, own: &Traffic) -> Self {
         Self {
             messages: Spread::new(ranks, own.messages),
             bytes: Spread::new(ranks, own.bytes),

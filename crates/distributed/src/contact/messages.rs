@@ -1,7 +1,7 @@
 //! Messages of a step: what rank zero says to all, what it deals to each, what it hears from each.
 
 use gluey_contact::part::{Dealt, PartFrame};
-use gluey_parallel::{Communicator, Message, Number};
+use gluey_parallel::{Communicator, Message, Number, Ranks};
 
 use super::words;
 
@@ -15,7 +15,7 @@ pub(super) enum Verdict<const D: usize> {
 
 impl<const D: usize> Verdict<D> {
     /// For rank zero.
-    pub fn tell(&self, ranks: &dyn Communicator) {
+    pub fn tell(&self, ranks: &Ranks) {
         let (kind, mut numbers) = match self {
             Self::Done => (0.0, Vec::new()),
             Self::Deal(frame) => (1.0, words::of_frame(frame)),
@@ -26,7 +26,7 @@ impl<const D: usize> Verdict<D> {
     }
 
     /// For the others.
-    pub fn hear(ranks: &dyn Communicator) -> Self {
+    pub fn hear(ranks: &Ranks) -> Self {
         let mut head = [0.0; 2];
         ranks.share(&mut head);
         let mut numbers = vec![0.0; head[1] as usize];
@@ -43,7 +43,7 @@ impl<const D: usize> Verdict<D> {
 }
 
 /// What each rank gets from rank zero, who has it for all.
-pub(super) fn deal<const D: usize>(ranks: &dyn Communicator, mut all: Vec<Dealt<D>>) -> Dealt<D> {
+pub(super) fn deal<const D: usize>(ranks: &Ranks, mut all: Vec<Dealt<D>>) -> Dealt<D> {
     let others = all.split_off(all.len().min(1));
     match all.pop() {
         Some(own) => {
@@ -56,7 +56,7 @@ pub(super) fn deal<const D: usize>(ranks: &dyn Communicator, mut all: Vec<Dealt<
 }
 
 /// What rank zero, which alone has some, has for each rank.
-pub(super) fn scatter(ranks: &dyn Communicator, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
+pub(super) fn scatter(ranks: &Ranks, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
     let mut words = words.unwrap_or_default();
     let mut lengths = vec![0.0; ranks.size()];
     lengths.iter_mut().zip(&words).for_each(|(length, words)| *length = words.len() as f64);
@@ -74,7 +74,7 @@ pub(super) fn scatter(ranks: &dyn Communicator, words: Option<Vec<Vec<u64>>>) ->
 }
 
 /// The words of all ranks in their order, on rank zero.
-pub(super) fn collect(ranks: &dyn Communicator, own: &[u64]) -> Option<Vec<Vec<u64>>> {
+pub(super) fn collect(ranks: &Ranks, own: &[u64]) -> Option<Vec<Vec<u64>>> {
     let lengths = ranks.all_gather(&[own.len() as u64]);
     if ranks.rank() > 0 {
         ranks.exchange(&[Message { rank: 0, bytes: bytes_of(own) }], &mut []);

@@ -15,7 +15,7 @@ use gluey_contact::{
     Domain, MemoryError, PairContact, StepGeometry, WithFixed,
 };
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 use crate::moving::{Memory, Order};
 use messages::{Verdict, collect, deal};
@@ -28,7 +28,7 @@ use words::Outcome;
 /// The velocity correction, which pushes one pair after the other, is done by rank zero alone, and so is
 /// everything where there is one rank.
 pub struct SharedContact<'a, const D: usize> {
-    ranks: &'a dyn Communicator,
+    ranks: &'a Ranks,
     /// Knows whether the others, who follow a [`Suspension`](crate::Suspension), wait for this rank; none
     /// where they know themselves when a step comes.
     memory: Option<Rc<Memory<D>>>,
@@ -79,7 +79,7 @@ where
     ///
     /// # Errors
     /// [`ContactFailure`], on all ranks.
-    pub fn step(&mut self, ranks: &dyn Communicator) -> Result<(), ContactFailure> {
+    pub fn step(&mut self, ranks: &Ranks) -> Result<(), ContactFailure> {
         loop {
             match Verdict::hear(ranks) {
                 Verdict::Deal(frame) => {
@@ -98,7 +98,7 @@ fn work<const D: usize>(
     part: &mut PartContact<D>,
     frame: &PartFrame<D>,
     dealt: &Dealt<D>,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> Option<Told<D>>
 where
     Dim<D>: Space<D>,
@@ -136,7 +136,7 @@ where
     Dim<D>: Space<D>,
 {
     /// What `contact` does alone, with the ranks that each call [`ContactFollower::step`] at each step.
-    pub fn new(contact: PairContact<D, WithFixed>, ranks: &'a dyn Communicator) -> Self {
+    pub fn new(contact: PairContact<D, WithFixed>, ranks: &'a Ranks) -> Self {
         let (part, load) = (PartContact::default(), ContactLoad::default());
         let centers = [Vec::new(), Vec::new()];
         Self { ranks, memory: None, lead: Lead::new(contact), part, load, centers }
@@ -144,11 +144,7 @@ where
 
     /// The same with ranks that [`Suspension::follow`](crate::Suspension::follow), and the memory of the flow
     /// that they share.
-    pub fn leading(
-        contact: PairContact<D, WithFixed>,
-        ranks: &'a dyn Communicator,
-        memory: Rc<Memory<D>>,
-    ) -> Self {
+    pub fn leading(contact: PairContact<D, WithFixed>, ranks: &'a Ranks, memory: Rc<Memory<D>>) -> Self {
         Self { memory: Some(memory), ..Self::new(contact, ranks) }
     }
 

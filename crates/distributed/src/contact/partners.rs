@@ -4,13 +4,13 @@ use std::cell::RefCell;
 
 use gluey_contact::part::{Dealt, Partners};
 use gluey_geom::Vector;
-use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted};
 
 use super::messages::{collect, scatter};
 
 /// The ranks that share a step.
 pub(super) struct Sharers<'a, const D: usize> {
-    ranks: &'a dyn Communicator,
+    ranks: &'a Ranks,
     /// Of all particles that were dealt, and of those selected.
     all: RefCell<Border>,
     selected: RefCell<Option<Border>>,
@@ -39,7 +39,7 @@ impl Border {
 
 impl<'a, const D: usize> Sharers<'a, D> {
     /// Finds out who has copies of which particles. All ranks call this.
-    pub fn new(ranks: &'a dyn Communicator, dealt: &Dealt<D>) -> Self {
+    pub fn new(ranks: &'a Ranks, dealt: &Dealt<D>) -> Self {
         let particles = &dealt.particles;
         let copies = (0u32..).zip(particles).filter(|(_, particle)| particle.owner != dealt.rank);
         let wanted = copies.map(|(place, particle)| Wanted {

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
-use gluey_parallel::Communicator;
+use gluey_parallel::Ranks;
 use gluey_stokes::Lubrication;
 
 use super::told::{Order, Told};
@@ -17,7 +17,7 @@ where
     Dim<D>: Space<D>,
 {
     suspension: &'a Suspension<D>,
-    ranks: &'a dyn Communicator,
+    ranks: &'a Ranks,
     told: Told<D>,
     /// Whether others follow and are to be told of the end.
     leads: bool,
@@ -35,7 +35,7 @@ where
     Dim<D>: Space<D>,
 {
     /// For ranks that all make the same predictions.
-    pub fn beside(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+    pub fn beside(suspension: &'a Suspension<D>, ranks: &'a Ranks) -> Self {
         let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
         Self {
             suspension,
@@ -50,7 +50,7 @@ where
     }
 
     /// For rank zero, while the others [`Suspension::follow`].
-    pub fn leading(suspension: &'a Suspension<D>, ranks: &'a dyn Communicator) -> Self {
+    pub fn leading(suspension: &'a Suspension<D>, ranks: &'a Ranks) -> Self {
         let mut new = Self::beside(suspension, ranks);
         new.leads = true;
         new
@@ -120,11 +120,11 @@ where
         let places = particles.iter().map(|particle| particle.pose.position);
         told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
         memory.is_sharing.set(true);
-        Order::Predict.share(*ranks);
-        told.share(*ranks);
+        Order::Predict.share(ranks);
+        told.share(ranks);
         self.last = None;
         let start = std::time::Instant::now();
-        let flow = suspension.solve_as_told(*ranks, told, memory);
+        let flow = suspension.solve_as_told(ranks, told, memory);
         memory.is_sharing.set(false);
         let (flow, rate) = flow?;
         self.rate = rate;

@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::Ranks;
 
 use super::Suspension;
 use crate::warm_start::{PieceError, SavedPiece, WarmStart};
@@ -52,7 +52,7 @@ where
     pub fn restore(
         &self,
         suspension: &Suspension<D>,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         saved: Vec<SavedPiece>,
     ) -> Result<(), PieceError> {
         let periodic = suspension.periods.map(|period| period.is_some());

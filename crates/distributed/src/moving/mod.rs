@@ -18,7 +18,7 @@ use gluey_fem::{ImplicitTree, MeshError};
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::Fields;
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{Conditions, Field, GivenOf, Lubrication, Refinement};
 
 use crate::contact::ContactFollower;
@@ -99,7 +99,7 @@ where
     /// [`SuspensionError`], on all ranks.
     pub fn solve(
         &self,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         positions: &[Vector<D>],
         wrenches: &[Wrench<D>],
         shear_factor: f64,
@@ -117,7 +117,7 @@ where
     /// solve starts from the flows in memory, and its flow is kept there for the next.
     fn solve_as_told(
         &self,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         told: &Told<D>,
         memory: &Memory<D>,
     ) -> Result<(MyFlow<D>, f64), SuspensionError> {
@@ -297,22 +297,18 @@ where
 
     /// Does what rank zero asks for with its [`SharedHydrodynamics::leading`], until that ends. All other
     /// ranks call this.
-    pub fn follow(&self, ranks: &dyn Communicator) {
+    pub fn follow(&self, ranks: &Ranks) {
         self.follow_and_show(ranks, &mut |_, _| {});
     }
 
     /// The same, and hands `show` the fields in the cells of this rank when rank zero [asks](ask_for_fields)
     /// for them: none if there is no flow.
-    pub fn follow_and_show(
-        &self,
-        ranks: &dyn Communicator,
-        show: &mut dyn FnMut(FrameName, Option<Fields<D>>),
-    ) {
+    pub fn follow_and_show(&self, ranks: &Ranks, show: &mut dyn FnMut(FrameName, Option<Fields<D>>)) {
         self.follow_for(ranks, &Memory::default(), &mut Showing(show));
     }
 
     /// The same with flows in `memory`, for a follower who keeps them too.
-    pub fn follow_for(&self, ranks: &dyn Communicator, memory: &Memory<D>, follower: &mut dyn Follower<D>) {
+    pub fn follow_for(&self, ranks: &Ranks, memory: &Memory<D>, follower: &mut dyn Follower<D>) {
         let (mut told, mut last) = (Told::new(self), None::<MyFlow<D>>);
         let mut contact = ContactFollower::default();
         loop {
@@ -363,7 +359,7 @@ impl<const D: usize> Follower<D> for Showing<'_, D> {
 fn finest_level<const D: usize>(
     tree: &mut ImplicitTree<'_, D>,
     own: &std::ops::Range<u64>,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> u8 {
     let mut finest = 0;
     let depth = tree.max_level();

@@ -1,7 +1,7 @@
 //! What rank zero tells the others between two flows.
 
 use gluey_geom::{Dim, Space, Vector, Wrench};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 use super::Suspension;
 
@@ -27,7 +27,7 @@ pub(crate) enum Order {
 
 impl Order {
     /// What rank zero wants, on all ranks.
-    pub fn share(self, ranks: &dyn Communicator) -> Self {
+    pub fn share(self, ranks: &Ranks) -> Self {
         let mut numbers = match self {
             Self::End => [0.0; 3],
             Self::Predict => [1.0, 0.0, 0.0],
@@ -51,13 +51,13 @@ impl Order {
 
 /// For rank zero between two flows: has the others, who [`Suspension::follow_and_show`], show the fields of
 /// the last one.
-pub fn ask_for_fields(ranks: &dyn Communicator, frame: FrameName) {
+pub fn ask_for_fields(ranks: &Ranks, frame: FrameName) {
     Order::Show(frame).share(ranks);
 }
 
 /// For rank zero between two flows: has the others keep, under a name, what the flow after the step that was
 /// checkpointed last starts from.
-pub fn ask_to_keep(ranks: &dyn Communicator, name: u64) {
+pub fn ask_to_keep(ranks: &Ranks, name: u64) {
     Order::Keep(name).share(ranks);
 }
 
@@ -93,7 +93,7 @@ where
     }
 
     /// Replaces all by what rank zero says.
-    pub fn share(&mut self, ranks: &dyn Communicator) {
+    pub fn share(&mut self, ranks: &Ranks) {
         let with_stress = f64::from(u8::from(self.with_stress));
         let mut numbers = vec![self.shear_factor, self.strain, self.pair_stress, with_stress];
         numbers.extend(self.positions.iter().flatten());

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use gluey_linalg::{LinOp, Pattern, SellMatrix, SparseError, SparseMatrix};
-use gluey_parallel::{Communicator, GhostPlan, Wanted, route};
+use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted, route};
 use rustc_hash::FxHashMap;
 
 use crate::agreement::agreed;
@@ -20,7 +20,7 @@ pub type Masses<'a> = dyn Fn(&mut dyn FnMut(usize, &[f64])) + 'a;
 
 /// `T` on the owned pressures.
 pub struct SharedMass<'a> {
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     pub columns: Columns,
     /// Its diagonal at the owned pressures.
     pub diagonal: Vec<f32>,
@@ -76,7 +76,7 @@ impl Columns {
 impl<'a> SharedMass<'a> {
     /// With the weights of the owned pressures. All ranks call this.
     pub fn new<const D: usize>(
-        ranks: &'a dyn Communicator,
+        ranks: &'a Ranks,
         space: &LevelSpace<D>,
         pressures: &SharedPressures,
         masses: &Masses<'_>,
@@ -112,7 +112,7 @@ impl Columns {
     /// Entries that came by name, by number; ghosts that were not known are added.
     fn placed<const D: usize>(
         &mut self,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         space: &LevelSpace<D>,
         entries: &[[u64; 4]],
     ) -> Vec<(usize, usize, f64)> {
@@ -205,7 +205,7 @@ impl<const D: usize> Cells<'_, D> {
 
     /// Sends what own cells add to rows of others, and returns what others add to own ones: keys of row and
     /// column, who owns the column, and the value.
-    fn rows_of_others(&self, ranks: &dyn Communicator, columns: &Columns) -> Vec<[u64; 4]> {
+    fn rows_of_others(&self, ranks: &Ranks, columns: &Columns) -> Vec<[u64; 4]> {
         let mut entries = Vec::new();
         self.for_each_entry(columns, |row, column, value| {
             if row >= columns.owned {

@@ -9,7 +9,7 @@ mod whole_box;
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, SpectralInterval, estimate_lambda_max_from};
-use gluey_parallel::Communicator;
+use gluey_parallel::Ranks;
 
 use crate::agreement::agreed;
 use crate::flow::FlowError;
@@ -50,7 +50,7 @@ where
     /// For cells of these masses. All ranks call this.
     pub fn new(
         tree: &ImplicitTree<'_, D>,
-        ranks: &'a dyn Communicator,
+        ranks: &'a Ranks,
         space: &LevelSpace<D>,
         pressures: &SharedPressures,
         cells: &PressureCells<'_>,

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
-use gluey_parallel::{Communicator, route};
+use gluey_parallel::{Ranks, route};
 use gluey_stokes::part::ratio_inside;
 
 use crate::pressures::SharedPressures;
@@ -36,7 +36,7 @@ impl Flowing {
 
 /// Weights of the owned pressures, one for those that are not unknowns. All ranks call this.
 pub fn weights<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
     flowing: &Flowing,
@@ -53,7 +53,7 @@ where
 
 /// `s_q / m_q` of the owned unknowns next to fixed velocities.
 fn ratios<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
     flowing: &Flowing,
@@ -93,7 +93,7 @@ fn ratios<const D: usize>(
 
 /// Which unknowns act on a cell with a velocity that is that of a wall or of a body.
 fn next_to_fixed<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     space: &LevelSpace<D>,
     pressures: &SharedPressures,
     flowing: &Flowing,

@@ -6,7 +6,7 @@
 
 use gluey_fem::{ImplicitTree, NodeMap, Part, TreeMesh};
 use gluey_geom::{Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{BoxCorrection, StokesError};
 use nalgebra::{DMatrix, DVector};
 
@@ -37,7 +37,7 @@ where
     /// `None` where the mesh is too large. Rank zero computes the matrix. All ranks call this.
     pub fn new(
         tree: &ImplicitTree<'_, D>,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         space: &LevelSpace<D>,
         pressures: &SharedPressures,
         viscosity: f64,
@@ -74,7 +74,7 @@ where
     }
 
     /// Adds the correction at the owned unknowns.
-    pub fn add(&mut self, ranks: &dyn Communicator, r: &[f32], z: &mut [f32]) {
+    pub fn add(&mut self, ranks: &Ranks, r: &[f32], z: &mut [f32]) {
         let Self { map, unknowns, correction, places, load, corrected, sums } = self;
         sums.fill(0.0);
         for (&(cell, place), &r) in places.iter().zip(r).filter(|entry| entry.0.0 != NOWHERE) {

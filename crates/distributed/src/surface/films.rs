@@ -1,7 +1,7 @@
 //! The network of films of all ranks: each has it whole, and the forces of its own films.
 
 use gluey_geom::{Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::part::{FilmCorrection, FilmNetwork, FilmRow};
 use gluey_stokes::{StokesError, StokesSystem};
 
@@ -15,7 +15,7 @@ use crate::flow::FlowError;
 /// # Errors
 /// If the block of a body is not positive definite, on all ranks.
 pub fn network<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     system: &StokesSystem<D>,
     near: &NearBodies<D>,
     (body_count, held): (usize, &[bool]),

@@ -21,7 +21,7 @@ use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
-use gluey_parallel::{Communicator, Traffic};
+use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::part::{AssembledSmoother, PartMethod, coarse_offset, rings_around_surfaces};
 use gluey_stokes::{
     Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
@@ -62,7 +62,7 @@ pub struct SurfaceBodies<'a, const D: usize> {
 pub struct SharedTree<'s, 't, const D: usize> {
     pub tree: &'s mut ImplicitTree<'t, D>,
     pub cuts: &'s Cuts,
-    pub ranks: &'s dyn Communicator,
+    pub ranks: &'s Ranks,
 }
 
 /// What a flow is computed with.
@@ -96,7 +96,7 @@ impl BoxFlow {
         around: &SurfaceBodies<'_, D>,
         tree: &mut ImplicitTree<'_, D>,
         cuts: &Cuts,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         conditions: &Conditions<'_, D>,
     ) -> Result<MyFlow<D>, FlowError>
     where
@@ -269,9 +269,8 @@ where
         if let Some(finest) = sizes.last_mut() {
             [finest.neighbours, finest.ghost_nodes] = space.neighbours();
         }
-        let mut reduced = space.shared_velocities();
-        let smoother = agreed(ranks, self.named(smoother.completed(&mut reduced)))?;
-        let cycle = SurfaceCycle::new(levels, smoother, reduced, system);
+        let smoother = agreed(ranks, self.named(smoother.completed(space.halos())))?;
+        let cycle = SurfaceCycle::new(levels, smoother, system);
         let schur = self.schur(tree, system, &space)?;
         let all = (self.shared.bodies.balls().len(), self.shared.held);
         let network = agreed(ranks, network(ranks, system, &self.bodies, all))?;

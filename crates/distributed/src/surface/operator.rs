@@ -2,6 +2,7 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::LinOp;
+use gluey_parallel::Communicator;
 use gluey_stokes::{StokesSystem, SystemOperator};
 
 use super::films::SharedFilms;

@@ -7,11 +7,12 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, vector};
-use gluey_stokes::part::{PressureForces, SharedVelocities, SurfaceSmoother};
+use gluey_parallel::Communicator;
+use gluey_stokes::part::{PressureForces, SurfaceSmoother};
 use gluey_stokes::{PressureSpace, StokesSystem};
 
 use super::films::SharedFilms;
-use super::space::{Reduced, SurfaceSpace};
+use super::space::SurfaceSpace;
 use crate::bodies::rigid;
 use crate::cycle::VCycle;
 use crate::level::Level;
@@ -24,7 +25,6 @@ where
 {
     levels: VCycle<'a, D>,
     smoother: SurfaceSmoother<D>,
-    shared: Reduced<'a>,
     /// Whether a node of the part is free.
     is_free: Vec<bool>,
     /// Reduced velocities of the part.
@@ -39,16 +39,11 @@ impl<'a, const D: usize> SurfaceCycle<'a, D>
 where
     Dim<D>: Space<D>,
 {
-    pub fn new(
-        levels: VCycle<'a, D>,
-        smoother: SurfaceSmoother<D>,
-        shared: Reduced<'a>,
-        system: &StokesSystem<D>,
-    ) -> Self {
+    pub fn new(levels: VCycle<'a, D>, smoother: SurfaceSmoother<D>, system: &StokesSystem<D>) -> Self {
         let [x, r, correction] = [(); 3].map(|()| vec![0.0; system.velocity_dim()]);
         let nodes = system.space.nodes().node_count();
         let is_free = (0..nodes).map(|node| system.space.is_free(node)).collect();
-        Self { levels, smoother, shared, is_free, x, r, correction, own: Vec::new() }
+        Self { levels, smoother, is_free, x, r, correction, own: Vec::new() }
     }
 
     /// `z = V r` on owned velocities and twists.
@@ -62,12 +57,12 @@ where
         self.own.resize(r.len(), 0.0);
         vector::convert(1.0 / norm, r, &mut self.own);
         space.set_velocities(&self.own, &mut self.r);
-        self.shared.update(&mut self.r);
+        self.smoother.update(&mut self.r);
         self.x.fill(0.0);
-        self.smoother.add_blocks(&mut self.r, &mut self.x, &mut self.shared);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
         self.correct(space);
-        self.smoother.add_blocks(&mut self.r, &mut self.x, &mut self.shared);
-        self.smoother.sweep(&self.r, &mut self.x, &mut self.shared);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
+        self.smoother.sweep(&self.r, &mut self.x);
         space.copy_velocities(&self.x, &mut self.own);
         vector::convert(norm, &self.own, z);
     }
@@ -90,9 +85,9 @@ where
         for (twist, &body) in twists.zip(&space.own_bodies) {
             self.correction[nodal + body as usize * rigid::<D>()..][..rigid::<D>()].copy_from_slice(twist);
         }
-        self.shared.update(&mut self.correction);
+        self.smoother.update(&mut self.correction);
         vector::axpy(1.0, &self.correction, &mut self.x);
-        self.smoother.subtract(&self.correction, &mut self.r, &mut self.shared);
+        self.smoother.subtract(&self.correction, &mut self.r);
     }
 
     /// The residual as a load on the unknowns of the finest level: those of its rigid nodes on its twists, to

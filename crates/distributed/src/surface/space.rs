@@ -7,8 +7,7 @@ use gluey_fem::{Cell, Constraint, ImplicitTree, Part, TreeMesh};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_linalg::Scalar;
-use gluey_parallel::{Communicator, GhostPlan, Number, Wanted};
-use gluey_stokes::part::SharedVelocities;
+use gluey_parallel::{Communicator, GhostPlan, Halo, Number, Ranks, Wanted};
 use gluey_stokes::{Film, Partner, Problem, StokesSystem};
 
 use crate::bodies::{Shared, rigid};
@@ -67,7 +66,7 @@ pub fn owner_of_film<const D: usize>(
 /// The unknowns.
 #[derive(Clone)]
 pub struct SurfaceSpace<'a, const D: usize> {
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     pub level: LevelSpace<D>,
     pub pressures: SharedPressures,
     /// Bodies whose twists are owned, by their places among those near the part.
@@ -235,49 +234,20 @@ where
         self.around.update::<f64, D>(self.ranks, &mut field[..nodal]);
     }
 
-    /// What the smoother of the part asks for.
-    pub fn shared_velocities(&self) -> Reduced<'a> {
-        let mut is_owned = vec![false; self.whole_velocity_dim()];
-        self.owned_velocities().for_each(|range| is_owned[range].fill(true));
-        let blocks = GhostPlan::joined(&[(&self.twists, rigid::<D>() * rigid::<D>(), 0)]);
-        Reduced { ranks: self.ranks, plan: self.velocities.clone(), blocks, is_owned }
+    /// The halos of reduced velocities and of the blocks of twists.
+    pub fn halos(&self) -> [Halo; 2] {
+        let size = rigid::<D>() * rigid::<D>();
+        let blocks = GhostPlan::joined(&[(&self.twists, size, 0)]);
+        let of_blocks = self.own_bodies.iter().map(|&body| body as usize * size..(body as usize + 1) * size);
+        [
+            Halo::new(self.ranks, self.velocities.clone(), self.owned_velocities().collect()),
+            Halo::new(self.ranks, blocks, of_blocks.collect()),
+        ]
     }
 
     /// Ranks that this one sends values to, and the number of those that it gets of nodes.
     pub fn neighbours(&self) -> [usize; 2] {
         [self.plan.neighbour_count(), self.velocities.ghost_count()]
-    }
-}
-
-/// Reduced velocities that ranks share.
-pub struct Reduced<'a> {
-    pub ranks: &'a dyn Communicator,
-    plan: GhostPlan,
-    /// Of blocks of twists.
-    blocks: GhostPlan,
-    is_owned: Vec<bool>,
-}
-
-impl SharedVelocities for Reduced<'_> {
-    fn update(&mut self, x: &mut [f32]) {
-        self.plan.update::<f32, 1>(self.ranks, x);
-    }
-
-    fn accumulate(&mut self, x: &mut [f32]) {
-        self.plan.accumulate::<f32, 1>(self.ranks, x);
-    }
-
-    fn clear(&self, x: &mut [f32]) {
-        x.iter_mut().zip(&self.is_owned).filter(|(_, is_owned)| !**is_owned).for_each(|(x, _)| *x = 0.0);
-    }
-
-    fn sum_blocks(&mut self, blocks: &mut [f64]) {
-        self.blocks.accumulate::<f64, 1>(self.ranks, blocks);
-        self.blocks.update::<f64, 1>(self.ranks, blocks);
-    }
-
-    fn complete(&self, sums: &mut [f64]) {
-        self.ranks.sum(sums);
     }
 }
 
@@ -353,7 +323,7 @@ where
 }
 
 /// The plan of the twists of other ranks' bodies, by their places among those near the part.
-fn twist_plan<const D: usize>(ranks: &dyn Communicator, bodies: &NearBodies<D>, here: &[bool]) -> GhostPlan {
+fn twist_plan<const D: usize>(ranks: &Ranks, bodies: &NearBodies<D>, here: &[bool]) -> GhostPlan {
     let rank = ranks.rank();
     let ghost = |place: &usize| here[*place] && bodies.owners[*place] != rank;
     let wanted = (0..bodies.ids.len()).filter(ghost).map(|place| Wanted {

@@ -3,6 +3,7 @@
 
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
+use gluey_parallel::Communicator;
 use gluey_stokes::part::FluidIntegrals;
 use gluey_stokes::{Given, Problem, Stress};
 

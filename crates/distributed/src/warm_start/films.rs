@@ -2,7 +2,7 @@
 
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space};
-use gluey_parallel::route;
+use gluey_parallel::{Communicator, route};
 use gluey_stokes::part::numbers_of_film;
 use serde::{Deserialize, Serialize};
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use gluey_fem::{Cuts, ImplicitTree, NodeMap, TreeMesh};
 use gluey_geom::{Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::NodalFields;
 
 use crate::bodies::{Shared, rigid};
@@ -103,7 +103,7 @@ where
     }
 
     /// The flows at the nodes of the cells of this rank. All ranks call this.
-    pub fn moved(&self, ranks: &dyn Communicator, level: &LevelSpace<D>) -> Moved {
+    pub fn moved(&self, ranks: &Ranks, level: &LevelSpace<D>) -> Moved {
         let own = level.part.own();
         let [velocities, pressures] = [(&level.velocity, D), (&level.pressure, 1)]
             .map(|(nodes, components)| self.at_nodes(ranks, (&nodes.map, own.clone()), components));

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use gluey_fem::{Evaluator, NodeMap};
 use gluey_geom::Vector;
-use gluey_parallel::{Communicator, route};
+use gluey_parallel::{Communicator, Ranks, route};
 
 use super::{MOST, Piece, SavedPiece, WarmStart};
 
@@ -26,7 +26,7 @@ impl<const D: usize> WarmStart<D> {
     /// each flow. All ranks call this.
     pub(super) fn at_nodes(
         &self,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         (nodes, cells): (&NodeMap<D>, Range<usize>),
         components: usize,
     ) -> Vec<Vec<f64>> {
@@ -68,7 +68,7 @@ impl<const D: usize> WarmStart<D> {
     /// What other ranks say. All ranks call this.
     fn answers(
         &self,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         questions: Vec<(usize, [u64; QUESTION])>,
         (degree, components): (usize, usize),
     ) -> Vec<[u64; ANSWER]> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use gluey_fem::{Cell, Cuts, ImplicitTree, MeshError, NodeMap, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 use serde::{Deserialize, Serialize};
 
 use super::{KeptFilm, MOST, Piece, Small, WarmStart};
@@ -102,7 +102,7 @@ where
     pub fn restored(
         (domain, roots, periodic): (Aabb<D>, [u32; D], [bool; D]),
         count: usize,
-        ranks: &dyn Communicator,
+        ranks: &Ranks,
         mut saved: Vec<SavedPiece>,
     ) -> Result<Self, PieceError> {
         let any = saved.first().cloned().ok_or(PieceError::Unfit { run: 0, what: "no piece" })?;

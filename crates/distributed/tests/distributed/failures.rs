@@ -1,11 +1,12 @@
 //! A rank that fails, wherever it is: all ranks end, and say the same.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
 use gluey_distributed::{BoxFlow, ContactFollower, FlowError, SharedContact, Suspension, SuspensionError};
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::{Communicator, Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 
@@ -17,7 +18,7 @@ const MANY: usize = 100;
 fn fail_in_turn(
     what: &'static str,
     fewest: usize,
-    work: impl Fn(&dyn Communicator) -> Option<String> + Send + Sync + 'static,
+    work: impl Fn(&Ranks) -> Option<String> + Send + Sync + 'static,
 ) {
     let work = Arc::new(work);
     let on_ranks = |fault: (usize, usize)| {
@@ -25,7 +26,8 @@ fn fail_in_turn(
         let run = move || {
             Threads::run(RANKS, |ranks| {
                 let ranks = Failing::new(ranks, fault);
-                (work(&ranks), ranks.agreements())
+                let agreements = ranks.agreements();
+                (work(&Ranks::new(ranks)), agreements.load(Ordering::Relaxed))
             })
             .unwrap()
         };

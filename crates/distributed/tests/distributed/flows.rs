@@ -3,7 +3,7 @@
 use gluey_distributed::{BoxFlow, MyFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
-use gluey_parallel::{Alone, Communicator, Threads};
+use gluey_parallel::{Ranks, Threads};
 
 /// Of velocities and pressures, over the largest.
 const LIMITS: [f64; 2] = [1.6e-11, 1.7e-10];
@@ -34,7 +34,7 @@ impl Example {
         }
     }
 
-    fn solve<const D: usize>(self, ranks: &dyn Communicator) -> MyFlow<D>
+    fn solve<const D: usize>(self, ranks: &Ranks) -> MyFlow<D>
     where
         Dim<D>: Space<D>,
     {
@@ -74,7 +74,7 @@ fn ranks_find_the_flow_of_one<const D: usize>(example: Example, limits: [f64; 2]
 where
     Dim<D>: Space<D>,
 {
-    let alone = example.solve::<D>(&Alone::default());
+    let alone = example.solve::<D>(&Ranks::alone());
     assert!(alone.relative_residual < 1e-11);
     for size in [2, 3, 4, 8] {
         let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
@@ -150,7 +150,7 @@ fn cuts_share_work() {
 #[test]
 fn ranks_without_cells_take_part() {
     let example = Example { level: 3, ..UNIFORM };
-    let alone = example.solve::<2>(&Alone::default());
+    let alone = example.solve::<2>(&Ranks::alone());
     let parts = Threads::run(40, |ranks| example.solve::<2>(ranks)).unwrap();
     assert!(parts.iter().any(|part| part.levels[0].cells == 0));
     let difference = largest_difference(&alone.velocity, &joined(&parts).0);

@@ -5,7 +5,7 @@ use gluey_distributed::{BoxFlow, FlowError, MyFlow, PartError, SurfaceBodies, eq
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, LevelSet};
-use gluey_parallel::{Alone, Communicator, Threads};
+use gluey_parallel::{Ranks, Threads};
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
 };
@@ -73,7 +73,7 @@ impl Example<'_> {
         (0..self.bodies.len()).map(wrench).collect()
     }
 
-    fn solve<const D: usize>(&self, ranks: &dyn Communicator) -> MyFlow<D>
+    fn solve<const D: usize>(&self, ranks: &Ranks) -> MyFlow<D>
     where
         Dim<D>: Space<D>,
     {
@@ -141,7 +141,7 @@ where
     Dim<D>: Space<D>,
 {
     let (balls, (velocity, twists)) = (example.balls::<D>(), example.serial::<D>(solver));
-    let alone = example.solve::<D>(&Alone::default());
+    let alone = example.solve::<D>(&Ranks::alone());
     for size in [1, 2, 3, 4, 8] {
         let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
         let parts = run();

@@ -5,7 +5,7 @@ use gluey_distributed::{BoxFlow, MyFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, LevelSet};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::{Ranks, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, GivenOf, Lubrication, Refinement, SolverKind,
 };
@@ -82,7 +82,7 @@ where
         (0..self.bodies.len()).map(wrench).collect()
     }
 
-    fn solve(&self, ranks: &dyn Communicator) -> MyFlow<D> {
+    fn solve(&self, ranks: &Ranks) -> MyFlow<D> {
         let (balls, refinement) = (self.balls(), self.refinement());
         let tree_of_balls = BallTree::new(&balls);
         let wants = |lower: &Vector<D>, h: f64, level: u8| refinement.wants(lower, h, level, &tree_of_balls);

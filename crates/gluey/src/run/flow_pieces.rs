@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gluey_distributed::{Memory, SavedPiece, Suspension};
 use gluey_geom::{Dim, Space};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
@@ -39,7 +39,7 @@ pub(super) fn write(
 pub(super) fn restore<const D: usize>(
     (case, checkpoint): (&Case, &Path),
     suspension: &Suspension<D>,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     memory: &Memory<D>,
 ) -> Result<(), CheckpointError>
 where
@@ -58,7 +58,7 @@ where
 fn own_pieces(
     checkpoint: &Path,
     pieces: &FlowPieces,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> Result<Vec<SavedPiece>, CheckpointError> {
     let (rank, size) = (ranks.rank(), ranks.size());
     let own: Vec<usize> =
@@ -76,7 +76,7 @@ fn own_pieces(
 /// The failure of the first rank that has one, on all.
 fn agreed(
     checkpoint: &Path,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     outcome: Result<(), CheckpointError>,
 ) -> Result<(), CheckpointError> {
     let text = outcome.as_ref().err().map(|error| {

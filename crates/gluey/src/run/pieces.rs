@@ -10,7 +10,7 @@ use std::rc::Rc;
 use gluey_distributed::{Follower, FrameName, Memory, SavedPiece, ask_for_fields, ask_to_keep};
 use gluey_geom::{Dim, Space};
 use gluey_motion::Fields;
-use gluey_parallel::{Communicator, RankFailure};
+use gluey_parallel::{Communicator, RankFailure, Ranks};
 
 use super::flow_pieces;
 use super::frames::{Others, StreamOptions};
@@ -19,7 +19,7 @@ use crate::output::{OutputError, vtk};
 
 /// All ranks but zero, as rank zero sees them.
 pub(super) struct OtherRanks<'a, const D: usize> {
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     /// Of rank zero.
     pub memory: Rc<Memory<D>>,
 }
@@ -52,7 +52,7 @@ where
 
 /// A rank other than zero, which writes what rank zero asks for and tells it what came of it.
 pub(super) struct Follows<'a> {
-    pub ranks: &'a dyn Communicator,
+    pub ranks: &'a Ranks,
     pub streams: Vec<StreamOptions>,
     pub checkpoint: Option<PathBuf>,
 }
@@ -74,7 +74,7 @@ where
 
 /// Writes the fields in the cells of a rank other than zero, which it tells what came of it.
 fn write_piece<const D: usize>(
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
     streams: &[StreamOptions],
     frame: FrameName,
     fields: Option<Fields<D>>,
@@ -96,7 +96,7 @@ fn write_piece<const D: usize>(
 }
 
 /// The failure of the first rank that has one, on all ranks.
-fn first_failure(ranks: &dyn Communicator, own: Option<&OutputError>) -> Result<(), OutputError> {
+fn first_failure(ranks: &Ranks, own: Option<&OutputError>) -> Result<(), OutputError> {
     ranks.first_failure(own.map(encoded)).map_or(Ok(()), |failure| Err(decoded(&failure)))
 }
 

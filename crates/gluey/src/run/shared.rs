@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, Suspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
-use gluey_parallel::Communicator;
+use gluey_parallel::{Communicator, Ranks};
 
 use super::contacts::{self, Contacts};
 use super::frames::StreamOptions;
@@ -26,7 +26,7 @@ pub fn run_shared(
     case: &Case,
     options: &RunOptions,
     progress: &dyn Progress,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> Result<Option<RunReport>, RunError> {
     case.check()?;
     check(case)?;
@@ -41,7 +41,7 @@ fn run_beside<const D: usize>(
     case: &Case,
     options: &RunOptions,
     progress: &dyn Progress,
-    ranks: &dyn Communicator,
+    ranks: &Ranks,
 ) -> Result<Option<RunReport>, RunError>
 where
     Dim<D>: Space<D>,
@@ -72,7 +72,7 @@ where
 
 /// How many ranks there are, and what memory there is for each: those on one machine, by its name, share what
 /// is left there. All of them come to the same answer.
-fn sharing(ranks: &dyn Communicator) -> Sharing {
+fn sharing(ranks: &Ranks) -> Sharing {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let machine = name.bytes().fold(0u64, |hash, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)));
     let machines = ranks.all_gather(&[machine]);

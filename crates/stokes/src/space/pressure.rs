@@ -34,11 +34,7 @@ where
     }
 
     /// The pressures of the cells in which `seen` holds; `ghosts` take their values from others.
-    pub fn around_surfaces(
-        nodes: &NodeMap<D>,
-        seen: impl Fn(usize) -> bool,
-        ghosts: &[Constraint],
-    ) -> Self {
+    pub fn around_surfaces(nodes: &NodeMap<D>, seen: impl Fn(usize) -> bool, ghosts: &[Constraint]) -> Self {
         let cells: Vec<usize> = (0..nodes.cell_count()).filter(|&cell| seen(cell)).collect();
         let free = self::seen(nodes, &cells);
         let constraints = nodes.constraints().iter().chain(ghosts).cloned().collect();

@@ -9,7 +9,6 @@
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
-use super::shared::Alone;
 use super::smoother::SurfaceSmoother;
 use crate::error::StokesError;
 use crate::operator::Elements;
@@ -52,7 +51,7 @@ where
         let dim = space.dim();
         let [x, r, velocity] = [(); 3].map(|()| vec![0.0; dim]);
         Ok(Self {
-            smoother: SurfaceSmoother::new(elements, surfaces, &mut Alone)?,
+            smoother: SurfaceSmoother::new(elements, surfaces)?,
             rigid: rigid.clone(),
             is_free: (0..space.nodes().node_count()).map(|node| space.is_free(node)).collect(),
             x,
@@ -83,7 +82,7 @@ where
             z.copy_from_slice(u);
         }
         vector::axpy(1.0, &self.correction, &mut self.x);
-        self.smoother.subtract(&self.correction, &mut self.r, &mut Alone);
+        self.smoother.subtract(&self.correction, &mut self.r);
     }
 }
 
@@ -98,10 +97,10 @@ where
         }
         vector::convert(1.0 / norm, r, &mut self.r);
         self.x.fill(0.0);
-        self.smoother.add_blocks(&mut self.r, &mut self.x, &mut Alone);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
         self.correct(levels);
-        self.smoother.add_blocks(&mut self.r, &mut self.x, &mut Alone);
-        self.smoother.sweep(&self.r, &mut self.x, &mut Alone);
+        self.smoother.add_blocks(&mut self.r, &mut self.x);
+        self.smoother.sweep(&self.r, &mut self.x);
         vector::convert(norm, &self.x, z);
     }
 

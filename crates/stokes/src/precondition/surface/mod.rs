@@ -2,9 +2,7 @@
 
 mod correction;
 mod roots;
-mod shared;
 mod smoother;
 
 pub use correction::SurfaceCorrection;
-pub use shared::SharedVelocities;
 pub use smoother::{AssembledSmoother, SurfaceSmoother};

@@ -12,6 +12,7 @@ use gluey_linalg::{
     Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
     estimate_lambda_max_from, invert_spd, vector,
 };
+use gluey_parallel::Halo;
 
 use crate::error::{DiagonalError, StokesError};
 use crate::operator::{BlockDiagonal, Elements, ViscousOperator, add_at, gather, nodal_diagonal};
@@ -22,7 +23,6 @@ use crate::space::{Discretisation, around_finest_cells};
 use crate::surface::SurfaceCoupling;
 
 use super::roots::{ModesError, modes_and_diagonal};
-use super::shared::SharedVelocities;
 
 /// Steps of the sweep with the diagonal in 2D and in 3D, and what it damps eigenvalues down to: the largest
 /// in the fluid over this.
@@ -43,6 +43,8 @@ pub struct SurfaceSmoother<const D: usize> {
     /// Reduced velocities and their loads.
     velocity: Vec<f32>,
     load: Vec<f32>,
+    /// Of reduced velocities.
+    halo: Halo,
 }
 
 /// Restricted additive Schwarz on the free nodes of the own roots.
@@ -68,18 +70,12 @@ impl<const D: usize> SurfaceSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoothers of a system with cut cells, a part of which may be here. Vectors that it is applied to
-    /// then hold the same at copies as at their owners.
+    /// The smoothers of a system with cut cells on one rank.
     ///
     /// # Errors
-    /// If a block or an entry of the diagonal is not positive. Where the mesh is shared, what comes before
-    /// the first message ([`SurfaceSmoother::assembled`]) may fail on one part alone.
-    pub fn new(
-        elements: &Elements<'_, D>,
-        surfaces: &SurfaceCoupling<D>,
-        shared: &mut dyn SharedVelocities,
-    ) -> Result<Self, StokesError> {
-        Self::assembled(elements, surfaces)?.completed(elements, shared)
+    /// If a block or an entry of the diagonal is not positive.
+    pub fn new(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Result<Self, StokesError> {
+        Self::assembled(elements, surfaces)?.completed(elements, <[Halo; 2]>::default())
     }
 
     /// What of it needs no other part.
@@ -121,19 +117,20 @@ impl<const D: usize> AssembledSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoother. All parts call this.
+    /// The smoother, with the halos of reduced velocities and of the blocks of twists. Vectors that it is
+    /// applied to hold the same at ghosts as at their owners. All ranks call this.
     ///
     /// # Errors
     /// If the block of a twist is not positive.
     pub fn completed(
         self,
         elements: &Elements<'_, D>,
-        shared: &mut dyn SharedVelocities,
+        [mut halo, mut of_blocks]: [Halo; 2],
     ) -> Result<SurfaceSmoother<D>, StokesError> {
         let Self { mut operator, blocks, nodal, near } = self;
         let system = elements.system();
         // Parts that fail send all messages first, which others wait for.
-        let (mut diagonal, failure) = diagonal(elements, nodal, shared);
+        let (mut diagonal, failure) = diagonal(elements, nodal, [&mut halo, &mut of_blocks]);
         let near: Vec<u32> = if system.discretisation().is_part() {
             let near = (0..near.len()).filter(|&node| near[node] && system.space.is_free(node));
             near.flat_map(|node| (node * D) as u32..((node + 1) * D) as u32).collect()
@@ -141,7 +138,7 @@ where
             blocks.positions.clone()
         };
         let reference = system.discretisation().reference();
-        let interval = interval(&mut operator, &mut diagonal, &near, &reference, shared)?;
+        let interval = interval(&mut operator, &mut diagonal, &near, &reference, &mut halo)?;
         operator.take_applications();
         failure.map_or(Ok(()), Err)?;
         let dim = operator.dim();
@@ -152,6 +149,7 @@ where
             blocks,
             velocity: vec![0.0; dim],
             load: vec![0.0; dim],
+            halo,
         })
     }
 }
@@ -161,28 +159,33 @@ where
     Dim<D>: Space<D>,
 {
     /// `x += G r`, `r -= A G r` by the blocks `G`.
-    pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32], shared: &mut dyn SharedVelocities) {
+    pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32]) {
         self.velocity.fill(0.0);
         self.blocks.add(r, &mut self.velocity);
-        shared.sum(&mut self.velocity);
+        self.halo.sum(&mut self.velocity);
         vector::axpy(1.0, &self.velocity, x);
         self.operator.apply_near(&self.velocity, &mut self.load);
-        shared.sum(&mut self.load);
+        self.halo.sum(&mut self.load);
         vector::axpy(-1.0, &self.load, r);
     }
 
     /// Chebyshev's sweep on `A x = b` from an `x` with the residual `r`.
-    pub fn sweep(&mut self, r: &[f32], x: &mut [f32], shared: &mut dyn SharedVelocities) {
-        let Self { operator, diagonal, chebyshev, velocity, .. } = self;
-        let mut operator = Summed { operator, shared };
+    pub fn sweep(&mut self, r: &[f32], x: &mut [f32]) {
+        let Self { operator, diagonal, chebyshev, velocity, halo, .. } = self;
+        let mut operator = Summed { operator, halo };
         chebyshev.smooth(&mut operator, diagonal, r, velocity, Guess::Zero);
         vector::axpy(1.0, velocity, x);
     }
 
     /// `r -= A z` at the nodes that are smoothed.
-    pub fn subtract(&mut self, z: &[f32], r: &mut [f32], shared: &mut dyn SharedVelocities) {
-        Summed { operator: &mut self.operator, shared }.apply(z, &mut self.load);
+    pub fn subtract(&mut self, z: &[f32], r: &mut [f32]) {
+        Summed { operator: &mut self.operator, halo: &mut self.halo }.apply(z, &mut self.load);
         vector::axpy(-1.0, &self.load, r);
+    }
+
+    /// Sets the ghosts of reduced velocities to what their owners have.
+    pub fn update(&mut self, x: &mut [f32]) {
+        self.halo.update(x);
     }
 
     /// Applications of the operator since the last call.
@@ -194,7 +197,7 @@ where
 /// The operator on vectors that hold the same at copies as at their owners.
 struct Summed<'a, const D: usize> {
     operator: &'a mut ViscousOperator<D>,
-    shared: &'a mut dyn SharedVelocities,
+    halo: &'a mut Halo,
 }
 
 impl<const D: usize> LinOp<f32> for Summed<'_, D>
@@ -207,14 +210,14 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.operator.apply(x, y);
-        self.shared.sum(y);
+        self.halo.sum(y);
     }
 }
 
 /// The operator on vectors that are zero at copies, whose scalar products are sums over parts.
 struct OnOwned<'a, const D: usize> {
     operator: &'a mut ViscousOperator<D>,
-    shared: &'a mut dyn SharedVelocities,
+    halo: &'a mut Halo,
     x: Vec<f32>,
 }
 
@@ -228,13 +231,13 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.x.copy_from_slice(x);
-        self.shared.update(&mut self.x);
+        self.halo.update(&mut self.x);
         self.operator.apply(&self.x, y);
-        self.shared.accumulate(y);
+        self.halo.accumulate(y);
     }
 
     fn complete(&self, sums: &mut [f64]) {
-        self.shared.complete(sums);
+        self.halo.sum_over_ranks(sums);
     }
 }
 
@@ -246,7 +249,7 @@ fn interval<const D: usize>(
     diagonal: &mut BlockDiagonal,
     near: &[u32],
     reference: &ReferenceMatrices<D>,
-    shared: &mut dyn SharedVelocities,
+    halo: &mut Halo,
 ) -> Result<SpectralInterval, StokesError>
 where
     Dim<D>: Space<D>,
@@ -254,8 +257,8 @@ where
     let in_fluid = cell_lambda_max(reference);
     let mut start = vec![0.0; operator.dim()];
     vector::fill_pseudo_random(1, &mut start);
-    shared.clear(&mut start);
-    let mut on_owned = OnOwned { x: start.clone(), operator, shared };
+    halo.clear(&mut start);
+    let mut on_owned = OnOwned { x: start.clone(), operator, halo };
     let largest = SAFETY * estimate_lambda_max_from(start, &mut on_owned, diagonal, LANCZOS_STEPS)?;
     let excess = (largest / in_fluid).max(1.0).sqrt();
     diagonal.scale(near, (1.0 / excess) as f32);
@@ -400,7 +403,7 @@ where
 fn diagonal<const D: usize>(
     elements: &Elements<'_, D>,
     mut nodal: Vec<f32>,
-    shared: &mut dyn SharedVelocities,
+    [halo, of_blocks]: [&mut Halo; 2],
 ) -> (BlockDiagonal, Option<StokesError>)
 where
     Dim<D>: Space<D>,
@@ -410,9 +413,9 @@ where
     let mut blocks = system.twist_blocks();
     let nodal_dim = nodal.len();
     nodal.resize(system.space.dim(), 0.0);
-    shared.update(&mut nodal);
+    halo.update(&mut nodal);
     nodal.truncate(nodal_dim);
-    shared.sum_blocks(&mut blocks);
+    of_blocks.sum(&mut blocks);
     // A body that is near a part and nowhere in it has none there.
     let is_here = |block: &[f64]| !system.discretisation().is_part() || block.iter().any(|&b| b != 0.0);
     let mut failure = None;

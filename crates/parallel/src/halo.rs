@@ -1,0 +1,71 @@
+//! The ghosts of a vector, with the ranks that own them: nothing where a rank is alone.
+
+use std::ops::{AddAssign, Range};
+
+use crate::communicator::Communicator;
+use crate::ghosts::GhostPlan;
+use crate::number::Number;
+use crate::ranks::Ranks;
+
+/// Copies that vectors of one kind hold of what other ranks own, entry by entry. Without ghosts, as in a
+/// program of one rank, all of it does nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Halo(Option<Box<Shared>>);
+
+#[derive(Clone, Debug)]
+struct Shared {
+    ranks: Ranks,
+    plan: GhostPlan,
+    /// Entries that this rank owns, in ascending order.
+    owned: Vec<Range<usize>>,
+}
+
+impl Halo {
+    /// The ghosts of a plan of single entries, in vectors of which this rank owns some ranges.
+    pub fn new(ranks: &Ranks, plan: GhostPlan, owned: Vec<Range<usize>>) -> Self {
+        Self(Some(Box::new(Shared { ranks: ranks.clone(), plan, owned })))
+    }
+
+    /// Whether no other rank has a part of the vectors.
+    pub fn is_alone(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// Sets the ghosts to what their owners have.
+    pub fn update<T: Number>(&mut self, x: &mut [T]) {
+        if let Some(Shared { ranks, plan, .. }) = self.0.as_deref_mut() {
+            plan.update::<T, 1>(ranks, x);
+        }
+    }
+
+    /// Adds the ghosts to what their owners have, and clears them.
+    pub fn accumulate<T: Number + AddAssign>(&mut self, x: &mut [T]) {
+        if let Some(Shared { ranks, plan, .. }) = self.0.as_deref_mut() {
+            plan.accumulate::<T, 1>(ranks, x);
+        }
+    }
+
+    /// From sums of each rank to sums of all, at owners and ghosts.
+    pub fn sum<T: Number + AddAssign>(&mut self, x: &mut [T]) {
+        self.accumulate(x);
+        self.update(x);
+    }
+
+    /// Clears what this rank does not own.
+    pub fn clear<T: Copy + Default>(&self, x: &mut [T]) {
+        let Some(Shared { owned, .. }) = self.0.as_deref() else { return };
+        let mut first = 0;
+        for range in owned {
+            x[first..range.start].fill(T::default());
+            first = range.end;
+        }
+        x[first..].fill(T::default());
+    }
+
+    /// Adds up numbers over all ranks.
+    pub fn sum_over_ranks(&self, numbers: &mut [f64]) {
+        if let Some(Shared { ranks, .. }) = self.0.as_deref() {
+            ranks.sum(numbers);
+        }
+    }
+}
