@@ -170,21 +170,21 @@ fn step<const D: usize>(
 fn operators(criterion: &mut Criterion) {
     operator(criterion, "constant", &Case::<2>::empty(8));
     operator(criterion, "constant", &Case::<3>::empty(5));
-    operator(criterion, "unfitted", &Case::unfitted(&pair_2d(), 8));
+    operator(criterion, "unfitted", &Case::unfitted(&pair_2d(), 7));
     operator(criterion, "paper", &Case::penalised(&pair_2d(), 7));
     operator(criterion, "unfitted", &Case::unfitted(&pair_3d(), 6));
     operator(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn cycles(criterion: &mut Criterion) {
-    cycle(criterion, "unfitted", &Case::unfitted(&pair_2d(), 8));
+    cycle(criterion, "unfitted", &Case::unfitted(&pair_2d(), 7));
     cycle(criterion, "paper", &Case::penalised(&pair_2d(), 7));
     cycle(criterion, "unfitted", &Case::unfitted(&pair_3d(), 6));
     cycle(criterion, "paper", &Case::penalised(&pair_3d(), 6));
 }
 
 fn solvers(criterion: &mut Criterion) {
-    let (unfitted, soft) = (Case::unfitted(&pair_2d(), 8), Case::penalised(&pair_2d(), 7));
+    let (unfitted, soft) = (Case::unfitted(&pair_2d(), 7), Case::penalised(&pair_2d(), 7));
     solver::<2, DirectSolver>(criterion, "unfitted-direct", &unfitted);
     solver::<2, MultigridSolver<2>>(criterion, "unfitted-multigrid", &unfitted);
     // A further step of Uzawa's iteration is one more solve with what is prepared.
@@ -205,9 +205,9 @@ fn steps(criterion: &mut Criterion) {
     let params =
         |formulation, solver| FlowParams { viscosity: VISCOSITY, formulation, solver, tolerance: TOLERANCE };
     step(criterion, "pair-2d-paper", params(paper, SolverKind::Direct), pair_2d(), 7, 0.025);
-    step(criterion, "pair-2d-unfitted", params(UNFITTED, SolverKind::Direct), pair_2d(), 8, 0.025);
+    step(criterion, "pair-2d-unfitted", params(UNFITTED, SolverKind::Direct), pair_2d(), 7, 0.025);
     step(criterion, "pair-3d-paper", params(paper, SolverKind::Multigrid), pair_3d(), 6, 0.05);
-    step(criterion, "pair-3d-unfitted", params(UNFITTED, SolverKind::Multigrid), pair_3d(), 7, 0.05);
+    step(criterion, "pair-3d-unfitted", params(UNFITTED, SolverKind::Multigrid), pair_3d(), 6, 0.05);
 }
 
 /// Fifty spheres in a periodic cube, and as many copies of it as it takes; `docs/benchmarks.md` names the
