@@ -34,9 +34,9 @@ where
     let finest = levels.len() - 1;
     for (index, level) in levels.iter_mut().enumerate() {
         let space = &level.space;
-        // The finest level around a solid that is not factorised leaves its operator to the solid.
+        // The finest level leaves its operator to the surfaces or to a solid that is not factorised.
         let Some(operator) = level.relaxation.as_mut().map(|r| &mut r.operator) else {
-            assert!(D == 3 && index == finest && matches!(formulation, Formulation::Paper(_)));
+            assert!(index == finest && (D == 3 || matches!(formulation, Formulation::Unfitted { .. })));
             continue;
         };
         let [x, y] = [1, 2].map(|seed| {
