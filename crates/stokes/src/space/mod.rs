@@ -1,5 +1,5 @@
-//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures; the marking of nodes
-//! and cells.
+//! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures; the marking of
+//! nodes and cells.
 
 mod cells;
 mod discretisation;
