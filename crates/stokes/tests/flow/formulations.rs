@@ -151,6 +151,6 @@ fn mean_and_central_velocity_become_one_as_the_body_hardens() {
 fn both_formulations_describe_the_same_flow() {
     let [unfitted, soft] = [UNFITTED, paper(1e3, 1)].map(|f| pair_motion(&pair(), &flow(f).twists));
     assert!((soft.normal_speed / unfitted.normal_speed - 1.0).abs() < 0.2, "{unfitted:?} {soft:?}");
-    assert!((soft.line_rotation - unfitted.line_rotation).abs() < 0.01, "{unfitted:?} {soft:?}");
-    assert!((0..2).all(|k| (soft.spins[k] - unfitted.spins[k]).abs() < 0.02), "{unfitted:?} {soft:?}");
+    assert!((soft.line_rotation - unfitted.line_rotation).abs() < 6.5e-3, "{unfitted:?} {soft:?}");
+    assert!((0..2).all(|k| (soft.spins[k] - unfitted.spins[k]).abs() < 1.5e-2), "{unfitted:?} {soft:?}");
 }
