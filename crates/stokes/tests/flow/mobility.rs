@@ -49,12 +49,12 @@ where
     a.iter().zip(b).map(|(&a, &b)| size(a - b)).fold(0.0, f64::max)
 }
 
-/// A solver to the tolerance 1e-10.
-fn solver<const D: usize>(formulation: Formulation, kind: SolverKind) -> FlowSolver<D>
+/// A solver to this tolerance.
+fn solver<const D: usize>(formulation: Formulation, kind: SolverKind, tolerance: f64) -> FlowSolver<D>
 where
     Dim<D>: Space<D>,
 {
-    FlowSolver::new(params(formulation, kind, 1e-10)).unwrap()
+    FlowSolver::new(params(formulation, kind, tolerance)).unwrap()
 }
 
 /// The two unequal balls, prepared.
@@ -81,7 +81,7 @@ fn mobility_is_reciprocal<const D: usize>(formulation: Formulation, kind: Solver
 where
     Dim<D>: Space<D>,
 {
-    let matrix = prepared::<D>(&mut solver(formulation, kind)).mobility().unwrap();
+    let matrix = prepared::<D>(&mut solver(formulation, kind, 1e-10)).mobility().unwrap();
     small("asymmetry of the mobility", asymmetry(&matrix), 1.9e-10);
     let found = matrix.symmetric_eigen().eigenvalues.min();
     small("least eigenvalue", (found / least - 1.0).abs(), 3.5e-6);
@@ -90,10 +90,10 @@ where
 #[test]
 fn the_mobility_is_symmetric_and_positive_definite() {
     for kind in SOLVERS {
-        mobility_is_reciprocal::<2>(UNFITTED, kind, 1.39990e-2);
+        mobility_is_reciprocal::<2>(UNFITTED, kind, 1.38796e-2);
     }
     mobility_is_reciprocal::<2>(paper(1e2, 2), SolverKind::Direct, 1.34657e-2);
-    mobility_is_reciprocal::<3>(UNFITTED, SolverKind::Multigrid, 1.24110e-1);
+    mobility_is_reciprocal::<3>(UNFITTED, SolverKind::Multigrid, 1.20827e-1);
     mobility_is_reciprocal::<3>(paper(1e2, 2), SolverKind::Multigrid, 1.14553e-1);
 }
 
@@ -102,7 +102,7 @@ fn resistance_inverts_mobility<const D: usize>(kind: SolverKind)
 where
     Dim<D>: Space<D>,
 {
-    let mut solver = solver(UNFITTED, kind);
+    let mut solver = solver(UNFITTED, kind, 1e-11);
     let mut prepared = prepared::<D>(&mut solver);
     let (mobility, resistance) = (prepared.mobility().unwrap(), prepared.resistance().unwrap());
     small("asymmetry of the resistance", asymmetry(&resistance), 1.5e-9);
@@ -132,7 +132,7 @@ fn a_free_body_beside_a_held_one<const D: usize>(
 ) where
     Dim<D>: Space<D>,
 {
-    let mut solver = solver(formulation, kind);
+    let mut solver = solver(formulation, kind, 1e-10);
     let mut prepared = prepared::<D>(&mut solver);
     let mut driven = Twist { velocity: Vector::from_fn(|d, _| 0.3 - 0.5 * d as f64), ..Twist::default() };
     driven.spin[Dim::<D>::ROT - 1] = 1.5;
@@ -159,7 +159,7 @@ fn free_bodies_and_held_ones_can_be_mixed() {
     a_free_body_beside_a_held_one::<2>(UNFITTED, direct, [2.5e-14, 2e-14]);
     a_free_body_beside_a_held_one::<2>(UNFITTED, multigrid, [5.9e-8, 4.5e-9]);
     a_free_body_beside_a_held_one::<3>(UNFITTED, multigrid, [8.6e-9, 1.1e-8]);
-    let mut solver = solver::<2>(UNFITTED, SolverKind::Direct);
+    let mut solver = solver::<2>(UNFITTED, SolverKind::Direct, 1e-10);
     let given = [GivenOf::Twist(Twist::default())];
     let error = prepared::<2>(&mut solver).solve(&Conditions::at_rest().with_bodies(&given)).unwrap_err();
     assert_eq!(error, StokesError::Count { what: "twists", found: 1, bodies: 2 });
@@ -170,8 +170,8 @@ fn free_bodies_and_held_ones_can_be_mixed() {
 fn a_solver_may_be_kept_with_its_flows() {
     let (kind, balls) = (SolverKind::Direct, unequal::<2>());
     let refined = || mesh(&bands(level(2)), &balls);
-    let mut own = solver::<2>(UNFITTED, kind).into_prepared(refined(), &balls).unwrap();
-    let mut lender = solver::<2>(UNFITTED, kind);
+    let mut own = solver::<2>(UNFITTED, kind, 1e-10).into_prepared(refined(), &balls).unwrap();
+    let mut lender = solver::<2>(UNFITTED, kind, 1e-10);
     assert_eq!(own.mobility(), prepared::<2>(&mut lender).mobility());
     assert_eq!(own.resistance(), prepared::<2>(&mut lender).resistance());
 }
@@ -192,12 +192,12 @@ where
     ];
     let held = (formulation == UNFITTED).then(|| sheared.with_twists(&twists));
     let all: Vec<_> = held.into_iter().chain(free).collect();
-    let mut many = solver(formulation, kind);
+    let mut many = solver(formulation, kind, 1e-10);
     let mut prepared = prepared::<D>(&mut many);
     for conditions in all.iter().rev() {
         let together = prepared.solve(conditions).unwrap();
         let mesh = mesh(&bands(level(D)), &balls);
-        let alone = solver(formulation, kind).solve_under(mesh, &balls, conditions).unwrap();
+        let alone = solver(formulation, kind, 1e-10).solve_under(mesh, &balls, conditions).unwrap();
         assert_eq!(together.twists, alone.twists, "{formulation:?}, {kind:?}");
         assert_eq!((together.wrenches, together.velocity), (alone.wrenches, alone.velocity));
     }
@@ -219,7 +219,7 @@ where
     Dim<D>: Space<D>,
 {
     let wrenches = wrenches::<D>();
-    let mut solver = solver(formulation, kind);
+    let mut solver = solver(formulation, kind, 1e-11);
     let mut prepared = prepared::<D>(&mut solver);
     let sheared = Conditions::boundary(&couette);
     let mut solve = |conditions: Conditions<'_, D>| prepared.solve(&conditions).unwrap();
@@ -292,20 +292,20 @@ where
 fn held_bodies_take_few_iterations() {
     let grid = |k: usize| Vector::<2>::new(0.2 + 0.15 * (k % 5) as f64, 0.2 + 0.15 * (k / 5) as f64);
     let crowd: Vec<_> = (0..25).map(|k| Ball::new(grid(k), 0.03 + 0.001 * k as f64)).collect();
-    for (balls, measured) in [(doublet(), [1, 29]), (crowd, [1, 40])] {
+    for (balls, measured) in [(doublet(), [1, 21]), (crowd, [1, 48])] {
         let found = SOLVERS.map(|kind| iterations_of_held(&balls, kind));
         assert!(found.iter().zip(measured).all(|(found, measured)| *found <= measured + 4), "{found:?}");
     }
     let spheres = [0.352, 0.648].map(|x| Ball::new(Vector::<3>::new(x, 0.5, 0.49), 0.14));
     let found = iterations_of_held(&spheres, SolverKind::Multigrid);
-    assert!(found <= 12 + 2, "{found}");
+    assert!(found <= 20 + 2, "{found}");
 }
 
 #[test]
 fn what_cannot_be_answered_is_refused() {
     let balls = unequal::<2>();
     let fine = || bands(5).mesh(Aabb::unit(), [1; 2], [false; 2], &balls).unwrap();
-    let mut solver = solver::<2>(UNFITTED, SolverKind::Direct);
+    let mut solver = solver::<2>(UNFITTED, SolverKind::Direct, 1e-10);
     let mut prepared = solver.prepared(fine(), &balls).unwrap();
     let (one, twist) = ([Wrench::default()], [Twist::default()]);
     let few = prepared.solve(&Conditions::at_rest().with_wrenches(&one)).err().unwrap();
@@ -319,7 +319,7 @@ fn what_cannot_be_answered_is_refused() {
     // What failed leaves no trace.
     assert!(prepared.solve(&Conditions::at_rest().with_wrenches(&wrenches())).is_ok());
 
-    let mut solver = self::solver::<2>(paper(1e2, 2), SolverKind::Direct);
+    let mut solver = self::solver::<2>(paper(1e2, 2), SolverKind::Direct, 1e-10);
     let mut soft = solver.prepared(fine(), &balls).unwrap();
     let flow = soft.solve(&Conditions::boundary(&couette)).unwrap();
     let held = soft.solve(&Conditions::at_rest().with_twists(&flow.twists)).err();
