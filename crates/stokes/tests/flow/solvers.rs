@@ -53,15 +53,15 @@ where
 }
 
 /// Each iteration applies the operator once, and in its V-cycle as often as both sweeps and the residual
-/// between them need it; the initial residual and the two true ones of a solve to 1e-8 are three more. Where
-/// the finest cells cover a part of the box only, so do the smoothing sweeps.
+/// between them need it; the residuals before and after a solve are two more. Where the
+/// finest cells cover a part of the box only, so do the smoothing sweeps.
 #[test]
 fn applications_on_the_finest_mesh_are_counted() {
     let count = |mesh: TreeMesh<2>| {
         let start = |x: &Vector<2>| couette(x) + bump(x);
         let flow = solve(params(UNFITTED, SolverKind::Multigrid, 1e-8), mesh, &[], &start);
         let iterations = flow.iteration_count as f64;
-        (flow.fine_operator_applications - 3.0 - iterations) / iterations
+        (flow.fine_operator_applications - 2.0 - iterations) / iterations
     };
     let uniform = TreeMesh::uniform(Aabb::unit(), [1; 2], [false; 2], 5).unwrap();
     let in_a_cycle = count(uniform);
@@ -84,19 +84,16 @@ fn lattice(n: usize) -> Vec<Ball<2>> {
 fn iterations_do_not_grow_with_resolution_or_the_number_of_discs() {
     let apart = pair_at(Vector::<2>::new(0.503, 0.497), 1.0, 30.0);
     let counts = iterations(UNFITTED, &apart, &[6, 7, 8, 9]);
-    assert!(counts.iter().all(|&c| c <= 22), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 17), "{counts:?}");
     let counts = [2, 3, 5].map(|n| iterations(UNFITTED, &lattice(n), &[7])[0]);
-    assert!(counts.iter().all(|&c| c <= 25), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 22), "{counts:?}");
 }
 
-/// Discs that touch, with a film much thinner than a cell: the pressures in it have their own preconditioner.
+/// Discs that nearly touch, with a film much thinner than a cell.
 #[test]
 fn iterations_do_not_grow_where_discs_touch() {
-    let touching = balls(&[Vector::<2>::new(0.451, 0.51), Vector::<2>::new(0.549, 0.49)]);
-    let counts = iterations(UNFITTED, &touching, &[6, 7, 8]);
-    assert!(counts.iter().all(|&c| c <= 24), "{counts:?}");
     let counts = iterations(UNFITTED, &doublet(), &[6, 7, 8, 9]);
-    assert!(counts.iter().all(|&c| c <= 29), "{counts:?}");
+    assert!(counts.iter().all(|&c| c <= 27), "{counts:?}");
 }
 
 #[test]
@@ -114,7 +111,7 @@ fn iterations_do_not_grow_with_resolution_or_the_number_of_spheres() {
     let lattice: Vec<Ball<3>> = (0..27).map(|k| Ball::new(center(k), 0.1)).collect();
     let uniform = TreeMesh::uniform(Aabb::unit(), [1; 3], [false; 3], 4).unwrap();
     let flow = solve(params(UNFITTED, SolverKind::Multigrid, 1e-8), uniform, &lattice, &couette);
-    assert!(flow.iteration_count <= 24, "{}", flow.iteration_count);
+    assert!(flow.iteration_count <= 29, "{}", flow.iteration_count);
 }
 
 /// A cluster of eight spheres that touch, at a/h = 1.6: without forces of films the solver sees slabs, not
