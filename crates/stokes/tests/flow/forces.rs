@@ -36,7 +36,7 @@ where
             let region = SolidRegion::new(discretisation, balls, Ramp::new(paper.ramp * cell), &matrices);
             region.touched_nodes(&discretisation.velocity, balls)
         }
-        // All around the surface: what flows between these nodes moves as the body does where forces are summed.
+        // All around the surface: forces on it are those on all these nodes.
         Formulation::Unfitted { .. } => {
             solid_nodes(&discretisation.mesh, &discretisation.velocity, balls, -2.0)
         }
