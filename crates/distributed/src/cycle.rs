@@ -1,7 +1,7 @@
 //! One V-cycle on the velocities, as the serial solver runs it for bodies that are eliminated: loads go down
 //! as they are, and each level but the finest smooths once on the way up.
 
-use gluey_fem::ImplicitTree;
+use gluey_fem::{ImplicitTree, Interpolation};
 use gluey_parallel::Communicator;
 
 use crate::agreement::agreed;
@@ -10,7 +10,6 @@ use crate::coarse::CoarseFactor;
 use crate::flow::FlowError;
 use crate::level::{Level, LevelOperator};
 use crate::space::{Around, LevelSpace, ghost_plan};
-use crate::transfer::Transfer;
 
 /// Cells of the coarsest mesh along the shortest edge of the box, at most, unless it has more roots.
 const COARSEST_CELLS: u32 = 4;
@@ -19,7 +18,7 @@ pub struct VCycle<'a, const D: usize> {
     /// Coarsest first.
     pub levels: Vec<Level<'a, D>>,
     /// `transfers[l]` joins level `l` to level `l + 1`.
-    transfers: Vec<Transfer>,
+    transfers: Vec<Interpolation<D>>,
     /// On rank zero.
     coarse: Option<CoarseFactor>,
 }
@@ -49,9 +48,11 @@ impl<'a, const D: usize> VCycle<'a, D> {
             }
             levels.push(level);
         }
-        let pairs = levels.windows(2);
-        let transfers =
-            pairs.map(|pair| Transfer::new(&pair[0].operator.space, &pair[1].operator.space)).collect();
+        let transfer = |pair: &[Level<'a, D>]| {
+            let [coarse, fine] = [0, 1].map(|k| &pair[k].operator.space);
+            Interpolation::of_parts(&coarse.part, coarse.velocity.map.clone(), &fine.part, &fine.velocity.map)
+        };
+        let transfers = levels.windows(2).map(transfer).collect();
         let coarse = (ranks.rank() == 0).then(|| CoarseFactor::new(&levels[0].operator.space, viscosity));
         let coarse = agreed(ranks, coarse.transpose())?;
         Ok(Self { levels, transfers, coarse })
@@ -65,7 +66,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let Level { operator, b, nodal, .. } = fine_level;
             operator.spread(b, nodal);
             let LevelOperator { space, y, .. } = &mut coarse.operator;
-            self.transfers[fine - 1].restrict(space, nodal, &mut y[..space.nodal_dim()]);
+            self.transfers[fine - 1].restrict::<D>(nodal, &mut y[..space.nodal_dim()]);
             coarse.operator.reduce();
             coarse.operator.gather(&mut coarse.b);
         }
@@ -78,7 +79,7 @@ impl<'a, const D: usize> VCycle<'a, D> {
             let LevelOperator { space, x, .. } = &coarse.operator;
             let Level { operator, z, .. } = fine_level;
             let nodal = operator.space.owned_nodal_dim();
-            self.transfers[fine - 1].prolong(space, &x[..space.nodal_dim()], &mut z[..nodal]);
+            self.transfers[fine - 1].prolong::<D>(&x[..space.nodal_dim()], &mut z[..nodal]);
             operator.project(z);
             if fine + 1 < self.levels.len() {
                 self.levels[fine].smooth();

@@ -46,7 +46,6 @@ mod pressures;
 mod schur;
 mod space;
 mod surface;
-mod transfer;
 mod warm_start;
 
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};

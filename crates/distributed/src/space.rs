@@ -41,9 +41,7 @@ pub struct Nodes<const D: usize> {
 impl<const D: usize> Nodes<D> {
     fn new(part: &Part<D>, degree: usize) -> Self {
         let map = Arc::new(NodeMap::new(&part.mesh, degree));
-        let touched = |cells| map.cells(cells).iter().max().map_or(0, |&node| node as usize + 1);
-        let first = touched(0..part.own().start);
-        let owned = first..touched(0..part.own().end).max(first);
+        let owned = map.end_of(0..part.own().start)..map.end_of(0..part.own().end);
         let mut constraint_of = vec![u32::MAX; map.node_count()];
         for (k, constraint) in map.constraints().iter().enumerate() {
             constraint_of[constraint.node as usize] = k as u32;

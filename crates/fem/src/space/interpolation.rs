@@ -3,7 +3,8 @@
 //! On a refined coarse cell the fine nodes form a grid of `2 degree + 1` points per direction, and
 //! interpolation is the tensor product of one matrix of `2 degree + 1` rows. A fine node belongs to the
 //! coarse cell that touches it first. Nodes are numbered in that order, so the nodes of a coarse cell are a
-//! range, and all that is stored of a fine node is its place in the grid.
+//! range, and all that is stored of a fine node is its place in the grid. On the part of a rank the fine nodes
+//! are those that it owns.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use rayon::prelude::*;
 
 use super::nodes::NodeMap;
 use crate::element::{multi_index, values_1d};
-use crate::mesh::{Cell, TreeMesh};
+use crate::mesh::{Cell, Part, TreeMesh};
 
 /// Place of a hanging node: its value follows from its masters.
 const NOWHERE: u8 = u8::MAX;
@@ -24,6 +25,8 @@ const GRID: usize = 375;
 #[derive(Clone, Debug)]
 pub struct Interpolation<const D: usize> {
     coarse_nodes: Arc<NodeMap<D>>,
+    /// The first coarse cell that fine nodes belong to; those below follow it.
+    first_cell: usize,
     /// First fine node of each coarse cell, then their number.
     first: Vec<u32>,
     /// Place of each fine node in the grid of its coarse cell, or among its nodes where that is not refined.
@@ -47,46 +50,80 @@ impl<const D: usize> Interpolation<D> {
         fine: &TreeMesh<D>,
         fine_nodes: &NodeMap<D>,
     ) -> Self {
-        let coarse_nodes = coarse_nodes.into();
-        let cell_count = coarse.cell_count();
-        let mut new = Self {
-            first: Vec::with_capacity(cell_count + 1),
-            place: Vec::with_capacity(fine_nodes.node_count()),
-            refined: Vec::with_capacity(cell_count),
-            line: Line::new(fine_nodes.degree()),
-            loads: Vec::new(),
-            incidence: incidence(&coarse_nodes),
-            coarse_nodes,
-        };
-        for (c, cell) in fine.cells().iter().enumerate() {
-            let parent = coarse.cells().get(new.refined.len().wrapping_sub(1));
-            if parent.is_none_or(|parent| !is_child(cell, parent)) {
-                new.start_cell(coarse, cell);
-            }
-            new.place_nodes(cell, fine_nodes, fine_nodes.cell(c));
-        }
-        assert_eq!(new.refined.len(), cell_count, "every coarse cell is one fine cell or holds its children");
-        new.first.push(new.place.len() as u32);
+        let new = Self::on_cells(coarse, coarse_nodes.into(), 0, fine, fine_nodes, 0..fine.cell_count());
+        let cell_count = new.refined.len();
+        assert_eq!(
+            cell_count,
+            coarse.cell_count(),
+            "every coarse cell is one fine cell or holds its children"
+        );
         new
     }
 
-    fn start_cell(&mut self, coarse: &TreeMesh<D>, cell: &Cell<D>) {
-        let parent = &coarse.cells()[self.refined.len()];
-        let refined = is_child(cell, parent);
-        assert!(refined || parent == cell, "the coarse mesh is the fine one cut one level lower");
-        self.refined.push(refined);
-        self.first.push(self.place.len() as u32);
+    /// Interpolation between the parts of a rank: from all nodes of the coarse one to those nodes of the fine
+    /// one that the rank owns.
+    ///
+    /// # Panics
+    /// If `coarse` is not the part of the same rank on the mesh coarsened by one level.
+    pub fn of_parts(
+        coarse: &Part<D>,
+        coarse_nodes: impl Into<Arc<NodeMap<D>>>,
+        fine: &Part<D>,
+        fine_nodes: &NodeMap<D>,
+    ) -> Self {
+        let first_cell = coarse.inner().start;
+        Self::on_cells(&coarse.mesh, coarse_nodes.into(), first_cell, &fine.mesh, fine_nodes, fine.own())
+    }
+
+    /// To the nodes that `cells` of the fine mesh are the first to touch.
+    fn on_cells(
+        coarse: &TreeMesh<D>,
+        coarse_nodes: Arc<NodeMap<D>>,
+        first_cell: usize,
+        fine: &TreeMesh<D>,
+        fine_nodes: &NodeMap<D>,
+        cells: Range<usize>,
+    ) -> Self {
+        let first_node = fine_nodes.end_of(0..cells.start);
+        let mut new = Self {
+            first_cell,
+            first: Vec::new(),
+            place: Vec::with_capacity(fine_nodes.end_of(0..cells.end) - first_node),
+            refined: Vec::new(),
+            line: Line::new(fine_nodes.degree()),
+            loads: Vec::new(),
+            incidence: Jagged::default(),
+            coarse_nodes,
+        };
+        let mut covering = None;
+        for c in cells {
+            let cell = &fine.cells()[c];
+            while !covering.is_some_and(|parent: &Cell<D>| parent == cell || is_child(cell, parent)) {
+                let parent = &coarse.cells()[first_cell + new.refined.len()];
+                new.refined.push(is_child(cell, parent));
+                new.first.push(new.place.len() as u32);
+                covering = Some(parent);
+            }
+            new.place_nodes(cell, fine_nodes, fine_nodes.cell(c), first_node);
+        }
+        new.first.push(new.place.len() as u32);
+        new.incidence = incidence(&new.coarse_nodes, first_cell..first_cell + new.refined.len());
+        new
     }
 
     /// Places the nodes of a fine cell that no cell before it touches.
-    fn place_nodes(&mut self, cell: &Cell<D>, fine_nodes: &NodeMap<D>, nodes: &[u32]) {
+    fn place_nodes(&mut self, cell: &Cell<D>, fine_nodes: &NodeMap<D>, nodes: &[u32], first_node: usize) {
         let refined = self.refined.last().is_some_and(|&refined| refined);
         let (degree, points) = (fine_nodes.degree(), self.line.points());
         for (i, &node) in nodes.iter().enumerate() {
-            if (node as usize) < self.place.len() {
+            if (node as usize) < first_node + self.place.len() {
                 continue;
             }
-            debug_assert_eq!(node as usize, self.place.len(), "nodes are numbered as cells touch them");
+            debug_assert_eq!(
+                node as usize,
+                first_node + self.place.len(),
+                "cells touch nodes in their order"
+            );
             let index = multi_index::<D>(i, degree + 1);
             let along = |d: usize| index[d] + (cell.coords[d] & 1) as usize * degree;
             let in_grid = || (0..D).rev().fold(0, |place, d| place * points + along(d));
@@ -95,7 +132,7 @@ impl<const D: usize> Interpolation<D> {
         }
     }
 
-    /// Number of fine nodes.
+    /// Number of fine nodes, to which `fine` in [`Self::prolong`] and [`Self::restrict`] belongs.
     pub fn fine_count(&self) -> usize {
         self.place.len()
     }
@@ -142,8 +179,7 @@ impl<const D: usize> Interpolation<D> {
         let (coarse, fine) = (coarse.as_chunks::<C>().0, fine.as_chunks_mut::<C>().0);
         let grids = &mut [[0.0; GRID]; 2];
         for cell in cells {
-            for (value, &node) in grids[0].as_chunks_mut::<C>().0.iter_mut().zip(self.coarse_nodes.cell(cell))
-            {
+            for (value, &node) in grids[0].as_chunks_mut::<C>().0.iter_mut().zip(self.coarse_cell(cell)) {
                 *value = coarse[node as usize];
             }
             let grid = if self.refined[cell] { self.expand::<C, DEGREE>(grids) } else { &grids[0] };
@@ -153,6 +189,11 @@ impl<const D: usize> Interpolation<D> {
                 *fine = if place == NOWHERE { [0.0; C] } else { grid[place as usize] };
             }
         }
+    }
+
+    /// The nodes of a coarse cell.
+    fn coarse_cell(&self, cell: usize) -> &[u32] {
+        self.coarse_nodes.cell(self.first_cell + cell)
     }
 
     /// The fine nodes that belong to a coarse cell.
@@ -166,7 +207,7 @@ impl<const D: usize> Interpolation<D> {
         let grids = &mut [[0.0; GRID]; 2];
         for cell in 0..self.refined.len() {
             let load = self.restrict_cell::<C, DEGREE>(cell, fine, grids).as_chunks::<C>().0;
-            for (load, &node) in load.iter().zip(self.coarse_nodes.cell(cell)) {
+            for (load, &node) in load.iter().zip(self.coarse_cell(cell)) {
                 add(load, &mut coarse[node as usize]);
             }
         }
@@ -335,9 +376,9 @@ fn combine<const DEGREE: usize>(weights: &[f32; 3], rows: &[f32], sum: &mut [f32
     }
 }
 
-/// The places where each node occurs in the lists of the cells, ascending.
-fn incidence<const D: usize>(nodes: &NodeMap<D>) -> Jagged<u32> {
-    let listed = (0..nodes.cell_count()).flat_map(|cell| nodes.cell(cell));
+/// The places where each node occurs in the lists of these cells, ascending.
+fn incidence<const D: usize>(nodes: &NodeMap<D>, cells: Range<usize>) -> Jagged<u32> {
+    let listed = cells.flat_map(|cell| nodes.cell(cell));
     Jagged::grouped(nodes.node_count(), listed.zip(0u32..).map(|(&node, place)| (node as usize, place)))
 }
 

@@ -87,6 +87,12 @@ impl<const D: usize> NodeMap<D> {
         &self.cell_nodes[cells.start * self.nodes_per_cell..cells.end * self.nodes_per_cell]
     }
 
+    /// One more than the last node that these cells touch; zero for none. Nodes are numbered as cells touch
+    /// them: those that the first cells are the first to touch end there.
+    pub fn end_of(&self, cells: std::ops::Range<usize>) -> usize {
+        self.cells(cells).iter().max().map_or(0, |&node| node as usize + 1)
+    }
+
     /// Position of a node.
     pub fn point(&self, node: usize) -> Vector<D> {
         let x = &self.lattice[node];
