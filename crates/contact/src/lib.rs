@@ -47,6 +47,7 @@ mod grid;
 mod island_projection;
 mod islands;
 mod key;
+mod lead;
 mod memory;
 mod mobility;
 mod model;

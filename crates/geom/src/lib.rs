@@ -12,20 +12,16 @@
 //! ```
 
 mod aabb;
+mod algebra;
 mod lattice;
 mod motion;
 mod space;
 
 pub use aabb::Aabb;
+pub use algebra::{Matrix, Vector};
 pub use lattice::Lattice;
 pub use motion::{Particle, Pose, Twist, Wrench};
 pub use space::{Dim, Rotation, Space, Spin, Stored};
-
-/// A point, displacement or velocity in `D` dimensions.
-pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
-
-/// A second-order tensor in `D` dimensions.
-pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
 
 /// The examples of the README.
 #[cfg(doctest)]

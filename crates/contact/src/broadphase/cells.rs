@@ -3,7 +3,7 @@
 
 use gluey_geom::Vector;
 
-use super::{Broadphase, meet};
+use super::search::{Broadphase, meet};
 use crate::grid::{Grid, sort_by_key};
 
 /// Cells for every ball at most, so that a sparse cloud needs no more memory than a dense one.

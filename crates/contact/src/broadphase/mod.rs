@@ -2,27 +2,13 @@
 
 mod cells;
 mod hierarchy;
+mod search;
 
 use gluey_geom::Vector;
 
 pub use cells::CellList;
 pub use hierarchy::Hierarchy;
-
-/// Finds the pairs of balls that meet. All implementations give the same pairs in the same order.
-pub trait Broadphase<const D: usize>: Send {
-    /// Replaces `pairs` by all `(i, j)` with `i < j`, `i < asker_count` and `|x_i - x_j| <= r_i + r_j`,
-    /// sorted.
-    ///
-    /// Balls from `asker_count` on are only looked for (images across a periodic border). Coordinates are
-    /// finite, radii are positive.
-    fn meeting(
-        &mut self,
-        centers: &[Vector<D>],
-        radii: &[f64],
-        asker_count: usize,
-        pairs: &mut Vec<(u32, u32)>,
-    );
-}
+pub use search::Broadphase;
 
 /// Ratio of the largest to the mean radius beyond which the hierarchy is faster than the cell list.
 const SIZE_RATIO: f64 = 4.0;
@@ -54,11 +40,6 @@ impl<const D: usize> Broadphase<D> for BestOf {
             self.hierarchy.meeting(centers, radii, asker_count, pairs);
         }
     }
-}
-
-/// Whether two balls meet.
-fn meet<const D: usize>(x: &Vector<D>, y: &Vector<D>, reach: f64) -> bool {
-    (y - x).norm_squared() <= reach * reach
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 mod affine;
 mod images;
 mod order;
+mod ownership;
 mod part;
 
 use gluey_geom::{Lattice, Vector};
@@ -13,7 +14,8 @@ use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
 use affine::{AffineFit, Frame};
 pub(crate) use images::{for_each_image, wrap};
 pub(crate) use order::SpatialOrder;
-pub(crate) use part::{Ownership, PartSearch};
+pub(crate) use ownership::Ownership;
+pub(crate) use part::PartSearch;
 
 /// Pairs nearer than this part of their summed radii are kept in the list whatever they do (the skin of the
 /// list), so that one search serves several steps.

@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use super::PairContact;
+use super::{PairContact, free_moves};
 use crate::model::validate;
 use crate::{Contact, ContactError, Mobility, PairState, StepGeometry};
 
@@ -39,15 +39,4 @@ where
     pub(crate) fn take_over_contacts(&mut self, contacts: Vec<Contact>) {
         self.record.replace(|list| *list = contacts);
     }
-}
-
-/// Displacements of particles in a step without contact.
-pub(super) fn free_moves<'a, const D: usize>(
-    step: &'a StepGeometry<'_, D>,
-    twists: &'a [Twist<D>],
-) -> impl Iterator<Item = Vector<D>> + 'a
-where
-    Dim<D>: Space<D>,
-{
-    twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift)
 }

@@ -216,7 +216,7 @@ where
         buffers: &mut Buffers<D>,
     ) -> Result<ContactReport, ContactError> {
         buffers.free.clear();
-        buffers.free.extend(lead::free_moves(step, twists));
+        buffers.free.extend(free_moves(step, twists));
         let tolerance = self.tolerance(step, &buffers.free);
         self.neighbours.margin = 0.5 * self.margin();
         self.neighbours.begin(step, &self.domain, &buffers.free)?;
@@ -402,4 +402,15 @@ where
         };
         self.record.replace(|contacts| contacts.extend(buffers.rows.iter().filter_map(contact)));
     }
+}
+
+/// Displacements of particles in a step without contact.
+fn free_moves<'a, const D: usize>(
+    step: &'a StepGeometry<'_, D>,
+    twists: &'a [Twist<D>],
+) -> impl Iterator<Item = Vector<D>> + 'a
+where
+    Dim<D>: Space<D>,
+{
+    twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift)
 }

@@ -12,7 +12,7 @@ use crate::{ContactError, Domain, PairKey, PairState, Partner, StepGeometry};
 const CELLS_PER_PARTICLE: usize = 2;
 
 /// What particles do in a step.
-pub(super) struct Motion<'a, const D: usize> {
+pub(crate) struct Motion<'a, const D: usize> {
     /// Displacements without contact, by particle.
     pub free: &'a [Vector<D>],
     /// Displacements to search for, by particle.
@@ -27,7 +27,7 @@ pub(super) struct Motion<'a, const D: usize> {
 
 /// Deals particles to ranks.
 #[derive(Debug, Default)]
-pub(super) struct Dealer<const D: usize> {
+pub(crate) struct Dealer<const D: usize> {
     spatial: SpatialOrder,
     wrapped: Vec<Vector<D>>,
     windings: Vec<[i32; 3]>,
@@ -110,7 +110,7 @@ impl Cells {
 
 impl<const D: usize> Dealer<D> {
     /// What each of so many ranks gets.
-    pub(super) fn deal(
+    pub(crate) fn deal(
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,

@@ -11,17 +11,16 @@
 //!
 //! The documentation of `gluey-distributed` has what runs on this.
 
-mod deal;
+pub(crate) mod deal;
 mod failure;
-mod lead;
 
 use gluey_geom::Vector;
 
 use crate::{ContactError, ContactParams, ContactReport, Domain, PairKey};
 
+pub use crate::lead::Lead;
 pub use crate::pair_contact::PartContact;
 pub use failure::{PAIR_WORDS, pair_of, pair_words};
-pub use lead::Lead;
 
 /// What a rank asks of the others with whom it shares contacts. All ranks call the same methods in the same
 /// order.

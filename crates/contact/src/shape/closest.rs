@@ -1,9 +1,20 @@
 //! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's
 //! tolerances are absolute.
 
-use gluey_geom::{Dim, Matrix, Rotation, Space, Vector};
+use gluey_geom::{Dim, Matrix, Pose, Rotation, Space, Vector};
 
 use super::Shape;
+
+/// Distance of the surfaces of two shapes; `None` if their cores meet.
+pub fn gap<const D: usize, S: Shape<D>>(shapes: [&S; 2], poses: [&Pose<D>; 2]) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let frames = poses.map(|pose| frame(&pose.orientation));
+    let between = poses[1].position - poses[0].position;
+    let [p, q] = closest(shapes, [&frames[0], &frames[1]], &between)?;
+    Some((between + q - p).norm() - shapes[0].rounding() - shapes[1].rounding())
+}
 
 /// Cores nearer than this part of the shapes' size meet.
 const MEETING: f64 = 1e-12;

@@ -40,6 +40,7 @@ mod problem;
 use gluey_geom::{Dim, Pose, Space, Twist, Vector};
 
 pub use capsule::Capsule;
+pub use closest::gap;
 pub use contact::ShapeContact;
 
 /// A convex core with a rounding, in the frame of the body: the origin is the centre of the shape.
@@ -95,15 +96,4 @@ where
 {
     let orientation = Dim::<D>::advance(&pose.orientation, &by.spin, 1.0);
     Pose { position: pose.position + by.velocity, orientation }
-}
-
-/// Distance of the surfaces of two shapes; `None` if their cores meet.
-pub fn gap<const D: usize, S: Shape<D>>(shapes: [&S; 2], poses: [&Pose<D>; 2]) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
-    let frames = poses.map(|pose| closest::frame(&pose.orientation));
-    let between = poses[1].position - poses[0].position;
-    let [p, q] = closest::closest(shapes, [&frames[0], &frames[1]], &between)?;
-    Some((between + q - p).norm() - shapes[0].rounding() - shapes[1].rounding())
 }

@@ -5,10 +5,10 @@
 //! `x = max(floor, y - w(y)/||A||)`; the extrapolation starts anew when it has gone uphill. The number of
 //! iterations goes like the square root of that of Uzawa's algorithm.
 
-use super::infeasibility::MONITOR_VECTOR_COUNT;
+use super::infeasibility::{InfeasibilityMonitor, MONITOR_VECTOR_COUNT};
 use super::{
-    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    gaps_under, largest_eigenvalue, split,
+    ConvergenceLog, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under, largest_eigenvalue,
+    split,
 };
 
 /// Safety of the estimated norm, a lower bound.

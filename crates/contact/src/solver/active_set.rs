@@ -6,10 +6,10 @@
 //! step frees them. The rate of convergence depends on the spectrum of `A` only, and the operator may be
 //! singular.
 
-use super::infeasibility::MONITOR_VECTOR_COUNT;
+use super::infeasibility::{InfeasibilityMonitor, MONITOR_VECTOR_COUNT};
 use super::{
-    ConvergenceLog, InfeasibilityMonitor, Measures, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    dot, gaps_under, largest_eigenvalue, residual, split,
+    ConvergenceLog, Measures, Projection, ProjectionSolver, SolveFailure, SolveReport, dot, gaps_under,
+    largest_eigenvalue, residual, split,
 };
 
 /// Iterations between two computations of the gaps from the forces, beside twice the number of contacts: they

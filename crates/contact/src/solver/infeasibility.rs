@@ -5,7 +5,7 @@
 //! `A y = 0` and `q . y < 0` (Farkas' lemma): along `y` the dual function falls for ever, and iterates run
 //! away in that direction.
 
-use super::{Projection, dot};
+use super::{ConvergenceLog, Projection, SolveFailure, dot};
 
 /// Forces that would have to be so many times larger than the gaps call for are taken for infinite.
 const INFINITE: f64 = 1e9;
@@ -89,4 +89,19 @@ impl<'a> InfeasibilityMonitor<'a> {
 
 fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+impl ConvergenceLog {
+    /// The failure to report if there is no sense in going on.
+    pub(super) fn check(
+        &self,
+        monitor: &mut InfeasibilityMonitor<'_>,
+        problem: &mut Projection<'_>,
+        forces: &[f64],
+        norm: f64,
+    ) -> Result<(), SolveFailure> {
+        let infeasible = monitor.certificate(self.iteration, problem, forces, norm);
+        let is_lost = self.iteration >= problem.iteration_limit || !self.residual.is_finite();
+        if infeasible.is_some() || is_lost { Err(self.failure(infeasible)) } else { Ok(()) }
+    }
 }

@@ -34,8 +34,6 @@ pub use factor::Factor;
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 
-use infeasibility::InfeasibilityMonitor;
-
 /// The Delassus operator `A = c B M^-1 B^T`, symmetric and positive semidefinite: how far contact forces open
 /// the gaps.
 pub trait DelassusOperator {
@@ -173,19 +171,6 @@ impl ConvergenceLog {
     /// Whether the last residual is small enough.
     fn has_converged(&self, problem: &Projection<'_>) -> bool {
         self.residual <= problem.tolerance
-    }
-
-    /// The failure to report if there is no sense in going on.
-    fn check(
-        &self,
-        monitor: &mut InfeasibilityMonitor<'_>,
-        problem: &mut Projection<'_>,
-        forces: &[f64],
-        norm: f64,
-    ) -> Result<(), SolveFailure> {
-        let infeasible = monitor.certificate(self.iteration, problem, forces, norm);
-        let is_lost = self.iteration >= problem.iteration_limit || !self.residual.is_finite();
-        if infeasible.is_some() || is_lost { Err(self.failure(infeasible)) } else { Ok(()) }
     }
 
     fn report(&self) -> SolveReport {

@@ -1,10 +1,10 @@
 //! Uzawa's algorithm, `lambda <- max(floor, lambda - rho w)` (Verdon et al. 2010, eq. 29; DOI
 //! 10.3166/REMN.16.365-383).
 
-use super::infeasibility::MONITOR_VECTOR_COUNT;
+use super::infeasibility::{InfeasibilityMonitor, MONITOR_VECTOR_COUNT};
 use super::{
-    ConvergenceLog, InfeasibilityMonitor, Projection, ProjectionSolver, SolveFailure, SolveReport,
-    gaps_under, largest_eigenvalue, split,
+    ConvergenceLog, Projection, ProjectionSolver, SolveFailure, SolveReport, gaps_under, largest_eigenvalue,
+    split,
 };
 
 /// The paper's solver: gradient steps of fixed length in the forces.

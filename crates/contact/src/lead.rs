@@ -2,8 +2,8 @@
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use super::deal::{Dealer, Motion};
-use super::{Dealt, PartFrame};
+use crate::part::deal::{Dealer, Motion};
+use crate::part::{Dealt, PartFrame};
 use crate::{Contact, ContactError, ContactParams, Domain, Mobility, PairContact, StepGeometry};
 
 /// Contact of particles that ranks share, as the rank that knows all particles sees it.
