@@ -80,8 +80,8 @@ impl<const D: usize> Nodes<D> {
 }
 
 impl<const D: usize> LevelSpace<D> {
-    /// The tree cut at `depth`, around the keys `inner` or else those of the rank, with more of what is around.
-    /// All ranks call this.
+    /// The tree cut at `depth`, around the keys `inner` or else those of the rank, with more of what is
+    /// around. All ranks call this.
     pub fn new(
         tree: &mut ImplicitTree<'_, D>,
         depth: u8,

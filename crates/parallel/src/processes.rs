@@ -19,8 +19,8 @@ pub struct Processes {
     traffic: Mutex<Traffic>,
 }
 
-// SAFETY: the communicator is the handle of all processes, a constant of the library, and MPI is called by the
-// thread that started it alone: `transfer` refuses any other.
+// SAFETY: the communicator is the handle of all processes, a constant of the library, and MPI is called by
+// the thread that started it alone: `transfer` refuses any other.
 unsafe impl Send for Processes {}
 // SAFETY: as above.
 unsafe impl Sync for Processes {}

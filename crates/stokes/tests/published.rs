@@ -28,7 +28,14 @@ fn a_program_outside_the_workspace_runs() {
     let stranger = Stranger {
         uses: "gluey-stokes",
         default_features: true,
-        packages: &["gluey-geom", "gluey-linalg", "gluey-levelset", "gluey-fem", "gluey-stokes"],
+        packages: &[
+            "gluey-geom",
+            "gluey-parallel",
+            "gluey-linalg",
+            "gluey-levelset",
+            "gluey-fem",
+            "gluey-stokes",
+        ],
         program: PROGRAM,
         folder: Path::new(env!("CARGO_TARGET_TMPDIR")).join("published-stokes"),
     };

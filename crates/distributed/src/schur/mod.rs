@@ -1,6 +1,6 @@
 //! Approximate inverse of the pressure Schur complement, as in the serial solver: the weighted mass of the
-//! pressures over twice the viscosity by Chebyshev's method, and the pressures as large as the box from a small
-//! mesh.
+//! pressures over twice the viscosity by Chebyshev's method, and the pressures as large as the box from a
+//! small mesh.
 
 mod mass;
 mod weights;

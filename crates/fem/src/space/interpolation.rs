@@ -3,8 +3,8 @@
 //! On a refined coarse cell the fine nodes form a grid of `2 degree + 1` points per direction, and
 //! interpolation is the tensor product of one matrix of `2 degree + 1` rows. A fine node belongs to the
 //! coarse cell that touches it first. Nodes are numbered in that order, so the nodes of a coarse cell are a
-//! range, and all that is stored of a fine node is its place in the grid. On the part of a rank the fine nodes
-//! are those that it owns.
+//! range, and all that is stored of a fine node is its place in the grid. On the part of a rank the fine
+//! nodes are those that it owns.
 
 use std::ops::Range;
 use std::sync::Arc;
