@@ -120,11 +120,6 @@ impl<const D: usize> LevelBodies<D> {
         self.is_held[body]
     }
 
-    /// Whether a node here moves with a body whose motion is given.
-    pub fn holds_nodes(&self) -> bool {
-        self.nodes.iter().any(|rigid| self.is_held[rigid.body as usize])
-    }
-
     /// Whether a body has enough nodes on this level to be rigid.
     pub fn is_active(&self, body: usize) -> bool {
         self.fits[body * rigid_square::<D>()] > 0.0

@@ -2,11 +2,12 @@
 //! as they are, and each level but the finest smooths once on the way up.
 
 use gluey_fem::{ImplicitTree, Interpolation};
+use gluey_geom::{Dim, Space};
 use gluey_parallel::Communicator;
 
 use crate::agreement::agreed;
 use crate::bodies::Shared;
-use crate::coarse::CoarseFactor;
+use crate::coarse::WholeLevel;
 use crate::flow::FlowError;
 use crate::level::{Level, LevelOperator};
 use crate::space::{Around, LevelSpace, ghost_plan};
@@ -20,10 +21,13 @@ pub struct VCycle<'a, const D: usize> {
     /// `transfers[l]` joins level `l` to level `l + 1`.
     transfers: Vec<Interpolation<D>>,
     /// On rank zero.
-    coarse: Option<CoarseFactor>,
+    coarse: Option<WholeLevel>,
 }
 
-impl<'a, const D: usize> VCycle<'a, D> {
+impl<'a, const D: usize> VCycle<'a, D>
+where
+    Dim<D>: Space<D>,
+{
     /// Under a smoother of the finest level elsewhere, for which its part is to hold more. All ranks call
     /// this.
     pub fn new(
@@ -53,7 +57,8 @@ impl<'a, const D: usize> VCycle<'a, D> {
             Interpolation::of_parts(&coarse.part, coarse.velocity.map.clone(), &fine.part, &fine.velocity.map)
         };
         let transfers = levels.windows(2).map(transfer).collect();
-        let coarse = (ranks.rank() == 0).then(|| CoarseFactor::new(&levels[0].operator.space, viscosity));
+        let coarse =
+            (ranks.rank() == 0).then(|| WholeLevel::new(&levels[0].operator.space, shared, viscosity));
         let coarse = agreed(ranks, coarse.transpose())?;
         Ok(Self { levels, transfers, coarse })
     }
@@ -92,8 +97,8 @@ impl<'a, const D: usize> VCycle<'a, D> {
         let Level { operator, b, z, .. } = &mut self.levels[0];
         operator.scatter(b);
         operator.y.fill(0.0);
-        if let Some(factor) = &mut self.coarse {
-            factor.solve(&operator.x, &mut operator.y);
+        if let Some(level) = &mut self.coarse {
+            level.solve(&operator.space, &operator.x, &mut operator.y);
         }
         operator.gather(z);
     }

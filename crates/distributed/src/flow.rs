@@ -3,7 +3,7 @@
 use gluey_fem::{Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_linalg::{BadDiagonal, BlockError, DirectError, KrylovError, SparseError, vector};
+use gluey_linalg::{BadDiagonal, BlockError, KrylovError, SparseError, vector};
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::{Conditions, Lubrication, RaisedPenalties, StokesError, Stress};
@@ -29,9 +29,6 @@ pub enum PartError {
     /// A velocity or pressure has no equation.
     #[error(transparent)]
     Diagonal(#[from] BadDiagonal),
-    /// The matrix of the coarsest level has no factor: the box has no wall.
-    #[error("coarsest level: {0}")]
-    Coarse(#[from] DirectError),
     /// The motion of a body has no equation.
     #[error("body {}: {source}", body + 1)]
     Body {

@@ -23,7 +23,7 @@ pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::operator::PressureForces;
 pub use crate::precondition::schur::ratio_inside;
 pub use crate::precondition::surface::SurfaceSmoother;
-pub use crate::precondition::velocity::cell_lambda_max;
+pub use crate::precondition::velocity::{CoarseSolver, cell_lambda_max};
 pub use crate::surface::WeakCell;
 
 /// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two

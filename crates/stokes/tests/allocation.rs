@@ -65,7 +65,7 @@ fn steady_work_of_the_preconditioner_allocates_nothing() {
         let unfitted = Formulation::Unfitted { lubrication: Lubrication::Deficit };
         steady_work_allocates_nothing::<2>(unfitted);
         steady_work_allocates_nothing::<2>(film);
-        // In 3D the blocks of `unfitted` keep weak modes only, and gather residuals into new vectors.
+        steady_work_allocates_nothing::<3>(unfitted);
         steady_work_allocates_nothing::<3>(film);
     });
 }

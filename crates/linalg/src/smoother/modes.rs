@@ -42,8 +42,9 @@ pub struct WeakModes<const B: usize> {
     firsts: Vec<usize>,
     /// Where each node is in the list of the nodes of all patches.
     places: Jagged<u32>,
-    /// Corrections of all patches.
+    /// Corrections of all patches, and what they are made of.
     corrections: Vec<f32>,
+    residuals: Vec<f32>,
 }
 
 /// Memory for [`weak_modes`].
@@ -99,14 +100,17 @@ impl<const B: usize> WeakModes<B> {
         }));
         let places = patches.items().iter().zip(0u32..).map(|(&node, place)| (node as usize, place));
         let places = Jagged::grouped(full.len() / B, places);
-        Self { modes, weights, diagonal, patches, firsts, places, corrections: Vec::new() }
+        let [corrections, residuals] = [(); 2].map(|()| Vec::new());
+        Self { modes, weights, diagonal, patches, firsts, places, corrections, residuals }
     }
 
     /// `z = G r`.
     pub fn apply(&mut self, r: &[f32], z: &mut [f32]) {
-        let mut corrections = std::mem::take(&mut self.corrections);
-        corrections.resize(self.patches.items().len() * B, 0.0);
-        self.correct(0..self.patches.len(), r, &mut corrections);
+        let [mut corrections, mut residuals] =
+            [&mut self.corrections, &mut self.residuals].map(std::mem::take);
+        let dim = self.patches.items().len() * B;
+        [&mut corrections, &mut residuals].into_iter().for_each(|v| v.resize(dim, 0.0));
+        self.correct(0..self.patches.len(), r, &mut corrections, &mut residuals);
         let of_places = corrections.as_chunks::<B>().0;
         // Corrections of a node are added in the order of its patches.
         z.par_chunks_mut(NODES * B).enumerate().for_each(|(k, z)| {
@@ -119,36 +123,36 @@ impl<const B: usize> WeakModes<B> {
                 }
             }
         });
-        self.corrections = corrections;
+        (self.corrections, self.residuals) = (corrections, residuals);
     }
 
-    /// The corrections of a range of patches, without weights.
-    fn correct(&self, patches: Range<usize>, r: &[f32], corrections: &mut [f32]) {
+    /// The corrections of a range of patches, without weights, and the residuals on them.
+    fn correct(&self, patches: Range<usize>, r: &[f32], corrections: &mut [f32], residuals: &mut [f32]) {
         let start = |patch: usize| self.patches.starts()[patch] as usize * B;
         let first = start(patches.start);
         if patches.len() > PATCHES {
             let middle = patches.start + patches.len() / 2;
-            let (left, right) = corrections.split_at_mut(start(middle) - first);
+            let [of_corrections, of_residuals] =
+                [corrections, residuals].map(|v| v.split_at_mut(start(middle) - first));
             rayon::join(
-                || self.correct(patches.start..middle, r, left),
-                || self.correct(middle..patches.end, r, right),
+                || self.correct(patches.start..middle, r, of_corrections.0, of_residuals.0),
+                || self.correct(middle..patches.end, r, of_corrections.1, of_residuals.1),
             );
             return;
         }
-        let mut local = Vec::new();
         for patch in patches {
-            let z = &mut corrections[start(patch) - first..start(patch + 1) - first];
+            let at = start(patch) - first..start(patch + 1) - first;
+            let (z, local) = (&mut corrections[at.clone()], &mut residuals[at]);
             z.fill(0.0);
             let modes = &self.modes[self.firsts[patch]..self.firsts[patch + 1]];
             if modes.is_empty() {
                 continue;
             }
-            local.clear();
-            self.patches[patch]
-                .iter()
-                .for_each(|&node| local.extend_from_slice(&r[node as usize * B..][..B]));
+            for (own, &node) in local.chunks_exact_mut(B).zip(&self.patches[patch]) {
+                own.copy_from_slice(&r[node as usize * B..][..B]);
+            }
             for mode in modes.chunks_exact(local.len()) {
-                let share = inner(mode, &local);
+                let share = inner(mode, local);
                 z.iter_mut().zip(mode).for_each(|(z, w)| *z += share * w);
             }
         }

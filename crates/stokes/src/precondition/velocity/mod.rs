@@ -6,6 +6,7 @@ mod hierarchy;
 mod level;
 mod near_bodies;
 
+pub use coarse::CoarseSolver;
 pub use cycle::{LevelPlan, VCycle};
 pub use hierarchy::Hierarchy;
 pub use level::{Smoothing, cell_lambda_max};
