@@ -4,6 +4,7 @@
 use gluey_fem::{ImplicitTree, Interpolation};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::Communicator;
+use gluey_stokes::part::coarsest_level;
 
 use crate::agreement::agreed;
 use crate::bodies::Shared;
@@ -11,9 +12,6 @@ use crate::coarse::WholeLevel;
 use crate::flow::FlowError;
 use crate::level::{Level, LevelOperator};
 use crate::space::{Around, LevelSpace, ghost_plan};
-
-/// Cells of the coarsest mesh along the shortest edge of the box, at most, unless it has more roots.
-const COARSEST_CELLS: u32 = 4;
 
 pub struct VCycle<'a, const D: usize> {
     /// Coarsest first.
@@ -38,7 +36,7 @@ where
     ) -> Result<Self, FlowError> {
         let ranks = shared.ranks;
         let finest = tree.max_level();
-        let coarsest = coarsest_level(tree).min(finest);
+        let coarsest = coarsest_level(tree.frame().roots()).min(finest);
         let mut levels = Vec::new();
         for depth in coarsest..=finest {
             // Rank zero holds all of the coarsest level: what it lacks are ghosts.
@@ -102,10 +100,4 @@ where
         }
         operator.gather(z);
     }
-}
-
-/// Depth of the coarsest mesh.
-pub fn coarsest_level<const D: usize>(tree: &ImplicitTree<'_, D>) -> u8 {
-    let roots = tree.frame().roots().into_iter().min().unwrap_or(1);
-    (COARSEST_CELLS / roots).max(1).ilog2() as u8
 }

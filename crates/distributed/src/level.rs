@@ -3,21 +3,15 @@
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{ImplicitTree, ReferenceMatrices};
-use gluey_linalg::{
-    BadDiagonal, Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, invert_spd, vector,
-};
+use gluey_linalg::{BadDiagonal, Chebyshev, Guess, LinOp, Preconditioner, invert_spd, vector};
 use gluey_parallel::{GhostPlan, Ranks};
-use gluey_stokes::part::cell_lambda_max;
+use gluey_stokes::part::{LEVEL_SWEEP, cell_lambda_max};
 
 use crate::agreement::agreed;
 use crate::bodies::{Shared, rigid, rows};
 use crate::flow::{FlowError, PartError};
 use crate::near_bodies::NearBodies;
 use crate::space::{LevelSpace, Plans};
-
-/// Applications in a sweep, and the part of the spectrum that it damps, as in the serial solver. The largest
-/// eigenvalue is that of a cell, raised for twists, whose blocks are not sums over cells.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 5, ratio: 5.0, safety: 1.05, lanczos_steps: 0 };
 
 /// The viscous operator on the owned nodes and twists.
 pub struct LevelOperator<'a, const D: usize> {
@@ -180,7 +174,7 @@ impl<'a, const D: usize> Level<'a, D> {
         let diagonal = operator.diagonal(viscosity)?;
         let dim = operator.dim();
         let largest = cell_lambda_max(&operator.space.reference());
-        let chebyshev = Chebyshev::below(largest, dim, &SWEEP);
+        let chebyshev = Chebyshev::below(largest, dim, &LEVEL_SWEEP);
         let nodal = vec![0.0; operator.space.owned_nodal_dim()];
         let [b, z] = [0, 1].map(|_| vec![0.0; dim]);
         Ok(Self { operator, diagonal, chebyshev, near_bodies: None, b, z, nodal })

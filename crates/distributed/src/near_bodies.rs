@@ -3,19 +3,13 @@
 
 use gluey_fem::ImplicitTree;
 use gluey_fem::cells::Workspace;
-use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp, vector};
+use gluey_linalg::{Chebyshev, Guess, LinOp, vector};
 use gluey_parallel::GhostPlan;
+use gluey_stokes::part::{RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP};
 
 use crate::bodies::{Shared, rigid};
 use crate::level::{BlockDiagonal, Level, LevelOperator};
 use crate::space::{LevelSpace, Plans, wanted_nodes};
-
-/// Dimensions in which the nodes around bodies are few enough.
-const MOST_DIMENSIONS: usize = 2;
-/// Cells between a body and the farthest relaxed nodes.
-const RINGS: usize = 3;
-/// A sweep, which damps more of the spectrum than that of a level, since no coarser mesh helps.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 6, ratio: 20.0, safety: 1.05, lanczos_steps: 0 };
 
 /// The sweep around the bodies of one level.
 pub struct NearBodies<'a, const D: usize> {
@@ -37,7 +31,7 @@ impl<'a, const D: usize> NearBodies<'a, D> {
         viscosity: f64,
         lambda_max: f64,
     ) -> Option<Self> {
-        if D > MOST_DIMENSIONS || shared.bodies.balls().is_empty() {
+        if D > RELAXED_DIMENSIONS || shared.bodies.balls().is_empty() {
             return None;
         }
         let LevelOperator { space, plans, .. } = &level.operator;
@@ -62,7 +56,7 @@ impl<'a, const D: usize> NearBodies<'a, D> {
         let operator = LevelOperator { ranks: shared.ranks, space, plans, cells, work, x, y };
         let dim = operator.dim();
         let [r, e] = [0, 1].map(|_| vec![0.0; dim]);
-        Some(Self { operator, diagonal, chebyshev: Chebyshev::below(lambda_max, dim, &SWEEP), r, e })
+        Some(Self { operator, diagonal, chebyshev: Chebyshev::below(lambda_max, dim, &RELAXED_SWEEP), r, e })
     }
 
     /// Smooths `A x = b` from the present `x`, where `whole` is `A`.
@@ -89,7 +83,7 @@ fn near<const D: usize>(
     let mut near: Vec<f32> = (0..nodes.map.node_count())
         .map(|node| f32::from(u8::from(space.bodies.body_of(node).is_some())))
         .collect();
-    for _ in 0..RINGS {
+    for _ in 0..RELAXED_RINGS {
         let before = near.clone();
         for cell in 0..nodes.map.cell_count() {
             let of_cell = nodes.map.cell(cell);

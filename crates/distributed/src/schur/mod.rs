@@ -8,8 +8,9 @@ mod whole_box;
 
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, Jacobi, SpectralInterval, estimate_lambda_max_from};
+use gluey_linalg::{Chebyshev, Guess, Jacobi, estimate_lambda_max_from};
 use gluey_parallel::Ranks;
+use gluey_stokes::part::{LANCZOS_STEPS, mass_iteration};
 
 use crate::agreement::agreed;
 use crate::flow::FlowError;
@@ -19,13 +20,6 @@ use mass::Masses;
 use mass::SharedMass;
 pub use weights::Flowing;
 use whole_box::WholeBox;
-
-/// As in the serial solver: bound of the relative error of the inverse mass, most steps for it, Lanczos steps
-/// for the largest eigenvalue, and the factor by which the estimate is raised.
-const LARGEST_ERROR: f64 = 1.0 / 16.0;
-const MOST_STEPS: usize = 32;
-const LANCZOS_STEPS: usize = 15;
-const SAFETY: f64 = 1.1;
 
 /// The cells whose pressures there are.
 #[derive(Clone, Copy)]
@@ -64,8 +58,7 @@ where
         let start: Vec<f32> = start.map(|(q, &is_free)| pseudo_random(space, q, is_free)).collect();
         let largest = estimate_lambda_max_from(start, &mut mass, &mut jacobi, LANCZOS_STEPS);
         let largest = largest.map_err(FlowError::Krylov)?;
-        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
-        let chebyshev = Chebyshev::new(space.pressure.owned.len(), steps(interval), interval);
+        let chebyshev = mass_iteration::<D>(space.pressure.owned.len(), largest);
         Ok(Self { mass, jacobi, chebyshev, whole_box })
     }
 
@@ -87,12 +80,6 @@ fn pseudo_random<const D: usize>(space: &LevelSpace<D>, node: usize, is_free: bo
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     let fraction = ((x ^ (x >> 31)) >> 40) as f32 / (1u32 << 24) as f32;
     if is_free { fraction - 0.5 } else { 0.0 }
-}
-
-/// The smallest even number of steps whose error is small enough, as in the serial solver.
-fn steps(interval: SpectralInterval) -> usize {
-    let error = |steps: usize| Chebyshev::<f32>::new(0, steps, interval).contraction_bound();
-    (2..MOST_STEPS).step_by(2).find(|&steps| error(steps) <= LARGEST_ERROR).unwrap_or(MOST_STEPS)
 }
 
 #[cfg(test)]

@@ -10,13 +10,10 @@ use std::collections::BTreeMap;
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Ranks, route};
-use gluey_stokes::part::ratio_inside;
+use gluey_stokes::part::{LEAST_WEIGHT, ratio_inside};
 
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
-
-/// The least weight, for pressures that act on hardly any velocity.
-const LEAST: f64 = 0.05;
 
 /// Where something flows that nothing cuts, and which velocities are fixed there.
 pub struct Flowing {
@@ -47,7 +44,7 @@ where
 {
     let inside = ratio_inside::<D>();
     let ratios = ratios(ranks, space, pressures, flowing, viscosity);
-    let weight = |ratio: Option<f64>| ratio.map_or(1.0, |ratio| (ratio / inside).clamp(LEAST, 1.0));
+    let weight = |ratio: Option<f64>| ratio.map_or(1.0, |ratio| (ratio / inside).clamp(LEAST_WEIGHT, 1.0));
     ratios.into_iter().map(weight).collect()
 }
 

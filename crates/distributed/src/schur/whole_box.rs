@@ -7,15 +7,13 @@
 use gluey_fem::{ImplicitTree, NodeMap, Part, TreeMesh};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
+use gluey_stokes::part::{MOST_PRESSURES, coarsest_level};
 use gluey_stokes::{BoxCorrection, StokesError};
 use nalgebra::{DMatrix, DVector};
 
-use crate::cycle::coarsest_level;
 use crate::pressures::SharedPressures;
 use crate::space::LevelSpace;
 
-/// Largest number of pressures.
-const MOST_PRESSURES: usize = 1000;
 /// Stands for no cell.
 const NOWHERE: u32 = u32::MAX;
 
@@ -98,7 +96,7 @@ where
 
 /// The coarsest mesh of the multigrid, or a coarser one that is small enough.
 fn small_mesh<const D: usize>(tree: &ImplicitTree<'_, D>) -> Option<(TreeMesh<D>, NodeMap<D>)> {
-    let coarsest = coarsest_level(tree).min(tree.max_level());
+    let coarsest = coarsest_level(tree.frame().roots()).min(tree.max_level());
     (0..=coarsest).rev().find_map(|depth| {
         let all = 0..tree.end();
         let mut asked = tree.forgotten();

@@ -22,7 +22,9 @@ use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
 use gluey_parallel::{Communicator, Ranks, Traffic};
-use gluey_stokes::part::{AssembledSmoother, PartMethod, coarse_offset, rings_around_surfaces};
+use gluey_stokes::part::{
+    AssembledSmoother, MOST_ROUNDS, PartMethod, RESTART, coarse_offset, rings_around_surfaces,
+};
 use gluey_stokes::{
     Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
     StokesSystem, Stress,
@@ -43,11 +45,6 @@ use precondition::{SurfaceCycle, SurfaceTriangular};
 pub use space::NearBodies;
 use space::{SurfaceSpace, is_near_surface, owner_of_film};
 use weak::Before;
-
-/// Iterations between restarts.
-const RESTART: usize = 60;
-/// How often penalties of single cells are raised for one flow, at most, as in the serial solver.
-const MOST_ROUNDS: usize = 6;
 
 /// Bodies whose surfaces cut the mesh where they are, all of which every rank knows.
 #[derive(Clone, Copy, Debug)]

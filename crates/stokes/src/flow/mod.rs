@@ -30,6 +30,7 @@ pub use prepared::Prepared;
 pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
 pub use stress::Stress;
+pub use trusted::MOST_ROUNDS;
 pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 

@@ -13,7 +13,7 @@ use crate::error::StokesError;
 use crate::formulation::{Method, Problem};
 
 /// How often penalties are raised for one flow, at most.
-const MOST_ROUNDS: usize = 6;
+pub const MOST_ROUNDS: usize = 6;
 
 /// A flow whose penalties are large enough, and the reduced vector it belongs to.
 pub(super) struct Trusted<const D: usize>

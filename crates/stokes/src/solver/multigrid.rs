@@ -24,6 +24,8 @@ use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::solid::Penalty;
 use crate::space::{VelocitySpace, solid_nodes};
 
+/// Iterations between restarts.
+pub const RESTART: usize = 60;
 /// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
 /// iterations, see `docs/archive/experiments/0010-krylov-vectors.md`.
 const MOST_NOISE: f64 = 1.0;
@@ -50,7 +52,7 @@ where
     Dim<D>: Space<D>,
 {
     fn default() -> Self {
-        let params = GcrParams { max_iterations: 200, restart: 60, ..GcrParams::default() };
+        let params = GcrParams { max_iterations: 200, restart: RESTART, ..GcrParams::default() };
         Self {
             single: Gcr::with_steps(params),
             double: Gcr::with_directions(params),

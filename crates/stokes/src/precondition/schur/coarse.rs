@@ -25,7 +25,7 @@ use crate::operator::{Elements, StokesSystem, SystemOperator, assemble_viscous, 
 use crate::space::Discretisation;
 
 /// Largest dense matrix.
-const MOST_PRESSURES: usize = 1000;
+pub const MOST_PRESSURES: usize = 1000;
 /// Least number of columns of `S_0` that one thread finds.
 const LEAST_COLUMNS: usize = 16;
 /// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.

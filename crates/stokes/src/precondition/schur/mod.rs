@@ -16,8 +16,8 @@ mod weights;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max};
 
-pub use coarse::BoxCorrection;
-pub use weights::ratio_inside;
+pub use coarse::{BoxCorrection, MOST_PRESSURES};
+pub use weights::{LEAST_WEIGHT, ratio_inside};
 
 use crate::error::StokesError;
 use crate::operator::Elements;
@@ -31,7 +31,7 @@ const LARGEST_ERROR: f64 = 1.0 / 16.0;
 const MOST_STEPS: usize = 32;
 /// Lanczos steps for the largest eigenvalue. The bound `(3/2)^D` of a cell does not hold for its matrix in
 /// the unknowns: the pressures that an aggregate or a hanging node takes from others add up.
-const LANCZOS_STEPS: usize = 15;
+pub const LANCZOS_STEPS: usize = 15;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
 
@@ -65,9 +65,8 @@ where
         let diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
         let mut mass = SellMatrix::new(&mass);
         let mut jacobi = Jacobi::new(&diagonal).map_err(StokesError::PressureMass)?;
-        let upper = SAFETY * estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
-        let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper };
-        let chebyshev = Chebyshev::new(mass.dim(), steps(interval), interval);
+        let largest = estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
+        let chebyshev = mass_iteration::<D>(mass.dim(), largest);
         Ok(Self { mass, jacobi, chebyshev, coarse })
     }
 
@@ -80,6 +79,13 @@ where
             space.clear_fixed(z);
         }
     }
+}
+
+/// Chebyshev's iteration for the inverse of a pressure mass matrix of so many rows, whose largest eigenvalue,
+/// scaled by the diagonal, was estimated in [`LANCZOS_STEPS`].
+pub fn mass_iteration<const D: usize>(dim: usize, largest: f64) -> Chebyshev<f32> {
+    let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
+    Chebyshev::new(dim, steps(interval), interval)
 }
 
 /// The smallest even number of Chebyshev steps whose error is small enough, or [`MOST_STEPS`]. An odd number

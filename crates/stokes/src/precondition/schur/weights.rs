@@ -28,7 +28,7 @@ use crate::operator::{Elements, StokesSystem, viscous_diagonal};
 use crate::space::{Discretisation, VelocitySpace, pressure_expansion};
 
 /// The least weight, for pressures that act on hardly any velocity.
-const LEAST: f64 = 0.05;
+pub const LEAST_WEIGHT: f64 = 0.05;
 /// The least and the largest weight in cut cells.
 const OF_CUT_CELLS: [f64; 2] = [0.25, 2.0];
 
@@ -70,7 +70,7 @@ where
         let [least, most] = OF_CUT_CELLS;
         weights[q] = match in_cut_cells[q] {
             true => (ratio / inside).sqrt().clamp(least, most),
-            false => (ratio / inside).clamp(LEAST, 1.0),
+            false => (ratio / inside).clamp(LEAST_WEIGHT, 1.0),
         };
     }
     weights
@@ -313,7 +313,7 @@ mod tests {
         let weights = weights_in(&system, 1.0);
         let mut least = 1.0f64;
         for (q, &weight) in weights.iter().enumerate() {
-            assert!((LEAST..=1.0).contains(&weight));
+            assert!((LEAST_WEIGHT..=1.0).contains(&weight));
             let distance = (discretisation.pressure.point(q) - Vector::repeat(0.5)).norm();
             assert!(distance < 0.4 || weight == 1.0, "{weight} at {distance}");
             least = least.min(weight);

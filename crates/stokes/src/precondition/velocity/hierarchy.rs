@@ -27,7 +27,7 @@ impl<const D: usize> Hierarchy<D> {
     /// The meshes below `finest`. What was the same in the hierarchy `before` is taken from there.
     pub fn new(finest: &Discretisation<D>, before: Self) -> Self {
         let depth = finest.mesh.max_level();
-        let mut meshes: Vec<Discretisation<D>> = (coarsest_level(finest).min(depth)..depth)
+        let mut meshes: Vec<Discretisation<D>> = (coarsest_level(finest.mesh.roots()).min(depth)..depth)
             .map(|level| {
                 let is_kept = |mesh: &&Discretisation<D>| {
                     mesh.mesh.max_level() == level && mesh.mesh.is_coarsening_of(&finest.mesh)
@@ -51,8 +51,8 @@ impl<const D: usize> Hierarchy<D> {
     }
 }
 
-/// Depth of the coarsest mesh.
-fn coarsest_level<const D: usize>(finest: &Discretisation<D>) -> u8 {
-    let roots = finest.mesh.roots().into_iter().min().unwrap_or(1);
+/// Depth of the coarsest mesh of a box with so many roots along its edges.
+pub fn coarsest_level<const D: usize>(roots: [u32; D]) -> u8 {
+    let roots = roots.into_iter().min().unwrap_or(1);
     (COARSEST_CELLS / roots).max(1).ilog2() as u8
 }

@@ -23,7 +23,7 @@ impl Smoothing {
     /// Below the finest level: one sweep after the correction damps more than two of half its degree, at as
     /// many applications, and the restriction needs no residual.
     pub fn of_eliminated() -> Self {
-        Self { sweep: sweep(5, 5.0), before: false }
+        Self { sweep: LEVEL_SWEEP, before: false }
     }
 
     /// Below a penalised solid, where one sweep after the correction loses robustness at high contrast, see
@@ -32,6 +32,10 @@ impl Smoothing {
         Self { sweep: sweep(if is_finest { 2 } else { 3 }, 4.0), before: true }
     }
 }
+
+/// The sweep of levels whose bodies are eliminated.
+pub const LEVEL_SWEEP: ChebyshevParams =
+    ChebyshevParams { degree: 5, ratio: 5.0, safety: SAFETY, lanczos_steps: 0 };
 
 /// A sweep that damps eigenvalues down to the largest over `ratio`.
 pub fn sweep(degree: usize, ratio: f64) -> ChebyshevParams {

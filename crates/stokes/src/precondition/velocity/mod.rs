@@ -8,8 +8,9 @@ mod near_bodies;
 
 pub use coarse::CoarseSolver;
 pub use cycle::{LevelPlan, VCycle};
-pub use hierarchy::Hierarchy;
-pub use level::{Smoothing, cell_lambda_max};
+pub use hierarchy::{Hierarchy, coarsest_level};
+pub use level::{LEVEL_SWEEP, Smoothing, cell_lambda_max};
+pub use near_bodies::{RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP};
 
 /// Factor by which the bound of the largest eigenvalue is raised for hanging nodes and twists, whose
 /// diagonals are not sums over cells: they add little.

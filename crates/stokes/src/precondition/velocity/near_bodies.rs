@@ -7,7 +7,7 @@
 //! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
 //! are most of the cells of the finest mesh, and the iterations saved do not pay for it.
 //!
-//! After the sweep of the level the error `e` on the nodes within [`RINGS`] cells of a body and on the twists
+//! After the sweep of the level the error `e` on the nodes within [`RELAXED_RINGS`] cells of a body and on the twists
 //! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
 use gluey_geom::{Dim, Space};
@@ -18,11 +18,12 @@ use crate::operator::{BlockDiagonal, Restricted, acting, add_at};
 use crate::space::{ActiveCell, VelocitySpace, nodes_of_cells_with};
 
 /// Dimensions in which the nodes around bodies are few enough.
-const MOST_DIMENSIONS: usize = 2;
+pub const RELAXED_DIMENSIONS: usize = 2;
 /// Cells between a body and the farthest relaxed nodes.
-const RINGS: usize = 3;
+pub const RELAXED_RINGS: usize = 3;
 /// A sweep, which damps more of the spectrum than that of a level, since no coarser mesh helps.
-const SWEEP: ChebyshevParams = ChebyshevParams { degree: 6, ratio: 20.0, safety: SAFETY, lanczos_steps: 0 };
+pub const RELAXED_SWEEP: ChebyshevParams =
+    ChebyshevParams { degree: 6, ratio: 20.0, safety: SAFETY, lanczos_steps: 0 };
 
 /// The sweep around the bodies of one level.
 #[derive(Clone, Debug)]
@@ -49,7 +50,7 @@ where
         lambda_max: f64,
     ) -> Option<Self> {
         let discretisation = space.discretisation();
-        if D > MOST_DIMENSIONS {
+        if D > RELAXED_DIMENSIONS {
             return None;
         }
         let nodes = &discretisation.velocity;
@@ -57,7 +58,7 @@ where
         if !near.contains(&true) {
             return None;
         }
-        for _ in 0..RINGS {
+        for _ in 0..RELAXED_RINGS {
             near = nodes_of_cells_with(nodes, &near);
         }
         let relaxed = |n: &usize| near[*n] && space.is_free(*n);
@@ -68,7 +69,7 @@ where
         let acting = acting(discretisation, cells, &near);
         let operator = Restricted::new(space, &acting, cells.len(), positions, None);
         let dim = operator.dim();
-        let chebyshev = Chebyshev::below(lambda_max, dim, &SWEEP);
+        let chebyshev = Chebyshev::below(lambda_max, dim, &RELAXED_SWEEP);
         Some(Self { operator, diagonal, chebyshev, r: vec![0.0; dim], e: vec![0.0; dim] })
     }
 
