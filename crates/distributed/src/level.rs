@@ -3,9 +3,9 @@
 
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_fem::{ImplicitTree, ReferenceMatrices};
-use gluey_linalg::{BadDiagonal, Chebyshev, Guess, LinOp, Preconditioner, invert_spd, vector};
+use gluey_linalg::{BadDiagonal, Chebyshev, Guess, LinOp, invert_spd};
 use gluey_parallel::{GhostPlan, Ranks};
-use gluey_stokes::part::{LEVEL_SWEEP, cell_lambda_max};
+use gluey_stokes::part::{BlockDiagonal, LEVEL_SWEEP, cell_lambda_max};
 
 use crate::agreement::agreed;
 use crate::bodies::{Shared, rigid, rows};
@@ -119,35 +119,6 @@ impl<const D: usize> LinOp<f32> for LevelOperator<'_, D> {
     }
 }
 
-/// The inverse of the diagonal at nodes, and of the blocks of twists.
-#[derive(Clone)]
-pub struct BlockDiagonal {
-    pub nodal: Vec<f32>,
-    blocks: Vec<f32>,
-    rigid: usize,
-}
-
-impl Preconditioner<f32> for BlockDiagonal {
-    fn apply(&mut self, r: &[f32], z: &mut [f32]) {
-        let split = self.nodal.len();
-        vector::multiply(&self.nodal, &r[..split], &mut z[..split]);
-        self.apply_rest(&r[split..], &mut z[split..]);
-    }
-
-    fn diagonal(&self) -> &[f32] {
-        &self.nodal
-    }
-
-    fn apply_rest(&mut self, r: &[f32], z: &mut [f32]) {
-        let n = self.rigid;
-        for (body, block) in self.blocks.chunks_exact(n * n).enumerate() {
-            for (i, row) in block.chunks_exact(n).enumerate() {
-                z[body * n + i] = row.iter().zip(&r[body * n..]).map(|(m, r)| m * r).sum();
-            }
-        }
-    }
-}
-
 /// One level.
 pub struct Level<'a, const D: usize> {
     pub operator: LevelOperator<'a, D>,
@@ -210,7 +181,7 @@ impl<const D: usize> LevelOperator<'_, D> {
         let inverted = self.invert(&mut nodal);
         let blocks = self.blocks(viscosity);
         let blocks = agreed(self.ranks, inverted.map_err(PartError::from).and(blocks))?;
-        Ok(BlockDiagonal { nodal, blocks, rigid: rigid::<D>() })
+        Ok(BlockDiagonal::new(nodal, blocks, rigid::<D>()))
     }
 
     /// Inverts the diagonal at owned nodes, whose entry is zero where nothing is unknown.

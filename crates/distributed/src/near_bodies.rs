@@ -5,10 +5,10 @@ use gluey_fem::ImplicitTree;
 use gluey_fem::cells::Workspace;
 use gluey_linalg::{Chebyshev, Guess, LinOp, vector};
 use gluey_parallel::GhostPlan;
-use gluey_stokes::part::{RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP};
+use gluey_stokes::part::{BlockDiagonal, RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP};
 
 use crate::bodies::{Shared, rigid};
-use crate::level::{BlockDiagonal, Level, LevelOperator};
+use crate::level::{Level, LevelOperator};
 use crate::space::{LevelSpace, Plans, wanted_nodes};
 
 /// The sweep around the bodies of one level.
@@ -38,7 +38,7 @@ impl<'a, const D: usize> NearBodies<'a, D> {
         let near = near(tree, shared, space);
         let owned = space.velocity.owned.clone();
         let mut diagonal = level.diagonal.clone();
-        for (entries, node) in diagonal.nodal.chunks_exact_mut(D).zip(owned) {
+        for (entries, node) in diagonal.nodal_mut().chunks_exact_mut(D).zip(owned) {
             if !near[node] {
                 entries.fill(0.0);
             }

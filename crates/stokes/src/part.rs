@@ -21,7 +21,7 @@ use crate::space::Discretisation;
 
 pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::flow::MOST_ROUNDS;
-pub use crate::operator::PressureForces;
+pub use crate::operator::{BlockDiagonal, PressureForces};
 pub use crate::precondition::schur::{
     LANCZOS_STEPS, LEAST_WEIGHT, MOST_PRESSURES, mass_iteration, ratio_inside,
 };

@@ -34,6 +34,11 @@ impl BlockDiagonal {
         self.twists.iter_mut().for_each(|value| *value *= factor);
     }
 
+    /// The nodal entries, to change them.
+    pub fn nodal_mut(&mut self) -> &mut [f32] {
+        &mut self.nodal
+    }
+
     /// The nodal entries.
     pub fn into_nodal(self) -> Vec<f32> {
         self.nodal
