@@ -2,13 +2,13 @@
 //!
 //! A coarser mesh has its own rigid nodes, so what lies between its surface and that of the finer mesh it
 //! cannot correct: errors that reach over two or three cells from a body, too smooth for the sweep of a
-//! level. Of all errors the V-cycle reduces these the least
-//! (`docs/design/preconditioner.md`). As Brandt (1984) advises for boundaries, some more
-//! relaxation there restores the rate of the interior, at the price of the few cells it acts on. In 3D these
-//! are most of the cells of the finest mesh, and the iterations saved do not pay for it.
+//! level. Of all errors the V-cycle reduces these the least (`docs/design/preconditioner.md`). As Brandt
+//! (1984) advises for boundaries, some more relaxation there restores the rate of the interior, at the price
+//! of the few cells it acts on. In 3D these are most of the cells of the finest mesh, and the iterations
+//! saved do not pay for it.
 //!
-//! After the sweep of the level the error `e` on the nodes within [`RELAXED_RINGS`] cells of a body and on the twists
-//! is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
+//! After the sweep of the level the error `e` on the nodes within [`RELAXED_RINGS`] cells of a body and on
+//! the twists is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp};
