@@ -97,11 +97,11 @@ fn steady(done: &Done) -> anyhow::Result<Option<(f64, Vec<Estimate>)>> {
     Ok(strain.get(skip).map(|&begin| (begin, estimates)))
 }
 
-/// Columns of the rheology with a picture, each with its label.
+/// Columns of the rheology with a picture, each with its label, in the order in which they are drawn.
 const DRAWN: [(usize, &str, &str); 3] = [
-    (0, "viscosity", "relative viscosity"),
     (2, "first-normal-stress", "*N*_{1} / viscous stress"),
     (3, "second-normal-stress", "*N*_{2} / viscous stress"),
+    (0, "viscosity", "relative viscosity"),
 ];
 
 fn findings(done: &[Done]) -> anyhow::Result<Findings> {
@@ -127,7 +127,9 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
         let known = if k == 0 { known() } else { Vec::new() };
         (name, draw("volume fraction *φ*", label, k == 0, series, known))
     };
-    let drawings = drawn.iter().zip(DRAWN).map(drawing).collect();
+    let mut drawings: Vec<_> = drawn.iter().zip(DRAWN).map(drawing).collect();
+    // The page begins with the last one.
+    drawings.rotate_right(1);
     let columns = "model,phi,strain_skipped,viscosity,viscosity_half_width,viscosity_of_contacts,N1,N1_half_width,N2,N2_half_width,\
                    blocks_independent,min_gap_over_a,closed_films,halved_steps";
     Ok(Findings { columns, rows, drawings, remarks: remarks() })
