@@ -4,6 +4,8 @@ use std::path::Path;
 
 use clap::Args;
 use gluey::{Case, Progress, RunOptions, RunReport};
+#[cfg(feature = "mpi")]
+use gluey_parallel::{Communicator, Ranks};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
@@ -47,7 +49,7 @@ impl Manner {
     #[cfg(feature = "mpi")]
     pub fn run_on(
         &self,
-        ranks: &dyn gluey_parallel::Communicator,
+        ranks: &Ranks,
         case: &Case,
         options: &RunOptions,
         file: &Path,
