@@ -7,8 +7,9 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Matrix, Space, Twist};
-use gluey_levelset::Ball;
+use gluey_fem::TreeMesh;
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_levelset::{Ball, Body};
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
@@ -89,6 +90,7 @@ where
         bodies: &[Ball<D>],
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
+        check_resolved(discretisation, bodies, |body| reaches_into(&discretisation.mesh, &bodies[body]))?;
         let system = self.system(discretisation, bodies, viscosity, &|_| true)?;
         Ok((system, Arc::new(self.clone())))
     }
@@ -101,6 +103,17 @@ where
         let factors = cells.iter().map(|weak| (weak.cell, weak.factor()));
         Some(Arc::new(self.with_raised_penalties(factors)))
     }
+}
+
+/// Whether a body lies at least in part in the box of a mesh.
+fn reaches_into<const D: usize>(mesh: &TreeMesh<D>, body: &Ball<D>) -> bool {
+    let (domain, periodic, center) = (mesh.domain(), mesh.periodic(), body.center());
+    let beyond = |d: usize| match periodic[d] {
+        true => 0.0,
+        false => center[d] - center[d].clamp(domain.lower[d], domain.upper[d]),
+    };
+    let is_near = Vector::<D>::from_fn(|d, _| beyond(d)).norm() < body.bounding_radius();
+    is_near && center.iter().all(|x| x.is_finite())
 }
 
 /// The planes that widen films to these heights.
