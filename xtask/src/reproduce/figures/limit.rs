@@ -55,7 +55,7 @@ pub fn limit() -> Canvas {
     gaps.notes =
         vec!["Two spheres that approach at the velocity cos *t*, but for film or contact.".to_owned()];
     gaps.x.label.clear();
-    let memories = chart("*s* ln *D*/*a*,  *γ*", [-0.6, 0.0], curves(|run| &run.memory));
+    let memories = chart("*s* ln *D*/*a*,  *γ*", [-0.7, 0.0], curves(|run| &run.memory));
     stack(&[gaps, memories], |_| FRAME_HEIGHT)
 }
 
