@@ -27,9 +27,8 @@
 //!
 //! Contacts between particles are shared too ([`SharedContact`], `docs/design/ranks.md`).
 //!
-//! Surfaces that cut cells, as in `unfitted`, are those of the serial solver on the part of each rank
-//! (`docs/design/ranks.md`); held bodies, forces on the fluid and boxes without a wall
-//! are for these only. Not for viscosities that vary.
+//! Surfaces that cut cells are those of the formulation `unfitted` on the part of each rank
+//! (`docs/design/ranks.md`). Not for viscosities that vary.
 
 mod agreement;
 mod bodies;

@@ -26,11 +26,6 @@ impl Halo {
         Self(Some(Box::new(Shared { ranks: ranks.clone(), plan, owned })))
     }
 
-    /// Whether no other rank has a part of the vectors.
-    pub fn is_alone(&self) -> bool {
-        self.0.is_none()
-    }
-
     /// Sets the ghosts to what their owners have.
     pub fn update<T: Number>(&mut self, x: &mut [T]) {
         if let Some(Shared { ranks, plan, .. }) = self.0.as_deref_mut() {

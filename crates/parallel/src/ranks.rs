@@ -20,11 +20,6 @@ impl Ranks {
     pub fn alone() -> Self {
         Self::new(Alone::default())
     }
-
-    /// Whether there is no other rank.
-    pub fn is_alone(&self) -> bool {
-        self.size() == 1
-    }
 }
 
 impl std::fmt::Debug for Ranks {

@@ -100,7 +100,7 @@ impl<const B: usize> WeakModes<B> {
         }));
         let places = patches.items().iter().zip(0u32..).map(|(&node, place)| (node as usize, place));
         let places = Jagged::grouped(full.len() / B, places);
-        let [corrections, residuals] = [(); 2].map(|()| Vec::new());
+        let (corrections, residuals) = (Vec::new(), Vec::new());
         Self { modes, weights, diagonal, patches, firsts, places, corrections, residuals }
     }
 
