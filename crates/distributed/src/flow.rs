@@ -80,6 +80,9 @@ pub enum FlowError {
     /// then.
     #[error("flows without mean flow are those around held bodies in boxes without walls, without a stress")]
     Conditions,
+    /// Walls drive a flow that has none.
+    #[error("the box has no wall whose velocity could drive a flow")]
+    NoWall,
     /// As many wrenches or motions as bodies are needed, or none.
     #[error("{found} wrenches or motions for {bodies} bodies")]
     Count {
@@ -201,7 +204,7 @@ impl BoxFlow {
     /// cuts. The function is also taken for the undisturbed flow inside.
     ///
     /// # Errors
-    /// [`FlowError`], on all ranks.
+    /// [`FlowError`], on all ranks; [`FlowError::NoWall`] in a box that is periodic in all directions.
     pub fn solve<const D: usize>(
         &self,
         tree: &mut ImplicitTree<'_, D>,
@@ -212,6 +215,9 @@ impl BoxFlow {
     where
         Dim<D>: Space<D>,
     {
+        if tree.frame().periodic().into_iter().all(|is_periodic| is_periodic) {
+            return Err(FlowError::NoWall);
+        }
         let none = SurfaceBodies { balls: &[], lubrication: Lubrication::None };
         self.solve_around_surfaces(&none, tree, cuts, ranks, &Conditions::boundary(walls))
     }

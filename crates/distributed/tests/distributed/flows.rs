@@ -1,6 +1,6 @@
 //! Flows on several ranks: those of one rank, and those of the serial solver.
 
-use gluey_distributed::{BoxFlow, MyFlow, equal_cuts, weighted_cuts};
+use gluey_distributed::{BoxFlow, FlowError, MyFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Ranks, Threads};
@@ -180,16 +180,13 @@ fn no_rank_holds_arrays_of_the_size_of_the_mesh() {
     }
 }
 
-/// Between no walls nothing drives a flow.
 #[test]
-fn a_box_without_walls_is_at_rest_on_all_ranks() {
-    let speeds = Threads::run(3, |ranks| {
+fn a_box_without_walls_is_an_error_on_all_ranks() {
+    let errors = Threads::run(3, |ranks| {
         let wants = |_: &Vector<2>, _: f64, _: u8| true;
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true; 2], 3, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
-        let flow = FLOW.solve(&mut tree, &cuts, ranks, &|_| Vector::zeros()).unwrap();
-        flow.velocity.iter().map(Vector::norm).fold(0.0, f64::max)
-    })
-    .unwrap();
-    assert_eq!(speeds, [0.0; 3]);
+        FLOW.solve(&mut tree, &cuts, ranks, &walls).err()
+    });
+    assert_eq!(errors.unwrap(), [(); 3].map(|()| Some(FlowError::NoWall)));
 }
