@@ -5,10 +5,12 @@ use std::sync::atomic::Ordering;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
 use gluey_distributed::{BoxFlow, ContactFollower, FlowError, SharedContact, Suspension, SuspensionError};
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_parallel::{Communicator, Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
+
+use crate::support;
 
 const RANKS: usize = 3;
 /// Agreements of one computation; nothing here takes as many.
@@ -52,19 +54,12 @@ fn suspension<const D: usize>(lubrication: Lubrication, is_sheared: bool) -> Sus
 where
     Dim<D>: Space<D>,
 {
+    let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 };
+    let refinement = Refinement { coarsest: 3, surface: 4, band: 2.0 };
     Suspension {
-        flow: BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 },
-        domain: Aabb::unit(),
-        roots: [1; D],
         periods: std::array::from_fn(|d| (is_sheared || d == 0).then_some(1.0)),
-        refinement: Refinement { coarsest: 3, surface: 4, band: 2.0 },
-        lubrication,
-        radii: vec![0.14; 2],
         wrenches: vec![Wrench::default(); 2],
-        given: Vec::new(),
-        force_density: None,
-        shear_rate: 1.0,
-        shear_stress: None,
+        ..support::suspension(flow, refinement, lubrication, vec![0.14; 2])
     }
 }
 

@@ -5,6 +5,8 @@ use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Ranks, Threads};
 
+use crate::support::largest_difference;
+
 /// Of velocities and pressures, over the largest.
 const LIMITS: [f64; 2] = [1.6e-11, 1.7e-10];
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 120 };
@@ -51,13 +53,6 @@ fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
     u[0] = x[1] * (0.3 + x[D - 1]) - 0.2;
     u[1] = (2.0 * std::f64::consts::TAU * x[0]).sin() * (1.0 + 0.5 * x[1]);
     u
-}
-
-fn largest_difference<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
-    let scale = a.iter().map(Vector::norm).fold(0.0, largest);
-    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, largest) / scale
 }
 
 /// Velocities and pressures of all ranks, one after the other.

@@ -9,5 +9,6 @@ mod pieces;
 mod rigid;
 mod serial;
 mod sheared;
+mod support;
 mod surfaces;
 mod trajectory;

@@ -6,13 +6,15 @@ use gluey_distributed::{
     BoxFlow, FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
 };
 use gluey_fem::element::{multi_index, value};
-use gluey_geom::{Aabb, Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Fields, Hydrodynamics};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
 };
+
+use crate::support;
 
 /// Places and radii; the third lies across the border of the box in the first direction.
 const BODIES: [([f64; 3], f64); 3] =
@@ -24,20 +26,9 @@ where
     Dim<D>: Space<D>,
 {
     let surface = if D == 2 { 5 } else { 4 };
-    Suspension {
-        flow: BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 },
-        domain: Aabb::unit(),
-        roots: [1; D],
-        periods: std::array::from_fn(|d| (d == 0).then_some(1.0)),
-        refinement: Refinement { coarsest: surface - 2, surface, band: 2.0 },
-        lubrication,
-        radii: BODIES.map(|body| body.1).to_vec(),
-        wrenches: Vec::new(),
-        given: Vec::new(),
-        force_density: None,
-        shear_rate: 1.0,
-        shear_stress: None,
-    }
+    let flow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 };
+    let refinement = Refinement { coarsest: surface - 2, surface, band: 2.0 };
+    support::suspension(flow, refinement, lubrication, BODIES.map(|body| body.1).to_vec())
 }
 
 fn particles<const D: usize>() -> Vec<Particle<D>>

@@ -3,13 +3,15 @@
 use std::rc::Rc;
 
 use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, Suspension};
-use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Hydrodynamics, MeanStress};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
 };
+
+use crate::support;
 
 const TOLERANCE: f64 = 1e-11;
 const STRAIN: f64 = 0.2;
@@ -28,19 +30,13 @@ where
 {
     let mut wrenches = vec![Wrench::default(); PARTICLES.len()];
     (wrenches[1].force[1], wrenches[2].torque[0]) = (0.3, 0.02);
+    let flow = BoxFlow { viscosity: 1.0, tolerance: TOLERANCE, max_iterations: 100 };
+    let radii = PARTICLES.map(|particle| particle.1).to_vec();
     Suspension {
-        flow: BoxFlow { viscosity: 1.0, tolerance: TOLERANCE, max_iterations: 100 },
-        domain: Aabb::unit(),
-        roots: [1; D],
         periods: [Some(1.0); D],
-        refinement: Refinement::to_level(level),
-        lubrication: Lubrication::Deficit,
-        radii: PARTICLES.map(|particle| particle.1).to_vec(),
         wrenches,
-        given: Vec::new(),
-        force_density: None,
         shear_rate: RATE,
-        shear_stress: None,
+        ..support::suspension(flow, Refinement::to_level(level), Lubrication::Deficit, radii)
     }
 }
 

@@ -4,11 +4,13 @@
 use gluey_distributed::{BoxFlow, MyFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
-use gluey_levelset::{Ball, BallTree, LevelSet};
+use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Ranks, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, GivenOf, Lubrication, Refinement, SolverKind,
 };
+
+use crate::support::{is_in_fluid, velocities};
 
 const TOLERANCE: f64 = 1e-11;
 
@@ -107,8 +109,7 @@ where
     }
 
     /// Velocities of the fluid and twists are those of the serial solver on these numbers of ranks but for a
-    /// limit, in as many iterations, within one, and the same bits run after run. In bodies velocities are
-    /// polynomials that nothing holds but the tolerance.
+    /// limit, in as many iterations, within one, and the same bits run after run.
     fn check(&self, sizes: &[usize], limit: f64) {
         let (serial, balls) = (self.serial(), self.balls());
         let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
@@ -120,8 +121,7 @@ where
             assert_eq!(velocity.len() * D, serial.velocity.len());
             let pairs = velocity.iter().zip(serial.velocity.as_chunks::<D>().0);
             let points = parts.iter().flat_map(|part| &part.points);
-            let is_fluid = |x: &Vector<D>| balls.iter().all(|ball| ball.value(x) < 0.0);
-            let in_fluid = pairs.zip(points).filter(|pair| is_fluid(pair.1));
+            let in_fluid = pairs.zip(points).filter(|pair| is_in_fluid(&balls, pair.1));
             let differences = in_fluid.map(|((a, &b), _)| (a - Vector::from(b)).norm() / scale);
             let difference = differences.fold(0.0, largest);
             let twists = parts[0].twists.iter().zip(&serial.twists);
@@ -169,13 +169,6 @@ where
     let spins = Dim::<D>::spin_slice(&a.spin).iter().zip(Dim::<D>::spin_slice(&b.spin));
     let spins = spins.map(|(a, b)| (a - b).abs());
     spins.chain([(a.velocity - b.velocity).norm()]).fold(0.0, f64::max)
-}
-
-fn velocities<const D: usize>(parts: &[MyFlow<D>]) -> Vec<Vector<D>>
-where
-    Dim<D>: Space<D>,
-{
-    parts.iter().flat_map(|part| part.velocity.iter().copied()).collect()
 }
 
 /// Two bodies of different radii with this gap over the first one's, and a third across the border.

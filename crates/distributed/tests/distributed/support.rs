@@ -1,0 +1,54 @@
+//! Set-ups and measurements that the tests share.
+
+use gluey_distributed::{BoxFlow, MyFlow, Suspension};
+use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_levelset::{Ball, LevelSet};
+use gluey_stokes::{Lubrication, Refinement};
+
+/// Free particles that nothing but the shear drives, in the unit box, which is periodic in the first
+/// direction.
+pub fn suspension<const D: usize>(
+    flow: BoxFlow,
+    refinement: Refinement,
+    lubrication: Lubrication,
+    radii: Vec<f64>,
+) -> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    Suspension {
+        flow,
+        domain: Aabb::unit(),
+        roots: [1; D],
+        periods: std::array::from_fn(|d| (d == 0).then_some(1.0)),
+        refinement,
+        lubrication,
+        radii,
+        wrenches: Vec::new(),
+        given: Vec::new(),
+        force_density: None,
+        shear_rate: 1.0,
+        shear_stress: None,
+    }
+}
+
+/// Velocities of all ranks, one after the other.
+pub fn velocities<const D: usize>(parts: &[MyFlow<D>]) -> Vec<Vector<D>>
+where
+    Dim<D>: Space<D>,
+{
+    parts.iter().flat_map(|part| part.velocity.iter().copied()).collect()
+}
+
+/// Largest difference over the largest of `a`.
+pub fn largest_difference<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
+    let scale = a.iter().map(Vector::norm).fold(0.0, largest);
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, largest) / scale
+}
+
+/// Whether the fluid is at a point. In bodies velocities are polynomials that nothing holds but the tolerance.
+pub fn is_in_fluid<const D: usize>(balls: &[Ball<D>], x: &Vector<D>) -> bool {
+    balls.iter().all(|ball| ball.value(x) < 0.0)
+}
