@@ -80,11 +80,11 @@ fn has_kept(before: &BTreeMap<PathBuf, Vec<u8>>, out: &Path) {
     }
 }
 
-/// Whether the run says of itself that it is complete.
-fn is_complete(out: &Path) -> bool {
+/// What the run says of its own state.
+fn state(out: &Path) -> String {
     let record = fs::read(out.join(format!("{STEM}-run.json"))).expect("a record");
     let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
-    record["state"] == "complete"
+    record["state"].as_str().expect("a state").to_owned()
 }
 
 /// What `gluey info` says of a run is what lies there.
@@ -159,11 +159,13 @@ fn nothing_is_lost_to_one_signal_or_two() {
                 is_told(folder, "killed")
             }
             // Its process was still there, the run was not.
-            (None, Some(9)) if has_record && is_complete(&out) => {
+            (None, Some(9)) if has_record && state(&out) == "complete" => {
                 is_told(folder, "complete");
                 same_results(&out, &folder.join("whole"));
                 fs::remove_dir_all(&out).expect("removed");
             }
+            // It had not begun, or had done what the first signal asks for, and its process was still there.
+            (None, Some(9)) if has_record && state(&out) == "interrupted" => is_told(folder, "interrupted"),
             (None, Some(9)) if has_record => is_told(folder, "killed"),
             (None, Some(_)) => {}
             _ => panic!("{first} {second:?}: {status}: {stderr}"),
