@@ -21,10 +21,11 @@
 //! say what acts on the bodies, [`Prepared`] has their mobility and resistance. One that calls the linear
 //! solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
 //!
-//! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, the penalised
-//! solid, operators, preconditioners, formulations of rigidity, solvers, flows.
+//! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, films, surfaces,
+//! operators, preconditioners, formulations of rigidity, solvers, flows.
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
+
 
 mod dimension;
 mod error;
@@ -34,7 +35,6 @@ mod formulation;
 mod operator;
 pub mod part;
 mod precondition;
-mod solid;
 mod solver;
 mod space;
 mod surface;
@@ -47,7 +47,8 @@ pub use flow::{
 // Near bodies and the films between them.
 pub use film::{Film, FilmForce, Heights, Lubrication, Partner, films, thin_films};
 // How rigidity is imposed.
-pub use formulation::{Formulation, PaperParams, ParticleVelocity};
+pub use formulation::Formulation;
+pub use formulation::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.
@@ -55,8 +56,7 @@ pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
 pub use precondition::schur::BoxCorrection;
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
-// The parts of the system: unknowns, where the penalised solid is, planes that cut bodies flat.
-pub use solid::{PointMatrices, SolidRegion};
+// The parts of the system: unknowns, planes that cut bodies flat.
 pub use space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
 pub use surface::{Flat, Flats};
 // The crates whose types appear in this one.

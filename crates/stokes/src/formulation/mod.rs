@@ -19,7 +19,7 @@ use crate::error::StokesError;
 use crate::film::Lubrication;
 use crate::space::Discretisation;
 
-pub use paper::{PaperParams, ParticleVelocity};
+pub use paper::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
 pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
 

@@ -57,7 +57,7 @@ where
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
     ///
     /// # Errors
-    /// [`StokesError::NoSolid`] for a body that the field does not know.
+    /// For a body that the field does not know.
     fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError>;
 
     /// Predicts the flow from the residual `b` of the `lift` and the guess `x`, by one solve or several.
@@ -76,7 +76,7 @@ where
     /// the rows of the twists where these are unknowns.
     ///
     /// # Errors
-    /// [`StokesError::NoSolid`] for a body that has nothing to act on.
+    /// For a body that has nothing to act on.
     fn add_wrenches(
         &self,
         problem: &Problem<D>,
@@ -287,8 +287,7 @@ where
     /// none on any.
     ///
     /// # Errors
-    /// [`StokesError::Count`] unless there is one entry per body, [`StokesError::NoSolid`] for a penalised
-    /// body that others cover.
+    /// [`StokesError::Count`] unless there is one entry per body, and those of [`Rigidity::add_wrenches`].
     pub fn add_wrenches(&self, wrenches: &[Wrench<D>], b: &mut [f64]) -> Result<(), StokesError> {
         if wrenches.is_empty() {
             return Ok(());
@@ -377,7 +376,7 @@ where
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
     ///
     /// # Errors
-    /// [`StokesError::NoSolid`] for a penalised body that others cover.
+    /// Those of [`Rigidity::twists`].
     pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         self.rigidity.twists(self, velocity)
     }

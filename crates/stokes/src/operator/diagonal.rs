@@ -39,11 +39,6 @@ impl BlockDiagonal {
         &mut self.nodal
     }
 
-    /// The nodal entries.
-    pub fn into_nodal(self) -> Vec<f32> {
-        self.nodal
-    }
-
     /// The nodal entries at some positions, and all twists.
     pub fn restricted(&self, positions: &[u32]) -> Self {
         let nodal = positions.iter().map(|&k| self.nodal[k as usize]).collect();

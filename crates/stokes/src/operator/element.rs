@@ -58,9 +58,8 @@ where
     size: usize,
     /// Scale of the viscous reference matrix in each cell.
     viscous: Vec<f64>,
-    /// Index of the viscous matrix in `own` that a cell has in addition.
-    additional: Vec<Option<u32>>,
-    own: Vec<f64>,
+    /// The viscous matrix that a cell has in addition; no entries where none has.
+    own: Vec<Option<Box<[f64]>>>,
 }
 
 impl<'a, const D: usize> Elements<'a, D>
@@ -75,10 +74,9 @@ where
             reference: discretisation.reference(),
             size,
             viscous: system.cells.iter().map(|cell| cell.viscous).collect(),
-            additional: vec![None; system.cells.len()],
             own: Vec::new(),
         };
-        new.add_penalty(discretisation.mesh.cell_count());
+        new.add_viscosity(discretisation.mesh.cell_count());
         new
     }
 
@@ -97,32 +95,24 @@ where
         &self.system.cells
     }
 
-    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where a
-    /// surface cuts it.
+    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where the
+    /// viscosity varies.
     pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
-        let size = ReferenceMatrices::<D>::VELOCITY.pow(2);
-        let own = self.additional[index].map(|own| &self.own[own as usize * size..][..size]);
-        (self.viscous[index], own)
+        (self.viscous[index], self.own.get(index).and_then(Option::as_deref))
     }
 
-    fn add_penalty(&mut self, cell_count: usize) {
-        let Some(penalty) = &self.system.penalty else { return };
+    fn add_viscosity(&mut self, cell_count: usize) {
+        let Some(added) = &self.system.added else { return };
         let mut slot = vec![usize::MAX; cell_count];
         for (k, cell) in self.system.cells.iter().enumerate() {
             slot[cell.cell as usize] = k;
         }
-        let mut own_count = 0;
-        self.own.reserve_exact(penalty.stress.cut_cell_count() * ReferenceMatrices::<D>::VELOCITY.pow(2));
-        penalty.stress.for_each_cell(|cell, scale, own| {
+        self.own = vec![None; self.system.cells.len()];
+        added.for_each_matrix(&mut |cell, scale, own| {
             let slot = slot[cell as usize];
-            let scale = penalty.factor * scale;
             match own {
                 None => self.viscous[slot] += scale,
-                Some(own) => {
-                    self.own.extend(own.iter().map(|k| scale * k));
-                    self.additional[slot] = Some(own_count);
-                    own_count += 1;
-                }
+                Some(own) => self.own[slot] = Some(own.iter().map(|k| scale * k).collect()),
             }
         });
     }

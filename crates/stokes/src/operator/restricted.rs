@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Scalar};
 use rayon::prelude::*;
 
-use super::cells::cell_operator;
-use crate::solid::Penalty;
+use super::cells::{AddedViscosity, cell_operator};
+use super::system::StokesSystem;
 use crate::space::{ActiveCell, Discretisation, VelocitySpace, cells_touching};
 
 /// Entries that a thread takes at a time.
@@ -29,15 +29,24 @@ impl<T: CellScalar, const D: usize> CountedOperator<T, D>
 where
     Dim<D>: Space<D>,
 {
-    /// The operator of these cells, of `cell_count` in all, on the velocities of `space`.
-    pub fn new(
+    /// The fluid's operator in these cells, of `cell_count` in all, on the velocities of `space`.
+    pub fn new(space: &VelocitySpace<D>, cells: &[ActiveCell], cell_count: usize) -> Self {
+        Self::with_viscosity(space, cells, cell_count, None)
+    }
+
+    /// The operator of a system in some of its cells.
+    pub fn within(system: &StokesSystem<D>, cells: &[ActiveCell]) -> Self {
+        Self::with_viscosity(&system.space, cells, system.cells.len(), system.added.as_deref())
+    }
+
+    fn with_viscosity(
         space: &VelocitySpace<D>,
         cells: &[ActiveCell],
         cell_count: usize,
-        penalty: Option<&Penalty<D>>,
+        added: Option<&dyn AddedViscosity<D>>,
     ) -> Self {
         Self {
-            operator: cell_operator(space, cells, penalty),
+            operator: cell_operator(space, cells, added),
             work: Workspace::default(),
             dim: space.dim(),
             share: cells.len() as f64 / cell_count.max(1) as f64,
@@ -101,20 +110,10 @@ impl<T: CellScalar, const D: usize> Restricted<T, D>
 where
     Dim<D>: Space<D>,
 {
-    /// The operator on the velocities at `positions`, on which `acting` cells of `cell_count` act.
-    pub fn new(
-        space: &VelocitySpace<D>,
-        acting: &[ActiveCell],
-        cell_count: usize,
-        positions: Vec<u32>,
-        penalty: Option<&Penalty<D>>,
-    ) -> Self {
-        Self {
-            operator: CountedOperator::new(space, acting, cell_count, penalty),
-            velocity: vec![T::ZERO; space.dim()],
-            load: vec![T::ZERO; space.dim()],
-            positions,
-        }
+    /// The operator on the velocities at `positions`, from one of the cells that act on these.
+    pub fn new(operator: CountedOperator<T, D>, positions: Vec<u32>) -> Self {
+        let [velocity, load] = [(); 2].map(|()| vec![T::ZERO; operator.dim]);
+        Self { positions, operator, velocity, load }
     }
 
     /// The unknowns among the reduced velocities.

@@ -12,9 +12,8 @@ use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{DirectError, LinOp, Scalar, vector};
 
-use super::cells::cell_operator;
+use super::cells::{AddedViscosity, cell_operator};
 use crate::film::{Film, FilmCorrection, FilmCoupling, FilmNetwork, FilmRow, Heights};
-use crate::solid::Penalty;
 use crate::space::{
     ActiveCell, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells, own_cells,
 };
@@ -29,8 +28,8 @@ pub struct StokesSystem<const D: usize> {
     pub pressure: PressureSpace<D>,
     /// Cells that are not rigid, with the scales of their matrices.
     pub(crate) cells: Vec<ActiveCell>,
-    /// The penalised solid, in the `paper` formulation.
-    pub(crate) penalty: Option<Penalty<D>>,
+    /// What comes to the viscosity of the fluid in these cells.
+    pub(crate) added: Option<Arc<dyn AddedViscosity<D>>>,
     /// The cells that surfaces cut, where the mesh does not fit the bodies.
     pub(crate) surfaces: Option<Arc<SurfaceCoupling<D>>>,
     /// The films between bodies that are too thin for the mesh.
@@ -45,12 +44,21 @@ where
 {
     /// The system with fluid viscosity `viscosity` on the velocities of `space`.
     pub fn new(space: VelocitySpace<D>, viscosity: f64) -> Self {
-        Self::with_penalty(space, viscosity, None)
+        Self::with_viscosity(space, viscosity, None)
     }
 
-    /// The system with a penalised solid beside the fluid.
-    pub(crate) fn penalised(space: VelocitySpace<D>, viscosity: f64, penalty: Penalty<D>) -> Self {
-        Self::with_penalty(space, viscosity, Some(penalty))
+    /// The same with what comes to the viscosity of the fluid.
+    pub(crate) fn with_viscosity(
+        space: VelocitySpace<D>,
+        viscosity: f64,
+        added: Option<Arc<dyn AddedViscosity<D>>>,
+    ) -> Self {
+        let cells = active_cells(&space, viscosity);
+        let (pressure, operator) = rayon::join(
+            || PressureSpace::new(&space, &cells),
+            || cell_operator(&space, &cells, added.as_deref()),
+        );
+        Self { pressure, operator, space, cells, added, surfaces: None, films: None, viscosity }
     }
 
     /// The system in `fluid` cells that nothing cuts and in those that `surfaces` cut.
@@ -68,7 +76,7 @@ where
             operator: cell_operator(&space, &own_cells(space.discretisation(), &cells), None),
             space,
             cells,
-            penalty: None,
+            added: None,
             surfaces: Some(Arc::new(surfaces)),
             films: None,
             viscosity,
@@ -84,15 +92,6 @@ where
         );
         let films = FilmCoupling::new(&self.space, films, flows, heights, self.viscosity);
         Self { films: Some(Arc::new(films)), ..self }
-    }
-
-    fn with_penalty(space: VelocitySpace<D>, viscosity: f64, penalty: Option<Penalty<D>>) -> Self {
-        let cells = active_cells(&space, viscosity);
-        let (pressure, operator) = rayon::join(
-            || PressureSpace::new(&space, &cells),
-            || cell_operator(&space, &cells, penalty.as_ref()),
-        );
-        Self { pressure, operator, space, cells, penalty, surfaces: None, films: None, viscosity }
     }
 
     /// Mesh and nodes.

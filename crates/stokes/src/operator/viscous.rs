@@ -31,7 +31,7 @@ where
         let fluid = |marked: &[bool]| {
             let own = own_cells(system.discretisation(), &system.cells);
             let cells = acting(system.discretisation(), &own, marked);
-            CountedOperator::new(&system.space, &cells, system.cells.len(), system.penalty.as_ref())
+            CountedOperator::within(system, &cells)
         };
         Self {
             fluid: fluid(marked),

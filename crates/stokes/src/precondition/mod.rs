@@ -1,20 +1,15 @@
-//! The preconditioner: a V-cycle on the velocities, a correction for the penalised solid, and the Schur
-//! complement.
+//! The preconditioner: a V-cycle on the velocities, a correction around it, and the Schur complement.
 
-mod assembly;
+pub mod assembly;
 mod block_triangular;
-mod numbered;
+pub mod numbered;
 pub mod schur;
-pub mod solid;
 pub mod surface;
 pub mod velocity;
 
 use crate::space::Discretisation;
 
 pub use block_triangular::BlockTriangular;
-
-/// In 3D the operator in the bodies is factorised on meshes with at most this many cells per largest radius.
-const FACTORISED_CELLS: f64 = 2.0;
 
 /// The meshes of a velocity cycle and the bodies in them.
 #[derive(Clone, Copy, Debug)]
@@ -23,19 +18,6 @@ pub struct CycleLevels<'a, const D: usize> {
     pub meshes: &'a [Discretisation<D>],
     /// Radius of the largest body.
     pub radius: f64,
-}
-
-impl<const D: usize> CycleLevels<'_, D> {
-    /// Whether bodies are factorised on the last of the meshes.
-    pub fn are_factorised(&self) -> bool {
-        let is_small = |mesh: &Discretisation<D>| self.radius <= FACTORISED_CELLS * mesh.finest_cell_size();
-        D == 2 || self.meshes.len() < 2 || self.meshes.last().is_none_or(is_small)
-    }
-
-    /// The first of the levels.
-    pub fn below(&self, count: usize) -> Self {
-        Self { meshes: &self.meshes[..count], ..*self }
-    }
 }
 
 /// A correction around the velocity cycle, for the errors that its levels do not reduce.

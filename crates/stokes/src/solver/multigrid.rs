@@ -5,9 +5,8 @@
 //! `V` one V-cycle on the velocity. Steps are in `f32`, with a residual in `f64` now and then, or in `f64`
 //! where rounding would disturb them ([`rounding_noise`]). The levels are the tree's own: level `l` is the
 //! mesh cut at depth `l`. On every level the solid nodes of that level are eliminated; a coarse correction
-//! enters as the rigid motion that fits it best. In the `paper` formulation the finest level moves every node
-//! the solid touches rigidly: what the penalty makes stiff is invisible to all levels, and left to a
-//! correction, [`crate::precondition::solid::PenalisedCorrection`].
+//! enters as the rigid motion that fits it best. Errors that the levels do not reduce are left to a correction
+//! that the formulation has.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
@@ -21,7 +20,6 @@ use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle};
 use crate::precondition::{BlockTriangular, CycleLevels};
-use crate::solid::Penalty;
 use crate::space::{VelocitySpace, solid_nodes};
 
 /// Iterations between restarts.
@@ -182,13 +180,13 @@ fn run<S: Scalar>(
 }
 
 /// Change of the viscous force when a velocity is rounded to single precision, over the force of a velocity
-/// as smooth as the box: a difference of neighbours, times the viscosity of the solid.
+/// as smooth as the box: a difference of neighbours, times the largest viscosity.
 fn rounding_noise<const D: usize>(system: &StokesSystem<D>) -> f64
 where
     Dim<D>: Space<D>,
 {
     let mesh = &system.discretisation().mesh;
-    let contrast = system.penalty.as_ref().map_or(1.0, Penalty::contrast);
+    let contrast = system.added.as_ref().map_or(1.0, |added| added.contrast());
     let cells = mesh.domain().extent().max() / mesh.size(mesh.max_level());
     f64::from(f32::EPSILON) * contrast * cells * cells
 }

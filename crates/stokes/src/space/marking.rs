@@ -69,20 +69,3 @@ pub fn cells_touching<const D: usize>(nodes: &NodeMap<D>, marked: &[bool]) -> Ve
     }
     (0..nodes.cell_count()).map(|c| nodes.cell(c).iter().any(|&n| acting[n as usize])).collect()
 }
-
-/// The nodes of all cells next to those with nodes that two bodies touch; `None` without such cells.
-pub fn around_films<const D: usize>(
-    discretisation: &Discretisation<D>,
-    touched: &[Option<u32>],
-) -> Option<Vec<bool>> {
-    let nodes = &discretisation.velocity;
-    let mut film = vec![false; nodes.node_count()];
-    for cell in (0..nodes.cell_count()).map(|cell| nodes.cell(cell)) {
-        let mut bodies = cell.iter().filter_map(|&n| touched[n as usize]);
-        let first = bodies.next();
-        if bodies.any(|body| Some(body) != first) {
-            cell.iter().for_each(|&n| film[n as usize] = true);
-        }
-    }
-    film.contains(&true).then(|| nodes_of_cells_with(nodes, &film))
-}

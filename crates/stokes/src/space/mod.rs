@@ -11,8 +11,6 @@ mod velocity;
 pub use cells::{ActiveCell, active_cells, all_cells, own_cells};
 pub use discretisation::Discretisation;
 pub use expansion::{pressure_expansion, velocity_expansion};
-pub use marking::{
-    around_films, around_finest_cells, cells_touching, moves_as_one, nodes_of_cells_with, solid_nodes,
-};
+pub use marking::{around_finest_cells, cells_touching, moves_as_one, nodes_of_cells_with, solid_nodes};
 pub use pressure::PressureSpace;
 pub use velocity::{SolidNodes, VelocitySpace};

@@ -1,7 +1,15 @@
 //! `paper` (Verdon et al. 2010): viscosity `eta = I eta_s + (1-I) eta_f` (eq. 5) and the augmented Lagrangian
 //! of eqs. 9 and 10, see [`uzawa`].
 
+mod correction;
+mod moments;
+mod multigrid;
 mod params;
+mod pressures;
+mod quadrature;
+mod region;
+mod smoother;
+mod stress;
 mod uzawa;
 
 use gluey_fem::Evaluator;
@@ -9,18 +17,21 @@ use std::sync::Arc;
 
 use gluey_geom::{Dim, Space, Twist, Wrench};
 use gluey_levelset::{Ball, Ramp, ViscosityLaw};
-use gluey_linalg::vector;
+use gluey_linalg::{ChebyshevParams, vector};
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
-use crate::precondition::solid::PenalisedCorrection;
-use crate::precondition::velocity::Smoothing;
+use crate::precondition::velocity::{LEVEL_SWEEP, Smoothing};
 use crate::precondition::{Correction, CycleLevels};
-use crate::solid::{Penalty, PointMatrices, SolidRegion, SolidStress};
 use crate::space::{Discretisation, SolidNodes, VelocitySpace};
 
+use correction::PenalisedCorrection;
+use stress::{Penalty, SolidStress};
+
 pub use params::{PaperParams, ParticleVelocity};
+pub use quadrature::PointMatrices;
+pub use region::SolidRegion;
 
 /// The parameters, and the matrices of quadrature points, which are the same on all meshes.
 pub struct Paper<const D: usize> {
@@ -55,9 +66,9 @@ where
         let touched = region.touched_nodes(&discretisation.velocity, bodies);
         let nowhere = vec![None; discretisation.velocity.node_count()];
         let space = VelocitySpace::new::<Ball<D>>(discretisation, &[], &nowhere);
-        let penalty = Penalty { factor: law.excess(), stress };
-        let system = StokesSystem::penalised(space, viscosity, penalty);
-        let solid = PenalisedSolid { params: *params, region, touched, matrices: matrices.clone() };
+        let penalty = Penalty { factor: law.excess(), stress: stress.clone() };
+        let system = StokesSystem::with_viscosity(space, viscosity, Some(Arc::new(penalty)));
+        let solid = PenalisedSolid { params: *params, region, stress, touched, matrices: matrices.clone() };
         Ok((system, Arc::new(solid)))
     }
 }
@@ -67,6 +78,7 @@ where
 struct PenalisedSolid<const D: usize> {
     params: PaperParams,
     region: SolidRegion<D>,
+    stress: SolidStress<D>,
     /// Nodes of the cells with any solid, each with the body nearest to it.
     touched: SolidNodes,
     matrices: Arc<PointMatrices<D>>,
@@ -98,7 +110,7 @@ where
         x: &mut [f64],
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError> {
-        uzawa::solve(&self.params, problem, data, x, solve)
+        uzawa::solve(&self.params, &self.stress, problem, data, x, solve)
     }
 
     /// As forces per unit of volume, spread over the solid.
@@ -126,7 +138,7 @@ where
 
     fn smoothing(&self, levels: CycleLevels<'_, D>, is_finest: bool) -> Option<Smoothing> {
         match levels.are_factorised() {
-            true => Some(Smoothing::of_penalised(is_finest)),
+            true => Some(smoothing(is_finest)),
             // The smoother of the finest mesh is that of the solid.
             false => (!is_finest).then(Smoothing::of_eliminated),
         }
@@ -140,4 +152,11 @@ where
     ) -> Result<Option<Box<dyn Correction>>, StokesError> {
         Ok(Some(Box::new(PenalisedCorrection::new(elements, &self.touched, finest, levels)?)))
     }
+}
+
+/// Below a penalised solid one sweep after the correction loses robustness at high contrast, see
+/// `docs/archive/decisions/0012-passes-over-memory.md`.
+fn smoothing(is_finest: bool) -> Smoothing {
+    let degree = if is_finest { 2 } else { 3 };
+    Smoothing { sweep: ChebyshevParams { degree, ratio: 4.0, ..LEVEL_SWEEP }, before: true }
 }

@@ -13,14 +13,15 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
 use super::params::PaperParams;
+use super::stress::{SolidOperator, SolidStress};
 use crate::error::StokesError;
 use crate::formulation::problem::{Data, LinearSolve, Multiplier, Problem};
 use crate::operator::StokesSystem;
-use crate::solid::SolidOperator;
 
 /// The steps of a prediction; `x` holds the last velocity and pressure afterwards.
 pub fn solve<const D: usize>(
     params: &PaperParams,
+    stress: &SolidStress<D>,
     problem: &Problem<D>,
     data: &Data<'_>,
     x: &mut [f64],
@@ -31,8 +32,7 @@ where
 {
     let (system, reference) = (&problem.system, vector::norm(data.b));
     let mut multiplier = vec![0.0; system.space.full_dim()];
-    let penalty = system.penalty.as_ref().filter(|_| params.uzawa_steps > 1);
-    let mut stress = penalty.map(|penalty| penalty.stress.operator(system.space.nodes()));
+    let mut stress = (params.uzawa_steps > 1).then(|| stress.operator(system.space.nodes()));
     for step in 0..params.uzawa_steps {
         let mut b = data.b.to_vec();
         if let Some(stress) = stress.as_mut().filter(|_| step > 0) {

@@ -18,6 +18,8 @@ use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval
 
 pub use coarse::{BoxCorrection, MOST_PRESSURES};
 pub use weights::{LEAST_WEIGHT, ratio_inside};
+#[cfg(test)]
+pub use {cells::PressureMatrices, weights::weights};
 
 use crate::error::StokesError;
 use crate::operator::Elements;

@@ -14,9 +14,9 @@ use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells,
 #[derive(Clone, Copy, Debug)]
 pub struct Smoothing {
     /// A sweep with the block diagonal as preconditioner. Its largest eigenvalue is known.
-    sweep: ChebyshevParams,
+    pub sweep: ChebyshevParams,
     /// Whether a sweep from zero goes before the correction, beside the one after it.
-    before: bool,
+    pub before: bool,
 }
 
 impl Smoothing {
@@ -25,22 +25,11 @@ impl Smoothing {
     pub fn of_eliminated() -> Self {
         Self { sweep: LEVEL_SWEEP, before: false }
     }
-
-    /// Below a penalised solid, where one sweep after the correction loses robustness at high contrast, see
-    /// `docs/archive/decisions/0012-passes-over-memory.md`.
-    pub fn of_penalised(is_finest: bool) -> Self {
-        Self { sweep: sweep(if is_finest { 2 } else { 3 }, 4.0), before: true }
-    }
 }
 
 /// The sweep of levels whose bodies are eliminated.
 pub const LEVEL_SWEEP: ChebyshevParams =
     ChebyshevParams { degree: 5, ratio: 5.0, safety: SAFETY, lanczos_steps: 0 };
-
-/// A sweep that damps eigenvalues down to the largest over `ratio`.
-pub fn sweep(degree: usize, ratio: f64) -> ChebyshevParams {
-    ChebyshevParams { degree, ratio, safety: SAFETY, ..ChebyshevParams::default() }
-}
 
 /// One level of the multigrid.
 #[derive(Clone, Debug)]
@@ -93,7 +82,7 @@ where
         cells.retain(|c| touches[c.cell as usize]);
         let (diagonal, operator) = rayon::join(
             || block_diagonal(space, &cells, smoothed),
-            || CountedOperator::new(space, &cells, cell_count, None),
+            || CountedOperator::new(space, &cells, cell_count),
         );
         let mut diagonal = diagonal?;
         diagonal.hold(|body| !smooths_twists || space.is_held(body));

@@ -14,7 +14,7 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp};
 
 use super::SAFETY;
-use crate::operator::{BlockDiagonal, Restricted, acting, add_at};
+use crate::operator::{BlockDiagonal, CountedOperator, Restricted, acting, add_at};
 use crate::space::{ActiveCell, VelocitySpace, nodes_of_cells_with};
 
 /// Dimensions in which the nodes around bodies are few enough.
@@ -67,7 +67,7 @@ where
         let diagonal = diagonal.restricted(&positions);
         positions.extend((space.full_dim()..space.dim()).map(|k| k as u32));
         let acting = acting(discretisation, cells, &near);
-        let operator = Restricted::new(space, &acting, cells.len(), positions, None);
+        let operator = Restricted::new(CountedOperator::new(space, &acting, cells.len()), positions);
         let dim = operator.dim();
         let chebyshev = Chebyshev::below(lambda_max, dim, &RELAXED_SWEEP);
         Some(Self { operator, diagonal, chebyshev, r: vec![0.0; dim], e: vec![0.0; dim] })

@@ -6,7 +6,7 @@ use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 
 use crate::film::Lubrication;
-use crate::formulation::{Formulation, PaperParams, Problem};
+use crate::formulation::{Formulation, Problem};
 
 use super::MultigridSolver;
 use crate::solver::SaddleSolver;
@@ -58,7 +58,11 @@ where
 #[test]
 fn operators_of_all_levels_are_symmetric_to_round_off() {
     let unfitted = Formulation::Unfitted { lubrication: Lubrication::Deficit };
-    for formulation in [unfitted, Formulation::Paper(PaperParams::default())] {
+    let all = [
+        unfitted,
+        Formulation::Paper(crate::PaperParams::default()),
+    ];
+    for formulation in all {
         level_operators_are_symmetric::<2>(formulation);
         level_operators_are_symmetric::<3>(formulation);
     }

@@ -6,6 +6,8 @@
 //! among the solid's, so a cell that is cut stays cut as it is. [`SchwarzPatches`] on the cells smooth all
 //! but the coarsest level, which is factorised; on the finest the smoother of the whole mesh does.
 
+use gluey_fem::Evaluator;
+use gluey_fem::element::{multi_index, values_1d};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, ChebyshevParams, DirectSpd, Guess, LinOp, Ordering, Preconditioner, Prolongation,
@@ -87,6 +89,48 @@ where
         }
         x.fill(0.0);
         correct(&mut self.coarser, &mut self.direct, b, x);
+    }
+}
+
+impl<'a, const D: usize> NumberedNodes<'a, D> {
+    /// The numbered nodes of each cell whose centre has a number.
+    pub fn cells(&self) -> impl Iterator<Item = Vec<u32>> {
+        let nodes = &self.mesh.velocity;
+        let centre = nodes.nodes_per_cell() / 2;
+        let number = |node: &u32| self.nodes.number(*node as usize).map(|number| number as u32);
+        (0..nodes.cell_count())
+            .map(|cell| nodes.cell(cell))
+            .filter(move |cell| self.nodes.contains(cell[centre] as usize))
+            .map(move |cell| cell.iter().filter_map(number).collect())
+    }
+
+    /// The nodes of a coarser mesh that lie at numbered ones, and the interpolation from them.
+    pub fn coarsened<'b>(&self, mesh: &'b Discretisation<D>) -> (NumberedNodes<'b, D>, Prolongation) {
+        let mut found: Vec<(usize, [[f64; 3]; D])> = Vec::with_capacity(self.nodes.len());
+        let mut is_in = vec![false; mesh.velocity.node_count()];
+        let evaluator = Evaluator::new(&mesh.mesh);
+        for &node in self.nodes.positions() {
+            let Some((cell, x)) = evaluator.locate(&self.mesh.velocity.point(node as usize)) else {
+                continue;
+            };
+            let place = (0..D).rev().try_fold(0, |place, d| {
+                let along = 2.0 * x[d];
+                (along == along.round()).then_some(3 * place + along as usize)
+            });
+            if let Some(place) = place {
+                is_in[mesh.velocity.cell(cell)[place] as usize] = true;
+            }
+            found.push((cell, x.map(|x| values_1d(2, x))));
+        }
+        let coarse = NumberedNodes::new(mesh, |node| is_in[node]);
+        let terms = |(cell, line): &(usize, [[f64; 3]; D])| {
+            let weight = |i: usize| (0..D).map(|d| line[d][multi_index::<D>(i, 3)[d]]).product::<f64>();
+            let numbers = mesh.velocity.cell(*cell).iter().map(|&n| coarse.nodes.number(n as usize));
+            let terms = numbers.enumerate().filter_map(|(i, number)| Some((number? as u32, weight(i))));
+            terms.filter(|term| term.1 != 0.0).collect::<Vec<_>>()
+        };
+        let prolongation = Prolongation::new(coarse.nodes.len(), found.iter().map(terms));
+        (coarse, prolongation)
     }
 }
 

@@ -9,10 +9,13 @@ use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, Workspace};
 use gluey_fem::{Chunks, NodeMap};
-use gluey_linalg::Jagged;
+use gluey_geom::{Dim, Space};
+use gluey_linalg::BlockError;
 
+use super::pressures::pressure_matrices;
 use super::quadrature::PointMatrices;
 use super::region::{SolidCell, SolidRegion};
+use crate::operator::{AddedViscosity, CellViscosities};
 use crate::space::Discretisation;
 
 /// The viscous stress of the penalised solid and the factor it enters the operator with.
@@ -24,10 +27,35 @@ pub struct Penalty<const D: usize> {
     pub stress: SolidStress<D>,
 }
 
-impl<const D: usize> Penalty<D> {
+impl<const D: usize> AddedViscosity<D> for Penalty<D>
+where
+    Dim<D>: Space<D>,
+{
     /// The ratio `r` of the viscosities of solid and fluid.
-    pub fn contrast(&self) -> f64 {
+    fn contrast(&self) -> f64 {
         1.0 / (1.0 - self.factor)
+    }
+
+    fn values(&self, cell_count: usize) -> CellViscosities {
+        self.stress.viscosities(self.factor, cell_count)
+    }
+
+    /// Cells wholly inside have a multiple of the reference; for cut ones the matrix is integrated.
+    fn for_each_matrix(&self, visit: &mut dyn FnMut(u32, f64, Option<&[f64]>)) {
+        let SolidStress { cells, scales, matrices, .. } = &self.stress;
+        for (solid, &scale) in cells.iter().zip(scales.iter()) {
+            match solid.fraction.is_empty() {
+                true => visit(solid.cell, self.factor * scale, None),
+                false => visit(solid.cell, self.factor, Some(&matrices.matrix(scale, &solid.fraction))),
+            }
+        }
+    }
+
+    fn pressure_matrices(
+        &self,
+        cells: &mut dyn Iterator<Item = (f64, f64, Option<&[f64]>)>,
+    ) -> Result<Vec<Option<Vec<f64>>>, BlockError> {
+        pressure_matrices::<D>(cells)
     }
 }
 
@@ -41,30 +69,9 @@ pub struct SolidStress<const D: usize> {
     matrices: Arc<PointMatrices<D>>,
 }
 
-/// The viscosities that the solid adds to those of the cells of a mesh, times `h^(D-2)`.
-pub struct SolidViscosities {
-    /// One value per cell.
-    uniform: Vec<f64>,
-    /// Values at the quadrature points of each cell in which they vary.
-    points: Jagged<f64>,
-}
-
-impl SolidViscosities {
-    /// The viscosity times `h^(D-2)` that the solid adds in all of a cell, and at its quadrature points if it
-    /// varies.
-    pub fn of(&self, cell: usize) -> (f64, &[f64]) {
-        (self.uniform[cell], &self.points[cell])
-    }
-}
-
 impl<const D: usize> SolidStress<D> {
-    /// Gauss points per direction.
-    pub fn quadrature(&self) -> usize {
-        self.matrices.line()
-    }
-
     /// `factor I eta_s h^(D-2)` in the cells of a mesh.
-    pub fn viscosities(&self, factor: f64, cell_count: usize) -> SolidViscosities {
+    fn viscosities(&self, factor: f64, cell_count: usize) -> CellViscosities {
         let mut uniform = vec![0.0; cell_count];
         let mut solid = self.cells.iter().zip(self.scales.iter()).peekable();
         let points = uniform.iter_mut().enumerate().map(|(cell, uniform)| {
@@ -77,7 +84,7 @@ impl<const D: usize> SolidStress<D> {
             fraction.iter().map(move |f| scale * f)
         });
         let points = points.collect();
-        SolidViscosities { uniform, points }
+        CellViscosities { uniform, points, quadrature: self.matrices.line() }
     }
 
     /// Takes `K(I eta_s)` for `eta_s = solid_viscosity`.
@@ -97,22 +104,6 @@ impl<const D: usize> SolidStress<D> {
         }
     }
 
-    /// Number of solid cells that are not wholly inside.
-    pub fn cut_cell_count(&self) -> usize {
-        self.cells.iter().filter(|solid| !solid.fraction.is_empty()).count()
-    }
-
-    /// Calls `visit(cell, scale, matrix)` for every solid cell: interior ones have the matrix `scale * K`,
-    /// cut ones their own, which is integrated for the visit.
-    pub fn for_each_cell(&self, mut visit: impl FnMut(u32, f64, Option<&[f64]>)) {
-        for (solid, &scale) in self.cells.iter().zip(self.scales.iter()) {
-            match solid.fraction.is_empty() {
-                true => visit(solid.cell, scale, None),
-                false => visit(solid.cell, 1.0, Some(&self.matrices.matrix(scale, &solid.fraction))),
-            }
-        }
-    }
-
     /// The operator, ready to be applied.
     pub fn operator(&self, nodes: &NodeMap<D>) -> SolidOperator<D> {
         let viscosities = self.viscosities(1.0, nodes.cell_count());
@@ -120,7 +111,7 @@ impl<const D: usize> SolidStress<D> {
             let (viscous, points) = viscosities.of(solid.cell as usize);
             CellData { cell: solid.cell as usize, viscous, divergence: 0.0, points }
         });
-        let operator = CellOperator::new(&self.chunks, nodes, data, self.quadrature(), &[], 0);
+        let operator = CellOperator::new(&self.chunks, nodes, data, viscosities.quadrature, &[], 0);
         SolidOperator { operator, work: Workspace::default() }
     }
 }

@@ -16,10 +16,11 @@ use gluey_linalg::{
 
 use crate::error::StokesError;
 use crate::operator::{
-    CountedOperator, Elements, Restricted, StokesSystem, acting, add_at, block_diagonal, gather,
+    CountedOperator, Elements, Restricted, StokesSystem, acting, add_at, gather, nodal_diagonal,
 };
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
+use crate::space::{Discretisation, nodes_of_cells_with};
 
 /// A sweep with diagonal and patches as preconditioner.
 const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 1.1, lanczos_steps: 8 };
@@ -43,10 +44,9 @@ where
     ) -> Result<Self, StokesError> {
         let discretisation = system.discretisation();
         let acting = acting(discretisation, &system.cells, smoothed);
-        let fluid = block_diagonal(&system.space, &acting, smoothed);
-        let diagonal = fluid.map_err(StokesError::AroundSolid)?.into_nodal();
-        let cell_count = system.cells.len();
-        let operator = CountedOperator::new(&system.space, &acting, cell_count, system.penalty.as_ref());
+        let fluid = nodal_diagonal(&system.space, &acting, smoothed);
+        let diagonal = fluid.map_err(StokesError::AroundSolid)?;
+        let operator = CountedOperator::within(system, &acting);
         let preconditioner = DiagonalAndPatches::new(diagonal, solid, solid.positions(), matrix)?;
         let mut sweep = Sweep::new(operator, preconditioner)?;
         sweep.operator.take_applications();
@@ -88,22 +88,21 @@ where
     pub fn new(elements: &Elements<'_, D>, film: &[bool], touched: &[bool]) -> Result<Self, StokesError> {
         let system = elements.system();
         let discretisation = system.discretisation();
-        let (space, penalty) = (&system.space, system.penalty.as_ref());
+        let space = &system.space;
         let is_free = |node: usize| film[node] && space.is_free(node);
         let positions = NumberedNodes::new(discretisation, is_free).positions();
         let solid = NumberedNodes::new(discretisation, |node| is_free(node) && touched[node]);
         let matrix = assemble_on_nodes(&solid, elements)?;
         let acting = acting(discretisation, &system.cells, film);
-        let fluid = block_diagonal(space, &acting, film).map_err(StokesError::AroundSolid)?;
+        let fluid = nodal_diagonal(space, &acting, film).map_err(StokesError::AroundSolid)?;
         let mut diagonal = vec![0.0; positions.len()];
-        gather(&positions, &fluid.into_nodal(), &mut diagonal);
+        gather(&positions, &fluid, &mut diagonal);
         let place = |k: &u32| positions.binary_search(k).expect("the film has its solid") as u32;
         let places = solid.positions().iter().map(place).collect();
         let preconditioner = DiagonalAndPatches::new(diagonal, &solid, places, &matrix)?;
         let [r, x] = [(); 2].map(|()| vec![0.0; positions.len()]);
-        let cell_count = system.cells.len();
-        let operator = CountedOperator::new(space, &acting, cell_count, penalty);
-        let restricted = Restricted::new(space, &acting, cell_count, positions, penalty);
+        let operator = CountedOperator::within(system, &acting);
+        let restricted = Restricted::new(CountedOperator::within(system, &acting), positions);
         let mut sweep = Sweep::new(restricted, preconditioner)?;
         sweep.operator.take_applications();
         Ok(Self { sweep, operator, r, x })
@@ -132,6 +131,23 @@ where
     pub fn take_applications(&mut self) -> f64 {
         self.sweep.operator.take_applications() + self.operator.take_applications()
     }
+}
+
+/// The nodes of all cells next to those with nodes that two bodies touch; `None` without such cells.
+pub fn around_films<const D: usize>(
+    discretisation: &Discretisation<D>,
+    touched: &[Option<u32>],
+) -> Option<Vec<bool>> {
+    let nodes = &discretisation.velocity;
+    let mut film = vec![false; nodes.node_count()];
+    for cell in (0..nodes.cell_count()).map(|cell| nodes.cell(cell)) {
+        let mut bodies = cell.iter().filter_map(|&n| touched[n as usize]);
+        let first = bodies.next();
+        if bodies.any(|body| Some(body) != first) {
+            cell.iter().for_each(|&n| film[n as usize] = true);
+        }
+    }
+    film.contains(&true).then(|| nodes_of_cells_with(nodes, &film))
 }
 
 /// Chebyshev's method from zero: the operator, its preconditioner, load and velocity.
@@ -211,11 +227,13 @@ impl<const D: usize> Preconditioner<f32> for DiagonalAndPatches<D> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::error::DiagonalError;
-    use crate::formulation::{Formulation, PaperParams, Problem};
-    use crate::solid::{Penalty, PointMatrices, SolidRegion};
-    use crate::space::{VelocitySpace, around_films};
+    use crate::formulation::paper::stress::{Penalty, SolidStress};
+    use crate::formulation::{Formulation, PaperParams, PointMatrices, Problem, SolidRegion};
+    use crate::space::VelocitySpace;
     use gluey_fem::{ReferenceMatrices, TreeMesh};
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::{Ball, Ramp};
@@ -240,19 +258,23 @@ mod tests {
         let formulation = Formulation::Paper(PaperParams { viscosity_ratio, ..PaperParams::default() });
         let mesh = TreeMesh::refine(Aabb::unit(), [1; 3], [false; 3], level, |_, _, _| true).unwrap();
         let problem = Problem::new(mesh, balls, 1.0, formulation).unwrap();
+        let touched = region(&problem).0.touched_nodes(&problem.discretisation().velocity, balls);
+        (problem, touched)
+    }
+
+    /// Where its solid is, by these matrices.
+    fn region(problem: &Problem<3>) -> (SolidRegion<3>, Arc<PointMatrices<3>>) {
         let (discretisation, params) = (problem.discretisation(), PaperParams::default());
         let ramp = Ramp::new(params.ramp * discretisation.finest_cell_size());
-        let region = SolidRegion::new(discretisation, balls, ramp, &PointMatrices::new(params.quadrature));
-        let touched = region.touched_nodes(&discretisation.velocity, balls);
-        (problem, touched)
+        let matrices = Arc::new(PointMatrices::new(params.quadrature));
+        (SolidRegion::new(discretisation, &problem.bodies, ramp, &matrices), matrices)
     }
 
     /// Energies `e^T A e` of a random error on the marked nodes, before and after `sweep` corrects
     /// it from its load.
     fn energies(problem: &Problem<3>, marked: &[bool], sweep: impl FnOnce(&[f64], &mut [f64])) -> [f64; 2] {
         let system = &problem.system;
-        let (cells, penalty) = (&system.cells, system.penalty.as_ref());
-        let mut a = CountedOperator::new(&system.space, cells, cells.len(), penalty);
+        let mut a = CountedOperator::within(system, &system.cells);
         let mut energy = |e: &[f64], load: &mut [f64]| {
             a.apply(e, load);
             vector::dot(e, load)
@@ -293,9 +315,11 @@ mod tests {
     /// The smoother of a mesh where everything is solid, for viscosities of any sign.
     fn smoother_of(viscosity: f64, factor: f64) -> Result<PenalisedSmoother<3>, StokesError> {
         let (problem, _) = problem(2, 1e2, &[Ball::new(Vector::repeat(0.47), 0.3)]);
-        let Penalty { stress, .. } = problem.system.penalty.clone().unwrap();
+        let (region, matrices) = region(&problem);
+        let stress = SolidStress::new(problem.discretisation(), &region, &matrices, 1e2);
         let space = problem.system.space.clone();
-        let system = StokesSystem::penalised(space, viscosity, Penalty { factor, stress });
+        let penalty = Arc::new(Penalty { factor, stress });
+        let system = StokesSystem::with_viscosity(space, viscosity, Some(penalty));
         let elements = Elements::new(&system, ReferenceMatrices::<3>::VELOCITY);
         let solid = NumberedNodes::new(system.discretisation(), |n| system.space.is_free(n));
         let matrix = assemble_on_nodes(&solid, &elements).unwrap();

@@ -20,17 +20,33 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
 
 use super::multigrid::SolidMultigrid;
-use super::smoother::{FilmSmoother, PenalisedSmoother};
+use super::smoother::{FilmSmoother, PenalisedSmoother, around_films};
 use crate::error::StokesError;
 use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscous_on, gather};
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::{Correction, CycleLevels};
-use crate::space::{VelocitySpace, around_films, around_finest_cells, moves_as_one, nodes_of_cells_with};
+use crate::space::{Discretisation, VelocitySpace, around_finest_cells, moves_as_one, nodes_of_cells_with};
 
 /// Where the solid is less stiff a sweep around films saves no iterations, see
 /// `docs/design/paper.md`.
 const LEAST_CONTRAST_OF_FILMS: f64 = 300.0;
+
+/// In 3D the operator in the bodies is factorised on meshes with at most this many cells per largest radius.
+const FACTORISED_CELLS: f64 = 2.0;
+
+impl<const D: usize> CycleLevels<'_, D> {
+    /// Whether bodies are factorised on the last of the meshes.
+    pub fn are_factorised(&self) -> bool {
+        let is_small = |mesh: &Discretisation<D>| self.radius <= FACTORISED_CELLS * mesh.finest_cell_size();
+        D == 2 || self.meshes.len() < 2 || self.meshes.last().is_none_or(is_small)
+    }
+
+    /// The first of the levels.
+    pub fn below(&self, count: usize) -> Self {
+        Self { meshes: &self.meshes[..count], ..*self }
+    }
+}
 
 /// The correction of the velocity cycle for the penalised solid: the approximate inverse on its nodes, the
 /// sweeps, and the operators that give the residuals between them.
@@ -87,7 +103,7 @@ where
         } else {
             SolidInverse::smoothed(elements, &block, levels)?
         };
-        let is_stiff = system.penalty.as_ref().is_some_and(|p| p.contrast() >= LEAST_CONTRAST_OF_FILMS);
+        let is_stiff = system.added.as_ref().is_some_and(|solid| solid.contrast() >= LEAST_CONTRAST_OF_FILMS);
         let films = (smoother.is_some() && is_stiff).then(|| around_films(discretisation, touched)).flatten();
         let new = |nodes| FilmSmoother::new(elements, nodes, &block);
         let film = films.as_deref().map(new).transpose()?;
@@ -96,19 +112,18 @@ where
         let mut strained = acting(discretisation, &system.cells, &swept);
         let body_of = |&n: &u32| rigid.body_of(n as usize);
         strained.retain(|c| !moves_as_one(nodes.cell(c.cell as usize).iter().map(body_of)));
-        let (space, cell_count) = (&system.space, system.cells.len());
+        let nodal = system.space.full_dim();
         block.iter_mut().zip(films.iter().flatten()).for_each(|(is_in, film)| *is_in |= film);
         let solid = acting(discretisation, &system.cells, &block);
-        let penalty = system.penalty.as_ref();
         Ok(Self {
-            around_solid: CountedOperator::new(space, &solid, cell_count, penalty),
-            around_rigid: CountedOperator::new(space, &strained, cell_count, penalty),
+            around_solid: CountedOperator::within(system, &solid),
+            around_rigid: CountedOperator::within(system, &strained),
             b: vec![0.0; positions.len()],
             x: vec![0.0; positions.len()],
             load: vec![0.0; rigid.dim()],
             velocity: vec![0.0; rigid.dim()],
-            rigid_load: vec![0.0; space.full_dim()],
-            r: vec![0.0; space.full_dim()],
+            rigid_load: vec![0.0; nodal],
+            r: vec![0.0; nodal],
             rigid: rigid.clone(),
             cycle,
             positions,
