@@ -12,7 +12,7 @@ const STEPS: &[&str] = &[
     "clippy --workspace --all-targets --release -- -D warnings",
     "doc --workspace --no-deps --document-private-items --release",
     // Features one by one: whatever else is compiled turns all of them on.
-    "check --release -p gluey-geom -p gluey-motion -p gluey-contact --no-default-features",
+    "check --release -p gluey-geom -p gluey-motion -p gluey-contact -p gluey-stokes --no-default-features",
     "check --release -p gluey-contact --no-default-features --features dim2",
     "check --release -p gluey-contact --no-default-features --features dim3",
     "check --release -p gluey-contact --no-default-features --features parallel,serde",

@@ -25,6 +25,7 @@ pub enum StokesError {
     },
     /// No quadrature point of the penalised solid belongs to a body, or so few that they fix no rotation: its
     /// motion is unknown.
+    #[cfg(feature = "paper")]
     #[error(
         "body {} with a radius of {:.3} cells ({radius}, cells of size {cell_size}) has no solid from which to tell its \
          motion: refine the mesh, or move it out of the body that covers it",
@@ -130,6 +131,7 @@ pub enum StokesError {
         source: DiagonalError,
     },
     /// The fluid around a penalised solid cannot be smoothed.
+    #[cfg(feature = "paper")]
     #[error("the fluid around the solid cannot be smoothed: {0}")]
     AroundSolid(#[source] DiagonalError),
     /// The mesh around a surface has an unknown without stiffness.
@@ -146,6 +148,7 @@ pub enum StokesError {
         source: BlockError,
     },
     /// The penalised operator on the nodes of a cell is not positive definite.
+    #[cfg(feature = "paper")]
     #[error("the solid cannot be smoothed cell by cell: {0}")]
     SolidPatch(#[source] BlockError),
     /// The matrix that approximates the Schur complement has a bad diagonal.
@@ -172,13 +175,14 @@ impl StokesError {
     pub fn with_bodies(mut self, number: impl Fn(usize) -> usize) -> Self {
         match &mut self {
             Self::Unresolved { body, .. }
-            | Self::NoSolid { body, .. }
             | Self::NoRoot { body, .. }
             | Self::NoPenalty { body, .. }
             | Self::WeakSurface { body, .. }
             | Self::CoarseSurface { body }
             | Self::AtSurface(DiagonalError::Body { body, .. })
             | Self::SurfaceBlock { body, .. } => *body = number(*body),
+            #[cfg(feature = "paper")]
+            Self::NoSolid { body, .. } => *body = number(*body),
             _ => {}
         }
         self
@@ -247,6 +251,7 @@ mod tests {
         let (body, radius, cell_size) = (2, 0.05, 0.125);
         for error in [
             StokesError::Unresolved { body, radius, cell_size },
+            #[cfg(feature = "paper")]
             StokesError::NoSolid { body, radius, cell_size },
         ] {
             let text = error.to_string();

@@ -26,6 +26,8 @@
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
+// Without it nothing takes up some of what a formulation may ask of the rooms below.
+#![cfg_attr(not(feature = "paper"), allow(dead_code, unused_imports))]
 
 mod dimension;
 mod error;
@@ -48,6 +50,7 @@ pub use flow::{
 pub use film::{Film, FilmForce, Heights, Lubrication, Partner, films, thin_films};
 // How rigidity is imposed.
 pub use formulation::Formulation;
+#[cfg(feature = "paper")]
 pub use formulation::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};

@@ -1,9 +1,11 @@
 //! How rigidity is imposed: [`Formulation`] names the ways, each of which implements [`Method`] and
 //! [`problem::Rigidity`].
 //!
-//! Another formulation is a file or folder of this room and an arm of [`Formulation::method`].
+//! Another formulation is a file or folder of this room and an arm of [`Formulation::method`]. `paper` is
+//! compiled with the feature of that name.
 
 mod load;
+#[cfg(feature = "paper")]
 mod paper;
 mod problem;
 mod unfitted;
@@ -19,6 +21,7 @@ use crate::error::StokesError;
 use crate::film::Lubrication;
 use crate::space::Discretisation;
 
+#[cfg(feature = "paper")]
 pub use paper::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
 pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
@@ -27,6 +30,7 @@ pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formulation {
     /// Penalty and Uzawa multiplier of the paper.
+    #[cfg(feature = "paper")]
     Paper(PaperParams),
     /// Nitsche's conditions on the true surfaces, with aggregated elements.
     Unfitted {
@@ -61,6 +65,7 @@ impl Formulation {
         Dim<D>: Space<D>,
     {
         match *self {
+            #[cfg(feature = "paper")]
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
             Self::Unfitted { lubrication } => Arc::new(unfitted::Unfitted::new(lubrication)),
         }
@@ -70,6 +75,7 @@ impl Formulation {
     /// [`StokesError::Parameter`] for a value out of range.
     pub(crate) fn check(&self) -> Result<(), StokesError> {
         match self {
+            #[cfg(feature = "paper")]
             Self::Paper(params) => params.check(),
             Self::Unfitted { .. } => Ok(()),
         }

@@ -60,6 +60,7 @@ fn operators_of_all_levels_are_symmetric_to_round_off() {
     let unfitted = Formulation::Unfitted { lubrication: Lubrication::Deficit };
     let all = [
         unfitted,
+        #[cfg(feature = "paper")]
         Formulation::Paper(crate::PaperParams::default()),
     ];
     for formulation in all {
