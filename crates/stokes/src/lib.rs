@@ -40,6 +40,7 @@ mod precondition;
 mod solver;
 mod space;
 mod surface;
+mod term;
 
 // A flow, or one after the other, and the meshes they are computed on.
 pub use flow::{

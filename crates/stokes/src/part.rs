@@ -129,7 +129,7 @@ where
     /// [`StokesError::SurfaceBlock`] or [`StokesError::AtSurface`] where penalties are too small.
     pub fn new(problem: &'p Problem<D>) -> Result<Self, StokesError> {
         let elements = Elements::new(&problem.system, ReferenceMatrices::<D>::VELOCITY);
-        let surfaces = problem.system.surfaces.as_ref().ok_or(StokesError::NotPrepared)?;
+        let surfaces = problem.system.surfaces().ok_or(StokesError::NotPrepared)?;
         let smoother = SurfaceSmoother::assembled(&elements, surfaces)?;
         Ok(Self { elements, smoother })
     }
@@ -160,7 +160,7 @@ where
 
     /// The own cells that surfaces cut.
     pub fn own_cut_cells(&self) -> impl Iterator<Item = usize> + '_ {
-        let cut = self.surfaces.iter().flat_map(|surfaces| &surfaces.cut.cells);
+        let cut = self.surfaces().into_iter().flat_map(|surfaces| &surfaces.cut.cells);
         cut.map(|cell| cell.cell as usize).filter(|&cell| self.discretisation().is_own(cell))
     }
 
@@ -178,7 +178,7 @@ where
         let unit = self.discretisation().reference().pressure_mass;
         let mut matrix = vec![0.0; corners * corners];
         for cell in self.own_flowing_cells() {
-            let surfaces = self.surfaces.as_ref().map(|s| (s, s.cut.place[cell] as usize));
+            let surfaces = self.surfaces().map(|s| (s, s.cut.place[cell] as usize));
             if let Some((surfaces, place)) = surfaces.filter(|(s, place)| *place < s.cut.cells.len()) {
                 let viscosity = self.viscosity();
                 surfaces.for_each_mass(place, |q, r, mass| matrix[q * corners + r] = mass / viscosity);
@@ -193,11 +193,11 @@ where
     /// The bodies that own cells or own films depend on.
     pub fn bodies_here(&self) -> Vec<bool> {
         let mut here = vec![false; self.space.body_count()];
-        for (cell, body) in self.surfaces.iter().flat_map(|surfaces| surfaces.pieces()) {
+        for (cell, body) in self.terms.iter().flat_map(|term| term.pieces()) {
             here[body] |= self.discretisation().is_own(cell);
         }
         let nodal = self.space.full_dim();
-        for (k, _) in self.film_rows().flatten() {
+        for (k, _) in self.rows().flatten() {
             if let Some(twist) = (*k as usize).checked_sub(nodal) {
                 here[twist / Dim::<D>::RIGID] = true;
             }
@@ -207,20 +207,10 @@ where
 
     /// The first bodies of own films, ascending.
     pub fn bodies_with_films(&self) -> Vec<u32> {
-        let mut bodies: Vec<u32> = self.films.iter().flat_map(|films| films.first_bodies()).collect();
+        let mut bodies: Vec<u32> = self.films().into_iter().flat_map(|films| films.first_bodies()).collect();
         bodies.sort_unstable();
         bodies.dedup();
         bodies
-    }
-
-    /// Entries of the films' rows in reduced velocities.
-    pub fn film_rows(&self) -> impl Iterator<Item = &[(u32, f64)]> {
-        self.films.iter().flat_map(|films| (0..films.dim()).map(|row| films.row(row)))
-    }
-
-    /// The inverses of about the Schur complement of the films' forces.
-    pub fn film_inverses(&self) -> &[f64] {
-        self.films.as_ref().map_or(&[], |films| films.schur_inverses())
     }
 }
 
@@ -261,7 +251,7 @@ where
     /// pressures at all nodes.
     pub fn fluid_integrals(&self, [velocity, pressure]: [&[f64]; 2]) -> FluidIntegrals<D> {
         let mut sums = FluidIntegrals { volume: 0.0, velocity: Vector::zeros(), pressure: 0.0 };
-        let Some(surfaces) = &self.system.surfaces else { return sums };
+        let Some(surfaces) = self.system.surfaces() else { return sums };
         let (discretisation, cut) = (self.discretisation(), &surfaces.cut);
         let weights = fluid_weights(discretisation, &discretisation.velocity, cut);
         for (weight, u) in weights.iter().zip(velocity.chunks_exact(D)) {

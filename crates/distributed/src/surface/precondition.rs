@@ -188,7 +188,7 @@ where
         let ranks = space.ranks;
         let [ru, rp, rf] = space.parts(r);
         let [zu, zp, zf] = space.parts_mut(z);
-        let films = zf.iter_mut().zip(rf).zip(system.film_inverses());
+        let films = zf.iter_mut().zip(rf).zip(system.row_inverses());
         films.for_each(|((z, r), inverse)| *z = -inverse * r);
         vector::convert(-1.0, rp, rhs);
         space.pressures.remove_mean(ranks, rhs);

@@ -115,7 +115,7 @@ where
             ranks,
             level: level.clone(),
             own_bodies: bodies.owned(rank),
-            film_dim: system.film_dim(),
+            film_dim: system.row_count(),
             body_count: bodies.ids.len(),
             plan,
             velocities: GhostPlan::joined(&of_velocities),
@@ -285,7 +285,7 @@ where
     fn needed(&self, level: &LevelSpace<D>, system: &StokesSystem<D>) -> Vec<bool> {
         let mut needed = vec![false; self.nodes.map.node_count()];
         level.part.own().for_each(|cell| self.mark(cell, &mut needed));
-        for (k, _) in system.film_rows().flatten() {
+        for (k, _) in system.rows().flatten() {
             if let Some(needed) = needed.get_mut(*k as usize / D) {
                 *needed = true;
             }

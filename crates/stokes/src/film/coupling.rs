@@ -17,8 +17,9 @@
 //! closes they are small. With about the resistance `R_0` that the mesh has, the Schur complement is
 //! `1 + R / R_0`.
 
+use gluey_fem::Evaluator;
 use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
-use gluey_linalg::{Jagged, Scalar};
+use gluey_linalg::{Jagged, Scalar, vector};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
@@ -27,6 +28,7 @@ use super::near::{Film, Heights, Partner};
 use super::network::FilmRow;
 use super::through::FilmFlow;
 use crate::space::VelocitySpace;
+use crate::term::{Load, Product, Scratch, Term};
 
 /// Least cosine between the normals of one film in two steps.
 const SAME_FILM: f64 = 0.7;
@@ -204,11 +206,6 @@ where
         self.scales.len()
     }
 
-    /// The entries of a row in reduced velocities; that of its own force is -1.
-    pub fn row(&self, row: usize) -> &[(u32, f64)] {
-        &self.rows[row]
-    }
-
     /// The rows of relative motions of surfaces, on the twists, the first of which is entry `first` of
     /// reduced velocities.
     pub fn rows_of_motion(&self, first: usize) -> Vec<FilmRow> {
@@ -223,50 +220,13 @@ where
         (0..self.dim()).filter(is_of_motion).map(of_twists).collect()
     }
 
-    /// The inverses of the entries of about the Schur complement.
-    pub fn schur_inverses(&self) -> &[f64] {
-        &self.inverses
-    }
-
-    /// `(y, z) += (s B^T g, s B x - g)` for reduced velocities.
-    pub fn add<T: Scalar>(&self, [x, g]: [&[T]; 2], [y, z]: [&mut [T]; 2]) {
-        let measure = |(row, (z, g)): (usize, (&mut T, &T))| {
-            let terms = self.rows[row].iter();
-            let motion: f64 = terms.map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
-            *z += T::from_f64(motion - g.to_f64());
-        };
-        let rows = z.par_iter_mut().zip(g).enumerate().with_min_len(ROWS);
-        rayon::join(|| self.add_loads(g, y), || rows.for_each(measure));
-    }
-
     /// `y += s B^T g`.
-    pub fn add_loads<S: Scalar, T: Scalar>(&self, g: &[S], y: &mut [T]) {
+    fn add_loads<S: Scalar, T: Scalar>(&self, g: &[S], y: &mut [T]) {
         for (row, g) in self.rows.iter().zip(g) {
             for &(k, weight) in row {
                 y[k as usize] += T::from_f64(weight * g.to_f64());
             }
         }
-    }
-
-    /// `z += s B V` for the strain of a linear flow that velocities are relative to, at bodies and in the
-    /// films between them.
-    pub fn add_strain(&self, strain: &Matrix<D>, z: &mut [f64]) {
-        self.subtract_partners(|film| (!film.partner.is_wall()).then(|| strain * film.branch()), z);
-        self.for_each_flow(|row, film, flow| {
-            // From the mean place of the two centres to the middle of the film.
-            let arm = film.normal * (0.5 * (film.arm(0) - film.arm(1)));
-            let places = flow.first + flow.total * arm.transpose();
-            z[row] += self.scales[row] * strain.component_mul(&places).sum();
-        });
-    }
-
-    /// `z += s B V` for the velocities of boundary nodes in a nodal field, which are not unknowns.
-    pub fn add_boundary(&self, u: &[f64], z: &mut [f64]) {
-        self.for_each_flow(|row, _, flow| {
-            let at = |node: u32| Vector::<D>::from_column_slice(&u[node as usize * D..][..D]);
-            let sum: f64 = flow.boundary.iter().map(|(node, weight)| weight.dot(&at(*node))).sum();
-            z[row] += self.scales[row] * sum;
-        });
     }
 
     fn for_each_flow(&self, mut visit: impl FnMut(usize, &Film<D>, &FilmFlow<D>)) {
@@ -278,7 +238,7 @@ where
 
     /// `z -= s B V` for what the velocities of the partners are beside those of bodies: those of walls, or of
     /// the image of a body in a flow that is not periodic. `at` gives them by the film.
-    pub fn subtract_partners(&self, at: impl Fn(&Film<D>) -> Option<Vector<D>>, z: &mut [f64]) {
+    fn subtract_partners(&self, at: impl Fn(&Film<D>) -> Option<Vector<D>>, z: &mut [f64]) {
         let known = self.films.iter().enumerate().filter_map(|(index, film)| Some((index, film, at(film)?)));
         for (index, film, velocity) in known {
             for (k, mode) in self.modes[index].iter().enumerate() {
@@ -287,6 +247,65 @@ where
                 z[row] -= self.scales[row] * motion;
             }
         }
+    }
+}
+
+impl<X: Scalar, T, const D: usize> Product<X, T> for FilmCoupling<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// `(y, z) += (s B^T g, s B x - g)`.
+    fn add(&self, [x, _, g]: [&[X]; 3], [y, _, z]: [&mut [X]; 3], _: &mut Scratch<T>) {
+        let measure = |(row, (z, g)): (usize, (&mut X, &X))| {
+            let terms = self.rows[row].iter();
+            let motion: f64 = terms.map(|&(k, weight)| weight * x[k as usize].to_f64()).sum();
+            *z += X::from_f64(motion - g.to_f64());
+        };
+        let rows = z.par_iter_mut().zip(g).enumerate().with_min_len(ROWS);
+        rayon::join(|| self.add_loads(g, y), || rows.for_each(measure));
+    }
+}
+
+impl<const D: usize> Term<D> for FilmCoupling<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn row_count(&self) -> usize {
+        self.dim()
+    }
+
+    fn row(&self, row: usize) -> &[(u32, f64)] {
+        &self.rows[row]
+    }
+
+    fn row_inverses(&self) -> &[f64] {
+        &self.inverses
+    }
+
+    /// `z += s B V` for the velocities of walls, and of boundary nodes in a film.
+    fn add_data(&self, space: &VelocitySpace<D>, u: &[f64], z: &mut [f64]) {
+        let evaluator = Evaluator::new(&space.discretisation().mesh);
+        let of_wall = |film: &Film<D>| evaluator.motion_at(space.nodes(), u, &film.far_point()).velocity;
+        self.subtract_partners(|film| film.partner.is_wall().then(|| of_wall(film)), z);
+        self.for_each_flow(|row, _, flow| {
+            let at = |node: u32| Vector::<D>::from_column_slice(&u[node as usize * D..][..D]);
+            let sum: f64 = flow.boundary.iter().map(|(node, weight)| weight.dot(&at(*node))).sum();
+            z[row] += self.scales[row] * sum;
+        });
+    }
+
+    /// `z -= s B V` for the strain at bodies and in the films between them.
+    fn add_strain(&self, strain: &Matrix<D>, _: &mut Load<D>, z: &mut [f64]) {
+        let mut motions = vec![0.0; z.len()];
+        let of_image = |film: &Film<D>| (!film.partner.is_wall()).then(|| strain * film.branch());
+        self.subtract_partners(of_image, &mut motions);
+        self.for_each_flow(|row, film, flow| {
+            // From the mean place of the two centres to the middle of the film.
+            let arm = film.normal * (0.5 * (film.arm(0) - film.arm(1)));
+            let places = flow.first + flow.total * arm.transpose();
+            motions[row] += self.scales[row] * strain.component_mul(&places).sum();
+        });
+        vector::axpy(-1.0, &motions, z);
     }
 }
 

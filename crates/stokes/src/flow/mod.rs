@@ -314,10 +314,10 @@ where
     ) -> Result<(Vec<f64>, Option<NodalFields>), StokesError> {
         match &self.warm_start {
             Some(warm) if self.params.solver == SolverKind::Multigrid => {
-                // Only films need it.
-                let b = match &problem.system.films {
-                    Some(_) => conditions.data(problem)?.1,
-                    None => Vec::new(),
+                // Only forces of terms need it.
+                let b = match problem.system.row_count() {
+                    0 => Vec::new(),
+                    _ => conditions.data(problem)?.1,
                 };
                 let (guess, last) = warm.moved(problem.discretisation()).into_guess(&problem.system, &b);
                 Ok((guess, Some(last)))
@@ -357,12 +357,12 @@ where
     let mut velocity = problem.velocity(lift, x);
     let space = &problem.system.space;
     let mut mean_velocity = None;
-    if let Some(surfaces) = &problem.system.surfaces
+    if let Some(surfaces) = problem.system.surfaces()
         && space.holds_any()
     {
         mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
     }
-    if let (false, Some(surfaces)) = (space.is_anchored(), &problem.system.surfaces) {
+    if let (false, Some(surfaces)) = (space.is_anchored(), problem.system.surfaces()) {
         let mean = mean::mean_velocity(problem, surfaces, &velocity);
         mean::subtract(space, &mut velocity, &mean, |_| true);
         // Guesses made of solutions would let what no equation determines grow from step to step.
@@ -405,7 +405,7 @@ fn stress_of<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    if problem.system.surfaces.is_none() {
+    if problem.system.surfaces().is_none() {
         return Err(StokesError::Unsupported { what: "stresses of suspensions" });
     }
     let mut pressure = pressure[..problem.system.pressure.dim()].to_vec();

@@ -42,7 +42,7 @@ pub fn dissipation<const D: usize>(problem: &Problem<D>, velocity: &[f64], strai
 where
     Dim<D>: Space<D>,
 {
-    let Some(surfaces) = &problem.system.surfaces else { return 0.0 };
+    let Some(surfaces) = problem.system.surfaces() else { return 0.0 };
     let cut = &surfaces.cut;
     let energy = StrainEnergy::new(problem.discretisation(), cut);
     let of_cell = |cell: usize| match problem.discretisation().is_own(cell) {
@@ -58,7 +58,7 @@ pub fn mean_pressure<const D: usize>(problem: &Problem<D>, pressure: &[f64]) -> 
 where
     Dim<D>: Space<D>,
 {
-    let Some(surfaces) = &problem.system.surfaces else { return 0.0 };
+    let Some(surfaces) = problem.system.surfaces() else { return 0.0 };
     let discretisation = problem.discretisation();
     mean_of(&fluid_weights(discretisation, &discretisation.pressure, &surfaces.cut), pressure)
 }

@@ -39,7 +39,7 @@ impl NodalFields {
         let mut velocity = x[..space.dim()].to_vec();
         space.expand(&mut velocity);
         let bodies = velocity.split_off(space.full_dim());
-        let films = system.films.as_ref();
+        let films = system.films();
         let films = films.map_or_else(Vec::new, |films| films.kept(system.parts(x)[2]));
         Self { velocity, pressure, bodies, films }
     }
@@ -171,7 +171,7 @@ where
         }
         space.clear_held(&mut x);
         complete(&mut x);
-        if let Some(films) = &system.films {
+        if let Some(films) = system.films() {
             guess.films = films.of_motions(&x, system.parts(b)[2]);
             films.restore(&self.last.films, &mut guess.films);
             if let Some(before) = &self.before {

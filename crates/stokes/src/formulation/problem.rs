@@ -18,9 +18,8 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::Smoothing;
 use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace};
-use crate::surface::{
-    CellState, CutCells, WeakCell, add_load_of_cut_cells, forces_on_bodies, load_of_strain,
-};
+use crate::surface::WeakCell;
+use crate::term::Load;
 
 /// A formulation with what it keeps from mesh to mesh.
 pub trait Method<const D: usize>: Send + Sync
@@ -226,31 +225,33 @@ where
     /// The load of the force `f(x)` per unit of volume.
     fn loads(&self, force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>) -> Vec<f64> {
         let mut b = parallel::filled(0.0, self.system.dim());
-        match (force, &self.system.surfaces) {
-            (None, _) => {}
-            (Some(force), None) => {
-                add_load(self.discretisation(), |_| true, force, &mut b);
-                self.system.reduce(&mut b);
-            }
-            (Some(force), Some(surfaces)) => self.add_loads_around_surfaces(&surfaces.cut, force, &mut b),
-        }
+        let Some(force) = force else { return b };
+        let (discretisation, terms) = (self.discretisation(), &self.system.terms);
+        let is_whole =
+            |cell: usize| discretisation.is_own(cell) && !terms.iter().any(|term| term.covers(cell));
+        let mut load = self.no_load();
+        add_load(discretisation, is_whole, force, &mut load.velocity);
+        terms.iter().for_each(|term| term.add_force(force, &mut load));
+        self.reduce(&load, &mut b);
         b
     }
 
-    /// The load on the fluid in whole cells and in cut ones, and on the bodies.
-    fn add_loads_around_surfaces(
-        &self,
-        cut: &CutCells<D>,
-        force: &dyn Fn(&Vector<D>) -> Vector<D>,
-        b: &mut [f64],
-    ) {
-        let discretisation = self.discretisation();
-        let is_whole = |cell: usize| cut.states[cell] == CellState::Fluid && discretisation.is_own(cell);
-        add_load(discretisation, is_whole, force, b);
-        add_load_of_cut_cells(discretisation, cut, force, b);
+    fn no_load(&self) -> Load<D> {
+        Load {
+            velocity: vec![0.0; self.system.space.full_dim()],
+            pressure: vec![0.0; self.system.pressure.dim()],
+            wrenches: vec![Wrench::default(); self.bodies.len()],
+        }
+    }
+
+    /// From a load to a reduced right-hand side that has no more than the rows of terms.
+    fn reduce(&self, load: &Load<D>, b: &mut [f64]) {
+        let [u, p, _] = self.system.parts_mut(b);
+        u[..load.velocity.len()].copy_from_slice(&load.velocity);
+        p.copy_from_slice(&load.pressure);
         self.system.reduce(b);
-        let forces = forces_on_bodies(discretisation, cut, force, self.bodies.len());
-        forces.iter().enumerate().for_each(|(body, wrench)| self.system.space.add_wrench(b, body, wrench));
+        let wrenches = load.wrenches.iter().enumerate().take(self.system.space.body_count());
+        wrenches.for_each(|(body, wrench)| self.system.space.add_wrench(b, body, wrench));
     }
 
     /// Adds the load of a linear flow with this strain, relative to which velocities are, to a reduced
@@ -262,23 +263,13 @@ where
         if strain.amax() == 0.0 || self.bodies.is_empty() {
             return Ok(());
         }
-        let Some(surfaces) = &self.system.surfaces else {
+        if !self.system.space.is_by_surface() {
             return Err(StokesError::Unsupported { what: "a linear flow far away" });
-        };
-        let (discretisation, viscosity) = (self.discretisation(), self.system.viscosity());
-        let load = load_of_strain(discretisation, surfaces, viscosity, strain, self.bodies.len());
-        let mut sum = vec![0.0; self.system.dim()];
-        let nodal = self.system.space.full_dim();
-        let [u, p, f] = self.system.parts_mut(&mut sum);
-        u[..nodal].copy_from_slice(&load.velocity);
-        p.copy_from_slice(&load.pressure);
-        if let Some(films) = &self.system.films {
-            films.add_strain(strain, f);
-            vector::scale(-1.0, f);
         }
-        self.system.reduce(&mut sum);
-        let wrenches = load.wrenches.iter().enumerate();
-        wrenches.for_each(|(body, wrench)| self.system.space.add_wrench(&mut sum, body, wrench));
+        let (mut load, mut sum) = (self.no_load(), vec![0.0; self.system.dim()]);
+        let rows = &mut *self.system.parts_mut(&mut sum)[2];
+        self.system.for_each_term(rows, |term, rows| term.add_strain(strain, &mut load, rows));
+        self.reduce(&load, &mut sum);
         vector::axpy(1.0, &sum, b);
         Ok(())
     }
@@ -356,7 +347,7 @@ where
     /// What films exert on bodies and walls.
     pub fn film_forces(&self, x: &[f64]) -> Vec<FilmForce<D>> {
         let system = &self.system;
-        system.films.as_ref().map_or(Vec::new(), |films| films.forces(&system.space, system.parts(x)[2]))
+        system.films().map_or(Vec::new(), |films| films.forces(&system.space, system.parts(x)[2]))
     }
 
     /// The pressure at its nodes, then the forces of films.

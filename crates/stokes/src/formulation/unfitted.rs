@@ -13,7 +13,7 @@ use gluey_levelset::{Ball, Body};
 
 use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
-use crate::film::{Film, Heights, Lubrication, thin_films};
+use crate::film::{Film, FilmCoupling, Heights, Lubrication, thin_films};
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface::SurfaceCorrection;
 use crate::precondition::velocity::Smoothing;
@@ -21,7 +21,7 @@ use crate::precondition::{Correction, CycleLevels};
 use crate::space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
 use crate::surface::{
     Aggregates, CellState, CutCells, Flat, Flats, PenaltyFactor, SurfaceCoupling, WeakCell, first_moments,
-    weak_cells,
+    flows_through_films, weak_cells,
 };
 
 /// Offset in cells of the nodes that are rigid on the levels of the velocity cycle.
@@ -73,10 +73,15 @@ impl Unfitted {
         let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
         let mut films = thin_films(bodies, discretisation.mesh.domain(), &heights);
         let flats = flats(&films, bodies.len(), &heights);
-        let system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
+        let mut system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
         films.retain(wanted);
         let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
-        Ok(if lubricates { system.with_films(bodies, films, &heights) } else { system })
+        if let Some(surfaces) = system.surfaces().filter(|_| lubricates) {
+            let spaces = (&system.space, &system.pressure);
+            let flows = flows_through_films(spaces, &surfaces.cut, (bodies, &films, &heights));
+            system.terms.push(Arc::new(FilmCoupling::new(spaces.0, films, flows, &heights, viscosity)));
+        }
+        Ok(system)
     }
 }
 
@@ -150,7 +155,7 @@ where
     let pressure =
         PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
     let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, (cut, penalty), &aggregates)?;
-    Ok(StokesSystem::around_surfaces(space, pressure, viscosity, surfaces))
+    Ok(StokesSystem::beside(Arc::new(surfaces), space, pressure, viscosity))
 }
 
 /// The nodes with no fluid in the cells around them, each with the body of one of these.
@@ -194,13 +199,13 @@ where
         undisturbed: &Matrix<D>,
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         let Problem { system, bodies, .. } = problem;
-        let Some(surfaces) = &system.surfaces else { return Ok(Vec::new()) };
+        let Some(surfaces) = system.surfaces() else { return Ok(Vec::new()) };
         let fields = (fields, undisturbed);
         Ok(first_moments(surfaces, &system.space, bodies, system.viscosity(), fields))
     }
 
     fn weak_cells(&self, problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {
-        let surfaces = problem.system.surfaces.as_ref();
+        let surfaces = problem.system.surfaces();
         surfaces.map_or_else(Vec::new, |surfaces| weak_cells(surfaces, velocity, strain))
     }
 
@@ -225,7 +230,7 @@ where
         finest: &VelocitySpace<D>,
         _: CycleLevels<'_, D>,
     ) -> Result<Option<Box<dyn Correction>>, StokesError> {
-        let Some(surfaces) = &elements.system().surfaces else { return Ok(None) };
+        let Some(surfaces) = elements.system().surfaces() else { return Ok(None) };
         Ok(Some(Box::new(SurfaceCorrection::new(elements, surfaces, finest)?)))
     }
 }

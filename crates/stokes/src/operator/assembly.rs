@@ -18,7 +18,7 @@ use super::element::{Elements, Source};
 use super::system::StokesSystem;
 use crate::error::StokesError;
 use crate::space::{VelocitySpace, pressure_expansion, velocity_expansion};
-use crate::surface::SurfaceCoupling;
+use crate::term::piece_size;
 
 /// The factor of a symmetric positive definite matrix.
 pub fn factorised(matrix: &SparseMatrix, ordering: Ordering<'_>) -> Result<DirectSpd, StokesError> {
@@ -48,10 +48,10 @@ where
     let discretisation = system.discretisation();
     let split = system.velocity_dim();
     let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
-    let films = split + system.pressure.dim();
+    let forces = split + system.pressure.dim();
     let loose = loose_node(&system.space);
     let unknowns = Subset::new(system.dim(), |k| match k.checked_sub(split) {
-        Some(_) if k >= films => true,
+        Some(_) if k >= forces => true,
         Some(q) => system.pressure.is_free(q) && Some(q) != pinned,
         None => keeps_velocity(&system.space, k) && Some(k / D) != loose,
     });
@@ -62,8 +62,8 @@ where
         discretisation.pressure.cell(cell).iter().for_each(|&q| local.push(pressure.terms(q as usize)));
     };
     let size = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
-    let films = film_rows(system, &unknowns);
-    assemble(unknowns, forms, &Elements::new(system, size), &films)
+    let rows = rows_of_terms(system, &unknowns);
+    assemble(unknowns, forms, &Elements::new(system, size), &rows)
 }
 
 /// Assembles the velocity block alone. Where nothing fixes a constant velocity, one node is left out.
@@ -120,13 +120,13 @@ where
     }
 }
 
-/// Sums up the matrices of the active cells and of the pieces of cut cells, whose local unknowns are given by
-/// `forms`, and the rows of the films' forces.
+/// Sums up the matrices of the active cells and of the pieces of terms, whose local unknowns are given by
+/// `forms`, and the rows of terms.
 fn assemble<const D: usize>(
     unknowns: Subset,
     forms: impl Fn(usize, &mut CellForms),
     elements: &Elements<'_, D>,
-    films: &Jagged<(u32, f64)>,
+    rows: &Jagged<(u32, f64)>,
 ) -> Result<Assembled, SparseError>
 where
     Dim<D>: Space<D>,
@@ -149,17 +149,17 @@ where
             sources.push(source);
         }
     }
-    for row in films.iter() {
+    for row in rows.iter() {
         groups.push(row.iter().map(|term| numbering.of[term.0 as usize] as usize));
     }
-    let mut films = films.iter();
+    let mut rows = rows.iter();
     let blocks = BlockPattern::new(numbering.first, groups)?;
     let mut of_cells = Reduction::new(unknowns.len(), elements.size());
-    let mut of_pieces = Reduction::new(unknowns.len(), SurfaceCoupling::<D>::piece_size());
+    let mut of_pieces = Reduction::new(unknowns.len(), piece_size::<D>());
     let mut sources = sources.into_iter();
     let matrix = blocks.sum(|group, target| {
         let Some(source) = sources.next() else {
-            return films.next().into_iter().for_each(|row| add_film(row, blocks.unknowns_of(group), target));
+            return rows.next().into_iter().for_each(|row| add_row(row, blocks.unknowns_of(group), target));
         };
         set_forms(source, &mut local);
         let reduction = if source.is_piece() { &mut of_pieces } else { &mut of_cells };
@@ -174,24 +174,22 @@ where
     Ok(Assembled { unknowns, blocks, matrix })
 }
 
-/// The rows of the films' forces in the kept unknowns, each ending with the force itself.
-fn film_rows<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Jagged<(u32, f64)>
+/// The rows of terms in the kept unknowns, each ending with the force itself.
+fn rows_of_terms<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Jagged<(u32, f64)>
 where
     Dim<D>: Space<D>,
 {
     let mut rows = Jagged::default();
-    let Some(films) = &system.films else { return rows };
-    let first = system.dim() - films.dim();
-    for (row, force) in (0..films.dim()).filter_map(|row| Some((row, unknowns.number(first + row)?))) {
-        let terms = films.row(row).iter();
-        let kept = terms.filter_map(|&(k, w)| Some((unknowns.number(k as usize)? as u32, w)));
+    let forces = system.dim() - system.row_count()..;
+    for (row, force) in system.rows().zip(forces).filter_map(|(row, k)| Some((row, unknowns.number(k)?))) {
+        let kept = row.iter().filter_map(|&(k, w)| Some((unknowns.number(k as usize)? as u32, w)));
         rows.push(kept.chain([(force as u32, -1.0)]));
     }
     rows
 }
 
 /// Adds the row of a force and its transpose to the matrix of these unknowns.
-fn add_film(row: &[(u32, f64)], unknowns: impl Iterator<Item = usize>, target: &mut [f64]) {
+fn add_row(row: &[(u32, f64)], unknowns: impl Iterator<Item = usize>, target: &mut [f64]) {
     let unknowns: Vec<usize> = unknowns.collect();
     let Some((&(force, own), terms)) = row.split_last() else { return };
     let place = |unknown: u32| unknowns.iter().position(|&k| k == unknown as usize);

@@ -1,30 +1,30 @@
 //! Element matrices of the Stokes system: the viscous one, or the whole saddle.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_fem::cut::ViscousMatrices;
 use gluey_geom::{Dim, Space};
 
 use super::system::StokesSystem;
 use crate::space::ActiveCell;
-use crate::surface::SurfaceCoupling;
+use crate::term::PieceMatrices;
 
 /// Relative artificial compressibility added to the factorised matrix: enough to make pressures that act on
 /// no velocity harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
-/// What has a matrix: its place among its kind, its cell in the mesh, and for the pieces of cut cells the
-/// body.
+/// What has a matrix: its place among its kind, its cell in the mesh, and for the pieces of terms the body.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
-    /// An active cell that no surface cuts.
+    /// An active cell that no term covers.
     Cell {
         /// Place among the active cells.
         index: usize,
         /// Index in the mesh.
         cell: usize,
     },
-    /// A piece of a cut cell.
+    /// A piece of a cell.
     Piece {
+        /// Place of its term.
+        term: usize,
         /// Place among the pieces.
         index: usize,
         /// Index of the cell in the mesh.
@@ -42,7 +42,7 @@ impl Source {
         }
     }
 
-    /// Whether it is a piece of a cut cell, whose matrix has velocities, pressures and a twist.
+    /// Whether it is a piece of a term, whose matrix has velocities, pressures and a twist.
     pub fn is_piece(self) -> bool {
         matches!(self, Self::Piece { .. })
     }
@@ -121,31 +121,34 @@ where
     pub fn sources(&self) -> impl Iterator<Item = Source> + 'a {
         let cells = self.system.cells.iter().enumerate();
         let cells = cells.map(|(index, cell)| Source::Cell { index, cell: cell.cell as usize });
-        let pieces = self.system.surfaces.iter().flat_map(|surfaces| surfaces.pieces().enumerate());
-        cells.chain(pieces.map(|(index, (cell, body))| Source::Piece { index, cell, body }))
+        let terms = self.system.terms.iter().enumerate();
+        cells.chain(terms.flat_map(|(term, pieces)| {
+            let pieces = pieces.pieces().enumerate();
+            pieces.map(move |(index, (cell, body))| Source::Piece { term, index, cell, body })
+        }))
     }
 
     /// Writes the matrix of a cell or a piece, row by row.
     pub fn fill_source(&self, source: Source, matrix: &mut [f64]) {
         match source {
             Source::Cell { index, .. } => self.fill(index, matrix),
-            Source::Piece { index, .. } => self.fill_piece(index, matrix),
+            Source::Piece { term, index, .. } => {
+                let compressibility = COMPRESSIBILITY / self.system.viscosity();
+                self.system.terms[term].fill(index, compressibility, matrix);
+            }
         }
     }
 
+    /// What fills the velocities' part of the matrices of pieces, term by term.
+    pub fn of_pieces(&self) -> Vec<PieceMatrices<'a>> {
+        self.system.terms.iter().map(|term| term.viscous_matrices()).collect()
+    }
+
     /// Writes the matrix of a cell, or the velocities' part of that of a piece, row by row.
-    pub fn fill_velocities(
-        &self,
-        source: Source,
-        pieces: Option<&mut ViscousMatrices<D>>,
-        matrix: &mut [f64],
-    ) {
-        match (source, pieces, &self.system.surfaces) {
-            (Source::Piece { index, .. }, Some(with), Some(surfaces)) => {
-                surfaces.viscous_matrix(index, with, matrix);
-            }
-            (Source::Cell { index, .. }, ..) => self.fill(index, matrix),
-            _ => matrix.fill(0.0),
+    pub fn fill_velocities(&self, source: Source, pieces: &mut [PieceMatrices<'_>], matrix: &mut [f64]) {
+        match source {
+            Source::Piece { term, index, .. } => pieces[term](index, matrix),
+            Source::Cell { index, .. } => self.fill(index, matrix),
         }
     }
 
@@ -164,17 +167,6 @@ where
         if size > n {
             self.fill_pressure(index, matrix);
         }
-    }
-
-    /// Writes the matrix of a piece of a cut cell, row by row: velocities, pressures, twist.
-    fn fill_piece(&self, index: usize, matrix: &mut [f64]) {
-        let Some(surfaces) = &self.system.surfaces else { return };
-        surfaces.matrix(index, matrix);
-        let (n, size) = (ReferenceMatrices::<D>::VELOCITY, SurfaceCoupling::<D>::piece_size());
-        let scale = COMPRESSIBILITY / self.system.viscosity();
-        surfaces.for_each_mass_of_piece(index, |q, r, mass| {
-            matrix[(n + q) * size + n + r] -= scale * mass;
-        });
     }
 
     fn fill_pressure(&self, index: usize, matrix: &mut [f64]) {

@@ -4,20 +4,20 @@
 //! unknowns of [`VelocitySpace`] and the pressure nodes. Cells that move as one body are left out: they have
 //! no strain. Pressure nodes that see no cell with a free node are dropped.
 
+use std::any::Any;
 use std::sync::Arc;
 
-use gluey_fem::Evaluator;
 use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_geom::{Dim, Space, Vector};
-use gluey_levelset::Ball;
+use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectError, LinOp, Scalar, vector};
 
 use super::cells::{AddedViscosity, cell_operator};
-use crate::film::{Film, FilmCorrection, FilmCoupling, FilmNetwork, FilmRow, Heights};
+use crate::film::{FilmCorrection, FilmCoupling, FilmNetwork, FilmRow};
 use crate::space::{
     ActiveCell, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells, own_cells,
 };
-use crate::surface::{CellState, SurfaceCoupling, SurfaceWorkspace, flows_through_films};
+use crate::surface::SurfaceCoupling;
+use crate::term::{Product, Scratch, Term, Terms, add_terms};
 
 /// Operator of the Stokes problem on a mesh, matrix-free.
 #[derive(Clone, Debug)]
@@ -26,14 +26,12 @@ pub struct StokesSystem<const D: usize> {
     pub space: VelocitySpace<D>,
     /// Reduced pressures.
     pub pressure: PressureSpace<D>,
-    /// Cells that are not rigid, with the scales of their matrices.
+    /// Cells that are not rigid and that no term covers, with the scales of their matrices.
     pub(crate) cells: Vec<ActiveCell>,
     /// What comes to the viscosity of the fluid in these cells.
     pub(crate) added: Option<Arc<dyn AddedViscosity<D>>>,
-    /// The cells that surfaces cut, where the mesh does not fit the bodies.
-    pub(crate) surfaces: Option<Arc<SurfaceCoupling<D>>>,
-    /// The films between bodies that are too thin for the mesh.
-    pub(crate) films: Option<Arc<FilmCoupling<D>>>,
+    /// What there is beside these cells.
+    pub(crate) terms: Terms<D>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
 }
@@ -58,40 +56,35 @@ where
             || PressureSpace::new(&space, &cells),
             || cell_operator(&space, &cells, added.as_deref()),
         );
-        Self { pressure, operator, space, cells, added, surfaces: None, films: None, viscosity }
+        Self { pressure, operator, space, cells, added, terms: Vec::new(), viscosity }
     }
 
-    /// The system in `fluid` cells that nothing cuts and in those that `surfaces` cut.
-    pub(crate) fn around_surfaces(
+    /// The system of a term and of the cells that it does not cover.
+    pub(crate) fn beside(
+        term: Arc<dyn Term<D>>,
         space: VelocitySpace<D>,
         pressure: PressureSpace<D>,
         viscosity: f64,
-        surfaces: SurfaceCoupling<D>,
     ) -> Self {
-        let is_fluid = |cell: &ActiveCell| surfaces.cut.states[cell.cell as usize] == CellState::Fluid;
         let mut cells = all_cells(space.discretisation(), viscosity);
-        cells.retain(is_fluid);
-        Self {
-            pressure,
-            operator: cell_operator(&space, &own_cells(space.discretisation(), &cells), None),
-            space,
-            cells,
-            added: None,
-            surfaces: Some(Arc::new(surfaces)),
-            films: None,
-            viscosity,
-        }
+        cells.retain(|cell| !term.covers(cell.cell as usize));
+        let operator = cell_operator(&space, &own_cells(space.discretisation(), &cells), None);
+        Self { pressure, operator, space, cells, added: None, terms: vec![term], viscosity }
     }
 
-    /// The same with the forces of `films` between these bodies that are widened to these heights.
-    pub(crate) fn with_films(self, bodies: &[Ball<D>], films: Vec<Film<D>>, heights: &Heights) -> Self {
-        let cut = self.surfaces.as_ref().map(|surfaces| &surfaces.cut);
-        let flows = cut.map_or_else(
-            || vec![Vec::new(); films.len()],
-            |cut| flows_through_films((&self.space, &self.pressure), cut, (bodies, &films, heights)),
-        );
-        let films = FilmCoupling::new(&self.space, films, flows, heights, self.viscosity);
-        Self { films: Some(Arc::new(films)), ..self }
+    /// The term of a type, for those who know it as more than a term.
+    fn term<T: Term<D>>(&self) -> Option<&T> {
+        self.terms.iter().find_map(|term| (&**term as &dyn Any).downcast_ref())
+    }
+
+    /// The cells that surfaces cut, where the mesh does not fit the bodies.
+    pub(crate) fn surfaces(&self) -> Option<&SurfaceCoupling<D>> {
+        self.term()
+    }
+
+    /// The films between bodies that are too thin for the mesh.
+    pub(crate) fn films(&self) -> Option<&FilmCoupling<D>> {
+        self.term()
     }
 
     /// Mesh and nodes.
@@ -104,34 +97,27 @@ where
         self.viscosity
     }
 
-    /// Length of a vector: reduced velocities, then all pressure nodes, then the forces of films.
+    /// Length of a vector: reduced velocities, then all pressure nodes, then the forces of terms.
     pub fn dim(&self) -> usize {
-        self.velocity_dim() + self.pressure.dim() + self.film_dim()
+        self.velocity_dim() + self.pressure.dim() + self.row_count()
     }
 
     /// Norm of the fluid's part of a right-hand side, loads on bodies included: what residuals are small
-    /// beside. Rows of films are left out, whose scale grows as they close.
+    /// beside. Rows of terms are left out: the scale of films grows as they close.
     pub fn fluid_norm(&self, b: &[f64]) -> f64 {
-        vector::norm(&b[..b.len() - self.film_dim()])
+        vector::norm(&b[..b.len() - self.row_count()])
     }
 
-    /// The own surfaces' block for the twist of each body, row by row.
+    /// The own pieces' block for the twist of each body, row by row.
     pub fn twist_blocks(&self) -> Vec<f64> {
-        let rigid = Dim::<D>::RIGID;
-        let mut blocks = vec![0.0; self.space.body_count() * rigid * rigid];
-        if let Some(surfaces) = &self.surfaces {
-            let own =
-                surfaces.pieces().enumerate().filter(|(_, (cell, _))| self.discretisation().is_own(*cell));
-            for (piece, (_, body)) in own {
-                surfaces.add_twist_block(piece, &mut blocks[body * rigid * rigid..][..rigid * rigid]);
-            }
-        }
+        let mut blocks = vec![0.0; self.space.body_count() * Dim::<D>::RIGID.pow(2)];
+        self.terms.iter().for_each(|term| term.add_twist_blocks(&mut blocks));
         blocks
     }
 
     /// The rows of the films' motions, on the twists of the bodies.
     pub fn rows_of_motion(&self) -> Vec<FilmRow> {
-        self.films.as_ref().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()))
+        self.films().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()))
     }
 
     /// The network of its films; `None` without films.
@@ -144,19 +130,42 @@ where
         FilmNetwork::new::<D>(&blocks, self.space.held(), &rows, rows.clone())
     }
 
-    /// Length of the films' part of a vector.
-    pub fn film_dim(&self) -> usize {
-        self.films.as_ref().map_or(0, |films| films.dim())
+    /// Length of the terms' part of a vector.
+    pub fn row_count(&self) -> usize {
+        self.terms.iter().map(|term| term.row_count()).sum()
     }
 
-    /// The parts of a vector: velocities, pressures, forces of films.
+    /// Entries of the terms' rows in reduced velocities; that of the force of a row is -1.
+    pub fn rows(&self) -> impl Iterator<Item = &[(u32, f64)]> {
+        self.terms.iter().flat_map(|term| (0..term.row_count()).map(|row| term.row(row)))
+    }
+
+    /// The inverses of about the Schur complement of the terms' forces.
+    pub fn row_inverses(&self) -> impl Iterator<Item = &f64> {
+        self.terms.iter().flat_map(|term| term.row_inverses())
+    }
+
+    /// Calls `visit` with each term and its part of `rows`.
+    pub(crate) fn for_each_term(
+        &self,
+        mut rows: &mut [f64],
+        mut visit: impl FnMut(&dyn Term<D>, &mut [f64]),
+    ) {
+        for term in &self.terms {
+            let own;
+            (own, rows) = rows.split_at_mut(term.row_count());
+            visit(term.as_ref(), own);
+        }
+    }
+
+    /// The parts of a vector: velocities, pressures, forces of terms.
     pub fn parts<'x, T>(&self, x: &'x [T]) -> [&'x [T]; 3] {
         let (u, rest) = x.split_at(self.velocity_dim());
         let (p, f) = rest.split_at(self.pressure.dim());
         [u, p, f]
     }
 
-    /// The parts of a vector: velocities, pressures, forces of films.
+    /// The parts of a vector: velocities, pressures, forces of terms.
     pub fn parts_mut<'x, T>(&self, x: &'x mut [T]) -> [&'x mut [T]; 3] {
         let (u, rest) = x.split_at_mut(self.velocity_dim());
         let (p, f) = rest.split_at_mut(self.pressure.dim());
@@ -169,32 +178,19 @@ where
     }
 
     /// `b -= [A, -B^T; -B, 0] (u, p)` for a nodal velocity field that already fulfils all constraints (it may
-    /// carry boundary values), with the result in reduced form. Pressures may be followed by forces of films,
+    /// carry boundary values), with the result in reduced form. Pressures may be followed by forces of terms,
     /// which are zero if not.
     pub fn residual(&self, u: &[f64], p: &[f64], b: &mut [f64]) {
         let mut y = vec![0.0; self.dim()];
         let [yu, yp, yf] = self.parts_mut(&mut y);
         let (p, f) = p.split_at(self.pressure.dim());
         self.operator.stokes_of_field(u, p, yu, yp, &mut Workspace::default());
-        if let Some(surfaces) = &self.surfaces {
-            surfaces.add([u, p], [&mut *yu, &mut *yp], &mut SurfaceWorkspace::default());
-        }
-        if let Some(films) = &self.films {
-            let at_rest = vec![0.0; films.dim()];
-            let f = if f.is_empty() { &at_rest } else { f };
-            films.add([u, f], [&mut *yu, &mut *yf]);
-            let at_wall = |film: &Film<D>| film.partner.is_wall().then(|| self.wall_velocity(film, u));
-            films.subtract_partners(at_wall, yf);
-            films.add_boundary(u, yf);
-        }
+        let none = vec![0.0; yf.len()];
+        let f = if f.is_empty() { &none } else { f };
+        add_terms::<f64, f64, D>(&self.terms, [u, p, f], [yu, &mut *yp, &mut *yf], &mut Scratch::default());
+        self.for_each_term(yf, |term, rows| term.add_data(&self.space, u, rows));
         self.reduce_pressures(yp);
         vector::axpy(-1.0, &y, b);
-    }
-
-    /// The velocity of the wall at a film.
-    fn wall_velocity(&self, film: &Film<D>, u: &[f64]) -> Vector<D> {
-        let mesh = &self.discretisation().mesh;
-        Evaluator::new(mesh).motion_at(self.space.nodes(), u, &film.far_point()).velocity
     }
 
     /// From nodal loads and unconstrained divergences to the reduced vector, in place. Divergences are made
@@ -243,7 +239,7 @@ struct Work<X> {
     /// Pressures at all nodes.
     pressure: Vec<X>,
     cells: Workspace<f64, X>,
-    surfaces: SurfaceWorkspace<f64>,
+    scratch: Scratch<f64>,
 }
 
 impl<'a, const D: usize> SystemOperator<'a, D>
@@ -269,27 +265,23 @@ where
 
 impl<X: Scalar> Work<X> {
     fn new() -> Self {
-        Self { pressure: Vec::new(), cells: Workspace::default(), surfaces: SurfaceWorkspace::default() }
+        Self { pressure: Vec::new(), cells: Workspace::default(), scratch: Scratch::default() }
     }
 
     fn apply<const D: usize>(&mut self, system: &StokesSystem<D>, x: &[X], y: &mut [X])
     where
         Dim<D>: Space<D>,
+        dyn Term<D>: Product<X, f64>,
     {
-        let Self { pressure, cells, surfaces: work } = self;
+        let Self { pressure, cells, scratch } = self;
         let [u, p, f] = system.parts(x);
         let [yu, yp, yf] = system.parts_mut(y);
         pressure.resize(p.len(), X::ZERO);
         vector::copy(p, pressure);
         system.pressure.expand(pressure);
         system.operator.stokes(u, pressure, yu, yp, cells);
-        if let Some(surfaces) = &system.surfaces {
-            surfaces.add([u, pressure], [&mut *yu, &mut *yp], work);
-        }
-        if let Some(films) = &system.films {
-            yf.fill(X::ZERO);
-            films.add([u, f], [&mut *yu, &mut *yf]);
-        }
+        yf.fill(X::ZERO);
+        add_terms(&system.terms, [u, pressure, f], [&mut *yu, &mut *yp, yf], scratch);
         system.space.clear_held(yu);
         system.reduce_pressures(yp);
     }
@@ -337,6 +329,7 @@ mod tests {
     use crate::space::solid_nodes;
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
+    use gluey_levelset::Ball;
 
     /// Constant pressures do no work on any admissible velocity.
     fn constants_are_in_the_kernel<const D: usize>()

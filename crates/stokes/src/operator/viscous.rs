@@ -1,7 +1,4 @@
-//! The velocity block of a system in single precision, with the cells that surfaces cut, all of it or around
-//! some of the nodes.
-
-use std::sync::Arc;
+//! The velocity block of a system in single precision, all of it or around some of the nodes.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::LinOp;
@@ -9,7 +6,7 @@ use gluey_linalg::LinOp;
 use super::restricted::{CountedOperator, acting};
 use super::system::StokesSystem;
 use crate::space::own_cells;
-use crate::surface::{SurfaceCoupling, SurfaceWorkspace};
+use crate::term::{Scratch, Terms, add_terms};
 
 /// `A` on reduced velocities, right at some of the nodes, which counts its applications.
 #[derive(Clone, Debug)]
@@ -17,8 +14,8 @@ pub struct ViscousOperator<const D: usize> {
     fluid: CountedOperator<f32, D>,
     /// The cells that act on fewer nodes.
     near: CountedOperator<f32, D>,
-    surfaces: Option<Arc<SurfaceCoupling<D>>>,
-    work: SurfaceWorkspace<f32>,
+    terms: Terms<D>,
+    scratch: Scratch<f32>,
 }
 
 impl<const D: usize> ViscousOperator<D>
@@ -36,15 +33,15 @@ where
         Self {
             fluid: fluid(marked),
             near: fluid(near),
-            surfaces: system.surfaces.clone(),
-            work: SurfaceWorkspace::default(),
+            terms: system.terms.clone(),
+            scratch: Scratch::default(),
         }
     }
 
     /// `y = A x` for velocities that vanish but near the surfaces.
     pub fn apply_near(&mut self, x: &[f32], y: &mut [f32]) {
         self.near.apply(x, y);
-        self.add_surfaces(x, y);
+        self.add_terms(x, y);
     }
 
     /// Applications since the last call.
@@ -52,10 +49,8 @@ where
         self.fluid.take_applications() + self.near.take_applications()
     }
 
-    fn add_surfaces(&mut self, x: &[f32], y: &mut [f32]) {
-        if let Some(surfaces) = &self.surfaces {
-            surfaces.add_narrow([x, &[]], [y, &mut []], &mut self.work);
-        }
+    fn add_terms(&mut self, x: &[f32], y: &mut [f32]) {
+        add_terms(&self.terms, [x, &[], &[]], [y, &mut [], &mut []], &mut self.scratch);
     }
 }
 
@@ -69,6 +64,6 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.fluid.apply(x, y);
-        self.add_surfaces(x, y);
+        self.add_terms(x, y);
     }
 }

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::numbered::NumberedNodes;
 use crate::operator::{Elements, Source};
-use crate::surface::SurfaceCoupling;
 
 /// Stands for the constraint of a node that has none.
 const NONE: u32 = u32::MAX;
@@ -52,13 +51,14 @@ pub fn for_each_matrix<const D: usize>(
 {
     let len = elements.size().pow(2);
     let mut dense = vec![0.0; BATCH.min(sources.len()) * len];
-    let surfaces = elements.system().surfaces.as_deref();
-    let workspace = || surfaces.map(SurfaceCoupling::viscous_matrices);
     for batch in sources.chunks(BATCH) {
         let pairs = batch.par_iter().zip(dense.par_chunks_exact_mut(len));
-        pairs.with_min_len(LEAST_SHARE).for_each_init(workspace, |with, (&source, dense)| {
-            elements.fill_velocities(source, with.as_mut(), dense);
-        });
+        pairs.with_min_len(LEAST_SHARE).for_each_init(
+            || elements.of_pieces(),
+            |pieces, (&source, dense)| {
+                elements.fill_velocities(source, pieces, dense);
+            },
+        );
         batch.iter().zip(dense.chunks_exact(len)).for_each(|(&source, dense)| visit(source, dense));
     }
 }

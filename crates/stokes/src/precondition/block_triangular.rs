@@ -8,7 +8,7 @@ use crate::operator::{PressureForces, StokesSystem};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 
-/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of films join the pressures. Then the films' rows
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of terms join the pressures. Then the films' rows
 /// of motions are made to hold ([`FilmCorrection`]), so that no step opens them.
 pub struct BlockTriangular<'a, const D: usize>
 where
@@ -47,11 +47,8 @@ where
         let Self { system, forces, cycle, schur, pressure, answer, films: correction } = self;
         let [ru, rp, rf] = system.parts(r);
         let [zu, zp, zf] = system.parts_mut(z);
-        if let Some(films) = &system.films {
-            let inverses = films.schur_inverses();
-            let answers = zf.iter_mut().zip(rf).zip(inverses);
-            answers.for_each(|((z, r), inverse)| *z = S::from_f64(-inverse * r.to_f64()));
-        }
+        let answers = zf.iter_mut().zip(rf).zip(system.row_inverses());
+        answers.for_each(|((z, r), inverse)| *z = S::from_f64(-inverse * r.to_f64()));
         vector::convert(-1.0, rp, pressure);
         system.pressure.remove_mean(pressure);
         schur.apply(&system.pressure, pressure, answer);

@@ -96,7 +96,7 @@ where
         self.forces = Some(PressureForces::new(system));
         self.films = system.film_network()?;
         // Penalties and extrapolated nodes in thin films leave large numbers that nearly cancel.
-        self.noise = if system.surfaces.is_some() { f64::INFINITY } else { rounding_noise(system) };
+        self.noise = if system.terms.is_empty() { rounding_noise(system) } else { f64::INFINITY };
         Ok(())
     }
 

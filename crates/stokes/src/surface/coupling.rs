@@ -14,6 +14,7 @@ use super::cut_cells::{CutCell, CutCells, in_space};
 use super::penalty::{PenaltyFactor, penalties};
 use crate::error::StokesError;
 use crate::space::{Discretisation, VelocitySpace};
+use crate::term::Scratch;
 
 /// Nodes that a thread takes at a time.
 const NODES: usize = 1024;
@@ -30,14 +31,14 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The cut cells.
     pub cut: CutCells<D>,
     discretisation: Discretisation<D>,
-    viscosity: f64,
+    pub(super) viscosity: f64,
     roots: Vec<u32>,
     /// A body that cuts each root or a bad cell that it carries.
     bodies_at_roots: Vec<u32>,
     /// `beta h / eta` of each cut cell.
     penalties: Vec<f64>,
     /// Cut cell and body of each piece.
-    pieces: Vec<(u32, u32)>,
+    pub(super) pieces: Vec<(u32, u32)>,
     /// The velocity nodes of own cut cells in the nodes of the mesh: themselves, or what they take their
     /// values from.
     velocity: AffineConstraints,
@@ -51,18 +52,8 @@ pub struct SurfaceCoupling<const D: usize> {
     /// The Gauss points of a cell, and the pressure functions there.
     points: Vec<[f64; D]>,
     corner_values: Vec<[f64; MOST_CORNERS]>,
-    wide: CutOperator<f64, D>,
-    narrow: CutOperator<f32, D>,
-}
-
-/// Workspace of a [`SurfaceCoupling`] that computes in `T`.
-#[derive(Clone, Debug, Default)]
-pub struct SurfaceWorkspace<T> {
-    velocity: Vec<T>,
-    pressure: Vec<T>,
-    velocity_load: Vec<T>,
-    pressure_load: Vec<T>,
-    pieces: Vec<T>,
+    pub(super) wide: CutOperator<f64, D>,
+    pub(super) narrow: CutOperator<f32, D>,
 }
 
 impl<const D: usize> SurfaceCoupling<D>
@@ -140,14 +131,6 @@ where
         &self.discretisation
     }
 
-    /// Cell and body of each piece.
-    pub fn pieces(&self) -> impl ExactSizeIterator<Item = (usize, usize)> + '_ {
-        self.pieces.iter().map(|&(k, s)| {
-            let cell = &self.cut.cells[k as usize];
-            (cell.cell as usize, cell.bodies[s as usize] as usize)
-        })
-    }
-
     /// The cells whose nodes are unknowns and that are cut or carry bad cells, ascending; indices in the
     /// mesh.
     pub fn roots(&self) -> &[u32] {
@@ -162,23 +145,6 @@ where
     /// `beta h / eta` of a cut cell, by its place among these.
     pub fn penalty(&self, place: usize) -> f64 {
         self.penalties[place]
-    }
-
-    /// Rows of the matrix of a piece.
-    pub fn piece_size() -> usize {
-        gluey_fem::ReferenceMatrices::<D>::VELOCITY
-            + gluey_fem::ReferenceMatrices::<D>::PRESSURE
-            + Dim::<D>::RIGID
-    }
-
-    /// The matrix of a piece, row by row: velocities node by node, pressures, twist.
-    pub fn matrix(&self, piece: usize, matrix: &mut [f64]) {
-        self.wide.matrix(piece, matrix);
-    }
-
-    /// What the viscous matrices of pieces are made with.
-    pub fn viscous_matrices(&self) -> ViscousMatrices<D> {
-        ViscousMatrices::new(self.discretisation.mesh.shear())
     }
 
     /// The part of the matrix of a piece for velocities alone.
@@ -239,14 +205,6 @@ where
         self.viscosity * self.discretisation.cell_size(cell.cell as usize).powi(D as i32 - 2)
     }
 
-    /// Calls `visit(q, r, int p_q p_r)` for the pressures of a piece, whose fluid it is.
-    pub fn for_each_mass_of_piece(&self, piece: usize, visit: impl FnMut(usize, usize, f64)) {
-        let (place, surface) = self.pieces[piece];
-        if surface == 0 {
-            self.for_each_mass(place as usize, visit);
-        }
-    }
-
     /// Calls `visit(q, r, int p_q p_r)` for the pressures of a cut cell, the integral over its fluid.
     pub fn for_each_mass(&self, place: usize, mut visit: impl FnMut(usize, usize, f64)) {
         let cell = &self.cut.cells[place];
@@ -264,25 +222,16 @@ where
         }
     }
 
-    /// `(y, q) += (A x - B^T p, -B x)` in double precision, for the pressures at all nodes; without pressures
-    /// where `q` is empty. Loads on nodes with given values are cleared.
-    pub fn add<X: Scalar>(&self, x: [&[X]; 2], y: [&mut [X]; 2], work: &mut SurfaceWorkspace<f64>) {
-        self.add_by(&self.wide, x, y, work);
-    }
-
-    /// The same in single precision.
-    pub fn add_narrow(&self, x: [&[f32]; 2], y: [&mut [f32]; 2], work: &mut SurfaceWorkspace<f32>) {
-        self.add_by(&self.narrow, x, y, work);
-    }
-
-    fn add_by<T: CellScalar, X: Scalar>(
+    /// `(y, q) += (A x - B^T p, -B x)` by one of the operators, for the pressures at all nodes; without
+    /// pressures where `q` is empty. Loads on nodes with given values are cleared.
+    pub(super) fn add_by<T: CellScalar, X: Scalar>(
         &self,
         operator: &CutOperator<T, D>,
         [x, p]: [&[X]; 2],
         [y, q]: [&mut [X]; 2],
-        work: &mut SurfaceWorkspace<T>,
+        scratch: &mut Scratch<T>,
     ) {
-        let SurfaceWorkspace { velocity, pressure, velocity_load, pressure_load, pieces } = work;
+        let [velocity, pressure, velocity_load, pressure_load, pieces] = &mut scratch.0;
         let nodal = self.velocity.unknown_count() * D;
         let convert = |value: &X| T::from_f64(value.to_f64());
         let back = |value: T| X::from_f64(value.to_f64());

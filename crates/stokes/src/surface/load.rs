@@ -9,11 +9,10 @@ use gluey_geom::{Dim, Space, Vector, Wrench};
 
 use super::cut_cells::{CutCell, CutCells, in_space};
 use crate::space::Discretisation;
+use crate::term::Force;
 
 /// Gauss points on the way from the centre of a body to its surface.
 const RAY_POINTS: usize = 4;
-
-type Force<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 
 /// `b += int f . v` over the fluid of the own cut cells for the nodal velocities `v`.
 pub fn add_load_of_cut_cells<const D: usize>(

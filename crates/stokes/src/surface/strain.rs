@@ -18,39 +18,20 @@ use super::coupling::SurfaceCoupling;
 use super::cut_cells::in_space;
 use super::shapes::Shapes;
 use crate::space::Discretisation;
+use crate::term::Load;
 
 /// Velocity nodes of a cell, at most.
 const MOST_NODES: usize = 27;
 
-/// Loads on the nodal velocities and on the pressures at all nodes, and on the bodies.
-pub struct StrainLoad<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    /// On the velocities of all nodes.
-    pub velocity: Vec<f64>,
-    /// On the pressures of all nodes.
-    pub pressure: Vec<f64>,
-    /// On the bodies.
-    pub wrenches: Vec<Wrench<D>>,
-}
-
-/// The load of a strain `E`, a symmetric matrix without trace, on `body_count` bodies, from the own cells.
-pub fn load_of_strain<const D: usize>(
-    discretisation: &Discretisation<D>,
+/// Adds the load of a strain `E`, a symmetric matrix without trace, from the own cells.
+pub fn add_load_of_strain<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
-    viscosity: f64,
     strain: &Matrix<D>,
-    body_count: usize,
-) -> StrainLoad<D>
-where
+    load: &mut Load<D>,
+) where
     Dim<D>: Space<D>,
 {
-    let mut load = StrainLoad {
-        velocity: vec![0.0; discretisation.velocity.node_count() * D],
-        pressure: vec![0.0; discretisation.pressure.node_count()],
-        wrenches: vec![Wrench::default(); body_count],
-    };
+    let (discretisation, viscosity) = (surfaces.discretisation(), surfaces.viscosity);
     let rule = Rule::<D>::new(discretisation.mesh.shear());
     let of_cell = |place: usize| {
         vectorised(
@@ -76,7 +57,6 @@ where
             wrench.torque += own.torque * viscosity;
         }
     }
-    load
 }
 
 /// The loads of a cut cell, those of a viscosity of one.

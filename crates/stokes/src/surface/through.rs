@@ -352,6 +352,7 @@ mod tests {
     use crate::film::{FilmCoupling, Lubrication, thin_films};
     use crate::formulation::{Formulation, Problem};
     use crate::space::Discretisation;
+    use crate::term::{Product, Scratch};
 
     /// Fluid and bodies that move as one lose nothing in films, whatever cells these cut.
     fn moving_as_one_is_free<const D: usize>()
@@ -369,7 +370,7 @@ mod tests {
         let space = &problem.system.space;
         let heights = Lubrication::Deficit.heights::<D>(discretisation.finest_cell_size());
         let films = thin_films(&bodies, &Aabb::unit(), &heights);
-        let surfaces = problem.system.surfaces.as_ref().unwrap();
+        let surfaces = problem.system.surfaces().unwrap();
         let spaces = (space, &problem.system.pressure);
         let flows = flows_through_films(spaces, &surfaces.cut, (&bodies, &films, &heights));
         assert_eq!(flows[0].len(), D - 1);
@@ -394,7 +395,8 @@ mod tests {
         }
         let size = |x: &[f64]| {
             let (mut z, at_rest) = (vec![0.0; coupling.dim()], vec![0.0; coupling.dim()]);
-            coupling.add([x, &at_rest], [&mut vec![0.0; space.dim()], &mut z]);
+            let y = [&mut *vec![0.0; space.dim()], &mut [], &mut z];
+            coupling.add([x, &[], &at_rest], y, &mut Scratch::<f64>::default());
             z.iter().map(|z| z.abs()).fold(0.0, f64::max)
         };
         assert!(size(&x) < 1e-11 * size(&still), "{} {}", size(&x), size(&still));

@@ -58,7 +58,8 @@ where
     let (mut x, mut z) = (vec![0.0; space.dim()], vec![0.0; coupling.dim()]);
     twists.iter().enumerate().for_each(|(body, twist)| space.set_twist(&mut x, body, twist));
     let at_rest = vec![0.0; coupling.dim()];
-    coupling.add([&x, &at_rest], [&mut vec![0.0; space.dim()], &mut z]);
+    let y = [&mut *vec![0.0; space.dim()], &mut [], &mut z];
+    coupling.add([&x, &[], &at_rest], y, &mut Scratch::<f64>::default());
     z
 }
 

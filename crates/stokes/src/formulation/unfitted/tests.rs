@@ -266,7 +266,7 @@ where
         1.0,
         &PenaltyFactor::new(PENALTY),
     )?;
-    let surfaces = system.surfaces.unwrap();
+    let surfaces = system.surfaces().unwrap();
     Ok((0..surfaces.cut.cells.len()).map(|place| surfaces.penalty(place)).fold(0.0, f64::max))
 }
 
@@ -306,7 +306,7 @@ where
     let penalty = PenaltyFactor::new(0.01);
     let system = around(&discretisation, &bodies, &Flats::none(2), 1.0, &penalty).unwrap();
     let elements = Elements::new(&system, gluey_fem::ReferenceMatrices::<D>::VELOCITY);
-    let surfaces = system.surfaces.as_deref().unwrap();
+    let surfaces = system.surfaces().unwrap();
     let error = SurfaceCorrection::new(&elements, surfaces, &system.space).err().unwrap();
     let StokesError::SurfaceBlock { center, body, .. } = error else { panic!("{error}") };
     let from_center = Vector::<D>::from_column_slice(&center) - bodies[body].center();

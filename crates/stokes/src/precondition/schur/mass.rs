@@ -109,7 +109,7 @@ where
             surfaces.for_each_mass(place, |i, j, value| matrix[i * m + j] = value);
             matrix
         };
-        let of_cut = system.surfaces.as_deref().map_or_else(Vec::new, |surfaces| {
+        let of_cut = system.surfaces().map_or_else(Vec::new, |surfaces| {
             (0..surfaces.cut.cells.len()).into_par_iter().map(|place| mass(surfaces, place)).collect()
         });
         Self { system, matrices, of_cut }
@@ -121,7 +121,7 @@ where
 
     fn cell(&self, at: usize) -> usize {
         let cells = &self.system.cells;
-        match (cells.get(at), &self.system.surfaces) {
+        match (cells.get(at), self.system.surfaces()) {
             (None, Some(surfaces)) => surfaces.cut.cells[at - cells.len()].cell as usize,
             _ => cells[at].cell as usize,
         }
