@@ -9,7 +9,7 @@ use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::{Conditions, Lubrication, RaisedPenalties, StokesError, Stress};
 
 use crate::cells::MyCells;
-use crate::space::{LevelSpace, Plans};
+use crate::space::LevelSpace;
 use crate::surface::SurfaceBodies;
 
 /// A fluid, and how well its flow is to be known.
@@ -97,6 +97,14 @@ impl FlowError {
     /// What goes wrong in the same way on each rank, for it follows from what all know.
     pub(crate) fn of_all(error: StokesError) -> Self {
         Self::Part(error.into())
+    }
+
+    /// What ranks have agreed on.
+    pub(crate) fn agreed(error: StokesError) -> Self {
+        match error {
+            StokesError::Elsewhere { rank, message } => Self::Elsewhere { rank, message },
+            error => Self::of_all(error),
+        }
     }
 }
 
@@ -220,19 +228,6 @@ impl BoxFlow {
         }
         let none = SurfaceBodies { balls: &[], lubrication: Lubrication::None };
         self.solve_around_surfaces(&none, tree, cuts, ranks, &Conditions::boundary(walls))
-    }
-}
-
-pub fn sizes<const D: usize>(space: &LevelSpace<D>, plans: &Plans) -> LevelSizes {
-    let cells = space.part.own().len();
-    LevelSizes {
-        cells,
-        ghost_cells: space.part.mesh.cell_count() - cells,
-        nodes: space.velocity.owned.len(),
-        ghost_nodes: plans.nodes.ghost_count(),
-        bodies: space.bodies.owned,
-        ghost_bodies: space.bodies.plan.ghost_count(),
-        neighbours: plans.all.neighbour_count(),
     }
 }
 

@@ -33,14 +33,11 @@
 mod agreement;
 mod bodies;
 mod cells;
-mod coarse;
 mod contact;
 mod cuts;
-mod cycle;
 mod flow;
-mod level;
+mod levels;
 mod moving;
-mod near_bodies;
 mod pressures;
 mod schur;
 mod space;

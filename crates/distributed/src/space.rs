@@ -4,11 +4,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_fem::cells::{CellData, CellOperator, CellScalar};
 use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part, ReferenceMatrices};
-use gluey_parallel::{Communicator, GhostPlan, Wanted};
+use gluey_parallel::{Communicator, Wanted};
 
-use crate::bodies::{LevelBodies, Shared, rigid};
+use crate::bodies::Shared;
 
 /// Velocities of one level.
 #[derive(Clone)]
@@ -17,7 +16,6 @@ pub struct LevelSpace<const D: usize> {
     pub velocity: Arc<Nodes<D>>,
     pub pressure: Arc<Nodes<D>>,
     pub chunks: Arc<Chunks<D>>,
-    pub bodies: Arc<LevelBodies<D>>,
 }
 
 /// What else a part of the finest level holds.
@@ -56,11 +54,6 @@ impl<const D: usize> Nodes<D> {
         itself.into_iter().chain(constraint.into_iter().flat_map(|c| c.masters.iter().copied()))
     }
 
-    /// Whether the value of a node is its own: it neither hangs nor lies on a wall.
-    pub fn is_loose(&self, node: usize) -> bool {
-        self.constraint_of[node] == u32::MAX && !self.map.is_on_boundary(node)
-    }
-
     /// Which nodes the inner cells of a part depend on: their own, and the masters of hanging ones.
     pub fn needed(&self, part: &Part<D>) -> Vec<bool> {
         let mut needed = vec![false; self.map.node_count()];
@@ -97,53 +90,12 @@ impl<const D: usize> LevelSpace<D> {
         };
         let (velocity, pressure) = (Nodes::new(&part, 2), Nodes::new(&part, 1));
         let chunks = Arc::new(Chunks::new(&velocity.map, &pressure.map));
-        let bodies = LevelBodies::new(tree, shared, &part, &velocity).into();
-        Self { part: part.into(), velocity: velocity.into(), pressure: pressure.into(), chunks, bodies }
-    }
-
-    /// Whether a node has an unknown velocity of its own.
-    pub fn is_free(&self, node: usize) -> bool {
-        self.velocity.is_loose(node) && self.bodies.body_of(node).is_none()
-    }
-
-    /// Cells of the rank that do not move as one body.
-    pub fn own_cells(&self) -> impl Iterator<Item = usize> {
-        self.part.own().filter(|&cell| !self.bodies.is_rigid(self.velocity.map.cell(cell)))
-    }
-
-    /// The same in a fluid of this viscosity.
-    pub fn cells(&self, viscosity: f64) -> impl Iterator<Item = CellData<'static>> {
-        let mesh = &self.part.mesh;
-        self.own_cells().map(move |cell| {
-            let h = mesh.size(mesh.cells()[cell].level);
-            let (viscous, divergence) = (viscosity * h.powi(D as i32 - 2), h.powi(D as i32 - 1));
-            CellData { cell, viscous, divergence, points: &[] }
-        })
-    }
-
-    /// The operator of these cells.
-    pub fn operator<T: CellScalar>(&self, viscosity: f64) -> CellOperator<T, D> {
-        self.operator_of(self.cells(viscosity))
-    }
-
-    /// The operator of some of them.
-    pub fn operator_of<T: CellScalar>(
-        &self,
-        cells: impl Iterator<Item = CellData<'static>>,
-    ) -> CellOperator<T, D> {
-        let (map, bodies) = (&self.velocity.map, &self.bodies);
-        CellOperator::new(&self.chunks, map, cells, 1, &bodies.nodes, bodies.ids.len())
-            .sheared(self.part.mesh.shear())
+        Self { part: part.into(), velocity: velocity.into(), pressure: pressure.into(), chunks }
     }
 
     /// The element matrices of its cells, which are sheared like the box.
     pub fn reference(&self) -> ReferenceMatrices<D> {
         ReferenceMatrices::sheared(self.part.mesh.shear())
-    }
-
-    /// Length of the velocities and twists in a vector at all nodes of the part.
-    pub fn dim(&self) -> usize {
-        self.nodal_dim() + self.bodies.dim()
     }
 
     /// Length of the velocities alone.
@@ -155,54 +107,6 @@ impl<const D: usize> LevelSpace<D> {
     pub fn owned_nodal_dim(&self) -> usize {
         self.velocity.owned.len() * D
     }
-
-    /// Length of the owned velocities and twists.
-    pub fn owned_dim(&self) -> usize {
-        self.owned_nodal_dim() + self.bodies.owned_dim()
-    }
-
-    /// Copies owned velocities and twists out of a vector at all nodes of the part.
-    pub fn copy_owned<T: Copy>(&self, from: &[T], to: &mut [T]) {
-        let (nodal, twists) = to.split_at_mut(self.owned_nodal_dim());
-        nodal.copy_from_slice(&from[self.velocity.owned.start * D..self.velocity.owned.end * D]);
-        twists.copy_from_slice(&from[self.nodal_dim()..][..self.bodies.owned_dim()]);
-    }
-
-    /// The other way round.
-    pub fn set_owned<T: Copy>(&self, from: &[T], to: &mut [T]) {
-        let (nodal, twists) = from.split_at(self.owned_nodal_dim());
-        to[self.velocity.owned.start * D..self.velocity.owned.end * D].copy_from_slice(nodal);
-        to[self.nodal_dim()..][..self.bodies.owned_dim()].copy_from_slice(twists);
-    }
-}
-
-/// The plan of velocities and twists in one vector.
-pub fn ghost_plan<const D: usize>(
-    tree: &mut ImplicitTree<'_, D>,
-    shared: &Shared<'_, '_, D>,
-    space: &LevelSpace<D>,
-) -> Plans {
-    let needed = space.velocity.needed(&space.part);
-    let keep = |node: usize| needed[node] && space.is_free(node);
-    let wanted = wanted_nodes(tree, shared, &space.part, &space.velocity, keep);
-    let nodes = GhostPlan::new(shared.ranks, wanted, space.velocity.finder());
-    let twists = GhostPlan::joined(&[(&space.bodies.plan, rigid::<D>(), space.nodal_dim())]);
-    Plans {
-        all: GhostPlan::joined(&[(&nodes, D, 0), (&space.bodies.plan, rigid::<D>(), space.nodal_dim())]),
-        nodes,
-        twists,
-    }
-}
-
-/// Plans of a vector of velocities and twists.
-#[derive(Clone)]
-pub struct Plans {
-    /// Of its entries.
-    pub all: GhostPlan,
-    /// Of its nodes.
-    pub nodes: GhostPlan,
-    /// Of the entries of twists alone.
-    pub twists: GhostPlan,
 }
 
 /// The nodes of a part that others own, of those that `keep`.

@@ -1,8 +1,10 @@
 //! The ghosts of a vector, with the ranks that own them: nothing where a rank is alone.
 
+use std::fmt::Display;
 use std::ops::{AddAssign, Range};
 
 use crate::communicator::Communicator;
+use crate::failure::RankFailure;
 use crate::ghosts::GhostPlan;
 use crate::number::Number;
 use crate::ranks::Ranks;
@@ -55,6 +57,37 @@ impl Halo {
             first = range.end;
         }
         x[first..].fill(T::default());
+    }
+
+    /// Whether there are no ghosts anywhere.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// What this rank owns of a vector, range by range: all of it where there are no ghosts.
+    pub fn owned<'x, T>(&'x self, x: &'x [T]) -> impl Iterator<Item = &'x [T]> {
+        let shared = self.0.as_deref();
+        let ranges = shared.into_iter().flat_map(|shared| &shared.owned).map(|range| &x[range.clone()]);
+        ranges.chain(shared.is_none().then_some(x))
+    }
+
+    /// The number of ghosts, and of ranks that this one sends values to.
+    pub fn counts(&self) -> [usize; 2] {
+        self.0.as_deref().map_or([0; 2], |shared| [shared.plan.ghost_count(), shared.plan.neighbour_count()])
+    }
+
+    /// A failure of one rank is one of all, who are told the first of them; a rank that failed in the same way
+    /// keeps its own. All ranks call this.
+    ///
+    /// # Errors
+    /// The failure of another rank.
+    pub fn agreed<T, E: Display>(&self, outcome: Result<T, E>) -> Result<Result<T, E>, RankFailure> {
+        let Some(Shared { ranks, .. }) = self.0.as_deref() else { return Ok(outcome) };
+        let own = outcome.as_ref().err().map(ToString::to_string);
+        match ranks.first_failure(own.clone()) {
+            Some(first) if own.as_ref() != Some(&first.message) => Err(first),
+            _ => Ok(outcome),
+        }
     }
 
     /// Adds up numbers over all ranks.

@@ -239,7 +239,7 @@ fn suspensions(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(discretisation.mesh.cell_count() as u64));
         group.bench_function(id("mesh"), |b| b.iter(&mesh));
         group.bench_function(id("solid-nodes"), |b| {
-            b.iter(|| solid_nodes(&discretisation.mesh, nodes, &balls, OFFSET));
+            b.iter(|| solid_nodes(&discretisation, &balls, OFFSET));
         });
         group.bench_function(id("solid-region"), |b| {
             b.iter(|| SolidRegion::new(&discretisation, &balls, ramp, &matrices));

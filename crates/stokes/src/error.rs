@@ -2,10 +2,19 @@
 
 use gluey_fem::MeshError;
 use gluey_linalg::{BadDiagonal, BlockError, DirectError, KrylovError, SparseError};
+use gluey_parallel::{Halo, RankFailure};
 
 /// Failure of a Stokes solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StokesError {
+    /// What goes wrong in the part of another rank.
+    #[error("{message} (on rank {rank})")]
+    Elsewhere {
+        /// Which rank, the first of them.
+        rank: usize,
+        /// What it says.
+        message: String,
+    },
     /// The mesh cannot be built.
     #[error(transparent)]
     Mesh(#[from] MeshError),
@@ -180,6 +189,7 @@ impl StokesError {
             | Self::WeakSurface { body, .. }
             | Self::CoarseSurface { body }
             | Self::AtSurface(DiagonalError::Body { body, .. })
+            | Self::Smoother { source: DiagonalError::Body { body, .. }, .. }
             | Self::SurfaceBlock { body, .. } => *body = number(*body),
             #[cfg(feature = "paper")]
             Self::NoSolid { body, .. } => *body = number(*body),
@@ -187,6 +197,12 @@ impl StokesError {
         }
         self
     }
+}
+
+/// A failure of one rank as one of all. All ranks call this.
+pub fn agreed<T>(halo: &Halo, outcome: Result<T, StokesError>) -> Result<T, StokesError> {
+    let elsewhere = |first: RankFailure| StokesError::Elsewhere { rank: first.rank, message: first.message };
+    halo.agreed(outcome).map_err(elsewhere)?
 }
 
 /// A part of the diagonal of an operator that has no inverse.

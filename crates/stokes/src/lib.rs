@@ -61,7 +61,7 @@ pub use operator::{StokesSystem, SystemOperator};
 pub use precondition::schur::BoxCorrection;
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
 // The parts of the system: unknowns, planes that cut bodies flat.
-pub use space::{Discretisation, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
+pub use space::{Discretisation, Partition, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
 pub use surface::{Flat, Flats};
 // The crates whose types appear in this one.
 pub use {gluey_fem as fem, gluey_geom as geom, gluey_levelset as levelset, gluey_linalg as linalg};

@@ -21,14 +21,13 @@ use crate::space::Discretisation;
 
 pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
 pub use crate::flow::MOST_ROUNDS;
-pub use crate::operator::{BlockDiagonal, PressureForces};
+pub use crate::operator::PressureForces;
 pub use crate::precondition::schur::{
     LANCZOS_STEPS, LEAST_WEIGHT, MOST_PRESSURES, mass_iteration, ratio_inside,
 };
-pub use crate::precondition::surface::SurfaceSmoother;
+pub use crate::precondition::surface::{SurfaceCorrection, SurfaceSmoother};
 pub use crate::precondition::velocity::{
-    CoarseSolver, LEVEL_SWEEP, RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP, cell_lambda_max,
-    coarsest_level,
+    Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarsest_level,
 };
 pub use crate::solver::RESTART;
 pub use crate::surface::WeakCell;

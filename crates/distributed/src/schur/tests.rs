@@ -22,7 +22,7 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
             let cuts = equal_cuts(&tree, ranks);
             let none: [Ball<2>; 0] = [];
             let bodies = BallTree::new(&none);
-            let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, offset: 0.0, held: &[] };
+            let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, held: &[] };
             let space = LevelSpace::new(&mut tree, 4, &shared, None, None);
             let free = PressureSpace::around_surfaces(&space.pressure.map, |_| true, &[]);
             let pressures = SharedPressures::new(&mut tree, &shared, &space, &free);
@@ -30,12 +30,12 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
             let unit = gluey_fem::ReferenceMatrices::<2>::new().pressure_mass;
             let matrix: Vec<f64> = unit.iter().map(|entry| scale * entry).collect();
             let masses = |visit: &mut dyn FnMut(usize, &[f64])| {
-                space.own_cells().for_each(|cell| visit(cell, &matrix));
+                space.part.own().for_each(|cell| visit(cell, &matrix));
             };
             let map = &space.velocity.map;
             let is_fixed = (0..map.node_count()).map(|node| map.is_on_boundary(node)).collect();
             let all = (0..map.cell_count()).collect();
-            let flowing = Flowing { own: space.own_cells().collect(), all, is_fixed };
+            let flowing = Flowing { own: space.part.own().collect(), all, is_fixed };
             let cells = PressureCells { viscosity: 1.0, flowing: &flowing, masses: &masses };
             let made = SchurInverse::new(&tree, ranks, &space, &pressures, &cells);
             made.err().map(|error| error.to_string())

@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Wrench};
 use gluey_stokes::{Conditions, Given, GivenOf};
 
-use super::space::NearBodies;
+use crate::bodies::NearBodies;
 use crate::flow::FlowError;
 
 /// # Errors

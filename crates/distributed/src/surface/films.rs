@@ -5,9 +5,9 @@ use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::part::{FilmCorrection, FilmNetwork, FilmRow};
 use gluey_stokes::{StokesError, StokesSystem};
 
-use super::space::{NearBodies, SurfaceSpace};
+use super::space::SurfaceSpace;
 use crate::agreement::{agreed, gathered};
-use crate::bodies::rigid;
+use crate::bodies::{NearBodies, rigid};
 use crate::flow::FlowError;
 
 /// The network of films around all bodies, of which some may be `held`. All ranks call this.

@@ -23,7 +23,7 @@ use gluey_levelset::{Ball, BallTree, Body};
 use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
 use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::part::{
-    AssembledSmoother, MOST_ROUNDS, PartMethod, RESTART, coarse_offset, rings_around_surfaces,
+    AssembledSmoother, MOST_ROUNDS, PartMethod, RESTART, SurfaceCorrection, VCycle, rings_around_surfaces,
 };
 use gluey_stokes::{
     Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
@@ -31,18 +31,17 @@ use gluey_stokes::{
 };
 
 use crate::agreement::{agreed, gathered};
-use crate::bodies::Shared;
+use crate::bodies::{NearBodies, Shared};
 use crate::cells::MyCells;
-use crate::cycle::VCycle;
-use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all, sizes};
+use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all};
+use crate::levels::Levels;
 use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use crate::warm_start::{Moved, WarmStart};
 use conditions::{check_count, given};
 use films::{corrections, network};
 use operator::SurfaceOperator;
-use precondition::{SurfaceCycle, SurfaceTriangular};
-pub use space::NearBodies;
+use precondition::SurfaceTriangular;
 use space::{SurfaceSpace, is_near_surface, owner_of_film};
 use weak::Before;
 
@@ -72,6 +71,7 @@ where
     bodies: NearBodies<D>,
     discretisation: Discretisation<D>,
     level: LevelSpace<D>,
+    sizes: Vec<LevelSizes>,
     conditions: &'f Conditions<'f, D>,
     /// What is known of the bodies near the part; wrenches of those alone that this rank owns.
     given: Vec<GivenOf<D>>,
@@ -131,22 +131,23 @@ impl BoxFlow {
         let start = ranks.traffic();
         let bodies = BallTree::new(around.balls);
         let held = conditions.held(around.balls.len());
-        let shared = Shared { cuts, ranks, bodies: &bodies, offset: coarse_offset(), held: &held };
+        let shared = Shared { cuts, ranks, bodies: &bodies, held: &held };
         let frame = tree.frame().clone();
         let spreads = |cell: &Cell<D>| is_near_surface(&frame, &bodies, cell);
         let is_own = |film: &Film<D>| owner_of_film(tree, &shared, film) == ranks.rank();
         let all = (around.balls, frame.domain());
         let rings = rings_around_surfaces(around.lubrication, all, cell_size, &is_own);
-        let levels = VCycle::new(tree, &shared, self.viscosity, &Around { rings, spreads: &spreads })?;
-        let level = levels.levels[levels.levels.len() - 1].operator.space.clone();
-        let bodies = NearBodies::new(tree, &shared, &level.part);
+        let wide = Around { rings, spreads: &spreads };
+        let Levels { cycle, finest: level, discretisation, bodies, sizes } =
+            Levels::new(tree, &shared, self.viscosity, &wide)?;
         let setting = Setting {
             flow: self,
             given: given(conditions, &bodies, ranks.rank()),
             bodies,
             shared,
-            discretisation: part_of(&level),
+            discretisation,
             level,
+            sizes,
             conditions,
             keeps: kept.is_some(),
             start,
@@ -156,14 +157,9 @@ impl BoxFlow {
         let before = kept.take().map(|last| last.moved(ranks, &setting.level));
         let method = PartMethod::new(around.lubrication);
         let flow;
-        (flow, *kept) = setting.trusted(tree, levels, method, before)?;
+        (flow, *kept) = setting.trusted(tree, cycle, method, before)?;
         Ok(flow)
     }
-}
-
-fn part_of<const D: usize>(level: &LevelSpace<D>) -> Discretisation<D> {
-    let nodes = [level.velocity.map.clone(), level.pressure.map.clone()];
-    Discretisation::of_part(level.part.mesh.clone(), nodes, level.chunks.clone(), level.part.own())
 }
 
 /// A flow with the penalties that were tried.
@@ -171,7 +167,7 @@ struct Attempt<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    levels: VCycle<'a, D>,
+    cycle: VCycle<D>,
     space: SurfaceSpace<'a, D>,
     /// Values at all nodes of the part, those of the velocity followed by the twists near it.
     velocity: Vec<f64>,
@@ -195,7 +191,7 @@ where
     fn trusted(
         &self,
         tree: &mut ImplicitTree<'_, D>,
-        mut levels: VCycle<'a, D>,
+        mut cycle: VCycle<D>,
         mut method: PartMethod,
         mut before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
@@ -209,7 +205,7 @@ where
                 continue;
             }
             let smoother = agreed(ranks, smoother)?;
-            let attempt = self.attempt(tree, levels, (&problem, smoother), before.as_mut())?;
+            let attempt = self.attempt(tree, cycle, (&problem, smoother), before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
                 return self.finished((tree, &problem), attempt, &earlier, before);
@@ -224,7 +220,7 @@ where
             earlier.raised.solved_again += 1;
             earlier.iterations += attempt.report.as_ref().map_or(0, |report| report.iterations);
             method = method.raised(self.found(tree, &weak).into_iter());
-            levels = attempt.levels;
+            cycle = attempt.cycle;
         }
     }
 
@@ -256,18 +252,20 @@ where
     fn attempt(
         &self,
         tree: &mut ImplicitTree<'_, D>,
-        levels: VCycle<'a, D>,
+        cycle: VCycle<D>,
         (problem, smoother): (&Problem<D>, AssembledSmoother<'_, D>),
         before: Option<&mut Moved>,
     ) -> Result<Attempt<'a, D>, FlowError> {
         let (ranks, system) = (self.shared.ranks, &problem.system);
         let space = SurfaceSpace::new(tree, &self.shared, &self.level, (problem, &self.bodies));
-        let mut sizes = level_sizes(&levels);
+        let mut sizes = self.sizes.clone();
         if let Some(finest) = sizes.last_mut() {
             [finest.neighbours, finest.ghost_nodes] = space.neighbours();
         }
         let smoother = agreed(ranks, self.named(smoother.completed(space.halos())))?;
-        let cycle = SurfaceCycle::new(levels, smoother, system);
+        let rigid = &cycle.levels[cycle.levels.len() - 1].space;
+        let surfaces = SurfaceCorrection::with_smoother(smoother, &system.space, rigid);
+        let cycle = cycle.with_surfaces(surfaces);
         let schur = self.schur(tree, system, &space)?;
         let all = (self.shared.bodies.balls().len(), self.shared.held);
         let network = agreed(ranks, network(ranks, system, &self.bodies, all))?;
@@ -293,7 +291,7 @@ where
         });
         let stress = stress.transpose()?;
         Ok(Attempt {
-            levels: preconditioner.into_levels(),
+            cycle: preconditioner.into_cycle(),
             space,
             velocity,
             pressure,
@@ -445,8 +443,4 @@ where
         };
         Ok((flow, kept))
     }
-}
-
-fn level_sizes<const D: usize>(levels: &VCycle<'_, D>) -> Vec<LevelSizes> {
-    levels.levels.iter().map(|level| sizes(&level.operator.space, &level.operator.plans)).collect()
 }

@@ -1,114 +1,15 @@
 //! The block triangular preconditioner around surfaces, as in the serial solver: `z_p = -S^-1 r_p`,
 //! `z_u = V (r_u + B^T z_p)`, the forces of films with the pressures.
-//!
-//! With the blocks `G` of the smoother, the levels `L` and the sweep `C` the cycle `V` is `z = G r`, `z += L
-//! (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`. Its vectors hold the same at copies as at their
-//! owners.
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, vector};
-use gluey_parallel::Communicator;
-use gluey_stokes::part::{PressureForces, SurfaceSmoother};
+use gluey_stokes::part::{PressureForces, VCycle};
 use gluey_stokes::{PressureSpace, StokesSystem};
 
 use super::films::SharedFilms;
 use super::space::SurfaceSpace;
 use crate::bodies::rigid;
-use crate::cycle::VCycle;
-use crate::level::Level;
 use crate::schur::SchurInverse;
-
-/// The cycle on the velocities.
-pub struct SurfaceCycle<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    levels: VCycle<'a, D>,
-    smoother: SurfaceSmoother<D>,
-    /// Whether a node of the part is free.
-    is_free: Vec<bool>,
-    /// Reduced velocities of the part.
-    x: Vec<f32>,
-    r: Vec<f32>,
-    correction: Vec<f32>,
-    /// What is owned of them.
-    own: Vec<f32>,
-}
-
-impl<'a, const D: usize> SurfaceCycle<'a, D>
-where
-    Dim<D>: Space<D>,
-{
-    pub fn new(levels: VCycle<'a, D>, smoother: SurfaceSmoother<D>, system: &StokesSystem<D>) -> Self {
-        let [x, r, correction] = [(); 3].map(|()| vec![0.0; system.velocity_dim()]);
-        let nodes = system.space.nodes().node_count();
-        let is_free = (0..nodes).map(|node| system.space.is_free(node)).collect();
-        Self { levels, smoother, is_free, x, r, correction, own: Vec::new() }
-    }
-
-    /// `z = V r` on owned velocities and twists.
-    fn apply(&mut self, space: &SurfaceSpace<'a, D>, r: &[f64], z: &mut [f64]) {
-        let mut square = [vector::dot(r, r)];
-        space.ranks.sum(&mut square);
-        let norm = square[0].sqrt();
-        if norm == 0.0 {
-            return z.fill(0.0);
-        }
-        self.own.resize(r.len(), 0.0);
-        vector::convert(1.0 / norm, r, &mut self.own);
-        space.set_velocities(&self.own, &mut self.r);
-        self.smoother.update(&mut self.r);
-        self.x.fill(0.0);
-        self.smoother.add_blocks(&mut self.r, &mut self.x);
-        self.correct(space);
-        self.smoother.add_blocks(&mut self.r, &mut self.x);
-        self.smoother.sweep(&self.r, &mut self.x);
-        space.copy_velocities(&self.x, &mut self.own);
-        vector::convert(norm, &self.own, z);
-    }
-
-    /// `z = L r`, `x += z`, `r -= A z`.
-    fn correct(&mut self, space: &SurfaceSpace<'a, D>) {
-        let top = self.levels.levels.len() - 1;
-        self.restrict(space);
-        self.levels.run();
-        let Level { operator, z, .. } = &mut self.levels.levels[top];
-        operator.scatter(z);
-        operator.expand();
-        let nodal = space.level.nodal_dim();
-        let owned = space.level.velocity.owned.clone();
-        for node in owned.filter(|&node| self.is_free[node]) {
-            let at = node * D..(node + 1) * D;
-            self.correction[at.clone()].copy_from_slice(&operator.x[at]);
-        }
-        let twists = z[space.level.owned_nodal_dim()..].chunks_exact(rigid::<D>());
-        for (twist, &body) in twists.zip(&space.own_bodies) {
-            self.correction[nodal + body as usize * rigid::<D>()..][..rigid::<D>()].copy_from_slice(twist);
-        }
-        self.smoother.update(&mut self.correction);
-        vector::axpy(1.0, &self.correction, &mut self.x);
-        self.smoother.subtract(&self.correction, &mut self.r);
-    }
-
-    /// The residual as a load on the unknowns of the finest level: those of its rigid nodes on its twists, to
-    /// which those of the bodies come.
-    fn restrict(&mut self, space: &SurfaceSpace<'a, D>) {
-        let top = self.levels.levels.len() - 1;
-        let Level { operator, b, .. } = &mut self.levels.levels[top];
-        let (nodal, n) = (space.level.nodal_dim(), rigid::<D>());
-        operator.y.fill(0.0);
-        let owned = &space.level.velocity.owned;
-        let at = owned.start * D..owned.end * D;
-        operator.y[at.clone()].copy_from_slice(&self.r[at]);
-        operator.reduce();
-        operator.gather(b);
-        let twists = b[space.level.owned_nodal_dim()..].chunks_exact_mut(n);
-        for (loads, &body) in twists.zip(&space.own_bodies) {
-            let own = &self.r[nodal + body as usize * n..][..n];
-            loads.iter_mut().zip(own).for_each(|(load, own)| *load += own);
-        }
-    }
-}
 
 /// The preconditioner.
 pub struct SurfaceTriangular<'s, 'a, const D: usize>
@@ -117,7 +18,7 @@ where
 {
     system: &'s StokesSystem<D>,
     space: SurfaceSpace<'a, D>,
-    cycle: SurfaceCycle<'a, D>,
+    cycle: VCycle<D>,
     schur: SchurInverse<'a, D>,
     forces: PressureForces<D>,
     /// At the owned pressures.
@@ -129,6 +30,9 @@ where
     /// Owned velocities.
     own_load: Vec<f32>,
     wide: Vec<f64>,
+    /// Velocities of the part, the same at ghosts as at their owners.
+    ru: Vec<f64>,
+    zu: Vec<f64>,
     films: Option<SharedFilms<'s>>,
 }
 
@@ -139,7 +43,7 @@ where
     pub fn new(
         system: &'s StokesSystem<D>,
         space: SurfaceSpace<'a, D>,
-        cycle: SurfaceCycle<'a, D>,
+        cycle: VCycle<D>,
         schur: SchurInverse<'a, D>,
         films: Option<SharedFilms<'s>>,
     ) -> Self {
@@ -152,6 +56,8 @@ where
             load: vec![0.0; system.velocity_dim()],
             own_load: vec![0.0; space.velocity_dim()],
             wide: vec![0.0; space.velocity_dim()],
+            ru: vec![0.0; system.velocity_dim()],
+            zu: vec![0.0; system.velocity_dim()],
             system,
             space,
             cycle,
@@ -160,9 +66,9 @@ where
         }
     }
 
-    /// The levels of the cycle, for another smoother.
-    pub fn into_levels(self) -> VCycle<'a, D> {
-        self.cycle.levels
+    /// The cycle, for other surfaces.
+    pub fn into_cycle(self) -> VCycle<D> {
+        self.cycle
     }
 }
 
@@ -183,6 +89,8 @@ where
             load,
             own_load,
             wide,
+            ru: whole,
+            zu: answers,
             films: network,
         } = self;
         let ranks = space.ranks;
@@ -203,7 +111,10 @@ where
         space.gather_velocities(load, own_load);
         vector::convert(1.0, own_load, wide);
         vector::residual_from_product(ru, wide);
-        cycle.apply(space, wide, zu);
+        space.set_velocities(wide, whole);
+        space.update_velocities(whole);
+        cycle.apply(whole, answers);
+        space.copy_velocities(answers, zu);
         let twists = zu[space.level.owned_nodal_dim()..].chunks_exact_mut(rigid::<D>());
         let held = twists.zip(&space.own_bodies).filter(|(_, body)| system.space.is_held(**body as usize));
         held.for_each(|(twist, _)| twist.fill(0.0));

@@ -3,53 +3,19 @@
 
 use std::ops::Range;
 
-use gluey_fem::{Cell, Constraint, ImplicitTree, Part, TreeMesh};
+use gluey_fem::{Cell, Constraint, ImplicitTree, TreeMesh};
 use gluey_geom::{Dim, Space, Vector};
-use gluey_levelset::{Ball, BallTree};
+use gluey_levelset::BallTree;
 use gluey_linalg::Scalar;
 use gluey_parallel::{Communicator, GhostPlan, Halo, Number, Ranks, Wanted};
 use gluey_stokes::{Film, Partner, Problem, StokesSystem};
 
-use crate::bodies::{Shared, rigid};
+use crate::bodies::{NearBodies, Shared, rigid};
 use crate::pressures::SharedPressures;
 use crate::space::{LevelSpace, Nodes, wanted_nodes};
 
-/// Cells between a part and the bodies that it has to know: a film with one of them may reach into it.
-const MARGIN: f64 = 3.0;
 /// Cells between the middle of a cell and a surface, at most, if the part is to hold what is around it.
 const CELLS_AT_SURFACE: f64 = 3.5;
-
-/// The bodies near the part of a rank.
-pub struct NearBodies<const D: usize> {
-    /// Their numbers among all bodies, ascending.
-    pub ids: Vec<u32>,
-    pub balls: Vec<Ball<D>>,
-    owners: Vec<usize>,
-}
-
-impl<const D: usize> NearBodies<D> {
-    pub fn new(tree: &ImplicitTree<'_, D>, shared: &Shared<'_, '_, D>, part: &Part<D>) -> Self {
-        let (mesh, all) = (&part.mesh, shared.bodies);
-        let mut is_near = vec![false; all.balls().len()];
-        for cell in mesh.cells() {
-            let h = mesh.size(cell.level);
-            let center = mesh.lower_corner(cell) + Vector::repeat(0.5 * h);
-            all.any_within(&center, mesh.half_diagonal(h) + MARGIN * h, |body| {
-                is_near[body] = true;
-                false
-            });
-        }
-        let ids: Vec<u32> = (0..is_near.len() as u32).filter(|&id| is_near[id as usize]).collect();
-        let balls: Vec<Ball<D>> = ids.iter().map(|&id| all.balls()[id as usize]).collect();
-        let owners = balls.iter().map(|ball| shared.owner(tree, ball)).collect();
-        Self { ids, balls, owners }
-    }
-
-    /// The bodies whose twists belong to this rank, by their places.
-    pub fn owned(&self, rank: usize) -> Vec<u32> {
-        (0..self.ids.len() as u32).filter(|&place| self.owners[place as usize] == rank).collect()
-    }
-}
 
 /// The rank that has the forces of a film: the one whose run holds its middle.
 pub fn owner_of_film<const D: usize>(

@@ -18,9 +18,8 @@ use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::NodalFields;
 
-use crate::bodies::{Shared, rigid};
+use crate::bodies::{NearBodies, Shared, rigid};
 use crate::space::LevelSpace;
-use crate::surface::NearBodies;
 use films::KeptFilm;
 pub use saved::{PieceError, SavedPiece};
 

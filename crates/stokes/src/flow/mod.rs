@@ -112,9 +112,9 @@ where
     /// for pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
     /// velocity of the fluid in the cells that surfaces cut.
     pub fn velocity_with_bodies(&self, bodies: &[Ball<D>]) -> Vec<f64> {
-        let Discretisation { mesh, velocity: nodes, .. } = &self.discretisation;
+        let nodes = &self.discretisation.velocity;
         let mut velocity = self.velocity.clone();
-        for (node, body) in solid_nodes(mesh, nodes, bodies, 0.0).into_iter().enumerate() {
+        for (node, body) in solid_nodes(&self.discretisation, bodies, 0.0).into_iter().enumerate() {
             let Some(body) = body.map(|body| body as usize) else { continue };
             let motion = self.twists[body].velocity_at(&bodies[body].arm(&nodes.point(node)));
             velocity[node * D..][..D].copy_from_slice(motion.as_slice());

@@ -215,7 +215,7 @@ where
 
     fn finest_level(&self, problem: &Problem<D>) -> VelocitySpace<D> {
         let discretisation = problem.discretisation();
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &problem.bodies, OFFSET);
+        let solid = solid_nodes(discretisation, &problem.bodies, OFFSET);
         VelocitySpace::new(discretisation, &problem.bodies, &solid)
     }
 

@@ -34,11 +34,6 @@ impl BlockDiagonal {
         self.twists.iter_mut().for_each(|value| *value *= factor);
     }
 
-    /// The nodal entries, to change them.
-    pub fn nodal_mut(&mut self) -> &mut [f32] {
-        &mut self.nodal
-    }
-
     /// The nodal entries at some positions, and all twists.
     pub fn restricted(&self, positions: &[u32]) -> Self {
         let nodal = positions.iter().map(|&k| self.nodal[k as usize]).collect();
@@ -67,18 +62,53 @@ impl Preconditioner<f32> for BlockDiagonal {
     }
 }
 
-/// The inverse diagonal of the fluid's operator on the nodes in `smoothed`, and those of the twists.
-pub fn block_diagonal<const D: usize>(
-    space: &VelocitySpace<D>,
-    cells: &[ActiveCell],
-    smoothed: &[bool],
-) -> Result<BlockDiagonal, DiagonalError>
-where
-    Dim<D>: Space<D>,
-{
-    let nodal = nodal_diagonal(space, cells, smoothed)?;
-    let twists = twist_blocks(space, cells, &space.discretisation().reference())?;
-    Ok(BlockDiagonal { nodal, twists, rigid: Dim::<D>::RIGID })
+/// The diagonal of the fluid's operator as cells add it up: at nodes, and `R^T A R` for the twists.
+pub struct DiagonalSums {
+    nodal: Vec<f64>,
+    twists: Vec<f64>,
+}
+
+impl DiagonalSums {
+    /// The sums over some cells.
+    pub fn new<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let twists = twist_blocks(space, cells, &space.discretisation().reference());
+        Self { nodal: nodal_sums(space, cells), twists }
+    }
+
+    /// The inverse diagonal on the nodes in `smoothed`, and those of the twists; zero for twists that are not
+    /// active or that no cell acts on. All ranks call this.
+    ///
+    /// # Errors
+    /// [`DiagonalError`] for a diagonal that has no inverse.
+    pub fn inverted<const D: usize>(
+        self,
+        space: &VelocitySpace<D>,
+        smoothed: &[bool],
+    ) -> Result<BlockDiagonal, DiagonalError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let Self { mut nodal, mut twists } = self;
+        nodal.resize(space.dim(), 0.0);
+        space.halo().clone().sum(&mut nodal);
+        space.halo_of_twist_blocks().clone().sum(&mut twists);
+        nodal.truncate(space.full_dim());
+        let nodal = inverse_entries(space, nodal, smoothed)?;
+        let rigid = Dim::<D>::RIGID;
+        for (body, block) in twists.chunks_exact_mut(rigid * rigid).enumerate() {
+            let is_touched = block.iter().any(|&entry| entry != 0.0);
+            if is_touched && space.is_active(body) {
+                invert_spd(rigid, block).map_err(|source| DiagonalError::Body { body, source })?;
+            } else {
+                block.fill(0.0);
+            }
+        }
+        let twists = twists.into_iter().map(|entry| entry as f32).collect();
+        Ok(BlockDiagonal { nodal, twists, rigid })
+    }
 }
 
 /// The inverse diagonal of the fluid's operator on the nodes in `smoothed`, zero elsewhere.
@@ -90,10 +120,30 @@ pub fn nodal_diagonal<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let discretisation = space.discretisation();
-    let mut nodal = viscous_diagonal(discretisation, cells.iter().map(|c| (c, c.viscous, None)));
+    inverse_entries(space, nodal_sums(space, cells), smoothed)
+}
+
+/// The diagonal at nodes.
+fn nodal_sums<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Vec<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let cells = cells.iter().map(|c| (c, c.viscous, None));
+    let mut nodal = viscous_diagonal(space.discretisation(), cells);
     // The squares keep the sum positive: weights of hanging nodes may be negative.
     space.nodes().condense(D, |w| w * w, &mut nodal);
+    nodal
+}
+
+/// Inverses of the entries at free nodes in `smoothed`, zero elsewhere.
+fn inverse_entries<const D: usize>(
+    space: &VelocitySpace<D>,
+    nodal: Vec<f64>,
+    smoothed: &[bool],
+) -> Result<Vec<f32>, DiagonalError>
+where
+    Dim<D>: Space<D>,
+{
     let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
@@ -105,12 +155,12 @@ where
     Ok(nodal)
 }
 
-/// Inverses of `R^T A R` for every body, zero for those that are not active or that no cell acts on.
+/// `R^T A R` for every body, row by row.
 fn twist_blocks<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     reference: &ReferenceMatrices<D>,
-) -> Result<Vec<f32>, DiagonalError>
+) -> Vec<f64>
 where
     Dim<D>: Space<D>,
 {
@@ -121,8 +171,7 @@ where
         rows[node as usize] = Some((body as usize, matrix));
     }
     let viscous = nalgebra::DMatrix::from_row_slice(n, n, &reference.viscous);
-    let mut blocks = vec![vec![0.0; rigid * rigid]; space.body_count()];
-    let mut is_touched = vec![false; space.body_count()];
+    let mut blocks = vec![0.0; space.body_count() * rigid * rigid];
     for cell in cells {
         let nodes = discretisation.velocity.cell(cell.cell as usize);
         let mut bodies: Vec<usize> =
@@ -140,18 +189,9 @@ where
             }
             let motion = nalgebra::DMatrix::from_row_slice(n, rigid, &motion);
             let product = motion.transpose() * (&viscous * &motion) * cell.viscous;
-            is_touched[body] = true;
-            blocks[body].iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
+            let block = &mut blocks[body * rigid * rigid..][..rigid * rigid];
+            block.iter_mut().zip(product.iter()).for_each(|(b, p)| *b += p);
         }
     }
-    let mut inverses = Vec::with_capacity(blocks.len() * rigid * rigid);
-    for (body, mut block) in blocks.into_iter().enumerate() {
-        if !space.is_active(body) || !is_touched[body] {
-            inverses.extend(std::iter::repeat_n(0f32, rigid * rigid));
-            continue;
-        }
-        invert_spd(rigid, &mut block).map_err(|source| DiagonalError::Body { body, source })?;
-        inverses.extend(block.iter().map(|&m| m as f32));
-    }
-    Ok(inverses)
+    blocks
 }

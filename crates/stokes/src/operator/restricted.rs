@@ -4,6 +4,7 @@
 use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Scalar};
+use gluey_parallel::{Halo, Number};
 use rayon::prelude::*;
 
 use super::cells::{AddedViscosity, cell_operator};
@@ -20,6 +21,8 @@ pub struct CountedOperator<T, const D: usize> {
     work: Workspace<T>,
     /// Reduced velocities.
     dim: usize,
+    /// Of these.
+    halo: Halo,
     /// Fraction of all cells.
     share: f64,
     applications: usize,
@@ -49,6 +52,7 @@ where
             operator: cell_operator(space, cells, added),
             work: Workspace::default(),
             dim: space.dim(),
+            halo: space.halo().clone(),
             share: cells.len() as f64 / cell_count.max(1) as f64,
             applications: 0,
         }
@@ -71,7 +75,8 @@ where
     }
 }
 
-impl<T: CellScalar, const D: usize> LinOp<T> for CountedOperator<T, D>
+/// On vectors that hold the same at ghosts as at their owners.
+impl<T: CellScalar + Number, const D: usize> LinOp<T> for CountedOperator<T, D>
 where
     Dim<D>: Space<D>,
 {
@@ -82,6 +87,7 @@ where
     fn apply(&mut self, x: &[T], y: &mut [T]) {
         self.applications += 1;
         self.operator.viscous(x, y, &mut self.work);
+        self.halo.sum(y);
     }
 }
 
@@ -106,7 +112,7 @@ pub fn acting<const D: usize>(
     cells.iter().filter(|c| acts[c.cell as usize]).copied().collect()
 }
 
-impl<T: CellScalar, const D: usize> Restricted<T, D>
+impl<T: CellScalar + Number, const D: usize> Restricted<T, D>
 where
     Dim<D>: Space<D>,
 {
@@ -135,7 +141,7 @@ where
     }
 }
 
-impl<T: CellScalar, const D: usize> LinOp<T> for Restricted<T, D>
+impl<T: CellScalar + Number, const D: usize> LinOp<T> for Restricted<T, D>
 where
     Dim<D>: Space<D>,
 {

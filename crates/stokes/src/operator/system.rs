@@ -342,7 +342,7 @@ mod tests {
         })
         .unwrap();
         let discretisation = Discretisation::new(mesh);
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, 0.0);
+        let solid = solid_nodes(&discretisation, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
         let system = StokesSystem::new(space, 1.5);
         let mut x = vec![0.0f64; system.dim()];

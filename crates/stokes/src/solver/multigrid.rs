@@ -147,7 +147,7 @@ where
     finest.hold(held);
     let correction = rigidity.correction(elements, &finest, levels)?;
     let coarser = hierarchy.meshes[..hierarchy.meshes.len() - 1].iter().map(|mesh| {
-        let solid = solid_nodes(&mesh.mesh, &mesh.velocity, bodies, rigidity.coarse_offset());
+        let solid = solid_nodes(mesh, bodies, rigidity.coarse_offset());
         let mut space = VelocitySpace::new(mesh, bodies, &solid);
         space.hold(held);
         (space, false)

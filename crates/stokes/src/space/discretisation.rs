@@ -1,9 +1,12 @@
 //! A mesh with its velocity and pressure nodes.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::{Chunks, NodeMap, ReferenceMatrices, TreeMesh};
+
+use super::partition::Partition;
 
 /// A mesh with the nodes of the Q2-Q1 pair. Cheap to clone: clones share all of it.
 #[derive(Clone, Debug)]
@@ -16,8 +19,8 @@ pub struct Discretisation<const D: usize> {
     pub pressure: Arc<NodeMap<D>>,
     /// How operators cut the mesh.
     pub chunks: Arc<Chunks<D>>,
-    /// The cells that are added up here, where the mesh is a part of a larger one.
-    own: Option<Range<usize>>,
+    /// This rank's share, where the mesh is a part of a larger one.
+    partition: Option<Arc<Partition>>,
 }
 
 impl<const D: usize> Discretisation<D> {
@@ -26,28 +29,58 @@ impl<const D: usize> Discretisation<D> {
         let nodes = |degree| Arc::new(NodeMap::new(&mesh, degree));
         let (velocity, pressure) = rayon::join(|| nodes(2), || nodes(1));
         let chunks = Arc::new(Chunks::new(&velocity, &pressure));
-        Self { mesh: Arc::new(mesh), velocity, pressure, chunks, own: None }
+        Self { mesh: Arc::new(mesh), velocity, pressure, chunks, partition: None }
     }
 
-    /// A part of a larger mesh, of which the cells `own` are added up here: operators are sums over these
-    /// cells, sums over all cells those of all parts.
+    /// A part of a larger mesh: operators are sums over the cells of `partition`, sums over all cells those of
+    /// all parts.
     pub fn of_part(
         mesh: Arc<TreeMesh<D>>,
         [velocity, pressure]: [Arc<NodeMap<D>>; 2],
         chunks: Arc<Chunks<D>>,
-        own: Range<usize>,
+        partition: Partition,
     ) -> Self {
-        Self { mesh, velocity, pressure, chunks, own: Some(own) }
+        Self { mesh, velocity, pressure, chunks, partition: Some(Arc::new(partition)) }
+    }
+
+    /// The same mesh as one that no ranks share.
+    #[must_use]
+    pub fn alone(&self) -> Self {
+        Self { partition: None, ..self.clone() }
+    }
+
+    /// This rank's share; `None` where the mesh is no part.
+    pub fn partition(&self) -> Option<&Partition> {
+        self.partition.as_deref()
     }
 
     /// Whether the mesh is a part of a larger one.
     pub fn is_part(&self) -> bool {
-        self.own.is_some()
+        self.partition.is_some()
     }
 
     /// Whether a cell is added up here: all are, but in a part.
     pub fn is_own(&self, cell: usize) -> bool {
-        self.own.as_ref().is_none_or(|own| own.contains(&cell))
+        self.partition().is_none_or(|part| part.cells.contains(&cell))
+    }
+
+    /// The velocity nodes that this rank owns.
+    pub fn own_nodes(&self) -> Range<usize> {
+        self.partition().map_or(0..self.velocity.node_count(), |part| part.nodes.clone())
+    }
+
+    /// Level of the smallest cell at each velocity node.
+    pub fn finest_levels(&self) -> Cow<'_, [u8]> {
+        if let Some(part) = self.partition() {
+            return Cow::Borrowed(&part.finest);
+        }
+        let mut finest = vec![0; self.velocity.node_count()];
+        for (index, cell) in self.mesh.cells().iter().enumerate() {
+            for &node in self.velocity.cell(index) {
+                finest[node as usize] = cell.level.max(finest[node as usize]);
+            }
+        }
+        Cow::Owned(finest)
     }
 
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.

@@ -1,6 +1,6 @@
 //! Which nodes and cells lie in bodies, near them, or between them.
 
-use gluey_fem::{NodeMap, TreeMesh};
+use gluey_fem::NodeMap;
 use gluey_levelset::{Ball, BallTree};
 use rayon::prelude::*;
 
@@ -13,17 +13,12 @@ const LEAST_SHARE: usize = 1024;
 /// The nodes with `alpha >= offset h`, each with the body whose level set is largest there; `h` is the size
 /// of the smallest cell at the node. A negative offset takes nodes slightly outside the surface.
 pub fn solid_nodes<const D: usize>(
-    mesh: &TreeMesh<D>,
-    nodes: &NodeMap<D>,
+    discretisation: &Discretisation<D>,
     bodies: &[Ball<D>],
     offset: f64,
 ) -> SolidNodes {
-    let mut finest = vec![0; nodes.node_count()];
-    for (index, cell) in mesh.cells().iter().enumerate() {
-        for &node in nodes.cell(index) {
-            finest[node as usize] = cell.level.max(finest[node as usize]);
-        }
-    }
+    let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
+    let finest = discretisation.finest_levels();
     let bodies = BallTree::new(bodies);
     let at = |node: usize| {
         let threshold = offset * mesh.size(finest[node]);
@@ -41,12 +36,9 @@ pub fn moves_as_one(mut bodies: impl Iterator<Item = Option<u32>>) -> bool {
 /// The nodes a level smooths: those of its finest cells and of the cells next to them. The others are those
 /// of the next coarser level, which smooths them.
 pub fn around_finest_cells<const D: usize>(discretisation: &Discretisation<D>) -> Vec<bool> {
-    let (mesh, nodes) = (&discretisation.mesh, &discretisation.velocity);
-    let mut finest = vec![false; nodes.node_count()];
-    for (cell, _) in mesh.cells().iter().enumerate().filter(|(_, c)| c.level == mesh.max_level()) {
-        nodes.cell(cell).iter().for_each(|&n| finest[n as usize] = true);
-    }
-    nodes_of_cells_with(nodes, &finest)
+    let level = discretisation.mesh.max_level();
+    let finest: Vec<bool> = discretisation.finest_levels().iter().map(|&finest| finest == level).collect();
+    nodes_of_cells_with(&discretisation.velocity, &finest)
 }
 
 /// The nodes of all cells that have a marked node.

@@ -8,11 +8,14 @@
 
 mod twists;
 
+use std::ops::Range;
+
 use gluey_fem::cells;
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space, Spin, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
+use gluey_parallel::Halo;
 
 use super::discretisation::Discretisation;
 
@@ -50,6 +53,8 @@ pub struct VelocitySpace<const D: usize> {
     by_surface: bool,
     /// See [`VelocitySpace::hold`]; empty where none is held.
     held: Vec<bool>,
+    /// Of reduced vectors, and of a square matrix for each twist.
+    halos: [Halo; 2],
 }
 
 impl<const D: usize> VelocitySpace<D>
@@ -57,22 +62,34 @@ where
     Dim<D>: Space<D>,
 {
     /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define
-    /// a rigid motion is left out: its nodes stay free, see [`VelocitySpace::is_active`].
+    /// a rigid motion is left out: its nodes stay free, see [`VelocitySpace::is_active`]. On a part of a mesh
+    /// all ranks call this, with the bodies near their parts.
     pub fn new<B: Body<D>>(discretisation: &Discretisation<D>, bodies: &[B], solid: &[Option<u32>]) -> Self {
+        let halos = discretisation.partition().map(|part| part.halos::<D>(solid));
+        Self::with_halos(discretisation, (bodies, solid), halos.unwrap_or_default())
+    }
+
+    fn with_halos<B: Body<D>>(
+        discretisation: &Discretisation<D>,
+        (bodies, solid): (&[B], &[Option<u32>]),
+        mut halos: [Halo; 2],
+    ) -> Self {
         let nodes = &discretisation.velocity;
         let boundary = (0..nodes.node_count() as u32).filter(|&n| nodes.is_on_boundary(n as usize)).collect();
         let rigid = rigid_nodes(nodes, bodies, solid);
+        let own = if halos[0].is_empty() { 0..nodes.node_count() } else { discretisation.own_nodes() };
         let mut space = Self {
             body_of: vec![NO_BODY; nodes.node_count()],
             discretisation: discretisation.clone(),
             boundary,
             radius: bodies.iter().map(|b| b.bounding_radius()).collect(),
-            fit: gram_inverses(bodies.len(), &rigid),
+            fit: gram_inverses(bodies.len(), &rigid, &own, &mut halos[1]),
             rigid,
             ghosts: Vec::new(),
             is_ghost: vec![false; nodes.node_count()],
             by_surface: false,
             held: Vec::new(),
+            halos,
         };
         let fit = &space.fit;
         space.rigid.retain(|r| fit[r.body as usize].is_some());
@@ -88,7 +105,7 @@ where
         solid: &[Option<u32>],
         ghosts: Vec<Constraint>,
     ) -> Self {
-        let mut space = Self::new(discretisation, bodies, solid);
+        let mut space = Self::with_halos(discretisation, (bodies, solid), <[Halo; 2]>::default());
         space.rigid = rigid_nodes(space.nodes(), bodies, solid);
         space.mark_rigid();
         ghosts.iter().for_each(|ghost| space.is_ghost[ghost.node as usize] = true);
@@ -119,6 +136,41 @@ where
     /// The mesh with its nodes.
     pub fn discretisation(&self) -> &Discretisation<D> {
         &self.discretisation
+    }
+
+    /// The halo of reduced vectors: nothing on one rank, and around surfaces.
+    pub fn halo(&self) -> &Halo {
+        &self.halos[0]
+    }
+
+    /// The halo of a square matrix for each twist, row by row.
+    pub fn halo_of_twist_blocks(&self) -> &Halo {
+        &self.halos[1]
+    }
+
+    /// The same unknowns as those of one rank, where this one holds the whole mesh.
+    pub fn whole(&self) -> Option<Self> {
+        let is_whole = self.discretisation.partition().is_none_or(|part| part.is_whole);
+        let alone = || Self {
+            discretisation: self.discretisation.alone(),
+            halos: Default::default(),
+            ..self.clone()
+        };
+        is_whole.then(alone)
+    }
+
+    /// Brings the marks of owned nodes to the ghosts of free ones, and takes those of all others away: nothing
+    /// on one rank.
+    pub fn share_marks(&self, marks: &mut [bool]) {
+        if self.halos[0].is_empty() {
+            return;
+        }
+        let (mut halo, mut numbers) = (self.halos[0].clone(), vec![0f32; self.dim()]);
+        let first = numbers.chunks_exact_mut(D).zip(marks.iter());
+        first.for_each(|(numbers, &is_marked)| numbers[0] = f32::from(u8::from(is_marked)));
+        halo.clear(&mut numbers);
+        halo.update(&mut numbers);
+        marks.iter_mut().zip(numbers.chunks_exact(D)).for_each(|(mark, numbers)| *mark = numbers[0] > 0.0);
     }
 
     /// Whether anything fixes a constant velocity: a wall, or bodies that are held.
@@ -237,10 +289,20 @@ where
     /// Replaces the nodal velocities of the rigid nodes by the twists closest to them in the least-squares
     /// sense, and clears hanging and boundary nodes and ghosts: from any nodal field to a reduced vector.
     pub fn project<T: Scalar>(&self, x: &mut [T]) {
+        self.begin_projection(x);
+        self.end_projection(x);
+    }
+
+    /// The first half of [`VelocitySpace::project`], on owned nodes, before sums over ranks.
+    pub fn begin_projection<T: Scalar>(&self, x: &mut [T]) {
         for constraint in self.nodes().constraints().iter().chain(&self.ghosts) {
             x[constraint.node as usize * D..][..D].fill(T::ZERO);
         }
         self.reduce(x);
+    }
+
+    /// The second half of [`VelocitySpace::project`].
+    pub fn end_projection<T: Scalar>(&self, x: &mut [T]) {
         self.solve_grams(&mut x[self.full_dim()..]);
     }
 
@@ -354,15 +416,21 @@ where
     rows
 }
 
-fn gram_inverses<const D: usize>(body_count: usize, rigid: &[RigidNode<D>]) -> Vec<Option<Vec<f64>>>
+/// Inverses of sums over the `own` nodes of all ranks.
+fn gram_inverses<const D: usize>(
+    body_count: usize,
+    rigid: &[RigidNode<D>],
+    own: &Range<usize>,
+    halo: &mut Halo,
+) -> Vec<Option<Vec<f64>>>
 where
     Dim<D>: Space<D>,
 {
     let n = Dim::<D>::RIGID;
-    let mut grams = vec![vec![0.0; n * n]; body_count];
-    for r in rigid {
+    let mut grams = vec![0.0; body_count * n * n];
+    for r in rigid.iter().filter(|r| own.contains(&(r.node as usize))) {
         let rows = rigid_matrix(&r.arm);
-        let gram = &mut grams[r.body as usize];
+        let gram = &mut grams[r.body as usize * n * n..][..n * n];
         for row in rows.chunks_exact(n) {
             for i in 0..n {
                 for j in 0..n {
@@ -371,7 +439,8 @@ where
             }
         }
     }
-    grams.iter().map(|gram| invert_gram(n, gram)).collect()
+    halo.sum(&mut grams);
+    grams.chunks_exact(n * n).map(|gram| invert_gram(n, gram)).collect()
 }
 
 /// Inverse of a symmetric matrix whose conditioning tells whether the nodes define a rigid motion.

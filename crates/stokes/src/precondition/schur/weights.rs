@@ -306,7 +306,7 @@ mod tests {
         .unwrap();
         let discretisation = Discretisation::new(mesh);
         assert!(!discretisation.pressure.constraints().is_empty());
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], 0.0);
+        let solid = solid_nodes(&discretisation, &[ball], 0.0);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
         let system = StokesSystem::new(space, 1.0);
         let weights = weights_in(&system, 1.0);

@@ -8,15 +8,17 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
+use gluey_parallel::Halo;
 
 use super::smoother::SurfaceSmoother;
 use crate::error::StokesError;
 use crate::operator::Elements;
 use crate::precondition::Correction;
-use crate::space::VelocitySpace;
+use crate::space::{VelocitySpace, norm};
 use crate::surface::SurfaceCoupling;
 
-/// The smoothers of the finest mesh around the rigid levels.
+/// The smoothers of the finest mesh around the rigid levels. Vectors hold the same at ghosts as at their
+/// owners.
 pub struct SurfaceCorrection<const D: usize>
 where
     Dim<D>: Space<D>,
@@ -24,6 +26,7 @@ where
     smoother: SurfaceSmoother<D>,
     /// The velocities of the finest rigid level.
     rigid: VelocitySpace<D>,
+    halo: Halo,
     /// Whether a node is free.
     is_free: Vec<bool>,
     /// On the reduced velocities.
@@ -47,11 +50,20 @@ where
         surfaces: &SurfaceCoupling<D>,
         rigid: &VelocitySpace<D>,
     ) -> Result<Self, StokesError> {
-        let space = &elements.system().space;
+        Ok(Self::with_smoother(SurfaceSmoother::new(elements, surfaces)?, &elements.system().space, rigid))
+    }
+
+    /// The same with this smoother of the velocities `space`.
+    pub fn with_smoother(
+        smoother: SurfaceSmoother<D>,
+        space: &VelocitySpace<D>,
+        rigid: &VelocitySpace<D>,
+    ) -> Self {
         let dim = space.dim();
         let [x, r, velocity] = [(); 3].map(|()| vec![0.0; dim]);
-        Ok(Self {
-            smoother: SurfaceSmoother::new(elements, surfaces)?,
+        Self {
+            smoother,
+            halo: rigid.halo().clone(),
             rigid: rigid.clone(),
             is_free: (0..space.nodes().node_count()).map(|node| space.is_free(node)).collect(),
             x,
@@ -60,13 +72,14 @@ where
             spread: vec![0.0; dim],
             correction: velocity.clone(),
             velocity,
-        })
+        }
     }
 
     /// `z = V r`, `x += z`, `r -= A z` for the residual in the workspace.
     fn correct(&mut self, levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
         let nodal = self.rigid.full_dim();
         vector::convert(1.0, &self.r, &mut self.load);
+        self.halo.update(&mut self.load);
         // The loads on the bodies, as nodal loads of the rigid level.
         self.spread.fill(0.0);
         self.spread[nodal..].copy_from_slice(&self.load[nodal..]);
@@ -81,6 +94,7 @@ where
         for ((z, u), _) in fields.zip(&self.is_free).filter(|(_, is_free)| **is_free) {
             z.copy_from_slice(u);
         }
+        self.smoother.update(&mut self.correction);
         vector::axpy(1.0, &self.correction, &mut self.x);
         self.smoother.subtract(&self.correction, &mut self.r);
     }
@@ -91,7 +105,7 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
-        let norm = vector::norm(r);
+        let norm = norm(self.smoother.halo(), r);
         if norm == 0.0 {
             return z.fill(0.0);
         }

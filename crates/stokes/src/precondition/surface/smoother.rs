@@ -188,6 +188,11 @@ where
         self.halo.update(x);
     }
 
+    /// The halo of reduced velocities.
+    pub fn halo(&self) -> &Halo {
+        &self.halo
+    }
+
     /// Applications of the operator since the last call.
     pub fn take_applications(&mut self) -> f64 {
         self.operator.take_applications()

@@ -6,9 +6,10 @@ use gluey_linalg::{Preconditioner, Scalar, vector};
 use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
-use crate::error::StokesError;
+use crate::error::{StokesError, agreed};
 use crate::precondition::Correction;
-use crate::space::VelocitySpace;
+use crate::precondition::surface::SurfaceCorrection;
+use crate::space::{VelocitySpace, norm};
 
 /// A level that a cycle is to have.
 pub struct LevelPlan<const D: usize> {
@@ -27,7 +28,8 @@ where
     pub hierarchy: Hierarchy<D>,
     /// Coarsest first.
     pub levels: Vec<Level<D>>,
-    coarse: CoarseSolver,
+    /// On the rank that holds all of the coarsest level.
+    coarse: Option<CoarseSolver>,
     /// For the errors that the levels do not reduce.
     correction: Option<Box<dyn Correction>>,
     /// Load and velocities of the correction.
@@ -38,10 +40,11 @@ impl<const D: usize> VCycle<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity.
+    /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity. All ranks call
+    /// this.
     ///
     /// # Errors
-    /// If a diagonal or the matrix of the coarsest level has no inverse.
+    /// If a diagonal or the matrix of the coarsest level has no inverse, on all ranks.
     pub fn new(
         hierarchy: Hierarchy<D>,
         plans: Vec<LevelPlan<D>>,
@@ -49,11 +52,13 @@ where
         viscosity: f64,
     ) -> Result<Self, StokesError> {
         let level = |(level, plan): (usize, LevelPlan<D>)| {
-            Level::new(plan.space, viscosity, plan.smoothing)
-                .map_err(|source| StokesError::Smoother { level, source })
+            let halo = plan.space.halo().clone();
+            let made = Level::new(plan.space, viscosity, plan.smoothing);
+            agreed(&halo, made.map_err(|source| StokesError::Smoother { level, source }))
         };
         let levels = plans.into_iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
-        let coarse = CoarseSolver::new(levels[0].space.clone(), viscosity)?;
+        let coarse = levels[0].space.whole().map(|space| CoarseSolver::new(space, viscosity));
+        let coarse = agreed(&levels[0].halo, coarse.transpose())?;
         Ok(Self { hierarchy, levels, coarse, correction, wide: Default::default() })
     }
 
@@ -66,20 +71,30 @@ where
 
     fn run(&mut self, top: usize) {
         if top == 0 {
-            let level = &mut self.levels[0];
-            self.coarse.solve(&level.b, &mut level.x);
-            return;
+            return self.solve_coarsest();
         }
         let (below, above) = self.levels.split_at_mut(top);
-        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
-        fine.restrict(&mut self.hierarchy.transfers[top - 1], &coarse.space, &mut coarse.b);
+        above[0].restrict(&mut self.hierarchy.transfers[top - 1], &mut below[top - 1]);
         self.run(top - 1);
         let (below, above) = self.levels.split_at_mut(top);
-        let (coarse, fine) = (&mut below[top - 1], &mut above[0]);
-        let mut x = std::mem::take(&mut coarse.x);
-        fine.correct(&self.hierarchy.transfers[top - 1], &coarse.space, &mut x);
-        coarse.x = x;
-        fine.smooth();
+        above[0].correct(&self.hierarchy.transfers[top - 1], &mut below[top - 1]);
+        above[0].smooth();
+    }
+
+    /// One rank solves for all.
+    fn solve_coarsest(&mut self) {
+        let Level { b, x, halo, .. } = &mut self.levels[0];
+        match &mut self.coarse {
+            Some(coarse) => coarse.solve(b, x),
+            None => x.fill(0.0),
+        }
+        halo.sum(x);
+    }
+
+    /// The same levels around the surfaces of another system, or of the same with other penalties.
+    #[must_use]
+    pub fn with_surfaces(self, surfaces: SurfaceCorrection<D>) -> Self {
+        Self { correction: Some(Box::new(surfaces)), ..self }
     }
 }
 
@@ -89,7 +104,7 @@ where
 {
     /// `z = V r` on the reduced vectors of the finest rigid level.
     fn rigid_cycle<T: Scalar>(&mut self, r: &[f64], z: &mut [T]) {
-        let norm = vector::norm(r);
+        let norm = norm(&self.levels[self.levels.len() - 1].halo, r);
         if norm == 0.0 {
             z.fill(T::ZERO);
             return;
@@ -103,7 +118,11 @@ where
     /// The reduced velocities `u` of one cycle on the finest rigid level for the nodal load `f`, which is
     /// reduced in place.
     fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
-        self.levels[self.levels.len() - 1].space.reduce(f);
+        let top = self.levels.len() - 1;
+        let Level { space, halo, .. } = &mut self.levels[top];
+        halo.clear(f);
+        space.reduce(f);
+        halo.sum(f);
         self.rigid_cycle(f, u);
     }
 

@@ -3,12 +3,13 @@
 use gluey_fem::{Interpolation, ReferenceMatrices};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp, vector};
+use gluey_parallel::Halo;
 
 use super::SAFETY;
 use super::near_bodies::NearBodies;
 use crate::error::DiagonalError;
-use crate::operator::{BlockDiagonal, CountedOperator, block_diagonal};
-use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells, cells_touching};
+use crate::operator::{BlockDiagonal, CountedOperator, DiagonalSums};
+use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells, cells_touching, own_cells};
 
 /// How a level smooths.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +40,8 @@ where
 {
     /// Reduced velocities.
     pub space: VelocitySpace<D>,
+    /// Of these: vectors hold the same at ghosts as at their owners.
+    pub halo: Halo,
     /// `None` where it only joins the coarser levels to one that smooths.
     pub relaxation: Option<Relaxation<D>>,
     /// Right-hand side.
@@ -68,24 +71,28 @@ impl<const D: usize> Relaxation<D>
 where
     Dim<D>: Space<D>,
 {
-    /// Smooths around the finest cells.
+    /// Smooths around the finest cells. All ranks call this.
     fn new(space: &VelocitySpace<D>, viscosity: f64, smoothing: Smoothing) -> Result<Self, DiagonalError> {
         let discretisation = space.discretisation();
         let nodes = &discretisation.velocity;
-        let smoothed = &around_finest_cells(discretisation);
-        let mut cells = active_cells(space, viscosity);
+        let mut smoothed = around_finest_cells(discretisation);
+        space.share_marks(&mut smoothed);
+        let smoothed = &smoothed;
+        let mut cells = own_cells(discretisation, &active_cells(space, viscosity));
         let touches = cells_touching(nodes, smoothed);
         let holds_a_body =
             |c: &ActiveCell| nodes.cell(c.cell as usize).iter().any(|&n| space.body_of(n as usize).is_some());
-        let smooths_twists = cells.iter().all(|c| touches[c.cell as usize] || !holds_a_body(c));
+        let is_beyond = |c: &&ActiveCell| !touches[c.cell as usize] && holds_a_body(c);
+        let mut beyond = [cells.iter().filter(is_beyond).count() as f64];
+        space.halo().sum_over_ranks(&mut beyond);
         let cell_count = cells.len();
         cells.retain(|c| touches[c.cell as usize]);
-        let (diagonal, operator) = rayon::join(
-            || block_diagonal(space, &cells, smoothed),
+        let (sums, operator) = rayon::join(
+            || DiagonalSums::new(space, &cells),
             || CountedOperator::new(space, &cells, cell_count),
         );
-        let mut diagonal = diagonal?;
-        diagonal.hold(|body| !smooths_twists || space.is_held(body));
+        let mut diagonal = sums.inverted(space, smoothed)?;
+        diagonal.hold(|body| beyond[0] > 0.0 || space.is_held(body));
         let lambda_max = cell_lambda_max::<D>(&space.discretisation().reference());
         Ok(Self {
             near_bodies: NearBodies::new(space, &cells, &diagonal, lambda_max),
@@ -119,7 +126,8 @@ where
         let (dim, nodal) = (space.dim(), space.full_dim());
         let before = relaxation.as_ref().is_some_and(|r| r.before);
         let r = vec![0.0; if before { dim } else { dim - nodal }];
-        Ok(Self { b: vec![0.0; dim], x: vec![0.0; dim], r, relaxation, space })
+        let halo = space.halo().clone();
+        Ok(Self { b: vec![0.0; dim], x: vec![0.0; dim], r, relaxation, space, halo })
     }
 
     /// Applications since the last call, each counted as its share of the mesh.
@@ -140,33 +148,34 @@ where
 
     /// Restricts to the right-hand side of the coarser level: the residual of a sweep from zero, or the
     /// right-hand side of this level.
-    pub fn restrict(
-        &mut self,
-        transfer: &mut Interpolation<D>,
-        coarse: &VelocitySpace<D>,
-        coarse_b: &mut [f32],
-    ) {
-        let Self { space, relaxation, b, x, r } = self;
+    pub fn restrict(&mut self, transfer: &mut Interpolation<D>, coarse: &mut Self) {
+        let Self { space, relaxation, b, x, r, .. } = self;
+        let first = space.discretisation().own_nodes().start * D;
         match relaxation {
             Some(relaxation) if relaxation.before => {
                 relaxation.smooth(b, x, Guess::Zero);
                 relaxation.operator.apply(x, r);
                 vector::residual_from_product(b, r);
                 space.spread(r);
-                transfer.restrict::<D>(r, coarse_b);
+                transfer.restrict::<D>(&r[first..], &mut coarse.b);
             }
-            _ => restrict_load(space, b, r, |b| transfer.restrict::<D>(b, coarse_b)),
+            _ => restrict_load(space, b, r, |b| transfer.restrict::<D>(&b[first..], &mut coarse.b)),
         }
-        coarse.reduce(coarse_b);
+        coarse.space.reduce(&mut coarse.b);
+        coarse.halo.sum(&mut coarse.b);
     }
 
-    /// Adds the correction `coarse_x` of the coarser level, whose entries it expands in place.
-    pub fn correct(&mut self, transfer: &Interpolation<D>, coarse: &VelocitySpace<D>, coarse_x: &mut [f32]) {
-        coarse.expand(coarse_x);
+    /// Adds the correction of the coarser level, whose entries it expands in place.
+    pub fn correct(&mut self, transfer: &Interpolation<D>, coarse: &mut Self) {
+        coarse.space.expand(&mut coarse.x);
         let before = self.relaxation.as_ref().is_some_and(|r| r.before);
         let correction = if before { &mut self.r } else { &mut self.x };
-        transfer.prolong::<D>(coarse_x, &mut correction[..self.space.full_dim()]);
-        self.space.project(correction);
+        let first = self.space.discretisation().own_nodes().start * D;
+        transfer.prolong::<D>(&coarse.x, &mut correction[first..self.space.full_dim()]);
+        self.halo.clear(correction);
+        self.space.begin_projection(correction);
+        self.halo.sum(correction);
+        self.space.end_projection(correction);
         if before {
             vector::axpy(1.0, &self.r, &mut self.x);
         }
@@ -227,7 +236,7 @@ mod tests {
         .unwrap();
         let discretisation = Discretisation::new(mesh);
         assert!(!discretisation.velocity.constraints().is_empty());
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &balls, -0.1);
+        let solid = solid_nodes(&discretisation, &balls, -0.1);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
         let level = Level::new(space, 1.7, Some(Smoothing::of_eliminated())).unwrap();
         let mut relaxation = level.relaxation.unwrap();
@@ -243,7 +252,7 @@ mod tests {
         let ball = Ball::new(Vector::<D>::repeat(0.47), 0.1);
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |_, _, _| true).unwrap();
         let discretisation = Discretisation::new(mesh);
-        let solid = solid_nodes(&discretisation.mesh, &discretisation.velocity, &[ball], -0.1);
+        let solid = solid_nodes(&discretisation, &[ball], -0.1);
         let space = VelocitySpace::new(&discretisation, &[ball], &solid);
         Level::new(space, 1.0, Some(Smoothing::of_eliminated())).unwrap()
     }

@@ -6,11 +6,10 @@ mod hierarchy;
 mod level;
 mod near_bodies;
 
-pub use coarse::CoarseSolver;
 pub use cycle::{LevelPlan, VCycle};
 pub use hierarchy::{Hierarchy, coarsest_level};
 pub use level::{LEVEL_SWEEP, Smoothing, cell_lambda_max};
-pub use near_bodies::{RELAXED_DIMENSIONS, RELAXED_RINGS, RELAXED_SWEEP};
+pub use near_bodies::{RELAXED_DIMENSIONS, RELAXED_RINGS};
 
 /// Factor by which the bound of the largest eigenvalue is raised for hanging nodes and twists, whose
 /// diagonals are not sums over cells: they add little.

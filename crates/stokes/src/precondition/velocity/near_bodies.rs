@@ -42,7 +42,7 @@ where
     Dim<D>: Space<D>,
 {
     /// For a level that acts with `cells` and smooths by `diagonal`, with eigenvalues up to `lambda_max`;
-    /// `None` in 3D and without bodies.
+    /// `None` in 3D and without bodies. All ranks call this.
     pub fn new(
         space: &VelocitySpace<D>,
         cells: &[ActiveCell],
@@ -55,12 +55,15 @@ where
         }
         let nodes = &discretisation.velocity;
         let mut near: Vec<bool> = (0..nodes.node_count()).map(|n| space.body_of(n).is_some()).collect();
-        if !near.contains(&true) {
+        let mut count = [near.iter().filter(|near| **near).count() as f64];
+        space.halo().sum_over_ranks(&mut count);
+        if count[0] == 0.0 {
             return None;
         }
         for _ in 0..RELAXED_RINGS {
             near = nodes_of_cells_with(nodes, &near);
         }
+        space.share_marks(&mut near);
         let relaxed = |n: &usize| near[*n] && space.is_free(*n);
         let nodal = (0..near.len()).filter(relaxed).flat_map(|n| n * D..(n + 1) * D);
         let mut positions: Vec<u32> = nodal.map(|k| k as u32).collect();

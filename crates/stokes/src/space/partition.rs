@@ -1,0 +1,75 @@
+//! A rank's share of a mesh that ranks have in parts: its cells, the nodes and twists that it owns, and where
+//! those of others are.
+
+use std::ops::Range;
+
+use gluey_geom::{Dim, Space};
+use gluey_parallel::{Communicator, GhostPlan, Halo, Ranks, Wanted};
+
+/// A rank's share of a mesh.
+#[derive(Clone, Debug)]
+pub struct Partition {
+    /// The ranks.
+    pub ranks: Ranks,
+    /// Cells that this rank adds up.
+    pub cells: Range<usize>,
+    /// Velocity nodes that it owns.
+    pub nodes: Range<usize>,
+    /// Velocity nodes on which its cells depend, hanging ones by their masters.
+    pub needed: Vec<bool>,
+    /// Those of them that others own.
+    pub ghosts: GhostPlan,
+    /// Level of the smallest cell of the whole mesh at each velocity node of the part.
+    pub finest: Vec<u8>,
+    /// Numbers among all bodies of those near the part, in ascending order.
+    pub bodies: Vec<u32>,
+    /// The ranks that own their twists.
+    pub owners: Vec<usize>,
+    /// Whether the part is the whole mesh.
+    pub is_whole: bool,
+}
+
+impl Partition {
+    /// The halos of reduced velocities, and of a square matrix for each twist: of the bodies with needed nodes,
+    /// and of all with nodes in the part, for nodes that are `solid`. All ranks call this.
+    pub fn halos<const D: usize>(&self, solid: &[Option<u32>]) -> [Halo; 2]
+    where
+        Dim<D>: Space<D>,
+    {
+        let (n, size, first) = (Dim::<D>::RIGID, Dim::<D>::RIGID * Dim::<D>::RIGID, solid.len() * D);
+        let [mut here, mut needed] = [(); 2].map(|()| vec![false; self.bodies.len()]);
+        for (body, &is_needed) in solid.iter().zip(&self.needed).filter_map(|of| Some(((*of.0)?, of.1))) {
+            here[body as usize] = true;
+            needed[body as usize] |= is_needed;
+        }
+        let velocities = [(&self.ghosts, D, 0), (&self.twists(&needed), n, first)];
+        let velocities = GhostPlan::joined(&velocities);
+        let matrices = GhostPlan::joined(&[(&self.twists(&here), size, 0)]);
+        let own = |first: usize, width: usize| {
+            self.own_bodies().map(move |body| first + body * width..first + (body + 1) * width)
+        };
+        let nodes = std::iter::once(self.nodes.start * D..self.nodes.end * D);
+        [
+            Halo::new(&self.ranks, velocities, nodes.chain(own(first, n)).collect()),
+            Halo::new(&self.ranks, matrices, own(0, size).collect()),
+        ]
+    }
+
+    /// The bodies whose twists this rank owns, by their places among those near the part.
+    pub fn own_bodies(&self) -> impl Iterator<Item = usize> {
+        let rank = self.ranks.rank();
+        self.owners.iter().enumerate().filter(move |of| *of.1 == rank).map(|of| of.0)
+    }
+
+    /// The plan of the twists of other ranks' bodies, of those `here`.
+    fn twists(&self, here: &[bool]) -> GhostPlan {
+        let is_ghost = |&place: &usize| here[place] && self.owners[place] != self.ranks.rank();
+        let wanted = (0..self.bodies.len()).filter(is_ghost).map(|place| Wanted {
+            owner: self.owners[place],
+            key: u64::from(self.bodies[place]),
+            place: place as u32,
+        });
+        let find = |key: u64| self.bodies.binary_search(&(key as u32)).ok().map(|place| place as u32);
+        GhostPlan::new(&self.ranks, wanted.collect(), find)
+    }
+}
