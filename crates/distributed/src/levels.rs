@@ -1,8 +1,8 @@
 //! The levels of the cycle on the velocities, as a rank has them: its part of each, with the bodies near it.
 
-use gluey_fem::{Cell, ImplicitTree, Interpolation};
+use gluey_fem::{Cell, ImplicitTree};
 use gluey_geom::{Dim, Space};
-use gluey_parallel::{Communicator, GhostPlan};
+use gluey_parallel::{Communicator, GhostPlan, Halo};
 use gluey_stokes::part::{
     Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarse_offset, coarsest_level,
 };
@@ -55,14 +55,8 @@ where
             })
             .collect();
         let sizes = parts.iter().zip(&plans).map(|(part, plan)| sizes(&part.level, &plan.space)).collect();
-        let transfer = |pair: &[PartOfLevel<D>]| {
-            let [coarse, fine] = [0, 1].map(|k| &pair[k].level);
-            Interpolation::of_parts(&coarse.part, coarse.velocity.map.clone(), &fine.part, &fine.velocity.map)
-        };
-        let hierarchy = Hierarchy {
-            meshes: parts.iter().map(|part| part.discretisation.clone()).collect(),
-            transfers: parts.windows(2).map(transfer).collect(),
-        };
+        let meshes: Vec<_> = parts.iter().map(|part| part.discretisation.clone()).collect();
+        let hierarchy = Hierarchy::of_parts(meshes);
         let cycle = VCycle::new(hierarchy, plans, None, viscosity).map_err(FlowError::agreed)?;
         let PartOfLevel { level: finest, discretisation, bodies } = parts.swap_remove(parts.len() - 1);
         Ok(Self { cycle, finest, discretisation, bodies, sizes })
@@ -113,12 +107,17 @@ fn discretised<const D: usize>(
     let LevelSpace { part, velocity, pressure, chunks } = level;
     let needed = velocity.needed(part);
     let wanted = wanted_nodes(tree, shared, part, velocity, |node| needed[node]);
+    let needed_pressures = pressure.needed(part);
+    let of_pressures = wanted_nodes(tree, shared, part, pressure, |node| needed_pressures[node]);
+    let of_pressures = GhostPlan::new(shared.ranks, of_pressures, pressure.finder());
     let partition = Partition {
         ranks: shared.ranks.clone(),
-        cells: part.own(),
+        part: (**part).clone(),
         nodes: velocity.owned.clone(),
         ghosts: GhostPlan::new(shared.ranks, wanted, velocity.finder()),
         needed,
+        pressure_nodes: pressure.owned.clone(),
+        pressures: Halo::new(shared.ranks, of_pressures, vec![pressure.owned.clone()]),
         finest: finest_levels(tree, level),
         bodies: bodies.ids.clone(),
         owners: bodies.owners.clone(),

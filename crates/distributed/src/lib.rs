@@ -38,8 +38,6 @@ mod cuts;
 mod flow;
 mod levels;
 mod moving;
-mod pressures;
-mod schur;
 mod space;
 mod surface;
 mod warm_start;

@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part, ReferenceMatrices};
+use gluey_fem::{Cell, Chunks, ImplicitTree, NodeMap, Part};
 use gluey_parallel::{Communicator, Wanted};
 
 use crate::bodies::Shared;
@@ -91,11 +91,6 @@ impl<const D: usize> LevelSpace<D> {
         let (velocity, pressure) = (Nodes::new(&part, 2), Nodes::new(&part, 1));
         let chunks = Arc::new(Chunks::new(&velocity.map, &pressure.map));
         Self { part: part.into(), velocity: velocity.into(), pressure: pressure.into(), chunks }
-    }
-
-    /// The element matrices of its cells, which are sheared like the box.
-    pub fn reference(&self) -> ReferenceMatrices<D> {
-        ReferenceMatrices::sheared(self.part.mesh.shear())
     }
 
     /// Length of the velocities alone.

@@ -58,7 +58,6 @@ pub use error::{DiagonalError, SmallMatrix, StokesError};
 // The linear system and its solvers.
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
-pub use precondition::schur::BoxCorrection;
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
 // The parts of the system: unknowns, planes that cut bodies flat.
 pub use space::{Discretisation, Partition, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};

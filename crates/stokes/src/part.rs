@@ -19,17 +19,13 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface;
 use crate::space::Discretisation;
 
-pub use crate::film::{FilmCorrection, FilmNetwork, FilmRow};
+pub use crate::film::{FilmNetwork, FilmRow, SharedTwists};
 pub use crate::flow::MOST_ROUNDS;
-pub use crate::operator::PressureForces;
-pub use crate::precondition::schur::{
-    LANCZOS_STEPS, LEAST_WEIGHT, MOST_PRESSURES, mass_iteration, ratio_inside,
-};
+pub use crate::precondition::schur::SchurInverse;
 pub use crate::precondition::surface::{SurfaceCorrection, SurfaceSmoother};
 pub use crate::precondition::velocity::{
     Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarsest_level,
 };
-pub use crate::solver::RESTART;
 pub use crate::surface::WeakCell;
 
 /// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two
@@ -152,41 +148,10 @@ where
         cells.filter(|&cell| self.discretisation().is_own(cell))
     }
 
-    /// All cells that no surface cuts.
-    pub fn fluid_cells(&self) -> impl Iterator<Item = usize> + '_ {
-        self.cells.iter().map(|cell| cell.cell as usize)
-    }
-
     /// The own cells that surfaces cut.
     pub fn own_cut_cells(&self) -> impl Iterator<Item = usize> + '_ {
         let cut = self.surfaces().into_iter().flat_map(|surfaces| &surfaces.cut.cells);
         cut.map(|cell| cell.cell as usize).filter(|&cell| self.discretisation().is_own(cell))
-    }
-
-    /// The own cells in which something flows.
-    fn own_flowing_cells(&self) -> Vec<usize> {
-        let mut cells: Vec<usize> = self.own_fluid_cells().chain(self.own_cut_cells()).collect();
-        cells.sort_unstable();
-        cells
-    }
-
-    /// Calls `visit` with each own cell in which something flows and `int p_q p_r / eta` over its fluid, row
-    /// by row.
-    pub fn for_each_pressure_mass(&self, mut visit: impl FnMut(usize, &[f64])) {
-        let corners = ReferenceMatrices::<D>::PRESSURE;
-        let unit = self.discretisation().reference().pressure_mass;
-        let mut matrix = vec![0.0; corners * corners];
-        for cell in self.own_flowing_cells() {
-            let surfaces = self.surfaces().map(|s| (s, s.cut.place[cell] as usize));
-            if let Some((surfaces, place)) = surfaces.filter(|(s, place)| *place < s.cut.cells.len()) {
-                let viscosity = self.viscosity();
-                surfaces.for_each_mass(place, |q, r, mass| matrix[q * corners + r] = mass / viscosity);
-            } else {
-                let scale = self.discretisation().cell_size(cell).powi(D as i32) / self.viscosity();
-                matrix.iter_mut().zip(unit.iter()).for_each(|(value, unit)| *value = scale * unit);
-            }
-            visit(cell, &matrix);
-        }
     }
 
     /// The bodies that own cells or own films depend on.
@@ -217,6 +182,16 @@ impl<const D: usize> Problem<D>
 where
     Dim<D>: Space<D>,
 {
+    /// The inverse of about the Schur complement of the pressures, on the meshes of a cycle. All parts call
+    /// this.
+    ///
+    /// # Errors
+    /// Those of [`SchurInverse::new`], on all parts.
+    pub fn schur_inverse(&self, cycle: &VCycle<D>) -> Result<SchurInverse<D>, StokesError> {
+        let elements = Elements::new(&self.system, ReferenceMatrices::<D>::VELOCITY);
+        SchurInverse::new(&cycle.hierarchy.meshes, &elements, None)
+    }
+
     /// The own cells whose penalty is too small for a velocity that [`Problem::velocity`] gave, right at all
     /// cells around own ones, relative to a linear flow with this strain.
     pub fn weak_cells(&self, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {

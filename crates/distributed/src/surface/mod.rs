@@ -9,8 +9,6 @@
 mod balance;
 mod conditions;
 mod films;
-mod operator;
-mod precondition;
 mod space;
 mod sums;
 mod weak;
@@ -20,14 +18,14 @@ use std::sync::Arc;
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body};
-use gluey_linalg::{Gcr, GcrParams, KrylovError, KrylovReport, Reference, vector};
-use gluey_parallel::{Communicator, Ranks, Traffic};
+use gluey_linalg::KrylovError;
+use gluey_parallel::{Communicator, Halo, Ranks, Traffic};
 use gluey_stokes::part::{
-    AssembledSmoother, MOST_ROUNDS, PartMethod, RESTART, SurfaceCorrection, VCycle, rings_around_surfaces,
+    AssembledSmoother, MOST_ROUNDS, PartMethod, SurfaceCorrection, VCycle, rings_around_surfaces,
 };
 use gluey_stokes::{
-    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, NodalFields, Problem, StokesError,
-    StokesSystem, Stress,
+    Conditions, Discretisation, Film, Given, GivenOf, Lubrication, MultigridSolver, NodalFields, Problem,
+    SaddleSolver, SolveReport, StokesError, Stress,
 };
 
 use crate::agreement::{agreed, gathered};
@@ -35,14 +33,11 @@ use crate::bodies::{NearBodies, Shared};
 use crate::cells::MyCells;
 use crate::flow::{BoxFlow, FlowError, LevelSizes, MyFlow, counts_of_all};
 use crate::levels::Levels;
-use crate::schur::{Flowing, PressureCells, SchurInverse};
 use crate::space::{Around, LevelSpace};
 use crate::warm_start::{Moved, WarmStart};
 use conditions::{check_count, given};
-use films::{corrections, network};
-use operator::SurfaceOperator;
-use precondition::SurfaceTriangular;
-use space::{SurfaceSpace, is_near_surface, owner_of_film};
+use films::network;
+use space::{PartHalos, is_near_surface, owner_of_film};
 use weak::Before;
 
 /// Bodies whose surfaces cut the mesh where they are, all of which every rank knows.
@@ -163,12 +158,11 @@ impl BoxFlow {
 }
 
 /// A flow with the penalties that were tried.
-struct Attempt<'a, const D: usize>
+struct Attempt<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     cycle: VCycle<D>,
-    space: SurfaceSpace<'a, D>,
     /// Values at all nodes of the part, those of the velocity followed by the twists near it.
     velocity: Vec<f64>,
     pressure: Vec<f64>,
@@ -178,7 +172,7 @@ where
     mean_velocity: Option<Vector<D>>,
     stress: Option<Stress<D>>,
     sizes: Vec<LevelSizes>,
-    report: Result<KrylovReport, KrylovError>,
+    report: Result<SolveReport, KrylovError>,
     setup_traffic: Traffic,
     solve_traffic: Traffic,
 }
@@ -197,7 +191,9 @@ where
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let (ranks, mut earlier) = (self.shared.ranks, Before::default());
         loop {
-            let problem = agreed(ranks, self.problem(tree, &method))?;
+            let mut problem = agreed(ranks, self.problem(tree, &method))?;
+            let halos = PartHalos::new(tree, &self.shared, &self.level, (&problem, &self.bodies));
+            problem.system.share(halos.of_system.clone());
             let smoother = self.named(AssembledSmoother::new(&problem));
             if let Some(stiffer) = self.stiffened(&method, &smoother) {
                 method = stiffer;
@@ -205,7 +201,7 @@ where
                 continue;
             }
             let smoother = agreed(ranks, smoother)?;
-            let attempt = self.attempt(tree, cycle, (&problem, smoother), before.as_mut())?;
+            let attempt = self.attempt((tree, &halos), cycle, (&problem, smoother), before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
                 return self.finished((tree, &problem), attempt, &earlier, before);
@@ -251,37 +247,39 @@ where
     /// The flow with the penalties of a problem. All ranks call this.
     fn attempt(
         &self,
-        tree: &mut ImplicitTree<'_, D>,
+        (tree, halos): (&ImplicitTree<'_, D>, &PartHalos),
         cycle: VCycle<D>,
         (problem, smoother): (&Problem<D>, AssembledSmoother<'_, D>),
         before: Option<&mut Moved>,
-    ) -> Result<Attempt<'a, D>, FlowError> {
+    ) -> Result<Attempt<D>, FlowError> {
         let (ranks, system) = (self.shared.ranks, &problem.system);
-        let space = SurfaceSpace::new(tree, &self.shared, &self.level, (problem, &self.bodies));
         let mut sizes = self.sizes.clone();
         if let Some(finest) = sizes.last_mut() {
-            [finest.neighbours, finest.ghost_nodes] = space.neighbours();
+            [finest.neighbours, finest.ghost_nodes] = halos.neighbours::<D>();
         }
-        let smoother = agreed(ranks, self.named(smoother.completed(space.halos())))?;
+        let smoother = agreed(
+            ranks,
+            self.named(smoother.completed([halos.of_system[1].clone(), halos.of_twist_blocks.clone()])),
+        )?;
         let rigid = &cycle.levels[cycle.levels.len() - 1].space;
         let surfaces = SurfaceCorrection::with_smoother(smoother, &system.space, rigid);
         let cycle = cycle.with_surfaces(surfaces);
-        let schur = self.schur(tree, system, &space)?;
+        let schur = self.named(problem.schur_inverse(&cycle)).map_err(FlowError::agreed)?;
         let all = (self.shared.bodies.balls().len(), self.shared.held);
         let network = agreed(ranks, network(ranks, system, &self.bodies, all))?;
-        let [of_iterates, of_steps] = corrections(network.as_ref(), &space, (&self.bodies, all.0))?;
-        let mut operator = SurfaceOperator::new(system, space.clone(), of_iterates);
-        let mut preconditioner = SurfaceTriangular::new(system, space, cycle, schur, of_steps);
-        let (lift, [whole, b]) = self.data(problem, &mut operator)?;
-        let mut x = self.guess((tree, problem), &mut operator.space, &whole, before);
-        drop(whole);
+        let (lift, mut b) = self.data(problem)?;
+        let mut x = self.guess((tree, problem), &b, before);
+        system.complete(&mut b);
+        let mut solver = MultigridSolver::of_parts(system, (cycle, schur), network, self.flow.max_iterations);
         let before = ranks.traffic();
-        let report = self.krylov(&mut operator, &mut preconditioner, &b, &mut x);
+        let report = match solver.solve(system, &b, &mut x, self.flow.tolerance) {
+            Err(StokesError::Krylov(error)) => Err(error),
+            other => Ok(other.map_err(FlowError::agreed)?),
+        };
         let solve_traffic = ranks.traffic().since(before);
-        let mut space = operator.into_space();
-        let [mut velocity, pressure, mut whole] = self.fields(problem, &mut space, &lift, &mut x);
+        let [mut velocity, pressure, mut whole] = fields(problem, &halos.around, &lift, x);
         let integrals = self.integrals(problem, [&velocity, &pressure]);
-        let mean_velocity = self.mean_flow(problem, &space, [&mut velocity, &mut whole], &integrals);
+        let mean_velocity = self.mean_flow(problem, [&mut velocity, &mut whole], &integrals);
         let wrenches = self.wrenches(problem, &velocity, &whole)?;
         let wants_stress = self.conditions.stress;
         let stress = wants_stress.then(|| {
@@ -291,8 +289,7 @@ where
         });
         let stress = stress.transpose()?;
         Ok(Attempt {
-            cycle: preconditioner.into_cycle(),
-            space,
+            cycle: solver.into_cycle().ok_or_else(|| FlowError::of_all(StokesError::NotPrepared))?,
             velocity,
             pressure,
             deviation: self.keeps.then(|| problem.deviation(&whole)),
@@ -306,68 +303,26 @@ where
         })
     }
 
-    /// The owned vector that a solve with the sums `b` over own cells as its right-hand side starts from. All
+    /// The vector that a solve with the sums `b` over own cells as its right-hand side starts from. All
     /// ranks call this.
     fn guess(
         &self,
         (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
-        space: &mut SurfaceSpace<'a, D>,
         b: &[f64],
         before: Option<&mut Moved>,
     ) -> Vec<f64> {
-        let mut x = vec![0.0; space.dim()];
-        if let Some(before) = before {
-            let bodies = problem.system.bodies_with_films();
-            let fields = before.near((tree, &self.shared), &self.bodies, &bodies);
-            let whole = problem.guess(fields, b, &mut |x| space.update_velocities(x));
-            space.copy_owned(&whole, &mut x);
-        }
+        let system = &problem.system;
+        let Some(before) = before else { return vec![0.0; system.dim()] };
+        let bodies = system.bodies_with_films();
+        let fields = before.near((tree, &self.shared), &self.bodies, &bodies);
+        let mut halo = system.halo_of_velocities().clone();
+        let mut x = problem.guess(fields, b, &mut |x| halo.update(x));
+        system.halo().clear(&mut x);
         x
     }
 
-    /// Velocity and pressure of the part and the vector that they belong to, from an owned one, whose
-    /// pressures lose their mean.
-    fn fields(
-        &self,
-        problem: &Problem<D>,
-        space: &mut SurfaceSpace<'a, D>,
-        lift: &[f64],
-        x: &mut [f64],
-    ) -> [Vec<f64>; 3] {
-        let mut pressure = space.parts(x)[1].to_vec();
-        space.pressures.remove_mean(space.ranks, &mut pressure);
-        space.parts_mut(x)[1].copy_from_slice(&pressure);
-        let mut whole = vec![0.0; problem.system.dim()];
-        space.spread(x, &mut whole);
-        space.update_around(&mut whole);
-        [problem.velocity(lift, &whole), problem.pressure(&whole), whole]
-    }
-
-    fn schur(
-        &self,
-        tree: &mut ImplicitTree<'_, D>,
-        system: &StokesSystem<D>,
-        space: &SurfaceSpace<'a, D>,
-    ) -> Result<SchurInverse<'a, D>, FlowError> {
-        let map = &self.level.velocity.map;
-        let is_fixed = |node: usize| map.is_on_boundary(node) || system.space.body_of(node).is_some();
-        let flowing = Flowing {
-            own: system.own_fluid_cells().collect(),
-            all: system.fluid_cells().collect(),
-            is_fixed: (0..map.node_count()).map(is_fixed).collect(),
-        };
-        let masses = |visit: &mut dyn FnMut(usize, &[f64])| system.for_each_pressure_mass(visit);
-        let cells = PressureCells { viscosity: self.flow.viscosity, flowing: &flowing, masses: &masses };
-        SchurInverse::new(tree, space.ranks, &self.level, &space.pressures, &cells)
-    }
-
-    /// The field that carries the data, and the right-hand side: the sums over own cells, without what is
-    /// others', and that of all.
-    fn data(
-        &self,
-        problem: &Problem<D>,
-        operator: &mut SurfaceOperator<'_, 'a, D>,
-    ) -> Result<(Vec<f64>, [Vec<f64>; 2]), FlowError> {
+    /// The field that carries the data, and the sums over own cells of the right-hand side.
+    fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), FlowError> {
         let wrenches: Vec<Wrench<D>> = self.given.iter().filter_map(GivenOf::wrench).collect();
         let bodies = match self.conditions.bodies {
             Given::Wrenches([]) => Given::Wrenches(&[]),
@@ -375,49 +330,25 @@ where
             _ => Given::Each(&self.given),
         };
         let data = problem.data_under(&Conditions { bodies, ..*self.conditions });
-        let (lift, mut whole) = agreed(self.shared.ranks, self.named(data))?;
-        let mut b = vec![0.0; operator.space.dim()];
-        operator.space.gather(&mut whole, &mut b);
-        Ok((lift, [whole, b]))
-    }
-
-    /// Steps in double precision, as in the serial solver: in films penalties and extrapolated nodes leave
-    /// large numbers that nearly cancel.
-    fn krylov(
-        &self,
-        operator: &mut SurfaceOperator<'_, 'a, D>,
-        preconditioner: &mut SurfaceTriangular<'_, 'a, D>,
-        b: &[f64],
-        x: &mut [f64],
-    ) -> Result<KrylovReport, KrylovError> {
-        let params = GcrParams {
-            relative_tolerance: self.flow.tolerance,
-            max_iterations: self.flow.max_iterations,
-            restart: RESTART,
-            ..GcrParams::default()
-        };
-        let mut gcr = Gcr::<f64, f64, f32>::with_directions(params);
-        let films = operator.space.parts(b)[2].len();
-        let mut square = [vector::dot(&b[..b.len() - films], &b[..b.len() - films])];
-        self.shared.ranks.sum(&mut square);
-        gcr.solve(operator, preconditioner, b, x, Reference::Norm(square[0].sqrt()))
+        let (lift, b) = agreed(self.shared.ranks, self.named(data))?;
+        Ok((lift, b))
     }
 
     /// The flow, and what the next one may start from.
     fn finished(
         &self,
         (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
-        attempt: Attempt<'a, D>,
+        attempt: Attempt<D>,
         earlier: &Before,
         before: Option<Moved>,
     ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
-        let Attempt { space, velocity, pressure, deviation, sizes, report, .. } = attempt;
+        let Attempt { velocity, pressure, deviation, sizes, report, .. } = attempt;
         let (report, level) = (report.map_err(FlowError::Krylov)?, &self.level);
         let here = (tree, &self.shared);
         let kept = deviation.map(|last| WarmStart::new(here, level, &self.bodies, last, before).into());
         let (points, nodal) = (&level.velocity, level.nodal_dim());
-        let counts = counts_of_all(level, space.ranks);
-        let reference = if report.reference_norm > 0.0 { report.reference_norm } else { 1.0 };
+        let counts = counts_of_all(level, self.shared.ranks);
+        let reference = if report.reference > 0.0 { report.reference } else { 1.0 };
         let flow = MyFlow {
             points: points.owned.clone().map(|node| points.map.point(node)).collect(),
             velocity: velocity[..nodal].as_chunks::<D>().0[points.owned.clone()]
@@ -425,13 +356,13 @@ where
                 .map(|&u| u.into())
                 .collect(),
             pressure: pressure[level.pressure.owned.clone()].to_vec(),
-            twists: self.twists_of_all(problem, &space, &velocity),
+            twists: self.twists_of_all(problem, &velocity),
             cell_count: counts[0] as usize,
             dof_count: counts[1] as usize,
             solve_count: earlier.raised.solved_again + 1,
             raised_penalties: earlier.raised,
             iterations: earlier.iterations + report.iterations,
-            relative_residual: report.residual_norm / reference,
+            relative_residual: report.residuals.last().map_or(0.0, |last| last / reference),
             wrenches: attempt.wrenches,
             mean_velocity: attempt.mean_velocity,
             mean_force: Vector::zeros(),
@@ -443,4 +374,18 @@ where
         };
         Ok((flow, kept))
     }
+}
+
+/// Velocity and pressure of the part and the vector that they belong to, right at all cells around own ones
+/// that are cut, from a vector that is zero at ghosts, whose pressures lose their mean.
+fn fields<const D: usize>(problem: &Problem<D>, around: &Halo, lift: &[f64], mut x: Vec<f64>) -> [Vec<f64>; 3]
+where
+    Dim<D>: Space<D>,
+{
+    let system = &problem.system;
+    let [_, p, _] = system.parts_mut(&mut x);
+    system.pressure.remove_mean(p);
+    system.halo().clone().update(&mut x);
+    around.clone().update(&mut x);
+    [problem.velocity(lift, &x), problem.pressure(&x), x]
 }

@@ -1,17 +1,12 @@
-//! Unknowns around surfaces as a rank sees them: the vectors of its part of the problem, which entries of
-//! them it owns, and the plan of the others.
-
-use std::ops::Range;
+//! The halos of the vectors of a rank's part of the problem around surfaces.
 
 use gluey_fem::{Cell, Constraint, ImplicitTree, TreeMesh};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::BallTree;
-use gluey_linalg::Scalar;
-use gluey_parallel::{Communicator, GhostPlan, Halo, Number, Ranks, Wanted};
-use gluey_stokes::{Film, Partner, Problem, StokesSystem};
+use gluey_parallel::{Communicator, GhostPlan, Halo, Ranks, Wanted};
+use gluey_stokes::{Film, Partner, PressureSpace, Problem, StokesSystem};
 
 use crate::bodies::{NearBodies, Shared, rigid};
-use crate::pressures::SharedPressures;
 use crate::space::{LevelSpace, Nodes, wanted_nodes};
 
 /// Cells between the middle of a cell and a surface, at most, if the part is to hold what is around it.
@@ -29,192 +24,96 @@ pub fn owner_of_film<const D: usize>(
     shared.owner_of_point(tree, &(film.center + middle))
 }
 
-/// The unknowns.
-#[derive(Clone)]
-pub struct SurfaceSpace<'a, const D: usize> {
-    pub ranks: &'a Ranks,
-    pub level: LevelSpace<D>,
-    pub pressures: SharedPressures,
-    /// Bodies whose twists are owned, by their places among those near the part.
-    pub own_bodies: Vec<u32>,
-    /// Number of films whose forces are owned: all that are here.
-    film_dim: usize,
-    body_count: usize,
-    /// Of whole vectors, and of their velocities alone.
-    plan: GhostPlan,
-    velocities: GhostPlan,
-    twists: GhostPlan,
-    /// Of the velocities in all cells around own ones that are cut.
-    around: GhostPlan,
+/// The halos of the vectors of a part's problem.
+pub struct PartHalos {
+    /// Of vectors, of their velocities and of pressures.
+    pub of_system: [Halo; 3],
+    /// Of a square matrix for each twist.
+    pub of_twist_blocks: Halo,
+    /// Of nodal velocities in all cells around own ones that are cut.
+    pub around: Halo,
 }
 
-impl<'a, const D: usize> SurfaceSpace<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl PartHalos {
     /// For the problem of the part. All ranks call this.
-    pub fn new(
+    pub fn new<const D: usize>(
         tree: &mut ImplicitTree<'_, D>,
-        shared: &Shared<'a, '_, D>,
+        shared: &Shared<'_, '_, D>,
         level: &LevelSpace<D>,
         (problem, bodies): (&Problem<D>, &NearBodies<D>),
-    ) -> Self {
-        let (ranks, system) = (shared.ranks, &problem.system);
-        let rank = ranks.rank();
+    ) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let (ranks, system, n) = (shared.ranks, &problem.system, rigid::<D>());
         let masters = Masters::new(problem, &level.velocity);
-        let needed = masters.needed(level, system);
         let mut plan_of = |needed: &[bool]| {
             let keep = |node: usize| needed[node] && system.space.is_free(node);
             let wanted = wanted_nodes(tree, shared, &level.part, &level.velocity, keep);
             GhostPlan::new(ranks, wanted, level.velocity.finder())
         };
-        let nodes = plan_of(&needed);
+        let nodes = plan_of(&masters.needed(level, system));
         let around = plan_of(&masters.around(level, system));
         let twists = twist_plan(ranks, bodies, &bodies_here(level, problem));
-        let pressures = SharedPressures::new(tree, shared, level, &system.pressure);
-        let nodal = system.space.full_dim();
-        let of_velocities = [(&nodes, D, 0), (&twists, rigid::<D>(), nodal)];
-        let [nodes_first, twists_after] = of_velocities;
-        let plan =
-            GhostPlan::joined(&[nodes_first, twists_after, (&pressures.plan, 1, system.velocity_dim())]);
+        let pressures = pressure_plan(tree, shared, level, &system.pressure);
+        let (first_twist, first_pressure) = (system.space.full_dim(), system.velocity_dim());
+        let films = system.dim() - system.row_count()..system.dim();
+        let own_nodes = level.velocity.owned.start * D..level.velocity.owned.end * D;
+        let own_pressures = level.pressure.owned.clone();
+        let own_twists = |first: usize, width: usize| {
+            let own = bodies.owned(ranks.rank()).into_iter().map(|body| body as usize);
+            own.map(move |body| first + body * width..first + (body + 1) * width)
+        };
+        let own_velocities: Vec<_> =
+            std::iter::once(own_nodes.clone()).chain(own_twists(first_twist, n)).collect();
+        let shifted = first_pressure + own_pressures.start..first_pressure + own_pressures.end;
+        let own = own_velocities.iter().cloned().chain([shifted, films]).collect();
+        let of_velocities = [(&nodes, D, 0), (&twists, n, first_twist)];
+        let of_all = [of_velocities[0], of_velocities[1], (&pressures, 1, first_pressure)];
         Self {
-            ranks,
-            level: level.clone(),
-            own_bodies: bodies.owned(rank),
-            film_dim: system.row_count(),
-            body_count: bodies.ids.len(),
-            plan,
-            velocities: GhostPlan::joined(&of_velocities),
-            twists,
-            around,
-            pressures,
+            of_system: [
+                Halo::new(ranks, GhostPlan::joined(&of_all), own),
+                Halo::new(ranks, GhostPlan::joined(&of_velocities), own_velocities),
+                Halo::new(ranks, pressures.clone(), vec![own_pressures]),
+            ],
+            of_twist_blocks: Halo::new(
+                ranks,
+                GhostPlan::joined(&[(&twists, n * n, 0)]),
+                own_twists(0, n * n).collect(),
+            ),
+            around: Halo::new(ranks, GhostPlan::joined(&[(&around, D, 0)]), vec![own_nodes]),
         }
     }
 
-    /// Length of the owned velocities and twists.
-    pub fn velocity_dim(&self) -> usize {
-        self.level.velocity.owned.len() * D + self.own_bodies.len() * rigid::<D>()
+    /// Ranks that this one sends values to, and the number of nodes whose values it gets.
+    pub fn neighbours<const D: usize>(&self) -> [usize; 2] {
+        [self.of_system[0].counts()[1], self.of_system[1].counts()[0] / D]
     }
+}
 
-    /// Length of an owned vector: velocities, twists, pressures, forces of films.
-    pub fn dim(&self) -> usize {
-        self.velocity_dim() + self.pressure_dim() + self.film_dim
+/// The plan of the unknown pressures of other ranks on which own cells depend, by themselves or by those that
+/// follow from them.
+fn pressure_plan<const D: usize>(
+    tree: &mut ImplicitTree<'_, D>,
+    shared: &Shared<'_, '_, D>,
+    level: &LevelSpace<D>,
+    pressure: &PressureSpace<D>,
+) -> GhostPlan
+where
+    Dim<D>: Space<D>,
+{
+    let nodes = &*level.pressure;
+    let mut needed = vec![false; nodes.map.node_count()];
+    for &node in nodes.map.cells(level.part.own()) {
+        nodes.regular(node).for_each(|(node, _)| needed[node as usize] = true);
     }
-
-    /// Number of owned pressure nodes.
-    pub fn pressure_dim(&self) -> usize {
-        self.level.pressure.owned.len()
-    }
-
-    /// The parts of an owned vector: velocities with twists, pressures, forces of films.
-    pub fn parts<'x, T>(&self, x: &'x [T]) -> [&'x [T]; 3] {
-        let (u, rest) = x.split_at(self.velocity_dim());
-        let (p, f) = rest.split_at(self.pressure_dim());
-        [u, p, f]
-    }
-
-    /// The same of one that changes.
-    pub fn parts_mut<'x, T>(&self, x: &'x mut [T]) -> [&'x mut [T]; 3] {
-        let (u, rest) = x.split_at_mut(self.velocity_dim());
-        let (p, f) = rest.split_at_mut(self.pressure_dim());
-        [u, p, f]
-    }
-
-    /// Entries of whole vectors up to the pressures.
-    fn whole_velocity_dim(&self) -> usize {
-        self.level.nodal_dim() + self.body_count * rigid::<D>()
-    }
-
-    /// Where the owned velocities and twists stand in a whole vector, range by range.
-    fn owned_velocities(&self) -> impl Iterator<Item = Range<usize>> + '_ {
-        let (owned, n) = (&self.level.velocity.owned, rigid::<D>());
-        let first = self.level.nodal_dim();
-        let twists = self.own_bodies.iter().map(move |&body| first + body as usize * n);
-        std::iter::once(owned.start * D..owned.end * D).chain(twists.map(move |at| at..at + n))
-    }
-
-    /// Sets the owned velocities and twists of a whole vector.
-    pub fn set_velocities<T: Copy>(&self, from: &[T], whole: &mut [T]) {
-        let mut rest = from;
-        for range in self.owned_velocities() {
-            let (own, others) = rest.split_at(range.len());
-            whole[range].copy_from_slice(own);
-            rest = others;
-        }
-    }
-
-    /// Copies them out of one.
-    pub fn copy_velocities<T: Copy>(&self, whole: &[T], to: &mut [T]) {
-        let mut rest = to;
-        for range in self.owned_velocities() {
-            let (own, others) = rest.split_at_mut(range.len());
-            own.copy_from_slice(&whole[range]);
-            rest = others;
-        }
-    }
-
-    /// A whole vector from an owned one: with what other ranks own.
-    pub fn spread<T: Scalar + Number>(&mut self, x: &[T], whole: &mut [T]) {
-        let [u, p, f] = self.parts(x);
-        self.set_velocities(u, whole);
-        let first = self.whole_velocity_dim();
-        let owned = &self.level.pressure.owned;
-        whole[first + owned.start..first + owned.end].copy_from_slice(p);
-        let films = whole.len() - f.len();
-        whole[films..].copy_from_slice(f);
-        self.plan.update::<T, 1>(self.ranks, whole);
-    }
-
-    /// An owned vector from sums over own cells, with divergences that sum to zero.
-    pub fn gather<T: Scalar + Number>(&mut self, whole: &mut [T], y: &mut [T]) {
-        self.plan.accumulate::<T, 1>(self.ranks, whole);
-        self.copy_owned(whole, y);
-        let [_, p, _] = self.parts_mut(y);
-        self.pressures.remove_mean(self.ranks, p);
-    }
-
-    /// Velocities and twists from sums over own cells.
-    pub fn gather_velocities<T: Scalar + Number>(&mut self, whole: &mut [T], y: &mut [T]) {
-        self.velocities.accumulate::<T, 1>(self.ranks, whole);
-        self.copy_velocities(whole, y);
-    }
-
-    /// Brings the velocities and twists of others to a whole vector, or to its velocities alone.
-    pub fn update_velocities(&mut self, whole: &mut [f64]) {
-        self.velocities.update::<f64, 1>(self.ranks, whole);
-    }
-
-    /// Copies an owned vector out of a whole one.
-    pub fn copy_owned<T: Copy>(&self, whole: &[T], x: &mut [T]) {
-        let (first, owned) = (self.whole_velocity_dim(), self.level.pressure.owned.clone());
-        let films = whole.len() - self.film_dim;
-        let [u, p, f] = self.parts_mut(x);
-        self.copy_velocities(whole, u);
-        p.copy_from_slice(&whole[first + owned.start..first + owned.end]);
-        f.copy_from_slice(&whole[films..]);
-    }
-
-    /// Brings the velocities of others in all cells around own ones that are cut to a nodal field.
-    pub fn update_around(&mut self, field: &mut [f64]) {
-        let nodal = self.level.nodal_dim();
-        self.around.update::<f64, D>(self.ranks, &mut field[..nodal]);
-    }
-
-    /// The halos of reduced velocities and of the blocks of twists.
-    pub fn halos(&self) -> [Halo; 2] {
-        let size = rigid::<D>() * rigid::<D>();
-        let blocks = GhostPlan::joined(&[(&self.twists, size, 0)]);
-        let of_blocks = self.own_bodies.iter().map(|&body| body as usize * size..(body as usize + 1) * size);
-        [
-            Halo::new(self.ranks, self.velocities.clone(), self.owned_velocities().collect()),
-            Halo::new(self.ranks, blocks, of_blocks.collect()),
-        ]
-    }
-
-    /// Ranks that this one sends values to, and the number of those that it gets of nodes.
-    pub fn neighbours(&self) -> [usize; 2] {
-        [self.plan.neighbour_count(), self.velocities.ghost_count()]
-    }
+    let rows = pressure.constraints().iter().filter(|row| !nodes.map.is_hanging(row.node as usize));
+    let masters: Vec<u32> =
+        rows.filter(|row| needed[row.node as usize]).flat_map(|row| &row.masters).map(|m| m.0).collect();
+    masters.into_iter().for_each(|master| needed[master as usize] = true);
+    let keep = |node: usize| needed[node] && pressure.is_free(node);
+    let wanted = wanted_nodes(tree, shared, &level.part, nodes, keep);
+    GhostPlan::new(shared.ranks, wanted, nodes.finder())
 }
 
 /// What nodes take their values from.

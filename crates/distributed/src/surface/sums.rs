@@ -8,7 +8,6 @@ use gluey_stokes::part::FluidIntegrals;
 use gluey_stokes::{Given, Problem, Stress};
 
 use super::Setting;
-use super::space::SurfaceSpace;
 use crate::agreement::agreed;
 use crate::bodies::rigid;
 use crate::flow::FlowError;
@@ -32,7 +31,6 @@ where
     fn mean_velocity(
         &self,
         problem: &Problem<D>,
-        space: &SurfaceSpace<'a, D>,
         velocity: &[f64],
         integrals: &FluidIntegrals<D>,
     ) -> Vector<D> {
@@ -40,7 +38,7 @@ where
         let balls = self.shared.bodies.balls();
         let volume = |ball: &Ball<D>| ball.bounding_radius().powi(D as i32);
         let all: f64 = balls.iter().map(volume).sum();
-        let twists = self.twists_of_all(problem, space, velocity);
+        let twists = self.twists_of_all(problem, velocity);
         let share = |ball: &Ball<D>| (whole_box - integrals.volume) * volume(ball) / all;
         let of_bodies = balls.iter().zip(&twists).map(|(ball, twist)| twist.velocity * share(ball));
         (integrals.velocity + of_bodies.sum::<Vector<D>>()) / whole_box
@@ -51,7 +49,6 @@ where
     pub(super) fn mean_flow(
         &self,
         problem: &Problem<D>,
-        space: &SurfaceSpace<'a, D>,
         [velocity, whole]: [&mut Vec<f64>; 2],
         integrals: &FluidIntegrals<D>,
     ) -> Option<Vector<D>> {
@@ -59,7 +56,7 @@ where
         if !holds_any && self.level.part.mesh.periodic().contains(&false) {
             return None;
         }
-        let mean = self.mean_velocity(problem, space, velocity, integrals);
+        let mean = self.mean_velocity(problem, velocity, integrals);
         if !holds_any {
             problem.subtract_uniform(&mean, velocity, whole);
         }
@@ -128,24 +125,19 @@ where
     }
 
     /// The twists of all bodies, of which each rank has its own.
-    pub(super) fn twists_of_all(
-        &self,
-        problem: &Problem<D>,
-        space: &SurfaceSpace<'a, D>,
-        velocity: &[f64],
-    ) -> Vec<Twist<D>> {
+    pub(super) fn twists_of_all(&self, problem: &Problem<D>, velocity: &[f64]) -> Vec<Twist<D>> {
         let (all, n) = (self.shared.bodies.balls().len(), rigid::<D>());
         if all == 0 {
             return Vec::new();
         }
         let mut numbers = vec![0.0; all * n];
-        for &body in &space.own_bodies {
+        for body in self.bodies.owned(self.shared.ranks.rank()) {
             let twist = problem.system.space.twist(velocity, body as usize);
             let own = &mut numbers[self.bodies.ids[body as usize] as usize * n..][..n];
             own[..D].copy_from_slice(twist.velocity.as_slice());
             own[D..].copy_from_slice(Dim::<D>::spin_slice(&twist.spin));
         }
-        space.ranks.sum(&mut numbers);
+        self.shared.ranks.sum(&mut numbers);
         let twist = |numbers: &[f64]| {
             let mut twist = Twist::default();
             twist.velocity.copy_from_slice(&numbers[..D]);

@@ -32,7 +32,7 @@ where
         &self,
         tree: &ImplicitTree<'_, D>,
         problem: &Problem<D>,
-        attempt: &Attempt<'a, D>,
+        attempt: &Attempt<D>,
     ) -> Vec<Named> {
         if !matches!(attempt.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
             return Vec::new();

@@ -17,7 +17,7 @@ mod through;
 pub use coupling::{FilmCoupling, FilmForce};
 pub use deficit::FilmShape;
 pub use near::{Film, Heights, Partner, films, thin_films};
-pub use network::{FilmCorrection, FilmNetwork, FilmRow};
+pub use network::{FilmCorrection, FilmNetwork, FilmRow, SharedTwists};
 pub use through::FilmFlow;
 
 /// Treatment of films between bodies that are too thin for the mesh.

@@ -14,13 +14,15 @@
 //! Rows of what flows through films have nodes of the mesh in them and stay as they are: their forces follow
 //! from the fluid, however stiff they are.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     DirectError, DirectSpd, Ordering, Preconditioner, RefinementParams, Scalar, SparseMatrix, Substitution,
-    Symbolic,
+    Symbolic, vector,
 };
+use gluey_parallel::Halo;
 
 /// Unknowns of a twist, at most.
 const MOST_RIGID: usize = 6;
@@ -96,6 +98,28 @@ pub struct FilmNetwork {
     /// The rows whose forces are here.
     rows: Vec<FilmRow>,
     factor: DirectSpd,
+    shared: Option<SharedTwists>,
+}
+
+/// Twists of all bodies, of which each rank has some in its vectors.
+#[derive(Clone, Debug)]
+pub struct SharedTwists {
+    /// The ranks.
+    pub halo: Halo,
+    /// Numbers among all bodies of those in vectors, in their order.
+    pub bodies: Vec<u32>,
+    /// Which of them this rank owns; the entries of others are zero.
+    pub is_own: Vec<bool>,
+}
+
+impl SharedTwists {
+    /// The own bodies: where their twists are in a vector, and among those of all.
+    fn own(&self, rigid: usize) -> impl Iterator<Item = [Range<usize>; 2]> + '_ {
+        let own = self.bodies.iter().enumerate().zip(&self.is_own).filter(|of| *of.1);
+        own.map(move |((place, &body), _)| {
+            [place, body as usize].map(|body| body * rigid..(body + 1) * rigid)
+        })
+    }
 }
 
 impl FilmNetwork {
@@ -134,7 +158,13 @@ impl FilmNetwork {
         let symbolic = Symbolic::new(matrix.pattern().clone(), Ordering::Amd)?;
         let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
         factor.factorise(matrix.values())?;
-        Ok(Some(Self { rigid, held: held.to_vec(), rows: own, factor }))
+        Ok(Some(Self { rigid, held: held.to_vec(), rows: own, factor, shared: None }))
+    }
+
+    /// The same for vectors with the twists of some of the bodies.
+    #[must_use]
+    pub fn with_shared(self, twists: SharedTwists) -> Self {
+        Self { shared: Some(twists), ..self }
     }
 
     /// Corrections with a workspace of their own.
@@ -149,6 +179,7 @@ impl FilmNetwork {
             residuals: vec![0.0; self.rows.len()],
             load: vec![0.0; dim],
             twists: vec![0.0; dim],
+            all: vec![0.0; if self.shared.is_some() { dim } else { 0 }],
         })
     }
 
@@ -166,19 +197,31 @@ pub struct FilmCorrection<'n> {
     residuals: Vec<f64>,
     load: Vec<f64>,
     twists: Vec<f64>,
+    /// The twists of all bodies, where ranks share them.
+    all: Vec<f64>,
 }
 
 impl FilmCorrection<'_> {
     /// Changes the twists of all bodies and the forces `g` of own films so that `s B V - g = b` holds in the
-    /// rows of motion. `complete` makes a sum over own films one over all.
-    pub fn apply<S: Scalar>(
-        &mut self,
-        b: &[S],
-        twists: &mut [S],
-        g: &mut [S],
-        complete: impl FnOnce(&mut [f64]),
-    ) {
-        let Self { network, factor, residuals, load, twists: change } = self;
+    /// rows of motion. All ranks call this.
+    pub fn apply<S: Scalar>(&mut self, b: &[S], twists: &mut [S], g: &mut [S]) {
+        let network = self.network;
+        let Some(shared) = &network.shared else { return self.correct(b, twists, g) };
+        let mut all = std::mem::take(&mut self.all);
+        all.fill(0.0);
+        for [here, at] in shared.own(network.rigid) {
+            vector::convert(1.0, &twists[here], &mut all[at]);
+        }
+        shared.halo.sum_over_ranks(&mut all);
+        self.correct(b, &mut all, g);
+        for [here, at] in shared.own(network.rigid) {
+            vector::convert(1.0, &all[at], &mut twists[here]);
+        }
+        self.all = all;
+    }
+
+    fn correct<S: Scalar, T: Scalar>(&mut self, b: &[S], twists: &mut [T], g: &mut [S]) {
+        let Self { network, factor, residuals, load, twists: change, .. } = self;
         let rigid = network.rigid;
         load.fill(0.0);
         for (row, residual) in network.rows.iter().zip(&mut *residuals) {
@@ -186,11 +229,13 @@ impl FilmCorrection<'_> {
             *residual = b[at].to_f64() - row.motion(rigid, twists) + g[at].to_f64();
             row.entries(rigid).for_each(|(k, weight)| load[k] += weight * *residual);
         }
-        complete(load);
+        if let Some(shared) = &network.shared {
+            shared.halo.sum_over_ranks(load);
+        }
         network.clear_held(load);
         factor.apply(load, change);
         let sums = twists.iter_mut().zip(&*change);
-        sums.for_each(|(twist, change)| *twist = S::from_f64(twist.to_f64() + change));
+        sums.for_each(|(twist, change)| *twist = T::from_f64(twist.to_f64() + change));
         for (row, residual) in network.rows.iter().zip(&*residuals) {
             let at = row.row as usize;
             g[at] = S::from_f64(g[at].to_f64() + row.motion(rigid, change) - residual);

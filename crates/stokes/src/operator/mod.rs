@@ -6,6 +6,7 @@ mod diagonal;
 mod element;
 mod pressure_forces;
 mod restricted;
+mod shared;
 mod system;
 mod viscous;
 
@@ -15,5 +16,6 @@ pub use diagonal::{BlockDiagonal, DiagonalSums, nodal_diagonal};
 pub use element::{Elements, Source};
 pub use pressure_forces::PressureForces;
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
+pub use shared::{OnOwned, Summed};
 pub use system::{StokesSystem, SystemOperator};
 pub use viscous::ViscousOperator;

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectError, LinOp, Scalar, vector};
+use gluey_parallel::{Halo, Number};
 
 use super::cells::{AddedViscosity, cell_operator};
 use crate::film::{FilmCorrection, FilmCoupling, FilmNetwork, FilmRow};
@@ -34,6 +35,8 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) terms: Terms<D>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
+    /// Of vectors, and of their velocities, where ranks share them.
+    halos: [Halo; 2],
 }
 
 impl<const D: usize> StokesSystem<D>
@@ -56,7 +59,8 @@ where
             || PressureSpace::new(&space, &cells),
             || cell_operator(&space, &cells, added.as_deref()),
         );
-        Self { pressure, operator, space, cells, added, terms: Vec::new(), viscosity }
+        let halos = Default::default();
+        Self { pressure, operator, space, cells, added, terms: Vec::new(), viscosity, halos }
     }
 
     /// The system of a term and of the cells that it does not cover.
@@ -69,7 +73,8 @@ where
         let mut cells = all_cells(space.discretisation(), viscosity);
         cells.retain(|cell| !term.covers(cell.cell as usize));
         let operator = cell_operator(&space, &own_cells(space.discretisation(), &cells), None);
-        Self { pressure, operator, space, cells, added: None, terms: vec![term], viscosity }
+        let halos = Default::default();
+        Self { pressure, operator, space, cells, added: None, terms: vec![term], viscosity, halos }
     }
 
     /// The term of a type, for those who know it as more than a term.
@@ -85,6 +90,30 @@ where
     /// The films between bodies that are too thin for the mesh.
     pub(crate) fn films(&self) -> Option<&FilmCoupling<D>> {
         self.term()
+    }
+
+    /// Makes the system of the part of a mesh that of all ranks, by the halos of vectors, velocities and
+    /// pressures. Vectors are zero at ghosts. All ranks call this.
+    pub fn share(&mut self, [all, velocities, pressures]: [Halo; 3]) {
+        self.halos = [all, velocities];
+        self.pressure.share(pressures);
+    }
+
+    /// The halo of vectors: nothing on one rank.
+    pub fn halo(&self) -> &Halo {
+        &self.halos[0]
+    }
+
+    /// The halo of their velocities and twists.
+    pub fn halo_of_velocities(&self) -> &Halo {
+        &self.halos[1]
+    }
+
+    /// From sums over own cells to a right-hand side, of all ranks.
+    pub fn complete(&self, b: &mut [f64]) {
+        self.halos[0].clone().accumulate(b);
+        let [_, p, _] = self.parts_mut(b);
+        self.pressure.remove_mean(p);
     }
 
     /// Mesh and nodes.
@@ -105,7 +134,10 @@ where
     /// Norm of the fluid's part of a right-hand side, loads on bodies included: what residuals are small
     /// beside. Rows of terms are left out: the scale of films grows as they close.
     pub fn fluid_norm(&self, b: &[f64]) -> f64 {
-        vector::norm(&b[..b.len() - self.row_count()])
+        let fluid = &b[..b.len() - self.row_count()];
+        let mut square = [vector::dot(fluid, fluid)];
+        self.halos[0].sum_over_ranks(&mut square);
+        square[0].sqrt()
     }
 
     /// The own pieces' block for the twist of each body, row by row.
@@ -207,7 +239,7 @@ where
         cell_operator(&self.space, &own_cells(self.discretisation(), &self.cells), None)
     }
 
-    /// In a part the mean is one over all parts, and not known here.
+    /// In a part the mean is one over all parts, see [`StokesSystem::complete`].
     fn reduce_pressures<T: Scalar>(&self, q: &mut [T]) {
         self.pressure.reduce(q);
         if !self.discretisation().is_part() {
@@ -226,6 +258,7 @@ where
     Dim<D>: Space<D>,
 {
     system: &'a StokesSystem<D>,
+    halo: Halo,
     wide: Work<f64>,
     narrow: Work<f32>,
     applications: usize,
@@ -236,6 +269,8 @@ where
 /// Workspace of the operator for vectors of `X`.
 #[derive(Debug)]
 struct Work<X> {
+    /// The vector with its ghosts.
+    x: Vec<X>,
     /// Pressures at all nodes.
     pressure: Vec<X>,
     cells: Workspace<f64, X>,
@@ -248,7 +283,14 @@ where
 {
     /// The operator of `system`.
     pub fn new(system: &'a StokesSystem<D>) -> Self {
-        Self { system, wide: Work::new(), narrow: Work::new(), applications: 0, films: None }
+        Self {
+            halo: system.halo().clone(),
+            system,
+            wide: Work::new(),
+            narrow: Work::new(),
+            applications: 0,
+            films: None,
+        }
     }
 
     /// The same whose iterates fulfil the rows of a network of films.
@@ -263,17 +305,25 @@ where
     }
 }
 
-impl<X: Scalar> Work<X> {
+impl<X: Scalar + Number> Work<X> {
     fn new() -> Self {
-        Self { pressure: Vec::new(), cells: Workspace::default(), scratch: Scratch::default() }
+        Self { x: Vec::new(), pressure: Vec::new(), cells: Workspace::default(), scratch: Scratch::default() }
     }
 
-    fn apply<const D: usize>(&mut self, system: &StokesSystem<D>, x: &[X], y: &mut [X])
+    fn apply<const D: usize>(&mut self, system: &StokesSystem<D>, halo: &mut Halo, x: &[X], y: &mut [X])
     where
         Dim<D>: Space<D>,
         dyn Term<D>: Product<X, f64>,
     {
-        let Self { pressure, cells, scratch } = self;
+        let Self { x: with_ghosts, pressure, cells, scratch } = self;
+        let x = if halo.is_empty() {
+            x
+        } else {
+            with_ghosts.resize(x.len(), X::ZERO);
+            with_ghosts.copy_from_slice(x);
+            halo.update(with_ghosts);
+            with_ghosts
+        };
         let [u, p, f] = system.parts(x);
         let [yu, yp, yf] = system.parts_mut(y);
         pressure.resize(p.len(), X::ZERO);
@@ -283,7 +333,10 @@ impl<X: Scalar> Work<X> {
         yf.fill(X::ZERO);
         add_terms(&system.terms, [u, pressure, f], [&mut *yu, &mut *yp, yf], scratch);
         system.space.clear_held(yu);
-        system.reduce_pressures(yp);
+        system.pressure.reduce(yp);
+        halo.accumulate(y);
+        let [_, yp, _] = system.parts_mut(y);
+        system.pressure.remove_mean(yp);
     }
 }
 
@@ -297,14 +350,18 @@ where
 
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         self.applications += 1;
-        self.wide.apply(self.system, x, y);
+        self.wide.apply(self.system, &mut self.halo, x, y);
+    }
+
+    fn complete(&self, sums: &mut [f64]) {
+        self.halo.sum_over_ranks(sums);
     }
 
     fn settle(&mut self, b: &[f64], x: &mut [f64]) {
         if let Some(films) = &mut self.films {
             let [_, _, bf] = self.system.parts(b);
             let [u, _, g] = self.system.parts_mut(x);
-            films.apply(bf, &mut u[self.system.space.full_dim()..], g, |_| ());
+            films.apply(bf, &mut u[self.system.space.full_dim()..], g);
         }
     }
 }
@@ -319,7 +376,11 @@ where
 
     fn apply(&mut self, x: &[f32], y: &mut [f32]) {
         self.applications += 1;
-        self.narrow.apply(self.system, x, y);
+        self.narrow.apply(self.system, &mut self.halo, x, y);
+    }
+
+    fn complete(&self, sums: &mut [f64]) {
+        self.halo.sum_over_ranks(sums);
     }
 }
 

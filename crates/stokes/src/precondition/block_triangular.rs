@@ -2,6 +2,7 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
+use gluey_parallel::Halo;
 
 use crate::film::FilmCorrection;
 use crate::operator::{PressureForces, StokesSystem};
@@ -23,6 +24,8 @@ where
     /// `z_p`.
     answer: Vec<f32>,
     films: Option<FilmCorrection<'a>>,
+    /// Of velocities and of pressures.
+    halos: [Halo; 2],
 }
 
 impl<'a, const D: usize> BlockTriangular<'a, D>
@@ -35,7 +38,16 @@ where
         films: Option<FilmCorrection<'a>>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];
-        Self { system, forces, cycle, schur, pressure: zeros(), answer: zeros(), films }
+        Self {
+            system,
+            forces,
+            cycle,
+            schur,
+            pressure: zeros(),
+            answer: zeros(),
+            films,
+            halos: [system.halo_of_velocities().clone(), system.pressure.halo().clone()],
+        }
     }
 }
 
@@ -44,22 +56,34 @@ where
     Dim<D>: Space<D>,
 {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
-        let Self { system, forces, cycle, schur, pressure, answer, films: correction } = self;
+        let Self {
+            system,
+            forces,
+            cycle,
+            schur,
+            pressure,
+            answer,
+            films: correction,
+            halos: [of_velocities, of_pressures],
+        } = self;
         let [ru, rp, rf] = system.parts(r);
         let [zu, zp, zf] = system.parts_mut(z);
         let answers = zf.iter_mut().zip(rf).zip(system.row_inverses());
         answers.for_each(|((z, r), inverse)| *z = S::from_f64(-inverse * r.to_f64()));
         vector::convert(-1.0, rp, pressure);
         system.pressure.remove_mean(pressure);
+        of_pressures.update(pressure);
         schur.apply(&system.pressure, pressure, answer);
+        of_pressures.clear(answer);
         system.pressure.remove_mean(answer);
         vector::convert(1.0, answer, zp);
         vector::copy(answer, pressure);
+        of_pressures.update(pressure);
         system.pressure.expand(pressure);
-        cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu);
+        cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu, of_velocities);
         system.space.clear_held(zu);
         if let Some(correction) = correction {
-            correction.apply(rf, &mut zu[system.space.full_dim()..], zf, |_| ());
+            correction.apply(rf, &mut zu[system.space.full_dim()..], zf);
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::operator::StokesSystem;
 
 pub use direct::DirectSolver;
 pub use kind::SolverKind;
-pub use multigrid::{MultigridSolver, RESTART};
+pub use multigrid::MultigridSolver;
 
 /// Effort and residuals of a linear solve.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,7 +13,7 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Gcr, GcrParams, LinOp, Preconditioner, Reference, Scalar};
 
 use super::{SaddleSolver, SolveReport};
-use crate::error::StokesError;
+use crate::error::{StokesError, agreed};
 use crate::film::FilmNetwork;
 use crate::formulation::Problem;
 use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
@@ -23,7 +23,7 @@ use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::space::{VelocitySpace, solid_nodes};
 
 /// Iterations between restarts.
-pub const RESTART: usize = 60;
+const RESTART: usize = 60;
 /// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
 /// iterations, see `docs/archive/experiments/0010-krylov-vectors.md`.
 const MOST_NOISE: f64 = 1.0;
@@ -67,6 +67,30 @@ impl<const D: usize> MultigridSolver<D>
 where
     Dim<D>: Space<D>,
 {
+    /// A solver whose ranks have prepared the parts of it, which gives up after so many iterations.
+    pub fn of_parts(
+        system: &StokesSystem<D>,
+        (cycle, schur): (VCycle<D>, SchurInverse<D>),
+        films: Option<FilmNetwork>,
+        max_iterations: usize,
+    ) -> Self {
+        let params = GcrParams { max_iterations, restart: RESTART, ..GcrParams::default() };
+        Self {
+            double: Gcr::with_directions(params),
+            noise: f64::INFINITY,
+            cycle: Some(cycle),
+            schur: Some(schur),
+            forces: Some(PressureForces::new(system)),
+            films,
+            ..Self::default()
+        }
+    }
+
+    /// Its cycle, for other surfaces; `None` before the solver was prepared.
+    pub fn into_cycle(self) -> Option<VCycle<D>> {
+        self.cycle
+    }
+
     /// One V-cycle on the velocity block, for reduced velocities; `None` before the solver was prepared.
     pub fn velocity_cycle(&mut self) -> Option<&mut impl Preconditioner<f64>> {
         self.cycle.as_mut()
@@ -114,8 +138,10 @@ where
         cycle.take_fine_applications();
         let [of_iterates, of_steps] =
             [(); 2].map(|()| self.films.as_ref().map(FilmNetwork::correction).transpose());
-        let operator = &mut SystemOperator::new(system).with_films(of_iterates?);
-        let preconditioner = &mut BlockTriangular::new(system, (forces, cycle, schur), of_steps?);
+        let corrections = of_iterates.and_then(|of_iterates| Ok((of_iterates, of_steps?)));
+        let (of_iterates, of_steps) = agreed(system.halo(), corrections.map_err(StokesError::from))?;
+        let operator = &mut SystemOperator::new(system).with_films(of_iterates);
+        let preconditioner = &mut BlockTriangular::new(system, (forces, cycle, schur), of_steps);
         let goal = Goal { tolerance, reference: system.fluid_norm(b) };
         let residuals = if self.noise <= MOST_NOISE {
             run(&mut self.single, operator, preconditioner, b, x, goal)?

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_fem::{Chunks, NodeMap, ReferenceMatrices, TreeMesh};
+use gluey_fem::{Chunks, Interpolation, NodeMap, ReferenceMatrices, TreeMesh};
 
 use super::partition::Partition;
 
@@ -20,7 +20,7 @@ pub struct Discretisation<const D: usize> {
     /// How operators cut the mesh.
     pub chunks: Arc<Chunks<D>>,
     /// This rank's share, where the mesh is a part of a larger one.
-    partition: Option<Arc<Partition>>,
+    partition: Option<Arc<Partition<D>>>,
 }
 
 impl<const D: usize> Discretisation<D> {
@@ -38,7 +38,7 @@ impl<const D: usize> Discretisation<D> {
         mesh: Arc<TreeMesh<D>>,
         [velocity, pressure]: [Arc<NodeMap<D>>; 2],
         chunks: Arc<Chunks<D>>,
-        partition: Partition,
+        partition: Partition<D>,
     ) -> Self {
         Self { mesh, velocity, pressure, chunks, partition: Some(Arc::new(partition)) }
     }
@@ -50,7 +50,7 @@ impl<const D: usize> Discretisation<D> {
     }
 
     /// This rank's share; `None` where the mesh is no part.
-    pub fn partition(&self) -> Option<&Partition> {
+    pub fn partition(&self) -> Option<&Partition<D>> {
         self.partition.as_deref()
     }
 
@@ -61,12 +61,28 @@ impl<const D: usize> Discretisation<D> {
 
     /// Whether a cell is added up here: all are, but in a part.
     pub fn is_own(&self, cell: usize) -> bool {
-        self.partition().is_none_or(|part| part.cells.contains(&cell))
+        self.partition().is_none_or(|part| part.part.own().contains(&cell))
     }
 
     /// The velocity nodes that this rank owns.
     pub fn own_nodes(&self) -> Range<usize> {
         self.partition().map_or(0..self.velocity.node_count(), |part| part.nodes.clone())
+    }
+
+    /// The pressure nodes that this rank owns.
+    pub fn own_pressure_nodes(&self) -> Range<usize> {
+        self.partition().map_or(0..self.pressure.node_count(), |part| part.pressure_nodes.clone())
+    }
+
+    /// The interpolation between nodes of this mesh and of one that is finer by one level: on parts to those
+    /// that the rank owns.
+    pub fn interpolation(&self, fine: &Self, nodes: fn(&Self) -> &Arc<NodeMap<D>>) -> Interpolation<D> {
+        match (self.partition(), fine.partition()) {
+            (Some(from), Some(to)) => {
+                Interpolation::of_parts(&from.part, nodes(self).clone(), &to.part, nodes(fine))
+            }
+            _ => Interpolation::new(&self.mesh, nodes(self).clone(), &fine.mesh, nodes(fine)),
+        }
     }
 
     /// Level of the smallest cell at each velocity node.

@@ -3,22 +3,27 @@
 
 use std::ops::Range;
 
+use gluey_fem::Part;
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, GhostPlan, Halo, Ranks, Wanted};
 
 /// A rank's share of a mesh.
 #[derive(Clone, Debug)]
-pub struct Partition {
+pub struct Partition<const D: usize> {
     /// The ranks.
     pub ranks: Ranks,
-    /// Cells that this rank adds up.
-    pub cells: Range<usize>,
+    /// The cells, of which this rank adds its own up.
+    pub part: Part<D>,
     /// Velocity nodes that it owns.
     pub nodes: Range<usize>,
     /// Velocity nodes on which its cells depend, hanging ones by their masters.
     pub needed: Vec<bool>,
     /// Those of them that others own.
     pub ghosts: GhostPlan,
+    /// Pressure nodes that it owns.
+    pub pressure_nodes: Range<usize>,
+    /// The halo of all pressures.
+    pub pressures: Halo,
     /// Level of the smallest cell of the whole mesh at each velocity node of the part.
     pub finest: Vec<u8>,
     /// Numbers among all bodies of those near the part, in ascending order.
@@ -29,13 +34,13 @@ pub struct Partition {
     pub is_whole: bool,
 }
 
-impl Partition {
+impl<const D: usize> Partition<D>
+where
+    Dim<D>: Space<D>,
+{
     /// The halos of reduced velocities, and of a square matrix for each twist: of the bodies with needed nodes,
     /// and of all with nodes in the part, for nodes that are `solid`. All ranks call this.
-    pub fn halos<const D: usize>(&self, solid: &[Option<u32>]) -> [Halo; 2]
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn halos(&self, solid: &[Option<u32>]) -> [Halo; 2] {
         let (n, size, first) = (Dim::<D>::RIGID, Dim::<D>::RIGID * Dim::<D>::RIGID, solid.len() * D);
         let [mut here, mut needed] = [(); 2].map(|()| vec![false; self.bodies.len()]);
         for (body, &is_needed) in solid.iter().zip(&self.needed).filter_map(|of| Some(((*of.0)?, of.1))) {

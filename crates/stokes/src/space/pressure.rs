@@ -5,6 +5,7 @@
 use gluey_fem::{Constraint, NodeMap};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
+use gluey_parallel::Halo;
 
 use super::cells::ActiveCell;
 use super::velocity::VelocitySpace;
@@ -14,8 +15,12 @@ use super::velocity::VelocitySpace;
 #[derive(Clone, Debug)]
 pub struct PressureSpace<const D: usize> {
     free: Vec<bool>,
+    /// Number of free nodes, on all ranks.
     free_count: usize,
     constraints: Vec<Constraint>,
+    halo: Halo,
+    /// Free nodes that this rank owns, where others have some.
+    own: Option<Vec<bool>>,
 }
 
 impl<const D: usize> PressureSpace<D>
@@ -39,7 +44,22 @@ where
         let free = self::seen(nodes, &cells);
         let constraints = nodes.constraints().iter().chain(ghosts).cloned().collect();
         let free_count = free.iter().filter(|&&f| f).count();
-        Self { free, free_count, constraints }
+        Self { free, free_count, constraints, halo: Halo::default(), own: None }
+    }
+
+    /// Makes the pressures of the part of a mesh those of all ranks, by the halo of the free ones. All ranks
+    /// call this.
+    pub(crate) fn share(&mut self, halo: Halo) {
+        let mut own = self.free.clone();
+        halo.clear(&mut own);
+        let mut count = [own.iter().filter(|is_own| **is_own).count() as f64];
+        halo.sum_over_ranks(&mut count);
+        (self.free_count, self.own, self.halo) = (count[0] as usize, Some(own), halo);
+    }
+
+    /// The halo of the pressures: nothing on one rank.
+    pub fn halo(&self) -> &Halo {
+        &self.halo
     }
 
     /// Length of a vector.
@@ -87,11 +107,13 @@ where
     }
 
     /// Makes the sum over free nodes vanish: a pressure is defined up to a constant, and the rest of the
-    /// divergence is spread evenly.
+    /// divergence is spread evenly. Ghosts are left as they are.
     pub fn remove_mean<T: Scalar>(&self, q: &mut [T]) {
-        let sum: f64 = q.iter().zip(&self.free).filter(|e| *e.1).map(|e| e.0.to_f64()).sum();
-        let mean = T::from_f64(sum / self.free_count.max(1) as f64);
-        for (value, &free) in q.iter_mut().zip(&self.free) {
+        let own = self.own.as_ref().unwrap_or(&self.free);
+        let mut sum = [q.iter().zip(own).filter(|e| *e.1).map(|e| e.0.to_f64()).sum()];
+        self.halo.sum_over_ranks(&mut sum);
+        let mean = T::from_f64(sum[0] / self.free_count.max(1) as f64);
+        for (value, &free) in q.iter_mut().zip(own) {
             if free {
                 *value -= mean;
             }

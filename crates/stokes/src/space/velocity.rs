@@ -65,7 +65,7 @@ where
     /// a rigid motion is left out: its nodes stay free, see [`VelocitySpace::is_active`]. On a part of a mesh
     /// all ranks call this, with the bodies near their parts.
     pub fn new<B: Body<D>>(discretisation: &Discretisation<D>, bodies: &[B], solid: &[Option<u32>]) -> Self {
-        let halos = discretisation.partition().map(|part| part.halos::<D>(solid));
+        let halos = discretisation.partition().map(|part| part.halos(solid));
         Self::with_halos(discretisation, (bodies, solid), halos.unwrap_or_default())
     }
 

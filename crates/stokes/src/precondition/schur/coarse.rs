@@ -12,20 +12,21 @@
 
 use std::sync::Arc;
 
-use gluey_fem::{Interpolation, TreeMesh};
+use gluey_fem::Interpolation;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectError, LinOp, Ordering, Preconditioner, Subset, vector};
+use gluey_parallel::Halo;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::mass::pressure_matrix;
 use super::weights::without_bodies;
-use crate::error::{SmallMatrix, StokesError};
+use crate::error::{SmallMatrix, StokesError, agreed};
 use crate::operator::{Elements, StokesSystem, SystemOperator, assemble_viscous, factorised};
 use crate::space::Discretisation;
 
 /// Largest dense matrix.
-pub const MOST_PRESSURES: usize = 1000;
+const MOST_PRESSURES: usize = 1000;
 /// Least number of columns of `S_0` that one thread finds.
 const LEAST_COLUMNS: usize = 16;
 /// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
@@ -36,8 +37,23 @@ pub struct CoarseSchur<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    /// The meshes, coarsest first.
+    /// The meshes, coarsest first, and of those of all ranks the first.
     meshes: Vec<Discretisation<D>>,
+    first_shared: usize,
+    /// On the rank that holds all of the coarsest mesh.
+    whole: Option<Whole<D>>,
+    /// `transfers[l]` joins the pressures of mesh `l` to those of mesh `l + 1`.
+    transfers: Vec<Interpolation<D>>,
+    /// Pressures on each mesh, and their halos.
+    pressures: Vec<Vec<f32>>,
+    halos: Vec<Halo>,
+}
+
+/// The correction on the coarsest mesh.
+struct Whole<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
     viscosity: f64,
     system: StokesSystem<D>,
     /// `S_0^-1 - T_0^-1` for the unknown pressures in `unknowns`.
@@ -46,10 +62,6 @@ where
     /// Load and correction at the unknown pressures.
     load: DVector<f32>,
     corrected: DVector<f32>,
-    /// `transfers[l]` joins the pressures of mesh `l` to those of mesh `l + 1`.
-    transfers: Vec<Interpolation<D>>,
-    /// Pressures on each mesh.
-    pressures: Vec<Vec<f32>>,
 }
 
 impl<const D: usize> CoarseSchur<D>
@@ -58,91 +70,89 @@ where
 {
     /// The correction from the coarsest of `meshes` (coarsest first), or, where that is too fine, from its
     /// coarsening; `None` where even the cells from which the mesh was refined are too many. What stayed the
-    /// same is taken from `before`.
+    /// same is taken from `before`. All ranks call this, with the halo of the pressures.
     pub fn new(
         meshes: &[Discretisation<D>],
         viscosity: f64,
-        before: Option<Self>,
+        (before, halo): (Option<Self>, &Halo),
     ) -> Result<Option<Self>, StokesError> {
-        let Some(meshes) = with_small_coarsest(meshes, before.as_ref()) else { return Ok(None) };
-        let transfers = meshes.windows(2).map(|pair| {
-            Interpolation::new(&pair[0].mesh, pair[0].pressure.clone(), &pair[1].mesh, &pair[1].pressure)
-        });
-        let transfers: Vec<_> = transfers.collect();
-        let pressures = meshes.iter().map(|mesh| vec![0.0; mesh.pressure.node_count()]).collect();
-        let is_same =
-            |old: &Self| Arc::ptr_eq(&old.meshes[0].mesh, &meshes[0].mesh) && old.viscosity == viscosity;
-        if let Some(old) = before.filter(is_same) {
-            return Ok(Some(Self { meshes, transfers, pressures, ..old }));
-        }
-        let coarsest = &meshes[0];
-        let system = without_bodies(coarsest, viscosity);
-        let unknowns = Subset::new(system.pressure.dim(), |q| system.pressure.is_free(q));
-        let correction = correction(&system, viscosity, unknowns.positions())?;
-        let [load, corrected] = [(); 2].map(|()| DVector::zeros(unknowns.len()));
+        let holds_all = meshes[0].partition().is_none_or(|part| part.is_whole);
+        let with_coarsest = match holds_all {
+            true => with_small_coarsest(meshes, before.as_ref()),
+            false => Some(meshes.to_vec()),
+        };
+        let mut missing = [if with_coarsest.is_none() { 1.0 } else { 0.0 }];
+        halo.sum_over_ranks(&mut missing);
+        let Some(all) = with_coarsest.filter(|_| missing[0] == 0.0) else { return Ok(None) };
+        let old = before.filter(|old| Arc::ptr_eq(&old.meshes[0].mesh, &all[0].mesh));
+        let old = old.and_then(|old| old.whole).filter(|old| old.viscosity == viscosity);
+        let whole = || old.map_or_else(|| Whole::new(&all[0].alone(), viscosity), Ok);
+        let whole = agreed(halo, holds_all.then(whole).transpose())?;
+        let transfers = all.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.pressure));
+        let halo = |mesh: &Discretisation<D>| {
+            mesh.partition().map_or_else(Halo::default, |part| part.pressures.clone())
+        };
         Ok(Some(Self {
-            meshes,
-            viscosity,
-            system,
-            correction,
-            unknowns,
-            load,
-            corrected,
-            transfers,
-            pressures,
+            first_shared: all.len() - meshes.len(),
+            transfers: transfers.collect(),
+            pressures: all.iter().map(|mesh| vec![0.0; mesh.pressure.node_count()]).collect(),
+            halos: all.iter().map(halo).collect(),
+            whole,
+            meshes: all,
         }))
     }
 
     /// `z += P (S_0^-1 - T_0^-1) P^T r` on all pressure nodes of the finest mesh. `r` is zero but at
     /// unknowns, where its sum vanishes.
     pub fn add(&mut self, r: &[f32], z: &mut [f32]) {
-        let Self { meshes, system, correction, unknowns, load, corrected, transfers, pressures, .. } = self;
+        let Self { meshes, first_shared, whole, transfers, pressures, halos } = self;
         let top = meshes.len() - 1;
         pressures[top].copy_from_slice(r);
         for level in (0..top).rev() {
             let (below, above) = pressures.split_at_mut(level + 1);
-            meshes[level + 1].pressure.condense(1, |w| w as f32, &mut above[0]);
-            transfers[level].restrict::<1>(&above[0], &mut below[level]);
+            let first = meshes[level + 1].own_pressure_nodes().start;
+            transfers[level].restrict::<1>(&above[0][first..], &mut below[level]);
+            meshes[level].pressure.condense(1, |w| w as f32, &mut below[level]);
+            halos[level].sum(&mut below[level]);
         }
-        system.pressure.reduce(&mut pressures[0]);
-        unknowns.gather(&pressures[0], load.as_mut_slice());
-        correction.mul_to(load, corrected);
-        unknowns.scatter(corrected.as_slice(), &mut pressures[0]);
-        for level in 0..top {
+        match whole {
+            Some(whole) => whole.apply(&mut pressures[0]),
+            None => pressures[0].fill(0.0),
+        }
+        for level in 0..=top {
             let (below, above) = pressures.split_at_mut(level + 1);
+            if level == *first_shared {
+                halos[level].sum(&mut below[level]);
+            }
+            let Some(above) = above.first_mut() else { break };
             meshes[level].pressure.distribute(1, |w| w as f32, &mut below[level]);
-            transfers[level].prolong::<1>(&below[level], &mut above[0]);
+            let first = meshes[level + 1].own_pressure_nodes().start;
+            transfers[level].prolong::<1>(&below[level], &mut above[first..]);
+            halos[level + 1].update(above);
         }
         vector::axpy(1.0, &pressures[top], z);
     }
 }
 
-/// The correction of a small mesh without bodies, for solvers that have meshes of their own.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BoxCorrection {
-    /// The unknown pressures of the mesh.
-    pub unknowns: Vec<u32>,
-    /// `S_0^-1 - T_0^-1` for them.
-    pub matrix: DMatrix<f32>,
-}
-
-impl BoxCorrection {
-    /// `None` where the matrix would be too large.
-    ///
-    /// # Errors
-    /// [`StokesError::BoxPressures`] if a matrix is not positive.
-    pub fn new<const D: usize>(mesh: TreeMesh<D>, viscosity: f64) -> Result<Option<Self>, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
-        let discretisation = Discretisation::new(mesh);
-        if discretisation.pressure.node_count() > MOST_PRESSURES {
-            return Ok(None);
-        }
-        let system = without_bodies(&discretisation, viscosity);
+impl<const D: usize> Whole<D>
+where
+    Dim<D>: Space<D>,
+{
+    fn new(coarsest: &Discretisation<D>, viscosity: f64) -> Result<Self, StokesError> {
+        let system = without_bodies(coarsest, viscosity);
         let unknowns = Subset::new(system.pressure.dim(), |q| system.pressure.is_free(q));
-        let matrix = correction(&system, viscosity, unknowns.positions())?;
-        Ok(Some(Self { unknowns: unknowns.positions().to_vec(), matrix }))
+        let correction = correction(&system, viscosity, unknowns.positions())?;
+        let [load, corrected] = [(); 2].map(|()| DVector::zeros(unknowns.len()));
+        Ok(Self { viscosity, system, correction, unknowns, load, corrected })
+    }
+
+    /// From loads on the pressures of the mesh to their correction.
+    fn apply(&mut self, pressures: &mut [f32]) {
+        let Self { system, correction, unknowns, load, corrected, .. } = self;
+        system.pressure.reduce(pressures);
+        unknowns.gather(pressures, load.as_mut_slice());
+        correction.mul_to(load, corrected);
+        unknowns.scatter(corrected.as_slice(), pressures);
     }
 }
 
@@ -229,6 +239,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
 
     /// Meshes of a long box, from level 2 on, the finest with hanging nodes.
@@ -259,13 +270,13 @@ mod tests {
     fn a_box_of_many_roots_is_coarsened_until_its_matrix_is_small() {
         let meshes = long_box(20);
         assert!(meshes[0].pressure.node_count() > MOST_PRESSURES);
-        let mut correction = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
+        let mut correction = CoarseSchur::new(&meshes, 2.0, (None, &Halo::default())).unwrap().unwrap();
         assert_eq!(correction.meshes.len(), 3);
-        assert_eq!(correction.unknowns.len(), 41 * 9);
+        assert_eq!(correction.whole.as_ref().unwrap().unknowns.len(), 41 * 9);
         let [x, y] = [1, 2].map(|seed| loads(&meshes[1], seed));
         let (xy, yx) = (product(&mut correction, &x, &y), product(&mut correction, &y, &x));
         assert!((xy - yx).abs() < 1e-4 * xy.abs(), "{xy} {yx}");
-        assert!(CoarseSchur::new(&long_box(300), 2.0, None).unwrap().is_none());
+        assert!(CoarseSchur::new(&long_box(300), 2.0, (None, &Halo::default())).unwrap().is_none());
     }
 
     /// A negative viscosity makes a negative mass.
@@ -283,11 +294,11 @@ mod tests {
     #[test]
     fn the_matrix_is_kept_while_coarsest_mesh_and_viscosity_stand() {
         let meshes = long_box(3);
-        let first = CoarseSchur::new(&meshes, 2.0, None).unwrap().unwrap();
-        let matrix = first.correction.clone();
-        let again = CoarseSchur::new(&meshes, 2.0, Some(first)).unwrap().unwrap();
-        assert_eq!(again.correction, matrix);
-        let thicker = CoarseSchur::new(&meshes, 4.0, Some(again)).unwrap().unwrap();
-        assert!((thicker.correction - matrix.scale(2.0)).amax() < 1e-4 * matrix.amax());
+        let first = CoarseSchur::new(&meshes, 2.0, (None, &Halo::default())).unwrap().unwrap();
+        let matrix = first.whole.as_ref().unwrap().correction.clone();
+        let again = CoarseSchur::new(&meshes, 2.0, (Some(first), &Halo::default())).unwrap().unwrap();
+        assert_eq!(again.whole.as_ref().unwrap().correction, matrix);
+        let thicker = CoarseSchur::new(&meshes, 4.0, (Some(again), &Halo::default())).unwrap().unwrap();
+        assert!((thicker.whole.unwrap().correction - matrix.scale(2.0)).amax() < 1e-4 * matrix.amax());
     }
 }

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 
 use super::cells::PressureMatrices;
 use super::weights::scale_by_weights;
-use crate::error::StokesError;
+use crate::error::{StokesError, agreed};
 use crate::operator::{Elements, StokesSystem};
 use crate::space::pressure_expansion;
 use crate::surface::SurfaceCoupling;
 
-/// `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in its place, scaled by
-/// the weights of the pressures.
+/// The share of own cells in `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in its place, scaled by
+/// the weights of the pressures. All ranks call this.
 pub fn pressure_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     viscosity: f64,
@@ -24,14 +24,18 @@ pub fn pressure_matrix<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let matrices = PressureMatrices::new(elements, viscosity)?;
-    let mut mass = pressure_mass(elements.system(), &matrices)?;
+    let halo = elements.system().pressure.halo();
+    let matrices = PressureMatrices::new(elements, viscosity);
+    let mass = matrices
+        .map_err(StokesError::from)
+        .and_then(|matrices| Ok((pressure_mass(elements.system(), &matrices)?, matrices)));
+    let (mut mass, matrices) = agreed(halo, mass)?;
     scale_by_weights(&mut mass, elements, &matrices);
     mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
     Ok(mass)
 }
 
-/// The sum of the cells' pressure matrices on free pressure nodes; other rows hold a one.
+/// The sum of the own cells' pressure matrices on free pressure nodes; other rows hold a one.
 pub fn pressure_mass<const D: usize>(
     system: &StokesSystem<D>,
     matrices: &PressureMatrices,
@@ -94,8 +98,10 @@ where
 {
     system: &'a StokesSystem<D>,
     matrices: &'a PressureMatrices,
-    /// Of cut cells, row by row.
-    of_cut: Vec<Vec<f64>>,
+    /// Own cells among those of the system.
+    fluid: Vec<usize>,
+    /// The own cut cells with their matrices, row by row.
+    of_cut: Vec<(usize, Vec<f64>)>,
 }
 
 impl<'a, const D: usize> Sources<'a, D>
@@ -104,34 +110,39 @@ where
 {
     fn new(system: &'a StokesSystem<D>, matrices: &'a PressureMatrices) -> Self {
         let m = ReferenceMatrices::<D>::PRESSURE;
+        let is_own = |cell: u32| system.discretisation().is_own(cell as usize);
         let mass = |surfaces: &SurfaceCoupling<D>, place: usize| {
+            let cell = surfaces.cut.cells[place].cell;
             let mut matrix = vec![0.0; m * m];
-            surfaces.for_each_mass(place, |i, j, value| matrix[i * m + j] = value);
-            matrix
+            is_own(cell).then(|| {
+                surfaces.for_each_mass(place, |i, j, value| matrix[i * m + j] = value);
+                (cell as usize, matrix)
+            })
         };
         let of_cut = system.surfaces().map_or_else(Vec::new, |surfaces| {
-            (0..surfaces.cut.cells.len()).into_par_iter().map(|place| mass(surfaces, place)).collect()
+            let places = (0..surfaces.cut.cells.len()).into_par_iter();
+            places.filter_map(|place| mass(surfaces, place)).collect()
         });
-        Self { system, matrices, of_cut }
+        let fluid = (0..system.cells.len()).filter(|&index| is_own(system.cells[index].cell)).collect();
+        Self { system, matrices, fluid, of_cut }
     }
 
     fn len(&self) -> usize {
-        self.system.cells.len() + self.of_cut.len()
+        self.fluid.len() + self.of_cut.len()
     }
 
     fn cell(&self, at: usize) -> usize {
-        let cells = &self.system.cells;
-        match (cells.get(at), self.system.surfaces()) {
-            (None, Some(surfaces)) => surfaces.cut.cells[at - cells.len()].cell as usize,
-            _ => cells[at].cell as usize,
+        match self.fluid.get(at) {
+            Some(&index) => self.system.cells[index].cell as usize,
+            None => self.of_cut[at - self.fluid.len()].0,
         }
     }
 
     /// The factor of a matrix, and the matrix.
     fn matrix(&self, at: usize) -> (f64, &[f64]) {
-        match at.checked_sub(self.system.cells.len()) {
-            Some(place) => (1.0 / self.system.viscosity(), &self.of_cut[place]),
-            None => self.matrices.of(at),
+        match self.fluid.get(at) {
+            Some(&index) => self.matrices.of(index),
+            None => (1.0 / self.system.viscosity(), &self.of_cut[at - self.fluid.len()].1),
         }
     }
 }

@@ -14,15 +14,16 @@ mod mass;
 mod weights;
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max};
+use gluey_linalg::{
+    Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max_from, vector,
+};
+use gluey_parallel::Halo;
 
-pub use coarse::{BoxCorrection, MOST_PRESSURES};
-pub use weights::{LEAST_WEIGHT, ratio_inside};
 #[cfg(test)]
 pub use {cells::PressureMatrices, weights::weights};
 
-use crate::error::StokesError;
-use crate::operator::Elements;
+use crate::error::{StokesError, agreed};
+use crate::operator::{Elements, OnOwned, Summed};
 use crate::space::{Discretisation, PressureSpace};
 use coarse::CoarseSchur;
 use mass::pressure_matrix;
@@ -33,7 +34,7 @@ const LARGEST_ERROR: f64 = 1.0 / 16.0;
 const MOST_STEPS: usize = 32;
 /// Lanczos steps for the largest eigenvalue. The bound `(3/2)^D` of a cell does not hold for its matrix in
 /// the unknowns: the pressures that an aggregate or a hanging node takes from others add up.
-pub const LANCZOS_STEPS: usize = 15;
+const LANCZOS_STEPS: usize = 15;
 /// Factor by which that estimate is raised.
 const SAFETY: f64 = 1.1;
 
@@ -47,6 +48,8 @@ where
     jacobi: Jacobi<f32>,
     chebyshev: Chebyshev<f32>,
     coarse: Option<CoarseSchur<D>>,
+    /// Of the pressures.
+    halo: Halo,
 }
 
 impl<const D: usize> SchurInverse<D>
@@ -54,28 +57,42 @@ where
     Dim<D>: Space<D>,
 {
     /// For the pressures of the system on the finest of `meshes` (coarsest first). What stayed the same is
-    /// taken from `before`.
+    /// taken from `before`. All ranks call this.
+    ///
+    /// # Errors
+    /// If a matrix is too large or not positive, on all ranks.
     pub fn new(
         meshes: &[Discretisation<D>],
         elements: &Elements<'_, D>,
         before: Option<Self>,
     ) -> Result<Self, StokesError> {
         let system = elements.system();
-        let viscosity = system.viscosity();
+        let (viscosity, mut halo) = (system.viscosity(), system.pressure.halo().clone());
         let mass = pressure_matrix(elements, viscosity)?;
-        let coarse = CoarseSchur::new(meshes, viscosity, before.and_then(|before| before.coarse))?;
-        let diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
+        let before = before.and_then(|before| before.coarse);
+        let coarse = CoarseSchur::new(meshes, viscosity, (before, &halo))?;
+        let mut diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
+        halo.sum(&mut diagonal);
+        if !halo.is_empty() {
+            // No own cell acts on these.
+            diagonal.iter_mut().filter(|entry| **entry == 0.0).for_each(|entry| *entry = 1.0);
+        }
         let mut mass = SellMatrix::new(&mass);
-        let mut jacobi = Jacobi::new(&diagonal).map_err(StokesError::PressureMass)?;
-        let largest = estimate_lambda_max(&mut mass, &mut jacobi, LANCZOS_STEPS)?;
+        let mut jacobi = agreed(&halo, Jacobi::new(&diagonal).map_err(StokesError::PressureMass))?;
+        let mut start = vec![0.0; diagonal.len()];
+        vector::fill_pseudo_random(1, &mut start);
+        halo.clear(&mut start);
+        let mut on_owned = OnOwned::new(&mut mass, &mut halo);
+        let largest = estimate_lambda_max_from(start, &mut on_owned, &mut jacobi, LANCZOS_STEPS)?;
         let chebyshev = mass_iteration::<D>(mass.dim(), largest);
-        Ok(Self { mass, jacobi, chebyshev, coarse })
+        Ok(Self { mass, jacobi, chebyshev, coarse, halo })
     }
 
-    /// `z` close to `S^-1 r`, up to a constant. `r` is zero but at unknowns, where its sum vanishes; so is
+    /// `z` close to `S^-1 r`, up to a constant, for vectors that hold the same at ghosts as at their owners. `r` is zero but at unknowns, where its sum vanishes; so is
     /// `z`.
     pub fn apply(&mut self, space: &PressureSpace<D>, r: &[f32], z: &mut [f32]) {
-        self.chebyshev.smooth(&mut self.mass, &mut self.jacobi, r, z, Guess::Zero);
+        let mut mass = Summed { operator: &mut self.mass, halo: &mut self.halo };
+        self.chebyshev.smooth(&mut mass, &mut self.jacobi, r, z, Guess::Zero);
         if let Some(coarse) = &mut self.coarse {
             coarse.add(r, z);
             space.clear_fixed(z);
@@ -85,7 +102,7 @@ where
 
 /// Chebyshev's iteration for the inverse of a pressure mass matrix of so many rows, whose largest eigenvalue,
 /// scaled by the diagonal, was estimated in [`LANCZOS_STEPS`].
-pub fn mass_iteration<const D: usize>(dim: usize, largest: f64) -> Chebyshev<f32> {
+fn mass_iteration<const D: usize>(dim: usize, largest: f64) -> Chebyshev<f32> {
     let interval = SpectralInterval { lower: 0.5f64.powi(D as i32), upper: SAFETY * largest };
     Chebyshev::new(dim, steps(interval), interval)
 }

@@ -28,7 +28,7 @@ use crate::operator::{Elements, StokesSystem, viscous_diagonal};
 use crate::space::{Discretisation, VelocitySpace, pressure_expansion};
 
 /// The least weight, for pressures that act on hardly any velocity.
-pub const LEAST_WEIGHT: f64 = 0.05;
+const LEAST_WEIGHT: f64 = 0.05;
 /// The least and the largest weight in cells in which the viscosity varies.
 const OF_CUT_CELLS: [f64; 2] = [0.25, 2.0];
 
@@ -41,7 +41,8 @@ pub fn scale_by_weights<const D: usize>(
 ) where
     Dim<D>: Space<D>,
 {
-    let weights = weights(elements, matrices);
+    let mut weights = weights(elements, matrices);
+    elements.system().pressure.halo().clone().update(&mut weights);
     let roots: Vec<f64> = weights.into_iter().map(f64::sqrt).collect();
     mass.fill_rows(|row, columns, values| {
         for (value, &column) in values.iter_mut().zip(columns) {
@@ -50,7 +51,8 @@ pub fn scale_by_weights<const D: usize>(
     });
 }
 
-/// The weights of all pressures, one for those that are not unknowns.
+/// The weights of all owned pressures, one for those that are not unknowns. A part lacks what cells far from
+/// its own add to pressures at hanging nodes and near surfaces: there weights are a little smaller.
 pub fn weights<const D: usize>(elements: &Elements<'_, D>, matrices: &PressureMatrices) -> Vec<f64>
 where
     Dim<D>: Space<D>,
@@ -63,7 +65,9 @@ where
     let is_cut = |index: usize| elements.viscous(index).1.is_some();
     let next_to_fixed = pressures_of(system, has_fixed_nodes);
     let in_cut_cells = pressures_of(system, is_cut);
-    let special: Vec<bool> = next_to_fixed.iter().zip(&in_cut_cells).map(|(a, b)| *a || *b).collect();
+    let own = discretisation.own_pressure_nodes();
+    let is_special = |q: usize| own.contains(&q) && (next_to_fixed[q] || in_cut_cells[q]);
+    let special: Vec<bool> = (0..next_to_fixed.len()).map(is_special).collect();
     let mut weights = vec![1.0; special.len()];
     let inside = ratio_inside::<D>();
     for (q, ratio) in ratios(elements, matrices, &fixed, &special) {
@@ -77,7 +81,7 @@ where
 }
 
 /// `s_q / m_q` in the middle of a mesh without bodies: what weights are relative to.
-pub fn ratio_inside<const D: usize>() -> f64
+fn ratio_inside<const D: usize>() -> f64
 where
     Dim<D>: Space<D>,
 {

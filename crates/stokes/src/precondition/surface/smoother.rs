@@ -15,7 +15,9 @@ use gluey_linalg::{
 use gluey_parallel::Halo;
 
 use crate::error::{DiagonalError, StokesError};
-use crate::operator::{BlockDiagonal, Elements, ViscousOperator, add_at, gather, nodal_diagonal};
+use crate::operator::{
+    BlockDiagonal, Elements, OnOwned, Summed, ViscousOperator, add_at, gather, nodal_diagonal,
+};
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::velocity::cell_lambda_max;
@@ -199,53 +201,6 @@ where
     }
 }
 
-/// The operator on vectors that hold the same at copies as at their owners.
-struct Summed<'a, const D: usize> {
-    operator: &'a mut ViscousOperator<D>,
-    halo: &'a mut Halo,
-}
-
-impl<const D: usize> LinOp<f32> for Summed<'_, D>
-where
-    Dim<D>: Space<D>,
-{
-    fn dim(&self) -> usize {
-        self.operator.dim()
-    }
-
-    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
-        self.operator.apply(x, y);
-        self.halo.sum(y);
-    }
-}
-
-/// The operator on vectors that are zero at copies, whose scalar products are sums over parts.
-struct OnOwned<'a, const D: usize> {
-    operator: &'a mut ViscousOperator<D>,
-    halo: &'a mut Halo,
-    x: Vec<f32>,
-}
-
-impl<const D: usize> LinOp<f32> for OnOwned<'_, D>
-where
-    Dim<D>: Space<D>,
-{
-    fn dim(&self) -> usize {
-        self.operator.dim()
-    }
-
-    fn apply(&mut self, x: &[f32], y: &mut [f32]) {
-        self.x.copy_from_slice(x);
-        self.halo.update(&mut self.x);
-        self.operator.apply(&self.x, y);
-        self.halo.accumulate(y);
-    }
-
-    fn complete(&self, sums: &mut [f64]) {
-        self.halo.sum_over_ranks(sums);
-    }
-}
-
 /// What the sweep damps. The cuts decide the largest eigenvalue near surfaces, at `near` and of the twists,
 /// which may be several times that in the fluid: half of the excess, in powers, goes into the diagonal there,
 /// half into the interval.
@@ -263,7 +218,7 @@ where
     let mut start = vec![0.0; operator.dim()];
     vector::fill_pseudo_random(1, &mut start);
     halo.clear(&mut start);
-    let mut on_owned = OnOwned { x: start.clone(), operator, halo };
+    let mut on_owned = OnOwned::new(operator, halo);
     let largest = SAFETY * estimate_lambda_max_from(start, &mut on_owned, diagonal, LANCZOS_STEPS)?;
     let excess = (largest / in_fluid).max(1.0).sqrt();
     diagonal.scale(near, (1.0 / excess) as f32);

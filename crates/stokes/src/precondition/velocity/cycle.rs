@@ -2,6 +2,7 @@
 
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
+use gluey_parallel::Halo;
 
 use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
@@ -126,8 +127,15 @@ where
         self.rigid_cycle(f, u);
     }
 
-    /// `z = V (r - g)` for the gradient `g` that `gradient` writes.
-    pub fn answer<S: Scalar>(&mut self, r: &[S], gradient: impl FnOnce(&mut [f32]), z: &mut [S]) {
+    /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero at
+    /// ghosts.
+    pub fn answer<S: Scalar>(
+        &mut self,
+        r: &[S],
+        gradient: impl FnOnce(&mut [f32]),
+        z: &mut [S],
+        halo: &mut Halo,
+    ) {
         let top = self.levels.len() - 1;
         gradient(&mut self.levels[top].b[..r.len()]);
         let Some(mut correction) = self.correction.take() else {
@@ -138,8 +146,11 @@ where
         let [mut load, mut answer] = std::mem::take(&mut self.wide);
         [&mut load, &mut answer].into_iter().for_each(|v| v.resize(r.len(), 0.0));
         vector::convert(1.0, &self.levels[top].b[..r.len()], &mut load);
+        halo.accumulate(&mut load);
         vector::residual_from_product(r, &mut load);
+        halo.update(&mut load);
         correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u));
+        halo.clear(&mut answer);
         vector::convert(1.0, &answer, z);
         self.wide = [load, answer];
         self.correction = Some(correction);

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gluey_fem::Interpolation;
+use gluey_geom::{Dim, Space};
 
 use crate::space::Discretisation;
 
@@ -23,7 +24,16 @@ impl<const D: usize> Default for Hierarchy<D> {
     }
 }
 
-impl<const D: usize> Hierarchy<D> {
+impl<const D: usize> Hierarchy<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The parts of a rank of these meshes, coarsest first.
+    pub fn of_parts(meshes: Vec<Discretisation<D>>) -> Self {
+        let transfers = meshes.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.velocity));
+        Self { transfers: transfers.collect(), meshes }
+    }
+
     /// The meshes below `finest`. What was the same in the hierarchy `before` is taken from there.
     pub fn new(finest: &Discretisation<D>, before: Self) -> Self {
         let depth = finest.mesh.max_level();
@@ -44,8 +54,7 @@ impl<const D: usize> Hierarchy<D> {
             if let Some(place) = kept.iter().position(|old| is_same(old.0)) {
                 return kept.swap_remove(place).1;
             }
-            let (coarse, fine) = (&pair[0], &pair[1]);
-            Interpolation::new(&coarse.mesh, coarse.velocity.clone(), &fine.mesh, &fine.velocity)
+            pair[0].interpolation(&pair[1], |mesh| &mesh.velocity)
         });
         Self { transfers: transfers.collect(), meshes }
     }
