@@ -110,11 +110,17 @@ fn discretised<const D: usize>(
     let needed_pressures = pressure.needed(part);
     let of_pressures = wanted_nodes(tree, shared, part, pressure, |node| needed_pressures[node]);
     let of_pressures = GhostPlan::new(shared.ranks, of_pressures, pressure.finder());
+    let own = [velocity.owned.len() as u64, pressure.owned.len() as u64];
+    let counts = shared.ranks.all_gather(&own);
+    let counts = counts.as_chunks::<2>().0;
+    let before = |k: usize| counts[..shared.ranks.rank()].iter().map(|of| of[k] as usize).sum();
     let partition = Partition {
         ranks: shared.ranks.clone(),
         part: (**part).clone(),
         nodes: velocity.owned.clone(),
         ghosts: GhostPlan::new(shared.ranks, wanted, velocity.finder()),
+        node_counts: [counts.iter().map(|of| of[0] as usize).sum(), before(0)],
+        pressures_before: before(1),
         needed,
         pressure_nodes: pressure.owned.clone(),
         pressures: Halo::new(shared.ranks, of_pressures, vec![pressure.owned.clone()]),

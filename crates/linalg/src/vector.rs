@@ -166,14 +166,22 @@ pub fn all_finite<T: Scalar>(x: &[T]) -> bool {
 /// A fixed vector with entries spread over (-1, 1) that has a part in every eigenvector in practice
 /// (splitmix64 of the index; Steele, Lea and Flood 2014, 10.1145/2660193.2660195).
 pub fn fill_pseudo_random<T: Scalar>(seed: u64, x: &mut [T]) {
-    let mut state = seed;
+    fill_pseudo_random_from(seed, 0, x);
+}
+
+/// The same numbers from the one at the index `first` on.
+pub fn fill_pseudo_random_from<T: Scalar>(seed: u64, first: usize, x: &mut [T]) {
+    let mut state = seed.wrapping_add(STEP.wrapping_mul(first as u64));
     for x in x {
         *x = T::from_f64(2.0 * uniform(&mut state) - 1.0);
     }
 }
 
+/// Between the states of two numbers that follow each other.
+const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
 fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    *state = state.wrapping_add(STEP);
     let mut z = *state;
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

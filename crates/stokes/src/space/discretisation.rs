@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::{Chunks, Interpolation, NodeMap, ReferenceMatrices, TreeMesh};
+use gluey_linalg::vector;
 
 use super::partition::Partition;
 
@@ -72,6 +73,32 @@ impl<const D: usize> Discretisation<D> {
     /// The pressure nodes that this rank owns.
     pub fn own_pressure_nodes(&self) -> Range<usize> {
         self.partition().map_or(0..self.pressure.node_count(), |part| part.pressure_nodes.clone())
+    }
+
+    /// Pseudo-random numbers at the own pressures, for any number of ranks those of one; zero at others.
+    pub fn pseudo_random_pressures(&self) -> Vec<f32> {
+        let mut numbers = vec![0.0; self.pressure.node_count()];
+        let before = self.partition().map_or(0, |part| part.pressures_before);
+        vector::fill_pseudo_random_from(1, before, &mut numbers[self.own_pressure_nodes()]);
+        numbers
+    }
+
+    /// The same at own velocities and the twists of own bodies of so many, with `width` numbers each.
+    pub fn pseudo_random_velocities(&self, bodies: usize, width: usize) -> Vec<f32> {
+        let nodal = self.velocity.node_count() * D;
+        let mut numbers = vec![0.0; nodal + bodies * width];
+        let Some(part) = self.partition() else {
+            vector::fill_pseudo_random(1, &mut numbers);
+            return numbers;
+        };
+        let [all, before] = part.node_counts;
+        let own = part.nodes.start * D..part.nodes.end * D;
+        vector::fill_pseudo_random_from(1, before * D, &mut numbers[own]);
+        for body in part.own_bodies() {
+            let first = all * D + part.bodies[body] as usize * width;
+            vector::fill_pseudo_random_from(1, first, &mut numbers[nodal + body * width..][..width]);
+        }
+        numbers
     }
 
     /// The interpolation between nodes of this mesh and of one that is finer by one level: on parts to those

@@ -16,6 +16,10 @@ pub struct Partition<const D: usize> {
     pub part: Part<D>,
     /// Velocity nodes that it owns.
     pub nodes: Range<usize>,
+    /// Velocity nodes of the whole mesh, and of ranks before this one.
+    pub node_counts: [usize; 2],
+    /// Pressure nodes of ranks before this one.
+    pub pressures_before: usize,
     /// Velocity nodes on which its cells depend, hanging ones by their masters.
     pub needed: Vec<bool>,
     /// Those of them that others own.
@@ -60,12 +64,6 @@ where
         ]
     }
 
-    /// The bodies whose twists this rank owns, by their places among those near the part.
-    pub fn own_bodies(&self) -> impl Iterator<Item = usize> {
-        let rank = self.ranks.rank();
-        self.owners.iter().enumerate().filter(move |of| *of.1 == rank).map(|of| of.0)
-    }
-
     /// The plan of the twists of other ranks' bodies, of those `here`.
     fn twists(&self, here: &[bool]) -> GhostPlan {
         let is_ghost = |&place: &usize| here[place] && self.owners[place] != self.ranks.rank();
@@ -76,5 +74,13 @@ where
         });
         let find = |key: u64| self.bodies.binary_search(&(key as u32)).ok().map(|place| place as u32);
         GhostPlan::new(&self.ranks, wanted.collect(), find)
+    }
+}
+
+impl<const D: usize> Partition<D> {
+    /// The bodies whose twists this rank owns, by their places among those near the part.
+    pub fn own_bodies(&self) -> impl Iterator<Item = usize> {
+        let rank = self.ranks.rank();
+        self.owners.iter().enumerate().filter(move |of| *of.1 == rank).map(|of| of.0)
     }
 }

@@ -14,9 +14,7 @@ mod mass;
 mod weights;
 
 use gluey_geom::{Dim, Space};
-use gluey_linalg::{
-    Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max_from, vector,
-};
+use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max_from};
 use gluey_parallel::Halo;
 
 #[cfg(test)]
@@ -79,9 +77,7 @@ where
         }
         let mut mass = SellMatrix::new(&mass);
         let mut jacobi = agreed(&halo, Jacobi::new(&diagonal).map_err(StokesError::PressureMass))?;
-        let mut start = vec![0.0; diagonal.len()];
-        vector::fill_pseudo_random(1, &mut start);
-        halo.clear(&mut start);
+        let start = system.discretisation().pseudo_random_pressures();
         let mut on_owned = OnOwned::new(&mut mass, &mut halo);
         let largest = estimate_lambda_max_from(start, &mut on_owned, &mut jacobi, LANCZOS_STEPS)?;
         let chebyshev = mass_iteration::<D>(mass.dim(), largest);

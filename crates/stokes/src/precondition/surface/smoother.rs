@@ -140,7 +140,9 @@ where
             blocks.positions.clone()
         };
         let reference = system.discretisation().reference();
-        let interval = interval(&mut operator, &mut diagonal, &near, &reference, &mut halo)?;
+        let (bodies, rigid) = (system.space.body_count(), Dim::<D>::RIGID);
+        let start = system.discretisation().pseudo_random_velocities(bodies, rigid);
+        let interval = interval((&mut operator, start), &mut diagonal, &near, &reference, &mut halo)?;
         operator.take_applications();
         failure.map_or(Ok(()), Err)?;
         let dim = operator.dim();
@@ -205,7 +207,7 @@ where
 /// which may be several times that in the fluid: half of the excess, in powers, goes into the diagonal there,
 /// half into the interval.
 fn interval<const D: usize>(
-    operator: &mut ViscousOperator<D>,
+    (operator, start): (&mut ViscousOperator<D>, Vec<f32>),
     diagonal: &mut BlockDiagonal,
     near: &[u32],
     reference: &ReferenceMatrices<D>,
@@ -215,9 +217,6 @@ where
     Dim<D>: Space<D>,
 {
     let in_fluid = cell_lambda_max(reference);
-    let mut start = vec![0.0; operator.dim()];
-    vector::fill_pseudo_random(1, &mut start);
-    halo.clear(&mut start);
     let mut on_owned = OnOwned::new(operator, halo);
     let largest = SAFETY * estimate_lambda_max_from(start, &mut on_owned, diagonal, LANCZOS_STEPS)?;
     let excess = (largest / in_fluid).max(1.0).sqrt();
