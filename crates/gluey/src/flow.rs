@@ -18,7 +18,9 @@ use std::time::Instant;
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
+use gluey_motion::{
+    Configuration, Fields, Film, FlowStatistics, Hydrodynamics, MeanStress, Prediction, ResumeError,
+};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, RaisedPenalties, Refinement,
 };
@@ -258,82 +260,24 @@ where
         slide
     }
 
-    fn mesh(&self, balls: &[Ball<D>]) -> Result<TreeMesh<D>, FlowError> {
-        let periodic = self.periods.map(|period| period.is_some());
-        Ok(self.refinement.mesh(self.domain, self.roots, periodic, balls)?)
-    }
-}
-
-impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
-where
-    Dim<D>: Space<D>,
-{
-    type Error = FlowError;
-
-    fn predict(
-        &mut self,
-        _t: f64,
-        particles: &[Particle<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), FlowError> {
-        let balls = self.balls(particles.iter().map(|p| p.pose.position));
-        let start = Instant::now();
-        let mesh = self.mesh(&balls)?;
-        let meshed = start.elapsed().as_secs_f64();
-        let mut flow = match self.sheared {
-            None => self.solve(mesh, &balls, particles)?,
-            Some(_) if self.control.is_some() => self.solve_at_stress(mesh, &balls)?,
-            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, particles, with_stress)?,
-        };
-        flow.times.assembly += meshed;
-        twists.copy_from_slice(&flow.twists);
-        if self.sheared.is_some() {
-            let undisturbed = self.undisturbed_twist();
-            for (twist, particle) in twists.iter_mut().zip(particles) {
-                *twist = *twist + undisturbed(&particle.pose.position);
-            }
-        }
-        // Without the rounding of what the flow is relative to.
-        for (index, twist) in twists.iter_mut().enumerate() {
-            *twist = self.given_twist(index).unwrap_or(*twist);
-        }
-        self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
-        self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
-        self.last = Some(flow);
-        self.last_raised = self.solver.take_raised_penalties();
-        self.last_balls = balls;
-        Ok(())
-    }
-
-    fn set_shear_factor(&mut self, factor: f64) {
-        self.shear_factor = factor;
-    }
-
-    fn set_strain(&mut self, strain: f64, with_stress: bool) {
+    /// Takes over what the next flow depends on beside the particles.
+    fn take(&mut self, configuration: &Configuration<'_, D>) {
+        self.shear_factor = configuration.shear_factor;
         if let Some(sheared) = &mut self.sheared {
-            *sheared = Sheared { strain, with_stress };
+            (sheared.strain, sheared.with_stress) = (configuration.strain, configuration.with_stress);
         }
-    }
-
-    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
         self.acting.clone_from(&self.wrenches);
         if self.acting.is_empty() {
-            self.acting.extend_from_slice(wrenches);
+            self.acting.extend_from_slice(configuration.wrenches);
         } else {
-            self.acting.iter_mut().zip(wrenches).for_each(|(sum, wrench)| *sum = *sum + *wrench);
+            let sums = self.acting.iter_mut().zip(configuration.wrenches);
+            sums.for_each(|(sum, wrench)| *sum = *sum + *wrench);
         }
-        Ok(())
+        self.control.iter_mut().for_each(|control| control.pair_stress = configuration.pair_stress);
     }
 
-    fn set_pair_stress(&mut self, stress: &Matrix<D>) {
-        self.control.iter_mut().for_each(|control| control.pair_stress = *stress);
-    }
-
-    fn clock_rate(&self) -> f64 {
-        self.control.as_ref().map_or(1.0, |control| control.rate)
-    }
-
-    fn stress(&self) -> Option<MeanStress<D>> {
+    /// The mean stress of the last flow, if it is wanted.
+    fn stress(&self, of_repulsion: Matrix<D>) -> Option<MeanStress<D>> {
         let stress = self.last.as_ref()?.stress.as_ref()?;
         if !self.sheared?.with_stress {
             return None;
@@ -345,32 +289,10 @@ where
             of_bodies: stress.of_bodies(volume),
             of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
             of_contacts: None,
-            of_repulsion: Matrix::zeros(),
+            of_repulsion,
             dissipation: stress.dissipation / volume,
             work_of_forces: self.work_of_forces() / volume,
         })
-    }
-
-    fn holding(&self) -> Option<Holding<D>> {
-        self.last_holding()
-    }
-
-    fn films(&self, reach: f64) -> Vec<Film<D>> {
-        if !self.keeps_films_open {
-            return Vec::new();
-        }
-        let mut films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
-        films.retain(|film| !film.is_across_flow());
-        let film = |film: gluey_stokes::Film<D>| Film {
-            first: film.body as usize,
-            second: film.side(1),
-            branch: film.branch(),
-            slide: self.slide(&film),
-            is_held: [0, 1].map(|side| film.side(side).is_some_and(|body| self.given_twist(body).is_some())),
-            gap: film.gap,
-            curvature_radius: film.curvature_radius(),
-        };
-        films.into_iter().map(film).collect()
     }
 
     fn statistics(&self) -> FlowStatistics {
@@ -388,6 +310,74 @@ where
             solved_again,
             phases: vec![("mesh and assembly", assembly), ("solver set-up", preparation), ("solve", solve)],
         }
+    }
+
+    fn mesh(&self, balls: &[Ball<D>]) -> Result<TreeMesh<D>, FlowError> {
+        let periodic = self.periods.map(|period| period.is_some());
+        Ok(self.refinement.mesh(self.domain, self.roots, periodic, balls)?)
+    }
+}
+
+impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
+where
+    Dim<D>: Space<D>,
+{
+    type Error = FlowError;
+
+    fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, FlowError> {
+        self.take(configuration);
+        let particles = configuration.particles;
+        let balls = self.balls(particles.iter().map(|p| p.pose.position));
+        let start = Instant::now();
+        let mesh = self.mesh(&balls)?;
+        let meshed = start.elapsed().as_secs_f64();
+        let mut flow = match self.sheared {
+            None => self.solve(mesh, &balls, particles)?,
+            Some(_) if self.control.is_some() => self.solve_at_stress(mesh, &balls)?,
+            Some(Sheared { with_stress, .. }) => self.solve_sheared(mesh, &balls, particles, with_stress)?,
+        };
+        flow.times.assembly += meshed;
+        let mut twists = flow.twists.clone();
+        if self.sheared.is_some() {
+            let undisturbed = self.undisturbed_twist();
+            for (twist, particle) in twists.iter_mut().zip(particles) {
+                *twist = *twist + undisturbed(&particle.pose.position);
+            }
+        }
+        // Without the rounding of what the flow is relative to.
+        for (index, twist) in twists.iter_mut().enumerate() {
+            *twist = self.given_twist(index).unwrap_or(*twist);
+        }
+        self.last_strain = self.sheared.map_or(0.0, |sheared| sheared.strain);
+        self.last_positions = particles.iter().map(|particle| particle.pose.position).collect();
+        self.last = Some(flow);
+        self.last_raised = self.solver.take_raised_penalties();
+        self.last_balls = balls;
+        let rate = self.control.as_ref().map_or(1.0, |control| control.rate);
+        let (stress, statistics) = (self.stress(configuration.pair_stress / rate), self.statistics());
+        Ok(Prediction { twists, rate, stress, holding: self.last_holding(), statistics })
+    }
+
+    fn answers_to_forces(&self) -> bool {
+        true
+    }
+
+    fn films(&self, _: &Configuration<'_, D>, reach: f64) -> Vec<Film<D>> {
+        if !self.keeps_films_open {
+            return Vec::new();
+        }
+        let mut films = gluey_stokes::films(&self.last_balls, &self.domain, reach);
+        films.retain(|film| !film.is_across_flow());
+        let film = |film: gluey_stokes::Film<D>| Film {
+            first: film.body as usize,
+            second: film.side(1),
+            branch: film.branch(),
+            slide: self.slide(&film),
+            is_held: [0, 1].map(|side| film.side(side).is_some_and(|body| self.given_twist(body).is_some())),
+            gap: film.gap,
+            curvature_radius: film.curvature_radius(),
+        };
+        films.into_iter().map(film).collect()
     }
 
     fn fields(&self) -> Option<Fields<D>> {
@@ -422,7 +412,7 @@ where
         if saved != present {
             return Err(FlowError::Particles { saved, present }.into());
         }
-        self.set_strain(strain, false);
+        self.sheared.iter_mut().for_each(|sheared| sheared.strain = strain);
         let balls = self.balls(centers.iter().copied());
         let mesh = self.mesh(&balls)?;
         self.solver.set_warm_start(mesh, last.into(), before.map(Into::into)).map_err(FlowError::from)?;

@@ -6,9 +6,10 @@ mod repelling;
 mod strain_clock;
 
 use gluey_contact::{BodyStep, Contact, ContactModel, ContactReport, ContactState, Domain};
-use gluey_geom::{Dim, Particle, Pose, Space, Twist};
+use gluey_geom::{Dim, Matrix, Particle, Pose, Space, Twist};
 use gluey_motion::{
-    Fields, FilmError, FilmReport, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, Scheme,
+    Configuration, Fields, FilmError, FilmReport, FlowStatistics, Holding, Hydrodynamics, Integrator,
+    MeanStress, NoForces, Prediction, Scheme,
 };
 use gluey_suspension::Repulsion;
 
@@ -67,10 +68,9 @@ where
     contact: C,
     poses: Vec<Pose<D>>,
     drift: Vec<Twist<D>>,
-    twists: Vec<Twist<D>>,
+    /// The last one, its velocities corrected; of the statistics, those of all flows of the step so far.
+    prediction: Prediction<D>,
     contact_report: ContactReport,
-    /// Size and effort of the flows of the step so far.
-    statistics: FlowStatistics,
     motion: Motion,
     phases: PhaseTable,
 }
@@ -138,9 +138,8 @@ where
             hydrodynamics,
             contact,
             drift: vec![Twist::default(); count],
-            twists: vec![Twist::default(); count],
+            prediction: Prediction::of(vec![Twist::default(); count]),
             contact_report: ContactReport::default(),
-            statistics: FlowStatistics::default(),
             motion: Motion::default(),
             phases: PhaseTable::default(),
         }
@@ -181,7 +180,7 @@ where
 
     /// Time and shear rate at the last prediction, where steps are those of the strain.
     pub fn time_and_rate(&self) -> Option<[f64; 2]> {
-        let rate = self.hydrodynamics.clock_rate() * if self.reversed { -1.0 } else { 1.0 };
+        let rate = self.prediction.rate * self.shear_factor();
         self.clock.as_ref().map(|clock| [clock.time(), rate])
     }
 
@@ -190,10 +189,13 @@ where
         self.strain
     }
 
+    fn shear_factor(&self) -> f64 {
+        if self.reversed { -1.0 } else { 1.0 }
+    }
+
     /// The shear rate at which images slide now.
     fn sliding_rate(&self) -> f64 {
-        let rate = self.sliding.map_or(0.0, |sliding| sliding.rate);
-        if self.reversed { -rate } else { rate }
+        self.sliding.map_or(0.0, |sliding| sliding.rate) * self.shear_factor()
     }
 
     /// Velocity along `x` of the image one period up in `y`, beyond that of its particle.
@@ -216,43 +218,43 @@ where
             (self.part, self.motion) = (Part::WHOLE, Motion::default());
         }
         let (step, time) = (self.step, self.time());
-        if let Some(Sliding { stress_every, .. }) = self.sliding {
-            self.hydrodynamics.set_strain(self.strain, is_first && step.is_multiple_of(stress_every));
-        }
-        self.repel()?;
         let start = std::time::Instant::now();
-        let predicted = self.hydrodynamics.predict(time, &self.particles, &mut self.twists);
-        self.book_flow(start.elapsed().as_secs_f64());
-        predicted.map_err(|source| StepError::Flow { step, time, source })?;
-        let flow = self.hydrodynamics.statistics();
-        self.statistics = if is_first { flow } else { flow.after(&self.statistics) };
-        let (rate, start) = (self.hydrodynamics.clock_rate(), self.part.start());
+        let predicted = self.predicted();
+        let named = predicted.as_ref().map_or(&[][..], |flow| &flow.statistics.phases);
+        self.book_flow(start.elapsed().as_secs_f64(), named);
+        let mut flow = predicted?;
+        if !is_first {
+            flow.statistics = flow.statistics.after(&self.prediction.statistics);
+        }
+        self.prediction = flow;
+        let (rate, start) = (self.prediction.rate, self.part.start());
         self.clock.iter_mut().for_each(|clock| clock.reach((step, start), self.dt, rate));
-        match self.twists.iter().position(|twist| !is_finite(twist)) {
+        match self.twists().iter().position(|twist| !is_finite(twist)) {
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),
         }
     }
 
-    /// Sets the forces by which particles repel each other where they are.
-    fn repel(&mut self) -> Result<(), StepError<H::Error>> {
-        let (step, time) = (self.step, self.time());
-        let Some(repelling) = &mut self.repelling else { return Ok(()) };
-        let tilt = self.strain * self.sliding.map_or(0.0, |sliding| sliding.height);
-        let (hydrodynamics, particles) = (&mut self.hydrodynamics, &self.particles);
-        self.phases
-            .time("flow", || {
-                repelling.update(particles, tilt);
-                hydrodynamics.set_pair_stress(&repelling.stress);
-                hydrodynamics.set_wrenches(&repelling.wrenches)
-            })
-            .map_err(|source| StepError::Forces { step, time, source })
+    /// What the flow says of the particles where they are, and of the forces by which they repel each other.
+    fn predicted(&mut self) -> Result<Prediction<D>, StepError<H::Error>> {
+        let (step, time, strain, particles) = (self.step, self.time(), self.strain, &self.particles[..]);
+        let is_due = |sliding: Sliding| self.part.is_first() && step.is_multiple_of(sliding.stress_every);
+        let with_stress = self.sliding.is_some_and(is_due);
+        let tilt = strain * self.sliding.map_or(0.0, |sliding| sliding.height);
+        let repulsion = self.repelling.as_mut().map(|repelling| repelling.between(particles, tilt));
+        let (wrenches, pair_stress) = repulsion.unwrap_or_else(|| (Vec::new(), Matrix::zeros()));
+        if !(wrenches.is_empty() || self.hydrodynamics.answers_to_forces()) {
+            return Err(StepError::Forces { step, time, source: NoForces });
+        }
+        let (shear_factor, wrenches) = (self.shear_factor(), &wrenches[..]);
+        let now = Configuration { time, particles, shear_factor, strain, with_stress, wrenches, pair_stress };
+        self.hydrodynamics.predict(&now).map_err(|source| StepError::Flow { step, time, source })
     }
 
     /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the
     /// step until they do.
     pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
-        let predicted = self.twists.clone();
+        let predicted = self.prediction.twists.clone();
         loop {
             let source = match self.try_to_open_films() {
                 Ok(FilmReport { closed_count, largest_push }) => {
@@ -268,15 +270,18 @@ where
             let (step, time, length) = (self.step, self.time(), self.part_length());
             self.part = half.ok_or(StepError::Film { step, time, length, source })?;
             self.motion.refused = Some(source);
-            self.twists.copy_from_slice(&predicted);
+            self.prediction.twists.copy_from_slice(&predicted);
         }
     }
 
     fn try_to_open_films(&mut self) -> Result<FilmReport, FilmError> {
         let (dt, rate) = (self.part_length(), self.sliding_rate());
-        let reach = self.integrator.film_reach_in_shear(dt, &self.particles, &self.twists, rate);
-        let films = self.hydrodynamics.films(reach);
-        let (integrator, particles, twists) = (&mut self.integrator, &self.particles, &mut self.twists);
+        let particles = &self.particles;
+        let reach = self.integrator.film_reach_in_shear(dt, particles, self.twists(), rate);
+        let (shear_factor, strain) = (self.shear_factor(), self.strain);
+        let now = Configuration { shear_factor, strain, ..Configuration::at(self.time(), particles) };
+        let films = self.hydrodynamics.films(&now, reach);
+        let (integrator, twists) = (&mut self.integrator, &mut self.prediction.twists);
         self.phases.time("motion", || integrator.open_films(dt, particles, &films, twists))
     }
 
@@ -297,7 +302,7 @@ where
             velocity_weight: self.integrator.velocity_weight(dt),
             dt,
         };
-        let (contact, twists) = (&mut self.contact, &mut self.twists);
+        let (contact, twists) = (&mut self.contact, &mut self.prediction.twists);
         let report = self
             .phases
             .time("contact", || contact.correct_bodies(&body_step, twists))
@@ -327,7 +332,7 @@ where
     fn advance_part(&mut self) {
         let dt = self.part_length();
         let (integrator, particles) = (&mut self.integrator, &mut self.particles);
-        self.phases.time("motion", || integrator.advance(dt, particles, &self.twists));
+        self.phases.time("motion", || integrator.advance(dt, particles, &self.prediction.twists));
         self.strain += self.sliding_rate() * dt;
         let Motion { parts, shortest, .. } = self.motion;
         let share = self.part.share();
@@ -342,7 +347,6 @@ where
     /// velocities are others, and the integrator begins anew.
     pub fn reverse_shear(&mut self) {
         self.reversed = !self.reversed;
-        self.hydrodynamics.set_shear_factor(if self.reversed { -1.0 } else { 1.0 });
         match self.has_forces {
             true => self.integrator.restart(),
             false => self.integrator.reverse(),
@@ -377,7 +381,7 @@ where
 
     /// The velocities computed last.
     pub fn twists(&self) -> &[Twist<D>] {
-        &self.twists
+        &self.prediction.twists
     }
 
     /// The contact model.
@@ -401,21 +405,18 @@ where
     }
 
     /// The mean stress of the last prediction, where the flow has one.
-    pub fn stress(&self) -> Option<MeanStress<D>> {
-        let stress = self.hydrodynamics.stress()?;
-        let of_repulsion = self.repelling.as_ref().map_or(stress.of_repulsion, |repelling| repelling.stress);
-        let of_repulsion = of_repulsion / self.hydrodynamics.clock_rate();
-        Some(MeanStress { of_repulsion, ..stress })
+    pub fn stress(&self) -> Option<&MeanStress<D>> {
+        self.prediction.stress.as_ref()
     }
 
     /// What held the particles that move as they are told at the last prediction, if there are any.
-    pub fn holding(&self) -> Option<Holding<D>> {
-        self.hydrodynamics.holding()
+    pub fn holding(&self) -> Option<&Holding<D>> {
+        self.prediction.holding.as_ref()
     }
 
     /// Size and effort of the flows of the last step, or of the one that is being done so far.
     pub fn statistics(&self) -> &FlowStatistics {
-        &self.statistics
+        &self.prediction.statistics
     }
 
     /// How the particles were moved in the last step, or are in the one that is being done.
@@ -462,7 +463,6 @@ where
         }
         self.hydrodynamics.resume(&state.hydrodynamics)?;
         self.contact.resume(state.contact)?;
-        self.hydrodynamics.set_shear_factor(if state.reversed { -1.0 } else { 1.0 });
         self.step = state.step;
         self.reversed = state.reversed;
         self.strain = state.strain;
@@ -473,8 +473,7 @@ where
     }
 
     /// Books the time of a prediction on the phases that the flow names, and the rest on "flow".
-    fn book_flow(&mut self, seconds: f64) {
-        let named = self.hydrodynamics.statistics().phases;
+    fn book_flow(&mut self, seconds: f64, named: &[(&'static str, f64)]) {
         let rest = seconds - named.iter().map(|(_, seconds)| seconds).sum::<f64>();
         named.iter().for_each(|(name, seconds)| self.phases.add(name, *seconds));
         self.phases.add("flow", rest.max(0.0));

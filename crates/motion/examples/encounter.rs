@@ -3,8 +3,10 @@
 //!
 //! `cargo run --release -p gluey-motion --example encounter`
 
-use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, PairMobilityError, Scheme};
+use gluey_geom::{Particle, Vector};
+use gluey_motion::{
+    Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, PairMobilityError, Scheme,
+};
 
 /// Time until the flow is reversed, in inverse shear rates.
 const TURN: f64 = 10.0;
@@ -15,15 +17,16 @@ pub fn there_and_back(scheme: Scheme, dt: f64) -> Result<(f64, f64), PairMobilit
     let mut particles = start;
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.0));
     let mut integrator = Integrator::new(scheme);
-    let mut twists = [Twist::default(); 2];
     let (step_count, mut smallest) = ((TURN / dt).round() as usize, f64::INFINITY);
+    let mut shear_factor = 1.0;
     for step in 0..2 * step_count {
         if step == step_count {
-            flow.set_shear_factor(-1.0);
+            shear_factor = -1.0;
             integrator.reverse();
         }
-        flow.predict(step as f64 * dt, &particles, &mut twists)?;
-        integrator.advance(dt, &mut particles, &twists);
+        let now = Configuration { shear_factor, ..Configuration::at(step as f64 * dt, &particles) };
+        let predicted = flow.predict(&now)?;
+        integrator.advance(dt, &mut particles, &predicted.twists);
         smallest = particles[0].gap(&particles[1]).min(smallest);
     }
     Ok((smallest, (particles[0].pose.position - start[0].pose.position).norm()))

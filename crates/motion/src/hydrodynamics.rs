@@ -4,6 +4,88 @@ use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 
 use crate::Film;
 
+/// What velocities are predicted from.
+///
+/// ```
+/// use gluey_geom::{Particle, Vector};
+/// use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, LinearFlow};
+///
+/// let particles = [Particle::new(Vector::<2>::new(0.0, 2.0), 1.0)];
+/// let reversed = Configuration { shear_factor: -1.0, ..Configuration::at(0.0, &particles) };
+/// let twists = BackgroundFlow::new(LinearFlow::shear(1.0, 0.0)).predict(&reversed)?.twists;
+/// assert_eq!(twists[0].velocity.x, -2.0);
+/// # Ok::<(), gluey_motion::NoForces>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Configuration<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// The time.
+    pub time: f64,
+    /// Where the particles are.
+    pub particles: &'a [Particle<D>],
+    /// Factor of the imposed shear rate: 1 as configured, -1 reversed.
+    pub shear_factor: f64,
+    /// Shear strain of the periodic images, where these slide along each other: the image one period `H` up in
+    /// `y` is `strain H` further along `x`. It grows without bound.
+    pub strain: f64,
+    /// Whether a stress is wanted.
+    pub with_stress: bool,
+    /// Forces and torques on the particles, beside those that the model has from elsewhere; empty for none.
+    pub wrenches: &'a [Wrench<D>],
+    /// Stress of the forces between particles that are among these: minus the mean product of forces and lines
+    /// between centres.
+    pub pair_stress: Matrix<D>,
+}
+
+impl<'a, const D: usize> Configuration<'a, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Particles without forces at a time, in a shear as configured and images above each other.
+    pub fn at(time: f64, particles: &'a [Particle<D>]) -> Self {
+        Self {
+            time,
+            particles,
+            shear_factor: 1.0,
+            strain: 0.0,
+            with_stress: false,
+            wrenches: &[],
+            pair_stress: Matrix::zeros(),
+        }
+    }
+}
+
+/// What a model says of a configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity and spin of each particle, in their order.
+    pub twists: Vec<Twist<D>>,
+    /// Shear rate over that by which velocities count, where the stress is given and the rate follows; one
+    /// elsewhere.
+    pub rate: f64,
+    /// The mean stress, where it was wanted and the model has one.
+    pub stress: Option<MeanStress<D>>,
+    /// What holds the particles that move as they are told; `None` where all are free.
+    pub holding: Option<Holding<D>>,
+    /// Size and effort.
+    pub statistics: FlowStatistics,
+}
+
+impl<const D: usize> Prediction<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Free particles with these velocities, and nothing else.
+    pub fn of(twists: Vec<Twist<D>>) -> Self {
+        Self { twists, rate: 1.0, stress: None, holding: None, statistics: FlowStatistics::default() }
+    }
+}
+
 /// Predicts the velocities of particles from their positions, without contact.
 pub trait Hydrodynamics<const D: usize>
 where
@@ -12,61 +94,19 @@ where
     /// Why a prediction failed.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Writes into `twists` the velocity and spin of each particle at time `t`; both slices have one entry
-    /// per particle, in the same order.
-    fn predict(
-        &mut self,
-        t: f64,
-        particles: &[Particle<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), Self::Error>;
+    /// The velocities of a configuration, and what else the model knows of it.
+    fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, Self::Error>;
 
-    /// Sets the factor of the imposed shear rate (1 = as configured, -1 = reversed).
-    fn set_shear_factor(&mut self, factor: f64);
-
-    /// Sets the shear strain of the periodic images at the next prediction, where these slide along each
-    /// other: the image one period `H` up in `y` is `strain H` further along `x`. It grows without bound. And
-    /// whether that prediction is to have a stress.
-    fn set_strain(&mut self, _strain: f64, _with_stress: bool) {}
-
-    /// Sets forces and torques on the particles at the next predictions, beside those that the model has from
-    /// elsewhere; empty for none.
-    ///
-    /// # Errors
-    /// If the model does not answer to forces.
-    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
-        if wrenches.is_empty() { Ok(()) } else { Err(NoForces) }
+    /// Whether the model answers to [`Configuration::wrenches`]: a time loop that has some refuses with
+    /// [`NoForces`] one that does not.
+    fn answers_to_forces(&self) -> bool {
+        false
     }
 
-    /// Sets the stress of the forces between particles that are among those set by
-    /// [`Hydrodynamics::set_wrenches`]: minus the mean product of forces and lines between centres.
-    fn set_pair_stress(&mut self, _stress: &Matrix<D>) {}
-
-    /// Shear rate of the last prediction over that by which its velocities count, where the stress is given
-    /// and the rate follows; one elsewhere.
-    fn clock_rate(&self) -> f64 {
-        1.0
-    }
-
-    /// The mean stress of the last prediction; `None` where the model has none.
-    fn stress(&self) -> Option<MeanStress<D>> {
-        None
-    }
-
-    /// What held the particles that move as they are told at the last prediction; `None` where all are free.
-    fn holding(&self) -> Option<Holding<D>> {
-        None
-    }
-
-    /// The films of the last prediction that lubrication keeps open, with gaps up to `reach`, sorted by
-    /// particles. None where the model lets gaps close.
-    fn films(&self, _reach: f64) -> Vec<Film<D>> {
+    /// The films of a configuration that lubrication keeps open, with gaps up to `reach`, sorted by particles.
+    /// None where the model lets gaps close.
+    fn films(&self, _configuration: &Configuration<'_, D>, _reach: f64) -> Vec<Film<D>> {
         Vec::new()
-    }
-
-    /// Size and effort of the last prediction.
-    fn statistics(&self) -> FlowStatistics {
-        FlowStatistics::default()
     }
 
     /// The flow fields of the last prediction, for output; `None` where the model has none.

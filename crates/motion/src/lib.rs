@@ -6,8 +6,8 @@
 //! [`Integrator`] moves the particles by explicit Euler or Adams-Bashforth 2 and owns the velocity history.
 //!
 //! ```
-//! use gluey_geom::{Particle, Twist, Vector};
-//! use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+//! use gluey_geom::{Particle, Vector};
+//! use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 //!
 //! let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
 //! let mut particles = [
@@ -15,10 +15,9 @@
 //!     Particle::new(Vector::<3>::new(0.7, 0.475, 0.5), 0.05),
 //! ];
 //! let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
-//! let mut twists = [Twist::default(); 2];
 //! for n in 0..20 {
-//!     flow.predict(0.05 * n as f64, &particles, &mut twists)?;
-//!     integrator.advance(0.05, &mut particles, &twists);
+//!     let predicted = flow.predict(&Configuration::at(0.05 * n as f64, &particles))?;
+//!     integrator.advance(0.05, &mut particles, &predicted.twists);
 //! }
 //! assert!((particles[0].pose.position.x - 0.325).abs() < 1e-3);
 //! # Ok::<(), gluey_motion::PairMobilityError>(())
@@ -36,7 +35,10 @@ mod pair_mobility;
 
 pub use approach::approach_mobility;
 pub use films::{Film, FilmClosed, FilmEnds, FilmError, FilmReport};
-pub use hydrodynamics::{Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
+pub use hydrodynamics::{
+    Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
+    ResumeError,
+};
 pub use integrator::{Integrator, Scheme, UnknownScheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};

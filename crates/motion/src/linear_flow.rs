@@ -1,12 +1,10 @@
 //! Linear flows `u(x) = L (x - x0)`, and particles that simply follow them.
 
-use std::convert::Infallible;
-
-use gluey_geom::{Dim, Matrix, Particle, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::Hydrodynamics;
+use crate::{Configuration, Hydrodynamics, NoForces, Prediction};
 
 /// The flow `u(x) = L (x - x0)`, `L[(i, j)] = d u_i / d x_j` (unit: 1/time).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,13 +59,12 @@ where
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BackgroundFlow<const D: usize> {
     flow: LinearFlow<D>,
-    factor: f64,
 }
 
 impl<const D: usize> BackgroundFlow<D> {
     /// Particles in `flow`.
     pub fn new(flow: LinearFlow<D>) -> Self {
-        Self { flow, factor: 1.0 }
+        Self { flow }
     }
 }
 
@@ -75,23 +72,15 @@ impl<const D: usize> Hydrodynamics<D> for BackgroundFlow<D>
 where
     Dim<D>: Space<D>,
 {
-    type Error = Infallible;
+    type Error = NoForces;
 
-    fn predict(
-        &mut self,
-        _t: f64,
-        particles: &[Particle<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), Infallible> {
-        let flow = self.flow.scaled(self.factor);
-        let spin = flow.spin();
-        for (particle, twist) in particles.iter().zip(twists) {
-            *twist = Twist { velocity: flow.velocity(&particle.pose.position), spin };
+    fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, NoForces> {
+        if !configuration.wrenches.is_empty() {
+            return Err(NoForces);
         }
-        Ok(())
-    }
-
-    fn set_shear_factor(&mut self, factor: f64) {
-        self.factor = factor;
+        let flow = self.flow.scaled(configuration.shear_factor);
+        let velocities = configuration.particles.iter().map(|it| flow.velocity(&it.pose.position));
+        let spin = flow.spin();
+        Ok(Prediction::of(velocities.map(|velocity| Twist { velocity, spin }).collect()))
     }
 }

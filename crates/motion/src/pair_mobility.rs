@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 
-use crate::{Film, Hydrodynamics, LinearFlow, MobilityTable, NoForces, approach_mobility};
+use crate::{Configuration, Film, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
 
 /// Why a pair has no velocities.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -47,26 +47,21 @@ pub enum PairMobilityError {
 /// What may be left of forces beside those that the model knows: rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Exact pair hydrodynamics as a cheap [`Hydrodynamics`].
+/// Exact pair hydrodynamics as a cheap [`Hydrodynamics`], in a fluid of viscosity 1.
 ///
 /// Overlapping spheres (gap + offset <= 0) move as at contact: no relative normal velocity, tangential and
 /// spin coefficients at their limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairMobility {
     flow: LinearFlow<3>,
-    factor: f64,
     offset: f64,
     table: MobilityTable,
-    /// The film between the two at the last prediction.
-    film: Option<Film<3>>,
-    /// Forces and torques on the two, or none at all.
-    wrenches: Vec<Wrench<3>>,
 }
 
 impl PairMobility {
     /// Two spheres in `flow`, exactly.
     pub fn new(flow: LinearFlow<3>) -> Self {
-        Self { flow, factor: 1.0, offset: 0.0, table: MobilityTable::new(), film: None, wrenches: Vec::new() }
+        Self { flow, offset: 0.0, table: MobilityTable::new() }
     }
 
     /// The same with the mobility evaluated at `gap + offset` (`offset` in radii), to imitate a soft solver.
@@ -74,49 +69,24 @@ impl PairMobility {
         self.offset = offset;
         self
     }
-
-    /// The force on the second sphere along `n`, the opposite of which acts on the first.
-    fn push(&self, n: &Vector<3>) -> Result<f64, PairMobilityError> {
-        let [first, second] = self.wrenches.as_slice() else { return Ok(0.0) };
-        let push = second.force.dot(n);
-        let rest = (second.force - n * push).norm()
-            + (first.force + second.force).norm()
-            + first.torque.norm()
-            + second.torque.norm();
-        let size = first.force.norm().max(second.force.norm());
-        if rest > ROUNDING * size {
-            return Err(PairMobilityError::Wrenches { rest: rest / size });
-        }
-        Ok(push)
-    }
 }
 
 impl Hydrodynamics<3> for PairMobility {
     type Error = PairMobilityError;
 
-    fn predict(
-        &mut self,
-        _t: f64,
-        particles: &[Particle<3>],
-        twists: &mut [Twist<3>],
-    ) -> Result<(), PairMobilityError> {
-        let (first, second) = equal_pair(particles)?;
-        let flow = self.flow.scaled(self.factor);
+    fn predict(&mut self, configuration: &Configuration<'_, 3>) -> Result<Prediction<3>, PairMobilityError> {
+        let [first, second] = equal_pair(configuration.particles)?;
+        let flow = self.flow.scaled(configuration.shear_factor);
         let r = second.pose.position - first.pose.position;
         let distance = r.norm();
         if !(distance > 0.0 && distance.is_finite()) {
             return Err(PairMobilityError::NoDirection { distance });
         }
         let n = r / distance;
-        let gap = distance - 2.0 * first.radius;
-        let (slide, curvature_radius) = (Vector::zeros(), first.radius);
-        let film =
-            Film { first: 0, second: Some(1), branch: r, slide, is_held: [false; 2], gap, curvature_radius };
-        self.film = (gap > 0.0 && self.offset == 0.0).then_some(film);
         let xi = distance / first.radius - 2.0 + self.offset;
         let mobility = self.table.at(xi);
         // Each sphere moves as alone under its force, but for the other that is pushed the other way.
-        let push = self.push(&n)? * approach_mobility(xi) / (6.0 * PI * first.radius);
+        let push = push(configuration.wrenches, &n)? * approach_mobility(xi) / (6.0 * PI * first.radius);
 
         let strain = flow.strain_rate() * r;
         let normal = n * n.dot(&strain);
@@ -126,29 +96,43 @@ impl Hydrodynamics<3> for PairMobility {
         // By symmetry the mid-point moves with the fluid.
         let middle = flow.velocity(&((first.pose.position + second.pose.position) * 0.5));
         let spin = flow.spin() + Dim::<3>::moment(&n, &(strain / distance)) * mobility.spin;
-        for (twist, side) in twists.iter_mut().zip([-0.5, 0.5]) {
-            *twist = Twist { velocity: middle + (relative + n * (2.0 * push)) * side, spin };
-        }
-        Ok(())
+        let velocity = |side: f64| middle + (relative + n * (2.0 * push)) * side;
+        let twists = [-0.5, 0.5].map(|side| Twist { velocity: velocity(side), spin });
+        Ok(Prediction::of(twists.to_vec()))
     }
 
-    fn set_shear_factor(&mut self, factor: f64) {
-        self.factor = factor;
+    fn answers_to_forces(&self) -> bool {
+        true
     }
 
-    /// Forces of a fluid of viscosity 1.
-    fn set_wrenches(&mut self, wrenches: &[Wrench<3>]) -> Result<(), NoForces> {
-        self.wrenches.clear();
-        self.wrenches.extend_from_slice(wrenches);
-        Ok(())
-    }
-
-    fn films(&self, reach: f64) -> Vec<Film<3>> {
-        self.film.into_iter().filter(|film| film.gap < reach).collect()
+    fn films(&self, configuration: &Configuration<'_, 3>, reach: f64) -> Vec<Film<3>> {
+        let Ok([first, second]) = equal_pair(configuration.particles) else { return Vec::new() };
+        let branch = second.pose.position - first.pose.position;
+        let gap = branch.norm() - 2.0 * first.radius;
+        let (slide, curvature_radius) = (Vector::zeros(), first.radius);
+        let film =
+            Film { first: 0, second: Some(1), branch, slide, is_held: [false; 2], gap, curvature_radius };
+        let keeps_open = self.offset == 0.0 && gap > 0.0 && gap < reach;
+        keeps_open.then_some(film).into_iter().collect()
     }
 }
 
-fn equal_pair(particles: &[Particle<3>]) -> Result<(&Particle<3>, &Particle<3>), PairMobilityError> {
+/// The force on the second sphere along `n`, the opposite of which acts on the first.
+fn push(wrenches: &[Wrench<3>], n: &Vector<3>) -> Result<f64, PairMobilityError> {
+    let [first, second] = wrenches else { return Ok(0.0) };
+    let push = second.force.dot(n);
+    let rest = (second.force - n * push).norm()
+        + (first.force + second.force).norm()
+        + first.torque.norm()
+        + second.torque.norm();
+    let size = first.force.norm().max(second.force.norm());
+    if rest > ROUNDING * size {
+        return Err(PairMobilityError::Wrenches { rest: rest / size });
+    }
+    Ok(push)
+}
+
+fn equal_pair(particles: &[Particle<3>]) -> Result<[&Particle<3>; 2], PairMobilityError> {
     let [first, second] = particles else {
         return Err(PairMobilityError::ParticleCount { count: particles.len() });
     };
@@ -157,5 +141,5 @@ fn equal_pair(particles: &[Particle<3>]) -> Result<(&Particle<3>, &Particle<3>),
     if !(a > 0.0 && (a - b).abs() <= 1e-12 * a) {
         return Err(PairMobilityError::UnequalRadii { first: a, second: b });
     }
-    Ok((first, second))
+    Ok([first, second])
 }

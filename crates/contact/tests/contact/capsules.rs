@@ -8,7 +8,7 @@ use gluey_contact::{
     SolverKind, StepGeometry, WithFixed,
 };
 use gluey_geom::{Dim, Particle, Pose, Space, Spin, Twist, Vector};
-use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
+use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -120,10 +120,11 @@ where
     let mut particles = [Particle::new(at(-2.0, 0.3), 1.0), Particle::new(at(2.0, -0.3), 1.0)];
     let mut flow = BackgroundFlow::new(LinearFlow::shear(1.0, 0.0));
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
-    let (mut twists, mut drift, dt) = ([Twist::default(); 2], [Twist::default(); 2], 0.05);
+    let (mut drift, dt) = ([Twist::default(); 2], 0.05);
     let mut contact_count = 0;
     for step in 0..120 {
-        flow.predict(step as f64 * dt, &particles, &mut twists).expect("cannot fail");
+        let now = Configuration::at(step as f64 * dt, &particles);
+        let mut twists = flow.predict(&now).expect("no forces").twists;
         integrator.body_drift(dt, &mut drift);
         let poses = particles.map(|particle| particle.pose);
         let velocity_weight = integrator.velocity_weight(dt);

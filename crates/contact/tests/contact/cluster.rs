@@ -3,8 +3,8 @@
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, SolverKind, StepGeometry,
 };
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
-use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
+use gluey_geom::{Dim, Matrix, Particle, Space, Vector};
+use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -40,13 +40,12 @@ where
     let sink = LinearFlow { gradient: -Matrix::<D>::identity(), origin: Vector::zeros() };
     let (mut flow, mut integrator) = (BackgroundFlow::new(sink), Integrator::new(Scheme::AdamsBashforth2));
     let mut contact = PairContact::<D>::new(params);
-    let mut twists = vec![Twist::default(); count];
     let (radii, mut drift) = (vec![1.0; count], vec![Vector::zeros(); count]);
     let mut outcome = Outcome { smallest_gap: f64::INFINITY, contact_count: 0, miss: 0.0 };
-    for factor in [1.0, -1.0] {
-        flow.set_shear_factor(factor);
+    for shear_factor in [1.0, -1.0] {
         for _ in 0..step_count {
-            flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
+            let now = Configuration { shear_factor, ..Configuration::at(0.0, &particles) };
+            let mut twists = flow.predict(&now).expect("no forces").twists;
             integrator.drift(dt, &mut drift);
             let positions: Vec<_> = particles.iter().map(|particle| particle.pose.position).collect();
             let velocity_weight = integrator.velocity_weight(dt);

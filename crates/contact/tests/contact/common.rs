@@ -1,8 +1,8 @@
 //! Set-up that the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
 
 use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
-use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+use gluey_geom::{Particle, Vector};
+use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 
 pub const RADIUS: f64 = 0.05;
 
@@ -13,6 +13,7 @@ pub struct Encounter {
     pub integrator: Integrator<3>,
     pub smallest_gap: f64,
     flow: PairMobility,
+    shear_factor: f64,
     dt: f64,
 }
 
@@ -25,6 +26,7 @@ impl Encounter {
             integrator: Integrator::new(scheme),
             smallest_gap: f64::INFINITY,
             flow: PairMobility::new(LinearFlow::shear(1.0, 0.5)).with_gap_offset(offset),
+            shear_factor: 1.0,
             dt,
         }
     }
@@ -35,8 +37,9 @@ impl Encounter {
     }
 
     pub fn step(&mut self) -> ContactReport {
-        let mut twists = [Twist::default(); 2];
-        self.flow.predict(0.0, &self.particles, &mut twists).expect("a good pair");
+        let shear_factor = self.shear_factor;
+        let now = Configuration { shear_factor, ..Configuration::at(0.0, &self.particles) };
+        let mut twists = self.flow.predict(&now).expect("a good pair").twists;
         let mut drift = [Vector::zeros(); 2];
         self.integrator.drift(self.dt, &mut drift);
         let positions = self.particles.map(|particle| particle.pose.position);
@@ -60,7 +63,7 @@ impl Encounter {
     }
 
     pub fn reverse(&mut self, factor: f64) {
-        self.flow.set_shear_factor(factor);
+        self.shear_factor = factor;
         self.integrator.reverse();
         self.contact.reverse();
     }

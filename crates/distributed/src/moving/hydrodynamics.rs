@@ -2,8 +2,10 @@
 
 use std::rc::Rc;
 
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
-use gluey_motion::{Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, ResumeError};
+use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_motion::{
+    Configuration, Fields, Film, FlowStatistics, Holding, Hydrodynamics, MeanStress, Prediction, ResumeError,
+};
 use gluey_parallel::Ranks;
 use gluey_stokes::Lubrication;
 
@@ -25,9 +27,6 @@ where
     last: Option<MyFlow<D>>,
     /// What the next flow starts from.
     memory: Rc<Memory<D>>,
-    /// Of the last flow where the stress is given, positive also while the shear is reversed.
-    rate: f64,
-    statistics: FlowStatistics,
 }
 
 impl<'a, const D: usize> SharedHydrodynamics<'a, D>
@@ -36,17 +35,8 @@ where
 {
     /// For ranks that all make the same predictions.
     pub fn beside(suspension: &'a Suspension<D>, ranks: &'a Ranks) -> Self {
-        let (told, statistics) = (Told::new(suspension), FlowStatistics::default());
-        Self {
-            suspension,
-            ranks,
-            told,
-            leads: false,
-            last: None,
-            memory: Rc::default(),
-            rate: 1.0,
-            statistics,
-        }
+        let told = Told::new(suspension);
+        Self { suspension, ranks, told, leads: false, last: None, memory: Rc::default() }
     }
 
     /// For rank zero, while the others [`Suspension::follow`].
@@ -69,11 +59,38 @@ where
     Dim<D>: Space<D>,
 {
     /// Power of the forces and torques of the case in the last flow, beside the shear.
-    fn work_of_forces(&self) -> f64 {
+    fn work_of_forces(&self, flow: &MyFlow<D>) -> f64 {
         let undisturbed = self.suspension.undisturbed_twist(self.told.shear_factor);
-        let twists = self.last.iter().flat_map(|flow| &flow.twists).zip(&self.told.positions);
+        let twists = flow.twists.iter().zip(&self.told.positions);
         let beside = twists.map(|(twist, place)| *twist - undisturbed(place));
         self.suspension.wrenches.iter().zip(beside).map(|(wrench, twist)| wrench.power(&twist)).sum()
+    }
+
+    /// The mean stress of a flow, if it is wanted.
+    fn stress(&self, flow: &MyFlow<D>, of_repulsion: Matrix<D>) -> Option<MeanStress<D>> {
+        let stress = flow.stress.as_ref().filter(|_| self.told.with_stress)?;
+        let volume = self.suspension.domain.extent().product();
+        Some(MeanStress {
+            rate: self.suspension.shear_rate * self.told.shear_factor,
+            viscosity: self.suspension.flow.viscosity,
+            of_bodies: stress.of_bodies(volume),
+            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            of_contacts: None,
+            of_repulsion,
+            dissipation: stress.dissipation / volume,
+            work_of_forces: self.work_of_forces(flow) / volume,
+        })
+    }
+
+    /// What holds particles in a flow, if any are held.
+    fn holding(&self, flow: &MyFlow<D>) -> Option<Holding<D>> {
+        let held = self.suspension.given.iter().enumerate().filter(|(_, given)| given.is_some());
+        let density = self.suspension.force_density.unwrap_or_else(Vector::zeros);
+        Some(Holding {
+            mean_velocity: flow.mean_velocity?,
+            force_density: flow.mean_force + density,
+            wrenches: held.map(|(k, _)| (k, flow.wrenches[k] - self.told.wrenches[k])).collect(),
+        })
     }
 
     /// Velocity of the image at a film beyond that of its particle.
@@ -110,15 +127,9 @@ where
 {
     type Error = SuspensionError;
 
-    fn predict(
-        &mut self,
-        _t: f64,
-        particles: &[Particle<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), SuspensionError> {
+    fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, SuspensionError> {
         let Self { suspension, ranks, told, memory, .. } = self;
-        let places = particles.iter().map(|particle| particle.pose.position);
-        told.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
+        told.take(suspension, configuration);
         memory.is_sharing.set(true);
         Order::Predict.share(ranks);
         told.share(ranks);
@@ -127,12 +138,11 @@ where
         let flow = suspension.solve_as_told(ranks, told, memory);
         memory.is_sharing.set(false);
         let (flow, rate) = flow?;
-        self.rate = rate;
         // Those that are given without the rounding of what the flow is relative to.
-        for (index, (twist, found)) in twists.iter_mut().zip(&flow.twists).enumerate() {
-            *twist = suspension.given_twist(index, told.shear_factor).unwrap_or(*found);
-        }
-        self.statistics = FlowStatistics {
+        let given = |index: usize| suspension.given_twist(index, told.shear_factor);
+        let twists = flow.twists.iter().enumerate();
+        let twists = twists.map(|(index, found)| given(index).unwrap_or(*found)).collect();
+        let statistics = FlowStatistics {
             cell_count: flow.cell_count,
             dof_count: flow.dof_count,
             solve_count: flow.solve_count,
@@ -143,64 +153,17 @@ where
             solved_again: flow.raised_penalties.solved_again,
             phases: vec![("shared flow", start.elapsed().as_secs_f64())],
         };
+        let stress = self.stress(&flow, configuration.pair_stress / rate);
+        let holding = self.holding(&flow);
         self.last = Some(flow);
-        Ok(())
+        Ok(Prediction { twists, rate, stress, holding, statistics })
     }
 
-    fn set_shear_factor(&mut self, factor: f64) {
-        self.told.shear_factor = factor;
+    fn answers_to_forces(&self) -> bool {
+        true
     }
 
-    fn set_strain(&mut self, strain: f64, with_stress: bool) {
-        if self.suspension.is_sheared() {
-            (self.told.strain, self.told.with_stress) = (strain, with_stress);
-        }
-    }
-
-    fn stress(&self) -> Option<MeanStress<D>> {
-        let stress = self.last.as_ref()?.stress.as_ref().filter(|_| self.told.with_stress)?;
-        let volume = self.suspension.domain.extent().product();
-        Some(MeanStress {
-            rate: self.suspension.shear_rate * self.told.shear_factor,
-            viscosity: self.suspension.flow.viscosity,
-            of_bodies: stress.of_bodies(volume),
-            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
-            of_contacts: None,
-            of_repulsion: Matrix::zeros(),
-            dissipation: stress.dissipation / volume,
-            work_of_forces: self.work_of_forces() / volume,
-        })
-    }
-
-    fn set_pair_stress(&mut self, stress: &Matrix<D>) {
-        self.told.pair_stress = stress[(0, 1)];
-    }
-
-    fn clock_rate(&self) -> f64 {
-        self.rate
-    }
-
-    fn holding(&self) -> Option<Holding<D>> {
-        let (flow, given) = (self.last.as_ref()?, &self.suspension.given);
-        let held = given.iter().enumerate().filter(|(_, given)| given.is_some());
-        let density = self.suspension.force_density.unwrap_or_else(Vector::zeros);
-        Some(Holding {
-            mean_velocity: flow.mean_velocity?,
-            force_density: flow.mean_force + density,
-            wrenches: held.map(|(k, _)| (k, flow.wrenches[k] - self.told.wrenches[k])).collect(),
-        })
-    }
-
-    fn set_wrenches(&mut self, wrenches: &[Wrench<D>]) -> Result<(), NoForces> {
-        self.told.wrenches = Told::new(self.suspension).wrenches;
-        for (acting, more) in self.told.wrenches.iter_mut().zip(wrenches) {
-            acting.force += more.force;
-            acting.torque += more.torque;
-        }
-        Ok(())
-    }
-
-    fn films(&self, reach: f64) -> Vec<Film<D>> {
+    fn films(&self, _: &Configuration<'_, D>, reach: f64) -> Vec<Film<D>> {
         if self.last.is_none() || self.suspension.lubrication != Lubrication::Deficit {
             return Vec::new();
         }
@@ -218,10 +181,6 @@ where
             curvature_radius: film.curvature_radius(),
         };
         films.into_iter().map(film).collect()
-    }
-
-    fn statistics(&self) -> FlowStatistics {
-        self.statistics.clone()
     }
 
     /// Nothing: what the next flow starts from is in pieces, which the [`Memory`] of each rank has until this

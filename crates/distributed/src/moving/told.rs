@@ -1,6 +1,7 @@
 //! What rank zero tells the others between two flows.
 
 use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_motion::Configuration;
 use gluey_parallel::{Communicator, Ranks};
 
 use super::Suspension;
@@ -90,6 +91,19 @@ where
         let positions = vec![Vector::zeros(); count];
         let (with_stress, pair_stress) = (false, 0.0);
         Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress, pair_stress }
+    }
+
+    /// Takes over a configuration of the suspension.
+    pub fn take(&mut self, suspension: &Suspension<D>, configuration: &Configuration<'_, D>) {
+        *self = Self { shear_factor: configuration.shear_factor, ..Self::new(suspension) };
+        let places = configuration.particles.iter().map(|particle| particle.pose.position);
+        self.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
+        let wrenches = self.wrenches.iter_mut().zip(configuration.wrenches);
+        wrenches.for_each(|(acting, more)| *acting = *acting + *more);
+        self.pair_stress = configuration.pair_stress[(0, 1)];
+        if suspension.is_sheared() {
+            (self.strain, self.with_stress) = (configuration.strain, configuration.with_stress);
+        }
     }
 
     /// Replaces all by what rank zero says.

@@ -6,9 +6,9 @@ use gluey_distributed::{
     BoxFlow, FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
 };
 use gluey_fem::element::{multi_index, value};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Particle, Space, Vector};
 use gluey_levelset::{Ball, BallTree};
-use gluey_motion::{Fields, Hydrodynamics};
+use gluey_motion::{Configuration, Fields, Hydrodynamics};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
@@ -77,8 +77,7 @@ where
             return seen.unwrap();
         }
         let mut flow = SharedHydrodynamics::leading(suspension, ranks);
-        let mut twists = vec![Twist::default(); BODIES.len()];
-        flow.predict(0.0, &particles(), &mut twists).unwrap();
+        flow.predict(&Configuration::at(0.0, &particles())).unwrap();
         ask_for_fields(ranks, FRAME);
         flow.fields().unwrap()
     });
@@ -183,7 +182,7 @@ fn a_flow_that_failed_has_no_fields() {
             return seen;
         }
         let mut flow = SharedHydrodynamics::leading(&suspension, ranks);
-        let error = flow.predict(0.0, &particles(), &mut [Twist::default(); 3]).unwrap_err();
+        let error = flow.predict(&Configuration::at(0.0, &particles())).unwrap_err();
         assert!(matches!(error, SuspensionError::Flow(_)), "{error}");
         ask_for_fields(ranks, FRAME);
         vec![flow.fields().is_some()]

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, Suspension};
 use gluey_geom::{Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{Hydrodynamics, MeanStress};
+use gluey_motion::{Configuration, Hydrodynamics, MeanStress};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
@@ -97,10 +97,10 @@ fn predict<const D: usize>(flow: &mut SharedHydrodynamics<'_, D>, strain: f64) -
 where
     Dim<D>: Space<D>,
 {
-    let mut twists = vec![Twist::default(); PARTICLES.len()];
-    flow.set_strain(strain, true);
-    flow.predict(0.0, &particles(strain), &mut twists).unwrap();
-    (twists, flow.stress().unwrap(), flow.statistics().iteration_count)
+    let particles = particles(strain);
+    let sheared = Configuration { strain, with_stress: true, ..Configuration::at(0.0, &particles) };
+    let found = flow.predict(&sheared).unwrap();
+    (found.twists, found.stress.unwrap(), found.statistics.iteration_count)
 }
 
 /// Flows by so many ranks.

@@ -5,7 +5,7 @@ use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
-use gluey_motion::{FlowStatistics, Hydrodynamics, Integrator, Scheme};
+use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
@@ -86,10 +86,11 @@ where
     let mut contact = PairContact::new(ContactParams::default());
     let count = particles.len();
     let (radii, mut touched, mut iterations) = (vec![meeting.radius; count], false, Vec::new());
-    let [mut twists, mut drift] = [(); 2].map(|()| vec![Twist::default(); count]);
+    let mut drift = vec![Twist::default(); count];
     for step in 0..STEPS {
-        flow.predict(step as f64 * STEP, &particles, &mut twists).unwrap();
-        iterations.push(flow.statistics().iteration_count);
+        let predicted = flow.predict(&Configuration::at(step as f64 * STEP, &particles)).unwrap();
+        let mut twists = predicted.twists;
+        iterations.push(predicted.statistics.iteration_count);
         integrator.body_drift(STEP, &mut drift);
         let poses: Vec<_> = particles.iter().map(|particle| particle.pose).collect();
         let velocity_weight = integrator.velocity_weight(STEP);
@@ -109,7 +110,6 @@ where
 {
     suspension: &'a Suspension<D>,
     solver: FlowSolver<D>,
-    iteration_count: usize,
 }
 
 fn solver<const D: usize>(suspension: &Suspension<D>) -> FlowSolver<D>
@@ -128,7 +128,7 @@ where
     Dim<D>: Space<D>,
 {
     fn new(suspension: &'a Suspension<D>) -> Self {
-        Self { suspension, solver: solver(suspension), iteration_count: 0 }
+        Self { suspension, solver: solver(suspension) }
     }
 }
 
@@ -138,29 +138,18 @@ where
 {
     type Error = StokesError;
 
-    fn predict(
-        &mut self,
-        _: f64,
-        particles: &[Particle<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<(), StokesError> {
+    fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, StokesError> {
         let Suspension { domain, roots, periods, refinement, wrenches, .. } = self.suspension;
         let ball = |particle: &Particle<D>| Ball::periodic(particle.pose.position, particle.radius, *periods);
-        let balls: Vec<Ball<D>> = particles.iter().map(ball).collect();
+        let balls: Vec<Ball<D>> = configuration.particles.iter().map(ball).collect();
         let mesh = refinement.mesh(*domain, *roots, periods.map(|p| p.is_some()), &balls)?;
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
         let conditions = Conditions::boundary(&shear).with_wrenches(wrenches);
         let flow = self.solver.solve_under(mesh, &balls, &conditions)?;
-        twists.copy_from_slice(&flow.twists);
-        self.iteration_count = flow.iteration_count;
-        Ok(())
+        let statistics =
+            FlowStatistics { iteration_count: flow.iteration_count, ..FlowStatistics::default() };
+        Ok(Prediction { statistics, ..Prediction::of(flow.twists) })
     }
-
-    fn statistics(&self) -> FlowStatistics {
-        FlowStatistics { iteration_count: self.iteration_count, ..FlowStatistics::default() }
-    }
-
-    fn set_shear_factor(&mut self, _: f64) {}
 }
 
 /// Whether particles touched on their way.
@@ -237,9 +226,8 @@ fn followers_end_when_the_leader_fails() {
             suspension.follow(ranks);
             return None;
         }
-        let mut twists = vec![Twist::default(); 2];
         let mut flow = SharedHydrodynamics::leading(&suspension, ranks);
-        flow.predict(0.0, &particles(PAIR), &mut twists).err().map(|error| error.to_string())
+        flow.predict(&Configuration::at(0.0, &particles(PAIR))).err().map(|error| error.to_string())
     });
     let first = errors.unwrap()[0].clone().unwrap();
     assert!(first.starts_with("body 1 has a radius"), "{first}");

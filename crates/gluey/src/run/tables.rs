@@ -93,7 +93,7 @@ impl Tables {
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
-            let stress = with_contacts(stress, simulation.contact(), simulation.particles())
+            let stress = with_contacts(*stress, simulation.contact(), simulation.particles())
                 .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
             let time_and_rate = simulation.time_and_rate();
@@ -101,7 +101,7 @@ impl Tables {
             rheology.write(&rheology::line(&row))?;
         }
         if let (Some(forces), Some(holding)) = (&mut self.forces, simulation.holding()) {
-            forces.write(&forces::line(time, &holding))?;
+            forces.write(&forces::line(time, holding))?;
         }
         Ok(())
     }

@@ -12,28 +12,24 @@ where
 {
     law: Repulsion,
     surroundings: Domain<D>,
-    /// Minus the mean product of forces and lines between centres at the last prediction.
-    pub stress: Matrix<D>,
-    /// The forces.
-    pub wrenches: Vec<Wrench<D>>,
 }
 
 impl<const D: usize> Repelling<D>
 where
     Dim<D>: Space<D>,
 {
-    /// No forces yet.
+    /// Particles that repel each other by this law, and the walls of their surroundings.
     pub fn new(law: Repulsion, surroundings: Domain<D>) -> Self {
-        Self { law, surroundings, stress: Matrix::zeros(), wrenches: Vec::new() }
+        Self { law, surroundings }
     }
 
-    /// Takes the forces between particles where they are now, with a lattice of this tilt.
-    pub fn update(&mut self, particles: &[Particle<D>], tilt: f64) {
+    /// The forces between particles where they are now, with a lattice of this tilt; and their stress, minus
+    /// the mean product of forces and lines between centres.
+    pub fn between(&mut self, particles: &[Particle<D>], tilt: f64) -> (Vec<Wrench<D>>, Matrix<D>) {
         self.surroundings.set_sliding(tilt, 0.0);
         let Repelled { forces, moment } = self.law.between(particles, &self.surroundings);
         let volume: f64 = self.surroundings.lattice.periods().iter().flatten().product();
-        self.stress = -moment / volume;
-        self.wrenches.clear();
-        self.wrenches.extend(forces.into_iter().map(|force| Wrench { force, ..Wrench::default() }));
+        let wrenches = forces.into_iter().map(|force| Wrench { force, ..Wrench::default() }).collect();
+        (wrenches, -moment / volume)
     }
 }

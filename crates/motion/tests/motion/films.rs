@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::{
-    Film, FilmClosed, FilmError, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme,
+    Configuration, Film, FilmClosed, FilmError, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme,
 };
 
 /// The gap over the radius of a pair in shear at a time.
@@ -22,7 +22,6 @@ fn encounter(steps: &[f64]) -> Vec<Seen> {
         Particle::new(Vector::<3>::new(0.7, 0.475, 0.5), 0.05),
     ];
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
-    let mut twists = [Twist::default(); 2];
     let (mut seen, mut time) = (Vec::new(), 0.0);
     for &dt in steps.iter().cycle() {
         if time > 16.0 {
@@ -30,8 +29,9 @@ fn encounter(steps: &[f64]) -> Vec<Seen> {
         }
         let line = particles[1].pose.position - particles[0].pose.position;
         seen.push(Seen { time, gap: particles[0].gap(&particles[1]) / 0.05, has_passed: -line.x });
-        flow.predict(time, &particles, &mut twists).unwrap();
-        let films: Vec<Film<3>> = flow.films(integrator.film_reach(dt, &particles, &twists));
+        let now = Configuration::at(time, &particles);
+        let mut twists = flow.predict(&now).unwrap().twists;
+        let films: Vec<Film<3>> = flow.films(&now, integrator.film_reach(dt, &particles, &twists));
         integrator.open_films(dt, &particles, &films, &mut twists).unwrap();
         integrator.advance(dt, &mut particles, &twists);
         time += dt;

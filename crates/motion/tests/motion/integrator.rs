@@ -1,7 +1,7 @@
 //! Order, reversal, rotation and checkpoint of the integrators.
 
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector};
-use gluey_motion::{BackgroundFlow, Hydrodynamics, Integrator, LinearFlow, Scheme};
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, NoForces, Scheme};
 
 fn unit<const D: usize>(axis: usize) -> Vector<D> {
     Vector::<D>::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 })
@@ -17,16 +17,21 @@ where
     LinearFlow { gradient, origin: Vector::zeros() }
 }
 
-fn step<const D: usize>(
-    flow: &mut BackgroundFlow<D>,
-    integrator: &mut Integrator<D>,
-    dt: f64,
-    particles: &mut [Particle<D>],
-) where
+/// Velocities in a multiple of the flow.
+fn twists<const D: usize>(flow: LinearFlow<D>, shear_factor: f64, particles: &[Particle<D>]) -> Vec<Twist<D>>
+where
     Dim<D>: Space<D>,
 {
-    let mut twists = vec![Twist::default(); particles.len()];
-    flow.predict(0.0, particles, &mut twists).expect("cannot fail");
+    let now = Configuration { shear_factor, ..Configuration::at(0.0, particles) };
+    BackgroundFlow::new(flow).predict(&now).expect("no forces").twists
+}
+
+/// A step in a multiple of the turning flow.
+fn step<const D: usize>(factor: f64, integrator: &mut Integrator<D>, dt: f64, particles: &mut [Particle<D>])
+where
+    Dim<D>: Space<D>,
+{
+    let twists = twists(turning(), factor, particles);
     integrator.advance(dt, particles, &twists);
 }
 
@@ -35,10 +40,10 @@ where
     Dim<D>: Space<D>,
 {
     let mut particles = [Particle::new(unit::<D>(0), 0.1)];
-    let (mut flow, mut integrator) = (BackgroundFlow::new(turning::<D>()), Integrator::new(scheme));
+    let mut integrator = Integrator::new(scheme);
     let dt = std::f64::consts::FRAC_PI_2 / step_count as f64;
     for _ in 0..step_count {
-        step(&mut flow, &mut integrator, dt, &mut particles);
+        step(1.0, &mut integrator, dt, &mut particles);
     }
     let turned = Dim::<D>::rotate(&particles[0].pose.orientation, &unit::<D>(0));
     assert!((turned - unit::<D>(1)).norm() < 1e-12, "a constant spin turns exactly");
@@ -67,15 +72,14 @@ fn euler_is_first_order_and_adams_bashforth_second() {
 #[test]
 fn the_linear_form_is_what_advance_does() {
     let dt = 0.1;
-    let mut flow = BackgroundFlow::new(turning::<2>());
     for (scheme, rates) in [(Scheme::Euler, [0.1, 0.1]), (Scheme::AdamsBashforth2, [0.1, 0.15])] {
         let mut integrator = Integrator::new(scheme);
         let mut particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
         for rate in rates {
             assert!((integrator.velocity_weight(dt) - rate).abs() < 1e-16);
-            let (mut drift, mut twists) = ([Vector::zeros()], [Twist::default()]);
+            let mut drift = [Vector::zeros()];
             integrator.drift(dt, &mut drift);
-            flow.predict(0.0, &particles, &mut twists).expect("cannot fail");
+            let twists = twists(turning(), 1.0, &particles);
             let expected =
                 particles[0].pose.position + (twists[0].velocity * integrator.velocity_weight(dt) + drift[0]);
             integrator.advance(dt, &mut particles, &twists);
@@ -87,14 +91,12 @@ fn the_linear_form_is_what_advance_does() {
 /// Error of coming back after `n` steps there and `n` back.
 fn return_error(scheme: Scheme, n: usize, turn: fn(&mut Integrator<2>)) -> f64 {
     let dt = 1.0 / n as f64;
-    let mut flow = BackgroundFlow::new(turning::<2>());
     let mut integrator = Integrator::new(scheme);
     let start = Vector::<2>::new(1.0, 0.3);
     let mut particles = [Particle::new(start, 0.1)];
     for factor in [1.0, -1.0] {
-        flow.set_shear_factor(factor);
         for _ in 0..n {
-            step(&mut flow, &mut integrator, dt, &mut particles);
+            step(factor, &mut integrator, dt, &mut particles);
         }
         turn(&mut integrator);
     }
@@ -117,35 +119,32 @@ fn reversal_keeps_second_order_and_ignoring_it_does_not() {
 #[test]
 fn the_step_after_a_reversal_goes_back_over_the_last() {
     let dt = 0.01;
-    let mut flow = BackgroundFlow::new(turning::<2>());
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
     let mut particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
     for _ in 0..9 {
-        step(&mut flow, &mut integrator, dt, &mut particles);
+        step(1.0, &mut integrator, dt, &mut particles);
     }
     let before = particles[0].pose.position;
-    step(&mut flow, &mut integrator, dt, &mut particles);
-    flow.set_shear_factor(-1.0);
+    step(1.0, &mut integrator, dt, &mut particles);
     integrator.reverse();
-    step(&mut flow, &mut integrator, dt, &mut particles);
+    step(-1.0, &mut integrator, dt, &mut particles);
     let error = (particles[0].pose.position - before).norm();
     assert!(error < dt.powi(3), "{error:e}");
 }
 
 #[test]
 fn a_checkpoint_resumes_bit_for_bit() {
-    let mut flow = BackgroundFlow::new(turning::<3>());
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
     let mut particles = [Particle::new(Vector::<3>::new(1.0, 0.3, 0.2), 0.1)];
     for _ in 0..5 {
-        step(&mut flow, &mut integrator, 0.1, &mut particles);
+        step(1.0, &mut integrator, 0.1, &mut particles);
     }
     let bytes = postcard::to_stdvec(&integrator).expect("serialises");
     let mut resumed: Integrator<3> = postcard::from_bytes(&bytes).expect("comes back");
     let mut others = particles;
     for _ in 0..5 {
-        step(&mut flow, &mut integrator, 0.1, &mut particles);
-        step(&mut flow, &mut resumed, 0.1, &mut others);
+        step(1.0, &mut integrator, 0.1, &mut particles);
+        step(1.0, &mut resumed, 0.1, &mut others);
     }
     assert_eq!(particles, others);
 }
@@ -162,11 +161,8 @@ fn check_shear<const D: usize>()
 where
     Dim<D>: Space<D>,
 {
-    let mut flow = BackgroundFlow::new(LinearFlow::<D>::shear(2.0, 0.5));
-    flow.set_shear_factor(-1.0);
-    let mut twists = [Twist::default()];
-    let particle = Particle::new(Vector::<D>::repeat(0.75), 0.1);
-    flow.predict(0.0, &[particle], &mut twists).expect("cannot fail");
+    let particles = [Particle::new(Vector::<D>::repeat(0.75), 0.1)];
+    let twists = twists(LinearFlow::shear(2.0, 0.5), -1.0, &particles);
     assert_eq!(twists[0].velocity, unit::<D>(0) * -0.5);
     // Clockwise at half the shear rate, reversed; about z in 3D.
     let spin = Dim::<D>::spin_slice(&twists[0].spin);
@@ -178,4 +174,12 @@ where
 fn shear_carries_and_turns() {
     check_shear::<2>();
     check_shear::<3>();
+}
+
+#[test]
+fn forces_are_refused_where_none_are_answered_to() {
+    let mut flow = BackgroundFlow::new(turning::<2>());
+    let particles = [Particle::new(Vector::<2>::new(1.0, 0.3), 0.1)];
+    let pushed = Configuration { wrenches: &[Wrench::default()], ..Configuration::at(0.0, &particles) };
+    assert_eq!((flow.answers_to_forces(), flow.predict(&pushed)), (false, Err(NoForces)));
 }

@@ -1,7 +1,9 @@
 //! The pair mobility against the exact trajectory of two spheres in unbounded shear.
 
-use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, PairMobilityError, Scheme};
+use gluey_geom::{Particle, Vector};
+use gluey_motion::{
+    Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, PairMobilityError, Scheme,
+};
 
 const RADIUS: f64 = 0.05;
 const REFERENCE: &str = include_str!("../../../../data/reference/pair3d_trajectory_unbounded.csv");
@@ -23,21 +25,21 @@ fn the_exact_trajectory_is_followed() {
     assert!(rows.len() > 300);
     let dt = 0.05 / substeps as f64;
     let mut particles = start();
-    let mut twists = [Twist::default(); 2];
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
     let (mut worst_gap, mut worst_position, mut worst_spin) = (0f64, 0f64, 0f64);
     for row in &rows {
         let steps = (row[0] / dt).round() as usize;
         let gap = particles[0].gap(&particles[1]) / RADIUS;
-        flow.predict(row[0], &particles, &mut twists).expect("a good pair");
+        let there = flow.predict(&Configuration::at(row[0], &particles)).expect("a good pair");
         let exact = Vector::<3>::new(row[3], row[4], 0.5);
         worst_gap = worst_gap.max((gap - row[1]).abs());
         worst_position = worst_position.max((particles[0].pose.position - exact).norm() / RADIUS);
-        worst_spin = worst_spin.max((twists[0].spin.z - row[7]).abs());
+        worst_spin = worst_spin.max((there.twists[0].spin.z - row[7]).abs());
         for n in 0..substeps {
-            flow.predict((steps + n) as f64 * dt, &particles, &mut twists).expect("a good pair");
-            integrator.advance(dt, &mut particles, &twists);
+            let now = Configuration::at((steps + n) as f64 * dt, &particles);
+            let predicted = flow.predict(&now).expect("a good pair");
+            integrator.advance(dt, &mut particles, &predicted.twists);
         }
     }
     println!("gap/a {worst_gap:e}, position/a {worst_position:e}, spin {worst_spin:e}");
@@ -50,11 +52,11 @@ fn the_exact_trajectory_is_followed() {
 fn a_gap_offset_lets_the_pair_overlap() {
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5)).with_gap_offset(0.2);
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
-    let (mut particles, mut twists) = (start(), [Twist::default(); 2]);
+    let mut particles = start();
     let mut smallest = f64::INFINITY;
     for n in 0..200 {
-        flow.predict(0.05 * n as f64, &particles, &mut twists).expect("a good pair");
-        integrator.advance(0.05, &mut particles, &twists);
+        let predicted = flow.predict(&Configuration::at(0.05 * n as f64, &particles)).expect("a good pair");
+        integrator.advance(0.05, &mut particles, &predicted.twists);
         smallest = smallest.min(particles[0].gap(&particles[1]) / RADIUS);
     }
     assert!((smallest + 0.177).abs() < 5e-3, "{smallest}");
@@ -64,33 +66,25 @@ fn a_gap_offset_lets_the_pair_overlap() {
 fn overlapping_spheres_turn_as_one() {
     let mut particles = start();
     particles[1].pose.position = particles[0].pose.position + Vector::<3>::new(0.04, 0.04, 0.0);
-    let mut twists = [Twist::default(); 2];
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
-    flow.predict(0.0, &particles, &mut twists).expect("overlap is not an error");
+    let predicted = flow.predict(&Configuration::at(0.0, &particles)).expect("overlap is not an error");
     let n = Vector::<3>::new(1.0, 1.0, 0.0).normalize();
-    assert!((twists[1].velocity - twists[0].velocity).dot(&n).abs() < 1e-15);
+    let [first, second] = [0, 1].map(|k| predicted.twists[k].velocity);
+    assert!((second - first).dot(&n).abs() < 1e-15);
 }
 
 #[test]
 fn bad_pairs_are_named() {
     let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
-    let mut twists = [Twist::default(); 2];
     let [one, mut two] = start();
-    assert_eq!(
-        flow.predict(0.0, &[one], &mut twists[..1]),
-        Err(PairMobilityError::ParticleCount { count: 1 })
-    );
-    let coincident = flow.predict(0.0, &[one, one], &mut twists);
-    assert_eq!(coincident, Err(PairMobilityError::NoDirection { distance: 0.0 }));
+    let mut error = |particles: &[Particle<3>]| flow.predict(&Configuration::at(0.0, particles)).unwrap_err();
+    assert_eq!(error(&[one]), PairMobilityError::ParticleCount { count: 1 });
+    assert_eq!(error(&[one, one]), PairMobilityError::NoDirection { distance: 0.0 });
     two.radius = 0.06;
-    let unequal = flow.predict(0.0, &[one, two], &mut twists);
-    assert_eq!(unequal, Err(PairMobilityError::UnequalRadii { first: 0.05, second: 0.06 }));
+    assert_eq!(error(&[one, two]), PairMobilityError::UnequalRadii { first: 0.05, second: 0.06 });
     two = start()[1];
     two.pose.position.x = f64::NAN;
-    assert!(matches!(
-        flow.predict(0.0, &[one, two], &mut twists),
-        Err(PairMobilityError::NoDirection { .. })
-    ));
+    assert!(matches!(error(&[one, two]), PairMobilityError::NoDirection { .. }));
 }
 
 /// The package carries a copy of the table, for it cannot reach outside its folder.

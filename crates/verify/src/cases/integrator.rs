@@ -1,7 +1,7 @@
 //! Orders in time of the integrators, with exact velocities.
 
-use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
+use gluey_geom::{Particle, Vector};
+use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 use gluey_testkit::convergence_order;
 use gluey_testkit::reference::pair_3d_trajectory_unbounded;
 use itertools::iproduct;
@@ -47,27 +47,26 @@ fn measure(scheme: Scheme, step: f64, steps: u32) -> Result<Vec<f64>, VerifyErro
     let exact = Vector::<3>::new(x, y, 0.5);
     let starts = [Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)];
     let mut particles = starts.map(|x| Particle::new(x, RADIUS));
-    let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
     let mut integrator = Integrator::new(scheme);
-    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    advance(1.0, &mut integrator, &mut particles, step, steps)?;
     let end = (particles[0].pose.position - exact).norm() / RADIUS;
-    flow.set_shear_factor(-1.0);
     integrator.reverse();
-    advance(&mut flow, &mut integrator, &mut particles, step, steps)?;
+    advance(-1.0, &mut integrator, &mut particles, step, steps)?;
     Ok(vec![end, (particles[0].pose.position - starts[0]).norm() / RADIUS])
 }
 
 fn advance(
-    flow: &mut PairMobility,
+    shear_factor: f64,
     integrator: &mut Integrator<3>,
     particles: &mut [Particle<3>; 2],
     step: f64,
     steps: u32,
 ) -> Result<(), VerifyError> {
-    let mut twists = [Twist::default(); 2];
+    let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
     for n in 0..steps {
-        flow.predict(step * f64::from(n), particles, &mut twists)?;
-        let films = flow.films(integrator.film_reach(step, particles, &twists));
+        let now = Configuration { shear_factor, ..Configuration::at(step * f64::from(n), particles) };
+        let mut twists = flow.predict(&now)?.twists;
+        let films = flow.films(&now, integrator.film_reach(step, particles, &twists));
         integrator.open_films(step, particles, &films, &mut twists)?;
         integrator.advance(step, particles, &twists);
     }

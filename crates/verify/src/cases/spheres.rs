@@ -1,8 +1,8 @@
 //! Two spheres over gap and position of the lattice.
 
-use gluey_geom::{Particle, Twist, Vector};
+use gluey_geom::{Particle, Vector};
 use gluey_levelset::Ball;
-use gluey_motion::{Hydrodynamics, LinearFlow, PairMobility};
+use gluey_motion::{Configuration, Hydrodynamics, LinearFlow, PairMobility};
 use gluey_stokes::Refinement;
 use itertools::iproduct;
 
@@ -83,9 +83,8 @@ fn measure(
     let found = PairMotion::of(centers, &solve(method, tolerance, mesh, &spheres, &couette)?.twists);
 
     let particles = centers.map(|center| Particle::new(center, RADIUS));
-    let mut twists = [Twist::default(); 2];
-    PairMobility::new(LinearFlow::shear(1.0, 0.5)).predict(0.0, &particles, &mut twists)?;
-    let exact = PairMotion::of(centers, &twists);
+    let mut flow = PairMobility::new(LinearFlow::shear(1.0, 0.5));
+    let exact = PairMotion::of(centers, &flow.predict(&Configuration::at(0.0, &particles))?.twists);
     Ok(vec![
         found.normal_speed / exact.normal_speed - 1.0,
         found.line_rotation - exact.line_rotation,
