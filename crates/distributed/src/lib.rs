@@ -46,7 +46,7 @@ pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError};
 pub use moving::{
-    Follower, FrameName, Memory, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
+    Follower, FrameName, Memory, SharedHydrodynamics, SharedSuspension, SuspensionError, ask_for_fields,
     ask_to_keep,
 };
 pub use surface::SurfaceBodies;

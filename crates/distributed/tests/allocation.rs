@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
-use gluey_distributed::{BoxFlow, Suspension};
+use gluey_distributed::{BoxFlow, SharedSuspension};
 use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_motion::Configuration;
 use gluey_parallel::{Ranks, Threads};
-use gluey_stokes::{Lubrication, Refinement};
+use gluey_stokes::{Lubrication, Refinement, Suspension};
 use gluey_testkit::allocation::{CountingAllocator, largest_in_thread};
 
 #[global_allocator]
@@ -22,8 +23,9 @@ where
     let [small, whole] = [4, level].map(|level| suspension::<D>(lubrication, level));
     // They nearly touch, so that there is a gap.
     let places = [[0.3, 0.4, 0.5], [0.651, 0.4, 0.5]].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
-    let solve = |suspension: &Suspension<D>, ranks: &Ranks| {
-        suspension.solve(ranks, &places, &[], 1.0).unwrap().iterations
+    let particles = small.suspension.particles(&places);
+    let solve = |suspension: &SharedSuspension<D>, ranks: &Ranks| {
+        suspension.solve(ranks, &Configuration::at(0.0, &particles)).unwrap().iterations
     };
     let found = Threads::run(ranks, |ranks| {
         solve(&small, ranks);
@@ -33,12 +35,12 @@ where
 }
 
 /// Two bodies among cells of one level.
-fn suspension<const D: usize>(lubrication: Lubrication, level: u8) -> Suspension<D>
+fn suspension<const D: usize>(lubrication: Lubrication, level: u8) -> SharedSuspension<D>
 where
     Dim<D>: Space<D>,
 {
-    Suspension {
-        flow: BoxFlow { viscosity: 1.0, tolerance: 1e-3, max_iterations: 50 },
+    let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-3, max_iterations: 50 };
+    let suspension = Suspension {
         domain: Aabb::unit(),
         roots: [1; D],
         periods: [None; D],
@@ -50,7 +52,8 @@ where
         force_density: None,
         shear_rate: 1.0,
         shear_stress: None,
-    }
+    };
+    SharedSuspension { flow, suspension }
 }
 
 /// A rank holds its part of the whole and what is around it.

@@ -68,7 +68,7 @@ pub use repulsion::RepulsionSpec;
 pub use suspension::{RadiiSpec, SuspensionSpec};
 
 use gluey_contact::{Domain, Wall};
-use gluey_geom::{Lattice, Vector};
+use gluey_geom::{Dim, Lattice, Particle, Space, Vector};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
@@ -253,6 +253,15 @@ impl Case {
     /// Edge lengths of the box.
     pub(crate) fn edges(&self) -> Vec<f64> {
         self.lower().iter().zip(self.upper()).map(|(lower, upper)| upper - lower).collect()
+    }
+
+    /// The particles of a checked case at time 0.
+    pub(crate) fn start<const D: usize>(&self) -> Vec<Particle<D>>
+    where
+        Dim<D>: Space<D>,
+    {
+        let position = |coordinates: &[f64]| Vector::<D>::from_fn(|axis, _| coordinates[axis]);
+        self.particles.iter().map(|spec| Particle::new(position(&spec.position), spec.radius)).collect()
     }
 
     /// Length of the box along an axis in which the particles see images of each other.

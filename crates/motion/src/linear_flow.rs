@@ -34,6 +34,11 @@ where
         self.gradient * (x - self.origin)
     }
 
+    /// Velocity and spin at `x`.
+    pub fn twist(&self, x: &Vector<D>) -> Twist<D> {
+        Twist { velocity: self.velocity(x), spin: self.spin() }
+    }
+
     /// Rate of strain `E = (L + L^T)/2`.
     pub fn strain_rate(&self) -> Matrix<D> {
         (self.gradient + self.gradient.transpose()) * 0.5
@@ -79,8 +84,7 @@ where
             return Err(NoForces);
         }
         let flow = self.flow.scaled(configuration.shear_factor);
-        let velocities = configuration.particles.iter().map(|it| flow.velocity(&it.pose.position));
-        let spin = flow.spin();
-        Ok(Prediction::of(velocities.map(|velocity| Twist { velocity, spin }).collect()))
+        let twists = configuration.particles.iter().map(|particle| flow.twist(&particle.pose.position));
+        Ok(Prediction::of(twists.collect()))
     }
 }

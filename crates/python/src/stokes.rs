@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use gluey::flow::prepared_flow;
 use gluey::{RunError, memory};
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_stokes::motion::LinearFlow;
 use gluey_stokes::{Conditions, Flow, Prepared, StokesError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -106,11 +107,8 @@ where
         let wrenches: Vec<_> = both().map(|(force, torque)| Wrench::<D> { force, torque }).collect();
         let twists: Vec<_> = both().map(|(velocity, spin)| Twist::<D> { velocity, spin }).collect();
         let (hold, rate, middle) = (drive.hold, drive.shear_rate, self.middle);
-        let shear = move |x: &Vector<D>| {
-            let mut u = Vector::zeros();
-            u[0] = rate * (x[1] - middle);
-            u
-        };
+        let undisturbed = LinearFlow::<D>::shear(rate, middle);
+        let shear = move |x: &Vector<D>| undisturbed.velocity(x);
         let prepared = &mut self.prepared;
         let solved = compute(py, threads, || {
             let conditions = Conditions::boundary(&shear);

@@ -22,7 +22,7 @@
 //! solvers itself builds a [`Problem`] and hands it to a [`SaddleSolver`].
 //!
 //! The rooms, lowest first; a room knows only those before it: errors, spaces of unknowns, films, surfaces,
-//! operators, preconditioners, formulations of rigidity, solvers, flows.
+//! operators, preconditioners, formulations of rigidity, solvers, flows, suspensions.
 //!
 //! Not for inertia, free surfaces or deformable bodies; bodies are balls, the domain is a box.
 
@@ -40,6 +40,7 @@ mod precondition;
 mod solver;
 mod space;
 mod surface;
+mod suspension;
 mod term;
 
 // A flow, or one after the other, and the meshes they are computed on.
@@ -55,6 +56,8 @@ pub use formulation::Formulation;
 pub use formulation::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};
+// What drives the particles of a suspension, and what its flow predicts.
+pub use suspension::{Drive, FlowOfBodies, NotDriven, Suspension};
 // The linear system and its solvers.
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
@@ -63,7 +66,10 @@ pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, Solve
 pub use space::{Discretisation, Partition, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
 pub use surface::{Flat, Flats};
 // The crates whose types appear in this one.
-pub use {gluey_fem as fem, gluey_geom as geom, gluey_levelset as levelset, gluey_linalg as linalg};
+pub use {
+    gluey_fem as fem, gluey_geom as geom, gluey_levelset as levelset, gluey_linalg as linalg,
+    gluey_motion as motion,
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

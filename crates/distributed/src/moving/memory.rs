@@ -6,7 +6,7 @@ use std::sync::Arc;
 use gluey_geom::{Dim, Space};
 use gluey_parallel::Ranks;
 
-use super::Suspension;
+use super::SharedSuspension;
 use crate::warm_start::{PieceError, SavedPiece, WarmStart};
 
 /// The flows that the next one starts from, as far as they are on this rank, and those that a checkpoint of
@@ -51,12 +51,12 @@ where
     /// [`PieceError`] for pieces that do not belong to the suspension; nothing has changed then.
     pub fn restore(
         &self,
-        suspension: &Suspension<D>,
+        suspension: &SharedSuspension<D>,
         ranks: &Ranks,
         saved: Vec<SavedPiece>,
     ) -> Result<(), PieceError> {
-        let periodic = suspension.periods.map(|period| period.is_some());
-        let tree_box = (suspension.domain, suspension.roots, periodic);
+        let suspension = &suspension.suspension;
+        let tree_box = (suspension.domain, suspension.roots, suspension.periodic());
         let restored = WarmStart::restored(tree_box, suspension.radii.len(), ranks, saved)?;
         self.last.replace(Some(Arc::new(restored)));
         Ok(())

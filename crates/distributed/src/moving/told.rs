@@ -1,10 +1,9 @@
 //! What rank zero tells the others between two flows.
 
-use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Particle, Space, Vector, Wrench};
 use gluey_motion::Configuration;
 use gluey_parallel::{Communicator, Ranks};
-
-use super::Suspension;
+use gluey_stokes::Suspension;
 
 /// A frame with the fields of the last flow that rank zero wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +49,7 @@ impl Order {
     }
 }
 
-/// For rank zero between two flows: has the others, who [`Suspension::follow_and_show`], show the fields of
+/// For rank zero between two flows: has the others, who [`SharedSuspension::follow_and_show`](super::SharedSuspension::follow_and_show), show the fields of
 /// the last one.
 pub fn ask_for_fields(ranks: &Ranks, frame: FrameName) {
     Order::Show(frame).share(ranks);
@@ -62,65 +61,59 @@ pub fn ask_to_keep(ranks: &Ranks, name: u64) {
     Order::Keep(name).share(ranks);
 }
 
-/// What rank zero tells the others.
+/// What rank zero tells the others: a [`Configuration`], in numbers of which all know how many there are.
 #[derive(Clone, Debug)]
 pub(super) struct Told<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    pub positions: Vec<Vector<D>>,
-    pub wrenches: Vec<Wrench<D>>,
+    particles: Vec<Particle<D>>,
+    wrenches: Vec<Wrench<D>>,
     pub shear_factor: f64,
-    /// Of the images in a box without walls.
-    pub strain: f64,
-    pub with_stress: bool,
-    /// Shear stress of the forces between particles themselves, where the stress is given.
-    pub pair_stress: f64,
+    strain: f64,
+    with_stress: bool,
+    pair_stress: Matrix<D>,
 }
 
 impl<const D: usize> Told<D>
 where
     Dim<D>: Space<D>,
 {
+    /// Nothing yet.
     pub fn new(suspension: &Suspension<D>) -> Self {
-        let count = suspension.radii.len();
-        let wrenches = match suspension.wrenches.len() {
-            0 => vec![Wrench::default(); count],
-            _ => suspension.wrenches.clone(),
-        };
-        let positions = vec![Vector::zeros(); count];
-        let (with_stress, pair_stress) = (false, 0.0);
-        Self { positions, wrenches, shear_factor: 1.0, strain: 0.0, with_stress, pair_stress }
+        let particles = suspension.particles(&vec![Vector::zeros(); suspension.radii.len()]);
+        Self::of(suspension, &Configuration::at(0.0, &particles))
     }
 
-    /// Takes over a configuration of the suspension.
-    pub fn take(&mut self, suspension: &Suspension<D>, configuration: &Configuration<'_, D>) {
-        *self = Self { shear_factor: configuration.shear_factor, ..Self::new(suspension) };
-        let places = configuration.particles.iter().map(|particle| particle.pose.position);
-        self.positions.iter_mut().zip(places).for_each(|(told, place)| *told = place);
-        let wrenches = self.wrenches.iter_mut().zip(configuration.wrenches);
-        wrenches.for_each(|(acting, more)| *acting = *acting + *more);
-        self.pair_stress = configuration.pair_stress[(0, 1)];
-        if suspension.is_sheared() {
-            (self.strain, self.with_stress) = (configuration.strain, configuration.with_stress);
-        }
+    pub fn of(suspension: &Suspension<D>, configuration: &Configuration<'_, D>) -> Self {
+        let Configuration { particles, shear_factor, strain, with_stress, pair_stress, .. } = *configuration;
+        let mut wrenches = configuration.wrenches.to_vec();
+        wrenches.resize(suspension.radii.len(), Wrench::default());
+        Self { particles: particles.to_vec(), wrenches, shear_factor, strain, with_stress, pair_stress }
+    }
+
+    pub fn configuration(&self) -> Configuration<'_, D> {
+        let Self { ref particles, ref wrenches, shear_factor, strain, with_stress, pair_stress } = *self;
+        Configuration { time: 0.0, particles, wrenches, shear_factor, strain, with_stress, pair_stress }
     }
 
     /// Replaces all by what rank zero says.
     pub fn share(&mut self, ranks: &Ranks) {
         let with_stress = f64::from(u8::from(self.with_stress));
-        let mut numbers = vec![self.shear_factor, self.strain, self.pair_stress, with_stress];
-        numbers.extend(self.positions.iter().flatten());
+        let mut numbers = vec![self.shear_factor, self.strain, with_stress];
+        numbers.extend(self.pair_stress.iter());
+        numbers.extend(self.particles.iter().flat_map(|particle| particle.pose.position.iter()));
         for wrench in &self.wrenches {
             numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
         }
         ranks.share(&mut numbers);
         let mut told = numbers.into_iter();
         let mut next = || told.next().unwrap_or_default();
-        [self.shear_factor, self.strain, self.pair_stress] = [next(), next(), next()];
+        [self.shear_factor, self.strain] = [next(), next()];
         self.with_stress = next() > 0.0;
-        for position in &mut self.positions {
-            position.iter_mut().for_each(|x| *x = next());
+        self.pair_stress.iter_mut().for_each(|x| *x = next());
+        for particle in &mut self.particles {
+            particle.pose.position.iter_mut().for_each(|x| *x = next());
         }
         for wrench in &mut self.wrenches {
             wrench.force.iter_mut().for_each(|f| *f = next());

@@ -4,10 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
-use gluey_distributed::{BoxFlow, ContactFollower, FlowError, SharedContact, Suspension, SuspensionError};
+use gluey_distributed::{
+    BoxFlow, ContactFollower, FlowError, SharedContact, SharedSuspension, SuspensionError,
+};
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_motion::Configuration;
 use gluey_parallel::{Communicator, Ranks, Threads};
-use gluey_stokes::{Lubrication, Refinement};
+use gluey_stokes::{Lubrication, Refinement, Suspension};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 
 use crate::support;
@@ -54,24 +57,35 @@ fn suspension<const D: usize>(lubrication: Lubrication, is_sheared: bool) -> Sus
 where
     Dim<D>: Space<D>,
 {
-    let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 };
     let refinement = Refinement { coarsest: 3, surface: 4, band: 2.0 };
     Suspension {
         periods: std::array::from_fn(|d| (is_sheared || d == 0).then_some(1.0)),
         wrenches: vec![Wrench::default(); 2],
-        ..support::suspension(flow, refinement, lubrication, vec![0.14; 2])
+        ..support::suspension(refinement, lubrication, vec![0.14; 2])
     }
+}
+
+/// What its flow fails with, around particles at these heights.
+fn failure<const D: usize>(
+    suspension: &Suspension<D>,
+    ranks: &Ranks,
+    heights: [f64; 2],
+) -> Option<SuspensionError>
+where
+    Dim<D>: Space<D>,
+{
+    let place = |k: usize| Vector::from_fn(|d, _| [[0.3, 0.7][k], heights[k], 0.5][d]);
+    let particles = suspension.particles(&[place(0), place(1)]);
+    let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 };
+    let shared = SharedSuspension { flow, suspension: suspension.clone() };
+    shared.solve(ranks, &Configuration::at(0.0, &particles)).err()
 }
 
 fn a_flow_fails_as_one<const D: usize>(what: &'static str, fewest: usize, of: Suspension<D>)
 where
     Dim<D>: Space<D>,
 {
-    let places: Vec<Vector<D>> =
-        [[0.3, 0.55], [0.7, 0.45]].iter().map(|x| Vector::from_fn(|d, _| [x[0], x[1], 0.5][d])).collect();
-    fail_in_turn(what, fewest, move |ranks| {
-        of.solve(ranks, &places, &of.wrenches, 1.0).err().map(|error| error.to_string())
-    });
+    fail_in_turn(what, fewest, move |ranks| failure(&of, ranks, [0.55, 0.45]).map(|error| error.to_string()));
 }
 
 /// Levels, matrices of pressures, surfaces, data, what is measured of the flow.
@@ -119,10 +133,7 @@ fn a_rank_that_fails_anywhere_in_contact_ends_all() {
 #[test]
 fn bodies_that_are_too_small_are_so_on_all_ranks() {
     let small = Suspension { radii: vec![0.001; 2], ..suspension::<2>(Lubrication::Deficit, false) };
-    let run = move || {
-        let places = [Vector::<2>::new(0.3, 0.5), Vector::<2>::new(0.7, 0.5)];
-        Threads::run(RANKS, |ranks| small.solve(ranks, &places, &small.wrenches, 1.0).unwrap_err()).unwrap()
-    };
+    let run = move || Threads::run(RANKS, |ranks| failure(&small, ranks, [0.5; 2]).unwrap()).unwrap();
     let errors = within_a_minute("small bodies", run);
     assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
     assert!(matches!(errors[0], SuspensionError::Flow(FlowError::Part(_))), "{errors:?}");

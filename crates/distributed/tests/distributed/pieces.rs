@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use gluey_distributed::{
-    BoxFlow, FrameName, SharedHydrodynamics, Suspension, SuspensionError, ask_for_fields,
+    BoxFlow, FrameName, SharedHydrodynamics, SharedSuspension, SuspensionError, ask_for_fields,
 };
 use gluey_fem::element::{multi_index, value};
 use gluey_geom::{Dim, Particle, Space, Vector};
@@ -21,14 +21,15 @@ const BODIES: [([f64; 3], f64); 3] =
     [([0.4, 0.35, 0.52], 0.14), ([0.5, 0.76, 0.7], 0.1), ([0.98, 0.6, 0.4], 0.16)];
 const FRAME: FrameName = FrameName { stream: 3, step: 70 };
 
-fn suspension<const D: usize>(lubrication: Lubrication) -> Suspension<D>
+fn suspension<const D: usize>(lubrication: Lubrication) -> SharedSuspension<D>
 where
     Dim<D>: Space<D>,
 {
     let surface = if D == 2 { 5 } else { 4 };
     let flow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 };
     let refinement = Refinement { coarsest: surface - 2, surface, band: 2.0 };
-    support::suspension(flow, refinement, lubrication, BODIES.map(|body| body.1).to_vec())
+    let radii = BODIES.map(|body| body.1).to_vec();
+    SharedSuspension { flow, suspension: support::suspension(refinement, lubrication, radii) }
 }
 
 fn particles<const D: usize>() -> Vec<Particle<D>>
@@ -38,32 +39,31 @@ where
     BODIES.iter().map(|(x, radius)| Particle::new(Vector::from_fn(|d, _| x[d]), *radius)).collect()
 }
 
-fn balls<const D: usize>(suspension: &Suspension<D>) -> Vec<Ball<D>>
+fn balls<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Ball<D>>
 where
     Dim<D>: Space<D>,
 {
     let ball = |(x, radius): &([f64; 3], f64)| {
-        Ball::periodic(Vector::from_fn(|d, _| x[d]), *radius, suspension.periods)
+        Ball::periodic(Vector::from_fn(|d, _| x[d]), *radius, suspension.suspension.periods)
     };
     BODIES.iter().map(ball).collect()
 }
 
-fn serial<const D: usize>(suspension: &Suspension<D>) -> Flow<D>
+fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Flow<D>
 where
     Dim<D>: Space<D>,
 {
-    let &Suspension { domain, roots, periods, ref refinement, lubrication, .. } = suspension;
     let balls = balls(suspension);
-    let mesh = refinement.mesh(domain, roots, periods.map(|p| p.is_some()), &balls).unwrap();
+    let mesh = suspension.suspension.mesh(&balls).unwrap();
     let viscosity = suspension.flow.viscosity;
-    let formulation = Formulation::Unfitted { lubrication };
+    let formulation = Formulation::Unfitted { lubrication: suspension.suspension.lubrication };
     let params = FlowParams { viscosity, formulation, solver: SolverKind::Multigrid, tolerance: 1e-12 };
     let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
     FlowSolver::new(params).unwrap().solve_under(mesh, &balls, &Conditions::boundary(&shear)).unwrap()
 }
 
 /// The fields of all ranks, of which rank zero alone is told where the particles are.
-fn shown<const D: usize>(suspension: &Suspension<D>, size: usize) -> Vec<Fields<D>>
+fn shown<const D: usize>(suspension: &SharedSuspension<D>, size: usize) -> Vec<Fields<D>>
 where
     Dim<D>: Space<D>,
 {
@@ -90,7 +90,11 @@ fn key<const D: usize>(lower: &Vector<D>, upper: &Vector<D>) -> Vec<u64> {
 }
 
 /// The largest differences of velocities and pressures, over the largest of these, and of level sets.
-fn differences<const D: usize>(suspension: &Suspension<D>, flow: &Flow<D>, pieces: &[Fields<D>]) -> [f64; 3]
+fn differences<const D: usize>(
+    suspension: &SharedSuspension<D>,
+    flow: &Flow<D>,
+    pieces: &[Fields<D>],
+) -> [f64; 3]
 where
     Dim<D>: Space<D>,
 {
@@ -163,8 +167,8 @@ fn pieces_are_the_fields_of_the_serial_solver_in_3d() {
 fn a_rank_without_cells_has_an_empty_piece() {
     for lubrication in [Lubrication::None, Lubrication::Deficit] {
         let mut suspension = suspension::<2>(lubrication);
-        suspension.refinement = Refinement { coarsest: 3, surface: 3, ..suspension.refinement };
-        suspension.radii = vec![0.14, 0.13, 0.16];
+        suspension.suspension.refinement = Refinement { coarsest: 3, surface: 3, band: 2.0 };
+        suspension.suspension.radii = vec![0.14, 0.13, 0.16];
         let pieces = shown(&suspension, 70);
         assert_eq!(pieces.iter().map(|piece| piece.cells.len() / 9).sum::<usize>(), 64);
         assert!(pieces.iter().any(|piece| piece.points.is_empty()));
@@ -174,7 +178,8 @@ fn a_rank_without_cells_has_an_empty_piece() {
 /// There is nothing to show of a flow that failed.
 #[test]
 fn a_flow_that_failed_has_no_fields() {
-    let suspension = Suspension { radii: vec![0.001; 3], ..suspension::<2>(Lubrication::Deficit) };
+    let mut suspension = suspension::<2>(Lubrication::Deficit);
+    suspension.suspension.radii = vec![0.001; 3];
     let found = Threads::run(2, |ranks| {
         if ranks.rank() > 0 {
             let mut seen = Vec::new();

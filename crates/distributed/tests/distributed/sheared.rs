@@ -2,13 +2,13 @@
 
 use std::rc::Rc;
 
-use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, Suspension};
+use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Hydrodynamics, MeanStress};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
-    Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
+    Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, Suspension,
 };
 
 use crate::support;
@@ -24,7 +24,7 @@ const RATE: f64 = 0.8;
 const PARTICLES: [([f64; 3], f64); 3] =
     [([0.3, 0.4, 0.5], 0.16), ([0.62, 0.5, 0.43], 0.17), ([0.4, 0.95, 0.55], 0.18)];
 
-fn suspension<const D: usize>(level: u8) -> Suspension<D>
+fn suspension<const D: usize>(level: u8) -> SharedSuspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -32,12 +32,13 @@ where
     (wrenches[1].force[1], wrenches[2].torque[0]) = (0.3, 0.02);
     let flow = BoxFlow { viscosity: 1.0, tolerance: TOLERANCE, max_iterations: 100 };
     let radii = PARTICLES.map(|particle| particle.1).to_vec();
-    Suspension {
+    let suspension = Suspension {
         periods: [Some(1.0); D],
         wrenches,
         shear_rate: RATE,
-        ..support::suspension(flow, Refinement::to_level(level), Lubrication::Deficit, radii)
-    }
+        ..support::suspension(Refinement::to_level(level), Lubrication::Deficit, radii)
+    };
+    SharedSuspension { flow, suspension }
 }
 
 /// The particles, carried by the shear from [`STRAIN`] to another strain.
@@ -60,27 +61,31 @@ fn strains() -> impl Iterator<Item = f64> {
 }
 
 /// Flows of the serial solver, relative to the shear, each from those before it.
-fn serial<const D: usize>(suspension: &Suspension<D>) -> Vec<Flow<D>>
+fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Flow<D>>
 where
     Dim<D>: Space<D>,
 {
     let solver = SolverKind::Multigrid;
-    let formulation = Formulation::Unfitted { lubrication: suspension.lubrication };
+    let formulation = Formulation::Unfitted { lubrication: suspension.suspension.lubrication };
     let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: TOLERANCE };
     let mut solver = FlowSolver::<D>::new(params).unwrap();
     strains().map(|strain| serial_flow(suspension, &mut solver, strain)).collect()
 }
 
-fn serial_flow<const D: usize>(suspension: &Suspension<D>, solver: &mut FlowSolver<D>, strain: f64) -> Flow<D>
+fn serial_flow<const D: usize>(
+    suspension: &SharedSuspension<D>,
+    solver: &mut FlowSolver<D>,
+    strain: f64,
+) -> Flow<D>
 where
     Dim<D>: Space<D>,
 {
-    let lattice = Lattice::new(suspension.periods).tilted(strain);
+    let lattice = Lattice::new(suspension.suspension.periods).tilted(strain);
     let ball =
         |particle: &Particle<D>| Ball::in_space(&particle.pose.position, particle.radius, &lattice, 0.0);
     let balls: Vec<Ball<D>> = particles(strain).iter().map(ball).collect();
-    let Suspension { domain, roots, refinement, wrenches, .. } = suspension;
-    let mesh = refinement.mesh(*domain, *roots, [true; D], &balls).unwrap();
+    let Suspension { wrenches, .. } = &suspension.suspension;
+    let mesh = suspension.suspension.mesh(&balls).unwrap();
     let mut gradient = Matrix::<D>::zeros();
     gradient[(0, 1)] = RATE;
     let back: Vector<D> = -wrenches.iter().map(|wrench| wrench.force).sum::<Vector<D>>();
@@ -104,7 +109,7 @@ where
 }
 
 /// Flows by so many ranks.
-fn shared<const D: usize>(suspension: &Suspension<D>, ranks: usize) -> Vec<Found<D>>
+fn shared<const D: usize>(suspension: &SharedSuspension<D>, ranks: usize) -> Vec<Found<D>>
 where
     Dim<D>: Space<D>,
 {
@@ -229,7 +234,8 @@ fn pieces_of_something_else_are_refused() {
         assert_eq!(memory.saved(), [], "nothing was to be kept");
         flow.checkpoint().unwrap();
         let saved = memory.saved();
-        let fewer = Suspension { radii: vec![0.1; 2], ..suspension.clone() };
+        let mut fewer = suspension.clone();
+        fewer.suspension.radii = vec![0.1; 2];
         let changed = |key: &str, value: serde_json::Value| {
             let mut numbers = serde_json::to_value(&saved).unwrap();
             numbers[0][key] = value;

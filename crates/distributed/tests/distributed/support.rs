@@ -1,14 +1,13 @@
 //! Set-ups and measurements that the tests share.
 
-use gluey_distributed::{BoxFlow, MyFlow, Suspension};
+use gluey_distributed::MyFlow;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, LevelSet};
-use gluey_stokes::{Lubrication, Refinement};
+use gluey_stokes::{Lubrication, Refinement, Suspension};
 
 /// Free particles that nothing but the shear drives, in the unit box, which is periodic in the first
 /// direction.
 pub fn suspension<const D: usize>(
-    flow: BoxFlow,
     refinement: Refinement,
     lubrication: Lubrication,
     radii: Vec<f64>,
@@ -17,7 +16,6 @@ where
     Dim<D>: Space<D>,
 {
     Suspension {
-        flow,
         domain: Aabb::unit(),
         roots: [1; D],
         periods: std::array::from_fn(|d| (d == 0).then_some(1.0)),

@@ -2,13 +2,14 @@
 //! the same number of ranks.
 
 use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
-use gluey_distributed::{BoxFlow, SharedHydrodynamics, Suspension};
+use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
 use gluey_parallel::{Communicator, Threads};
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
+    Suspension,
 };
 
 use crate::support;
@@ -46,7 +47,7 @@ const TRIO: Meeting = Meeting {
 fn suspension<const D: usize>(
     Meeting { places, radius, surface, tolerance, .. }: Meeting,
     lubrication: Lubrication,
-) -> Suspension<D>
+) -> SharedSuspension<D>
 where
     Dim<D>: Space<D>,
 {
@@ -55,7 +56,8 @@ where
     let flow = BoxFlow { viscosity: 1.0, tolerance, max_iterations: 500 };
     let refinement = Refinement { coarsest: surface - 1, surface, band: 2.0 };
     let radii = vec![radius; places.len()];
-    Suspension { wrenches, ..support::suspension(flow, refinement, lubrication, radii) }
+    let free = support::suspension(refinement, lubrication, radii);
+    SharedSuspension { flow, suspension: Suspension { wrenches, ..free } }
 }
 
 fn particles<const D: usize>(Meeting { places, radius, .. }: Meeting) -> Vec<Particle<D>>
@@ -108,15 +110,15 @@ struct Serial<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    suspension: &'a Suspension<D>,
+    suspension: &'a SharedSuspension<D>,
     solver: FlowSolver<D>,
 }
 
-fn solver<const D: usize>(suspension: &Suspension<D>) -> FlowSolver<D>
+fn solver<const D: usize>(suspension: &SharedSuspension<D>) -> FlowSolver<D>
 where
     Dim<D>: Space<D>,
 {
-    let Suspension { lubrication, flow, .. } = suspension;
+    let SharedSuspension { flow, suspension: Suspension { lubrication, .. } } = suspension;
     let formulation = Formulation::Unfitted { lubrication: *lubrication };
     let solver = SolverKind::Multigrid;
     let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: flow.tolerance };
@@ -127,7 +129,7 @@ impl<'a, const D: usize> Serial<'a, D>
 where
     Dim<D>: Space<D>,
 {
-    fn new(suspension: &'a Suspension<D>) -> Self {
+    fn new(suspension: &'a SharedSuspension<D>) -> Self {
         Self { suspension, solver: solver(suspension) }
     }
 }
@@ -139,10 +141,10 @@ where
     type Error = StokesError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, StokesError> {
-        let Suspension { domain, roots, periods, refinement, wrenches, .. } = self.suspension;
+        let Suspension { periods, wrenches, .. } = &self.suspension.suspension;
         let ball = |particle: &Particle<D>| Ball::periodic(particle.pose.position, particle.radius, *periods);
         let balls: Vec<Ball<D>> = configuration.particles.iter().map(ball).collect();
-        let mesh = refinement.mesh(*domain, *roots, periods.map(|p| p.is_some()), &balls)?;
+        let mesh = self.suspension.suspension.mesh(&balls)?;
         let shear = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 });
         let conditions = Conditions::boundary(&shear).with_wrenches(wrenches);
         let flow = self.solver.solve_under(mesh, &balls, &conditions)?;
@@ -220,7 +222,8 @@ fn ranks_take_particles_where_the_serial_solver_does_in_3d() {
 /// The others end with rank zero, whatever ends it.
 #[test]
 fn followers_end_when_the_leader_fails() {
-    let suspension = Suspension { radii: vec![0.001; 2], ..suspension::<2>(PAIR, Lubrication::Deficit) };
+    let mut suspension = suspension::<2>(PAIR, Lubrication::Deficit);
+    suspension.suspension.radii = vec![0.001; 2];
     let errors = Threads::run(3, |ranks| {
         if ranks.rank() > 0 {
             suspension.follow(ranks);

@@ -1,7 +1,7 @@
 //! Why the finite-element flow of a case fails.
 
 use gluey_fem::MeshError;
-use gluey_stokes::{StokesError, WarmStartError};
+use gluey_stokes::{NotDriven, StokesError, WarmStartError};
 use thiserror::Error;
 
 /// Why the finite-element flow failed.
@@ -30,16 +30,8 @@ pub enum FlowError {
         present: usize,
     },
     /// What drives a suspension is less than what particles that repel each other need at rest.
-    #[error(
-        "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
-         {at_rest:.6}; take a larger stress or less repulsion"
-    )]
-    NotDriven {
-        /// The stress that is given.
-        stress: f64,
-        /// That at rest.
-        at_rest: f64,
-    },
+    #[error(transparent)]
+    NotDriven(#[from] NotDriven),
     /// A flow to start from that is of another mesh.
     #[error(transparent)]
     WarmStart(#[from] WarmStartError),

@@ -10,10 +10,11 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Dim, Space};
+use gluey_motion::Configuration;
 use gluey_stokes::{Discretisation, Refinement};
 
-use super::{FlowError, StokesFlow, refinement, stokes_flow};
+use super::{FlowError, refinement, suspension};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 
 /// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
@@ -102,24 +103,10 @@ fn counts<const D: usize>(case: &Case) -> Result<(usize, usize), FlowError>
 where
     Dim<D>: Space<D>,
 {
-    let flow = stokes_flow::<D>(case)?;
-    let centers = case.particles.iter().map(|particle| Vector::<D>::from_fn(|d, _| particle.position[d]));
-    let discretisation = Discretisation::new(flow.mesh(&flow.balls(centers))?);
+    let suspension = suspension::<D>(case)?;
+    let balls = suspension.balls(&Configuration::at(0.0, &case.start()));
+    let discretisation = Discretisation::new(suspension.mesh(&balls)?);
     Ok((discretisation.mesh.cell_count(), discretisation.dof_count()))
-}
-
-impl<const D: usize> StokesFlow<D>
-where
-    Dim<D>: Space<D>,
-{
-    /// Number of cells of the mesh around `particles`, which is built for it.
-    ///
-    /// # Errors
-    /// [`FlowError`] if the box cannot be meshed.
-    pub fn cell_count(&self, particles: &[Particle<D>]) -> Result<usize, FlowError> {
-        let balls = self.balls(particles.iter().map(|particle| particle.pose.position));
-        Ok(self.mesh(&balls)?.cell_count())
-    }
 }
 
 /// The tree of a case as far as it matters here.

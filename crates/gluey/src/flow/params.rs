@@ -1,16 +1,37 @@
 //! Mesh and parameters of the flow of a case.
 
-use gluey_geom::Aabb;
-use gluey_stokes::{FlowParams, Refinement, SolverKind};
+use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_stokes::{FlowParams, Refinement, SolverKind, Suspension};
 
 use super::error::FlowError;
 use crate::case::{Case, Formulation, Lubrication, Solver};
 
-/// The root cells along each axis of a box, and the level of the surfaces.
-pub(crate) fn tree<const D: usize>(case: &Case, domain: &Aabb<D>) -> Result<([u32; D], f64), FlowError> {
+/// The particles of a checked case in their flow.
+///
+/// # Errors
+/// [`FlowError::Box`] if it has no mesh.
+pub(crate) fn suspension<const D: usize>(case: &Case) -> Result<Suspension<D>, FlowError>
+where
+    Dim<D>: Space<D>,
+{
+    let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
+    let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
     let roots = case.root_cells().and_then(|roots| roots.try_into().ok());
     let uneven = || FlowError::Box { extent: domain.extent().iter().copied().collect() };
-    roots.zip(case.surface_level()).ok_or_else(uneven)
+    let (roots, level) = roots.zip(case.surface_level()).ok_or_else(uneven)?;
+    Ok(Suspension {
+        domain,
+        roots,
+        periods: std::array::from_fn(|axis| case.period(axis)),
+        refinement: refinement(case, level),
+        lubrication: lubrication(case),
+        radii: case.particles.iter().map(|particle| particle.radius).collect(),
+        wrenches: case.wrenches(),
+        given: case.given_twists(),
+        force_density: case.force_density(),
+        shear_rate: case.shear_rate,
+        shear_stress: case.shear_stress,
+    })
 }
 
 /// Refinement of the mesh of a checked case, whose surfaces are at `level`.
@@ -40,7 +61,7 @@ pub(crate) fn flow_params<const D: usize>(case: &Case) -> FlowParams {
 }
 
 /// Treatment of films that are too thin for the mesh.
-pub(crate) fn lubrication(case: &Case) -> gluey_stokes::Lubrication {
+fn lubrication(case: &Case) -> gluey_stokes::Lubrication {
     match case.lubrication() {
         Lubrication::Deficit => gluey_stokes::Lubrication::Deficit,
         Lubrication::None => gluey_stokes::Lubrication::None,

@@ -1,6 +1,7 @@
 //! Several flows around the particles of a case where they are at time 0.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Space};
+use gluey_motion::Configuration;
 use gluey_stokes::Prepared;
 
 use super::{FlowError, stokes_flow};
@@ -15,8 +16,7 @@ where
     Dim<D>: Space<D>,
 {
     let flow = stokes_flow::<D>(case)?;
-    let centers = case.particles.iter().map(|particle| Vector::<D>::from_fn(|d, _| particle.position[d]));
-    let balls = flow.balls(centers);
-    let mesh = flow.mesh(&balls)?;
+    let balls = flow.suspension.balls(&Configuration::at(0.0, &case.start()));
+    let mesh = flow.suspension.mesh(&balls)?;
     Ok(flow.solver.into_prepared(mesh, &balls)?)
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gluey_distributed::{Memory, SavedPiece, Suspension};
+use gluey_distributed::{Memory, SavedPiece, SharedSuspension};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
@@ -38,7 +38,7 @@ pub(super) fn write(
 /// On rank zero why it failed, wherever it did. On other ranks if it failed on any.
 pub(super) fn restore<const D: usize>(
     (case, checkpoint): (&Case, &Path),
-    suspension: &Suspension<D>,
+    suspension: &SharedSuspension<D>,
     ranks: &Ranks,
     memory: &Memory<D>,
 ) -> Result<(), CheckpointError>

@@ -2,8 +2,8 @@
 
 use std::rc::Rc;
 
-use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, Suspension};
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, SharedSuspension};
+use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
 use super::contacts::{self, Contacts};
@@ -11,7 +11,7 @@ use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
 use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, leftovers, logged, occupied};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
-use crate::flow::{FlowError, lubrication, refinement, tree};
+use crate::flow::suspension;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::{Sharing, available};
 use crate::progress::Progress;
@@ -47,6 +47,8 @@ where
     Dim<D>: Space<D>,
 {
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
+    let flow = BoxFlow { viscosity: 1.0, tolerance: case.flow.tolerance, max_iterations: MOST_ITERATIONS };
+    let suspension = SharedSuspension { flow, suspension };
     let memory = Rc::new(Memory::default());
     if let Some(checkpoint) = &options.resume {
         flow_pieces::restore((case, checkpoint), &suspension, ranks, &memory)?;
@@ -93,29 +95,4 @@ fn check(case: &Case) -> Result<(), RunError> {
         Some((_, what)) => Err(RunError::NotShared { what }),
         None => Ok(()),
     }
-}
-
-/// The flow of a checked case.
-fn suspension<const D: usize>(case: &Case) -> Result<Suspension<D>, FlowError>
-where
-    Dim<D>: Space<D>,
-{
-    let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
-    let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
-    let (roots, level) = tree(case, &domain)?;
-    let tolerance = case.flow.tolerance;
-    Ok(Suspension {
-        flow: BoxFlow { viscosity: 1.0, tolerance, max_iterations: MOST_ITERATIONS },
-        domain,
-        roots,
-        periods: std::array::from_fn(|axis| case.period(axis)),
-        refinement: refinement(case, level),
-        lubrication: lubrication(case),
-        radii: case.particles.iter().map(|particle| particle.radius).collect(),
-        wrenches: case.wrenches(),
-        given: case.given_twists(),
-        force_density: case.force_density(),
-        shear_rate: case.shear_rate,
-        shear_stress: case.shear_stress,
-    })
 }

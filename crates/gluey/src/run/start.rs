@@ -1,6 +1,6 @@
 //! The simulation that a case is.
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Dim, Space};
 
 use super::contacts::Contacts;
 use crate::case::Case;
@@ -17,7 +17,7 @@ where
     H: gluey_motion::Hydrodynamics<D>,
 {
     let (scheme, dt) = (case.time.scheme, case.time.step);
-    let mut simulation = Simulation::new(particles(case), scheme, dt, hydrodynamics, contact);
+    let mut simulation = Simulation::new(case.start(), scheme, dt, hydrodynamics, contact);
     simulation = simulation.halving(case.time.halvings);
     if case.has_forces() {
         simulation = simulation.under_forces();
@@ -34,13 +34,4 @@ where
         stress_every: case.stress_every(),
     });
     if case.shear_stress.is_some() { simulation.at_given_stress() } else { simulation }
-}
-
-/// The particles of a checked case.
-fn particles<const D: usize>(case: &Case) -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
-    let position = |coordinates: &[f64]| Vector::<D>::from_fn(|axis, _| coordinates[axis]);
-    case.particles.iter().map(|spec| Particle::new(position(&spec.position), spec.radius)).collect()
 }

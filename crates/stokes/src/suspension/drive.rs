@@ -1,0 +1,184 @@
+//! What drives the flow of a configuration.
+//!
+//! Where the stress is given, the rate follows. The mean shear stress is `r A + B`, with `A` of the flow at
+//! the rate one and `B` of the flow that forces between particles make at rest, their own share included. Both
+//! are solved for on one mesh, so the rate `r = (sigma - B) / A` is exact. Velocities count by the strain,
+//! `u_1 + u_2 / r`, as at the rate one. Contacts scale with the flow; their stress is known after the step
+//! only and is no part of what is given.
+
+use gluey_fem::TreeMesh;
+use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_levelset::Ball;
+use gluey_motion::Configuration;
+
+use super::Suspension;
+use crate::error::StokesError;
+use crate::flow::{Conditions, Flow, FlowSolver, GivenOf, Stress};
+
+/// What drives the flow of a configuration.
+pub struct Drive<'a, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// All, but for [`Drive::pushes`].
+    pub conditions: Conditions<'a, D>,
+    /// Forces and torques whose flow at rest has a share in the stress that is given; elsewhere no entries.
+    pub pushes: &'a [Wrench<D>],
+    control: Option<StressControl>,
+}
+
+/// A shear stress that is given.
+struct StressControl {
+    stress: f64,
+    /// The shear rate one, or minus one.
+    direction: f64,
+    viscosity: f64,
+    volume: f64,
+    /// Shear stress of the forces between particles themselves.
+    of_pairs: f64,
+}
+
+/// The forces between particles drive them faster than the stress that is given.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "shear_stress = {stress}: the suspension would flow backwards, for the stress of its repulsion at rest is \
+     {at_rest:.6}; take a larger stress or less repulsion"
+)]
+pub struct NotDriven {
+    /// The stress that is given.
+    pub stress: f64,
+    /// That at rest.
+    pub at_rest: f64,
+}
+
+impl<const D: usize> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Hands `solve` what drives the flow of a configuration in a fluid of this viscosity.
+    ///
+    /// In a box without walls the flow is relative to the undisturbed one. Where all particles are free there,
+    /// forces that always act on them are balanced by a uniform one on all of the box, which is a mean
+    /// gradient of the pressure; those of the configuration are between particles, and their sum is zero.
+    /// Where some are held, these carry all of it; the mean gradient is the one given, or stops the mean flow.
+    pub fn driven<T>(
+        &self,
+        configuration: &Configuration<'_, D>,
+        viscosity: f64,
+        solve: impl FnOnce(&Drive<'_, D>) -> T,
+    ) -> T {
+        let (undisturbed, is_sheared) = (self.undisturbed(configuration.shear_factor), self.is_sheared());
+        let acting = self.acting(configuration);
+        let given = self.given_bodies(configuration, &acting);
+        let control = self.control(configuration, viscosity);
+        let wall = |x: &Vector<D>| undisturbed.velocity(x);
+        let conditions = match is_sheared {
+            true => Conditions::in_linear_flow(&undisturbed.gradient),
+            false => Conditions::boundary(&wall),
+        };
+        let conditions = match given[..] {
+            [] if control.is_some() => conditions,
+            [] => conditions.with_wrenches(&acting),
+            _ if is_sheared && self.force_density.is_none() => {
+                conditions.with_bodies(&given).without_mean_flow()
+            }
+            _ => conditions.with_bodies(&given),
+        };
+        let density = self.density();
+        let uniform = |_: &Vector<D>| density;
+        let conditions =
+            if density.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
+        let stress = is_sheared && given.is_empty() && (configuration.with_stress || control.is_some());
+        let pushes = match control {
+            Some(_) if acting.iter().any(|wrench| wrench.force.amax() > 0.0) => &acting[..],
+            _ => &[],
+        };
+        solve(&Drive { conditions: Conditions { stress, ..conditions }, pushes, control })
+    }
+
+    /// Force per unit of volume on fluid and particles.
+    fn density(&self) -> Vector<D> {
+        if self.is_sheared() && self.given.is_empty() {
+            let total: Vector<D> = self.wrenches.iter().map(|wrench| wrench.force).sum();
+            return -total / self.domain.extent().product();
+        }
+        self.force_density.unwrap_or_else(Vector::zeros)
+    }
+
+    /// What is known of each particle; no entries where all are free.
+    fn given_bodies(&self, configuration: &Configuration<'_, D>, acting: &[Wrench<D>]) -> Vec<GivenOf<D>> {
+        let (factor, is_sheared) = (configuration.shear_factor, self.is_sheared());
+        let undisturbed = self.undisturbed(factor);
+        let place = |index: usize| &configuration.particles[index].pose.position;
+        let of_body = |index: usize| match self.given_twist(index, factor) {
+            Some(twist) if is_sheared => GivenOf::Twist(twist - undisturbed.twist(place(index))),
+            Some(twist) => GivenOf::Twist(twist),
+            None => GivenOf::Wrench(acting.get(index).copied().unwrap_or_default()),
+        };
+        (0..self.given.len()).map(of_body).collect()
+    }
+
+    fn control(&self, configuration: &Configuration<'_, D>, viscosity: f64) -> Option<StressControl> {
+        let stress = self.shear_stress.filter(|_| self.is_sheared())?;
+        Some(StressControl {
+            stress,
+            direction: self.shear_rate * configuration.shear_factor,
+            viscosity,
+            volume: self.domain.extent().product(),
+            of_pairs: configuration.pair_stress[(0, 1)],
+        })
+    }
+}
+
+impl<const D: usize> Drive<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The shear rate over that by which velocities count, from the stresses of the flow under the conditions
+    /// and of that which the pushes make at rest, if there are any. Positive also while the shear is reversed;
+    /// one where no stress is given.
+    ///
+    /// # Errors
+    /// [`NotDriven`] if it is negative.
+    pub fn rate(&self, driven: Option<&Stress<D>>, pushed: Option<&Stress<D>>) -> Result<f64, NotDriven> {
+        let Some(control) = &self.control else { return Ok(1.0) };
+        let StressControl { stress, direction, viscosity, volume, of_pairs } = *control;
+        let of_bodies = |stress: Option<&Stress<D>>| stress.map_or(0.0, |it| it.of_bodies(volume)[(0, 1)]);
+        let at_rate_one = viscosity * direction + of_bodies(driven);
+        if self.pushes.is_empty() {
+            return Ok(direction * stress / at_rate_one);
+        }
+        let at_rest = of_pairs + of_bodies(pushed);
+        let rate = (direction * stress - at_rest) / at_rate_one;
+        match rate > 0.0 {
+            true => Ok(rate),
+            false => Err(NotDriven { stress, at_rest: direction * at_rest }),
+        }
+    }
+}
+
+impl<const D: usize> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// The flow that this drives, and [`Drive::rate`].
+    ///
+    /// # Errors
+    /// Those of [`FlowSolver::solve_combined`], and [`NotDriven`].
+    pub fn solve_driven<E: From<StokesError> + From<NotDriven>>(
+        &mut self,
+        mesh: TreeMesh<D>,
+        bodies: &[Ball<D>],
+        drive: &Drive<'_, D>,
+    ) -> Result<(Flow<D>, f64), E> {
+        let mut found = None;
+        let inverse_rate = |driven: &Flow<D>, pushed: &Flow<D>| {
+            let rate = drive.rate(driven.stress.as_ref(), pushed.stress.as_ref())?;
+            found = Some(rate);
+            Ok::<_, E>(rate.recip())
+        };
+        let flow = self.solve_combined(mesh, bodies, &drive.conditions, drive.pushes, inverse_rate)?;
+        let rate = found.map_or_else(|| drive.rate(flow.stress.as_ref(), None), Ok)?;
+        Ok((flow, rate))
+    }
+}

@@ -1,0 +1,155 @@
+//! What a flow predicts of the particles of a configuration.
+
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, Prediction};
+
+use super::Suspension;
+use crate::film::{self, Lubrication};
+use crate::flow::{Flow, Stress};
+
+/// What a flow says of the bodies in it, see [`Flow`].
+#[derive(Clone, Copy, Debug)]
+pub struct FlowOfBodies<'f, const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    /// Velocity and spin of each body.
+    pub twists: &'f [Twist<D>],
+    /// Force and torque on each by something other than the fluid.
+    pub wrenches: &'f [Wrench<D>],
+    /// Mean velocity of fluid and bodies, where some are held.
+    pub mean_velocity: Option<Vector<D>>,
+    /// The uniform force that stops the mean flow.
+    pub mean_force: Vector<D>,
+    /// The stress, where it was wanted.
+    pub stress: Option<&'f Stress<D>>,
+}
+
+impl<'f, const D: usize> From<&'f Flow<D>> for FlowOfBodies<'f, D>
+where
+    Dim<D>: Space<D>,
+{
+    fn from(flow: &'f Flow<D>) -> Self {
+        let Flow { twists, wrenches, mean_velocity, mean_force, stress, .. } = flow;
+        let (mean_velocity, mean_force, stress) = (*mean_velocity, *mean_force, stress.as_ref());
+        Self { twists, wrenches, mean_velocity, mean_force, stress }
+    }
+}
+
+impl<const D: usize> Suspension<D>
+where
+    Dim<D>: Space<D>,
+{
+    /// What a flow in a fluid of this viscosity predicts, with the rate that its [`super::Drive`] has; the
+    /// statistics are left to the solver.
+    pub fn prediction(
+        &self,
+        configuration: &Configuration<'_, D>,
+        viscosity: f64,
+        flow: FlowOfBodies<'_, D>,
+        rate: f64,
+    ) -> Prediction<D> {
+        Prediction {
+            rate,
+            stress: self.mean_stress(configuration, viscosity, &flow, rate),
+            holding: self.holding(configuration, &flow),
+            ..Prediction::of(self.twists_in_space(configuration, &flow))
+        }
+    }
+
+    fn twists_in_space(
+        &self,
+        configuration: &Configuration<'_, D>,
+        flow: &FlowOfBodies<'_, D>,
+    ) -> Vec<Twist<D>> {
+        let undisturbed = self.undisturbed(configuration.shear_factor);
+        let in_space = |index: usize| match self.is_sheared() {
+            true => flow.twists[index] + undisturbed.twist(&configuration.particles[index].pose.position),
+            false => flow.twists[index],
+        };
+        // Those that are given without the rounding of what the flow is relative to.
+        let given = |index: usize| self.given_twist(index, configuration.shear_factor);
+        (0..flow.twists.len()).map(|index| given(index).unwrap_or_else(|| in_space(index))).collect()
+    }
+
+    /// The mean stress, where it is wanted.
+    fn mean_stress(
+        &self,
+        configuration: &Configuration<'_, D>,
+        viscosity: f64,
+        flow: &FlowOfBodies<'_, D>,
+        rate: f64,
+    ) -> Option<MeanStress<D>> {
+        let stress = flow.stress.filter(|_| configuration.with_stress)?;
+        let volume = self.domain.extent().product();
+        let powers = self.wrenches.iter().zip(flow.twists).map(|(wrench, twist)| wrench.power(twist));
+        Some(MeanStress {
+            rate: self.shear_rate * configuration.shear_factor,
+            viscosity,
+            of_bodies: stress.of_bodies(volume),
+            of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
+            of_contacts: None,
+            of_repulsion: configuration.pair_stress / rate,
+            dissipation: stress.dissipation / volume,
+            work_of_forces: powers.sum::<f64>() / volume,
+        })
+    }
+
+    /// What holds the particles whose motions are given.
+    fn holding(
+        &self,
+        configuration: &Configuration<'_, D>,
+        flow: &FlowOfBodies<'_, D>,
+    ) -> Option<Holding<D>> {
+        let acting = self.acting(configuration);
+        let holds = |index: usize| flow.wrenches[index] - acting.get(index).copied().unwrap_or_default();
+        let held = (0..self.given.len()).filter(|&index| self.given[index].is_some());
+        Some(Holding {
+            mean_velocity: flow.mean_velocity?,
+            force_density: flow.mean_force + self.force_density.unwrap_or_else(Vector::zeros),
+            wrenches: held.map(|index| (index, holds(index))).collect(),
+        })
+    }
+
+    /// The films of a configuration that lubrication keeps open, with gaps up to `reach`.
+    pub fn films(&self, configuration: &Configuration<'_, D>, reach: f64) -> Vec<Film<D>> {
+        if self.lubrication != Lubrication::Deficit {
+            return Vec::new();
+        }
+        let mut films = film::films(&self.balls(configuration), &self.domain, reach);
+        films.retain(|film| !film.is_across_flow());
+        let is_held = |body: usize| self.given.get(body).is_some_and(Option::is_some);
+        let film = |film: film::Film<D>| Film {
+            first: film.body as usize,
+            second: film.side(1),
+            branch: film.branch(),
+            slide: self.slide(configuration, &film),
+            is_held: [0, 1].map(|side| film.side(side).is_some_and(is_held)),
+            gap: film.gap,
+            curvature_radius: film.curvature_radius(),
+        };
+        films.into_iter().map(film).collect()
+    }
+
+    /// Velocity of the image at a film beyond that of its particle.
+    fn slide(&self, configuration: &Configuration<'_, D>, film: &film::Film<D>) -> Vector<D> {
+        let mut slide = Vector::zeros();
+        if let (true, Some(second)) = (self.is_sheared(), film.side(1)) {
+            let y = |body: usize| configuration.particles[body].pose.position[1];
+            let direct = y(second) - y(film.body as usize);
+            slide[0] = self.shear_rate * configuration.shear_factor * (film.branch()[1] - direct);
+        }
+        slide
+    }
+
+    /// Fields on a mesh that is sheared so much, with the undisturbed flow and where they are in space.
+    pub fn in_space(&self, mut fields: Fields<D>, shear: f64, shear_factor: f64) -> Fields<D> {
+        let undisturbed = self.undisturbed(shear_factor);
+        let nodes = fields.points.iter_mut().zip(&mut fields.velocity).filter(|_| self.is_sheared());
+        for (point, velocity) in nodes {
+            point[0] += shear * (point[1] - self.domain.lower[1]);
+            *velocity += undisturbed.velocity(point);
+        }
+        fields
+    }
+}
