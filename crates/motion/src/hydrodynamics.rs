@@ -27,15 +27,15 @@ where
     pub particles: &'a [Particle<D>],
     /// Factor of the imposed shear rate: 1 as configured, -1 reversed.
     pub shear_factor: f64,
-    /// Shear strain of the periodic images, where these slide along each other: the image one period `H` up in
-    /// `y` is `strain H` further along `x`. It grows without bound.
+    /// Shear strain of the periodic images, where these slide along each other: the image one period `H` up
+    /// in `y` is `strain H` further along `x`. It grows without bound.
     pub strain: f64,
     /// Whether a stress is wanted.
     pub with_stress: bool,
     /// Forces and torques on the particles, beside those that the model has from elsewhere; empty for none.
     pub wrenches: &'a [Wrench<D>],
-    /// Stress of the forces between particles that are among these: minus the mean product of forces and lines
-    /// between centres.
+    /// Stress of the forces between particles that are among these: minus the mean product of forces and
+    /// lines between centres.
     pub pair_stress: Matrix<D>,
 }
 
@@ -103,8 +103,8 @@ where
         false
     }
 
-    /// The films of a configuration that lubrication keeps open, with gaps up to `reach`, sorted by particles.
-    /// None where the model lets gaps close.
+    /// The films of a configuration that lubrication keeps open, with gaps up to `reach`, sorted by
+    /// particles. None where the model lets gaps close.
     fn films(&self, _configuration: &Configuration<'_, D>, _reach: f64) -> Vec<Film<D>> {
         Vec::new()
     }

@@ -49,8 +49,9 @@ impl Order {
     }
 }
 
-/// For rank zero between two flows: has the others, who [`SharedSuspension::follow_and_show`](super::SharedSuspension::follow_and_show), show the fields of
-/// the last one.
+/// For rank zero between two flows: has the others, who
+/// [`SharedSuspension::follow_and_show`](super::SharedSuspension::follow_and_show), show the fields of the
+/// last one.
 pub fn ask_for_fields(ranks: &Ranks, frame: FrameName) {
     Order::Show(frame).share(ranks);
 }

@@ -46,7 +46,8 @@ pub fn largest_difference<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, largest) / scale
 }
 
-/// Whether the fluid is at a point. In bodies velocities are polynomials that nothing holds but the tolerance.
+/// Whether the fluid is at a point. In bodies velocities are polynomials that nothing holds but the
+/// tolerance.
 pub fn is_in_fluid<const D: usize>(balls: &[Ball<D>], x: &Vector<D>) -> bool {
     balls.iter().all(|ball| ball.value(x) < 0.0)
 }

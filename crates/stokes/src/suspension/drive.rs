@@ -1,10 +1,10 @@
 //! What drives the flow of a configuration.
 //!
 //! Where the stress is given, the rate follows. The mean shear stress is `r A + B`, with `A` of the flow at
-//! the rate one and `B` of the flow that forces between particles make at rest, their own share included. Both
-//! are solved for on one mesh, so the rate `r = (sigma - B) / A` is exact. Velocities count by the strain,
-//! `u_1 + u_2 / r`, as at the rate one. Contacts scale with the flow; their stress is known after the step
-//! only and is no part of what is given.
+//! the rate one and `B` of the flow that forces between particles make at rest, their own share included.
+//! Both are solved for on one mesh, so the rate `r = (sigma - B) / A` is exact. Velocities count by the
+//! strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale with the flow; their stress is known after the
+//! step only and is no part of what is given.
 
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Vector, Wrench};
@@ -57,10 +57,11 @@ where
 {
     /// Hands `solve` what drives the flow of a configuration in a fluid of this viscosity.
     ///
-    /// In a box without walls the flow is relative to the undisturbed one. Where all particles are free there,
-    /// forces that always act on them are balanced by a uniform one on all of the box, which is a mean
+    /// In a box without walls the flow is relative to the undisturbed one. Where all particles are free
+    /// there, forces that always act on them are balanced by a uniform one on all of the box, which is a mean
     /// gradient of the pressure; those of the configuration are between particles, and their sum is zero.
-    /// Where some are held, these carry all of it; the mean gradient is the one given, or stops the mean flow.
+    /// Where some are held, these carry all of it; the mean gradient is the one given, or stops the mean
+    /// flow.
     pub fn driven<T>(
         &self,
         configuration: &Configuration<'_, D>,
@@ -135,8 +136,8 @@ where
     Dim<D>: Space<D>,
 {
     /// The shear rate over that by which velocities count, from the stresses of the flow under the conditions
-    /// and of that which the pushes make at rest, if there are any. Positive also while the shear is reversed;
-    /// one where no stress is given.
+    /// and of that which the pushes make at rest, if there are any. Positive also while the shear is
+    /// reversed; one where no stress is given.
     ///
     /// # Errors
     /// [`NotDriven`] if it is negative.
