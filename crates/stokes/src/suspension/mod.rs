@@ -44,7 +44,9 @@ pub use prediction::FlowOfBodies;
 /// let solved = suspension.driven(&now, 1.0, |drive| solver.solve_driven(mesh, &balls, drive));
 /// let (flow, rate) = solved.map_err(|error: Box<dyn std::error::Error>| error)?;
 /// let prediction = suspension.prediction(&now, 1.0, (&flow).into(), rate);
-/// assert!((prediction.twists[0].velocity.x - 0.4).abs() < 0.02);
+/// // Here as of a flow between walls that move.
+/// let walls = |x: &Vector<2>| Vector::<2>::new(2.0 * (x[1] - 0.5), 0.0);
+/// assert_eq!(prediction.twists, solver.solve(suspension.mesh(&balls)?, &balls, &walls)?.twists);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
