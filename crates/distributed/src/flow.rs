@@ -1,16 +1,14 @@
 //! A flow in a box that ranks share.
 
-use gluey_fem::{Cuts, ImplicitTree};
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_linalg::{BadDiagonal, BlockError, KrylovError, SparseError, vector};
 use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Ranks, Traffic};
-use gluey_stokes::{Conditions, Lubrication, RaisedPenalties, StokesError, Stress};
+use gluey_stokes::{RaisedPenalties, StokesError, Stress};
 
 use crate::cells::MyCells;
 use crate::space::LevelSpace;
-use crate::surface::SurfaceBodies;
 
 /// A fluid, and how well its flow is to be known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,30 +202,6 @@ where
     /// Shear of the box: what stands at `x` in it is at `x + shear (y - y_lower) e_1` in space.
     pub fn shear(&self) -> f64 {
         self.cells.shear()
-    }
-}
-
-impl BoxFlow {
-    /// The flow with the velocity `walls` on the walls of the box. All ranks call this with the same tree and
-    /// cuts. The function is also taken for the undisturbed flow inside.
-    ///
-    /// # Errors
-    /// [`FlowError`], on all ranks; [`FlowError::NoWall`] in a box that is periodic in all directions.
-    pub fn solve<const D: usize>(
-        &self,
-        tree: &mut ImplicitTree<'_, D>,
-        cuts: &Cuts,
-        ranks: &Ranks,
-        walls: &dyn Fn(&Vector<D>) -> Vector<D>,
-    ) -> Result<MyFlow<D>, FlowError>
-    where
-        Dim<D>: Space<D>,
-    {
-        if tree.frame().periodic().into_iter().all(|is_periodic| is_periodic) {
-            return Err(FlowError::NoWall);
-        }
-        let none = SurfaceBodies { balls: &[], lubrication: Lubrication::None };
-        self.solve_around_surfaces(&none, tree, cuts, ranks, &Conditions::boundary(walls))
     }
 }
 

@@ -7,12 +7,12 @@ use gluey_parallel::Communicator;
 use gluey_stokes::part::FluidIntegrals;
 use gluey_stokes::{Given, Problem, Stress};
 
-use super::Setting;
+use super::context::SolveContext;
 use crate::agreement::agreed;
 use crate::bodies::rigid;
 use crate::flow::FlowError;
 
-impl<'a, const D: usize> Setting<'_, 'a, D>
+impl<'a, const D: usize> SolveContext<'_, 'a, D>
 where
     Dim<D>: Space<D>,
 {

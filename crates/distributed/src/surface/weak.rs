@@ -7,7 +7,8 @@ use gluey_stokes::part::WeakCell;
 use gluey_stokes::{Problem, RaisedPenalties};
 use rustc_hash::FxHashMap;
 
-use super::{Attempt, Setting};
+use super::attempt::Attempt;
+use super::context::SolveContext;
 
 /// A cell whose penalty is too small, as ranks tell each other: its key, the factor, a body and the share of
 /// energy that it takes.
@@ -22,7 +23,7 @@ pub(super) struct Before {
     pub iterations: usize,
 }
 
-impl<'a, const D: usize> Setting<'_, 'a, D>
+impl<'a, const D: usize> SolveContext<'_, 'a, D>
 where
     Dim<D>: Space<D>,
 {
