@@ -3,9 +3,8 @@
 use std::fs;
 
 use gluey::case::ParticleSpec;
-use gluey::flow::{MeshEstimate, stokes_flow};
+use gluey::flow::{MeshEstimate, MeshSize};
 use gluey::{Case, Formulation, RunError, RunOptions, Silent, run};
-use gluey_geom::{Dim, Particle, Space, Vector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -17,21 +16,11 @@ fn shipped() -> Vec<Case> {
     files.iter().map(|file| Case::load(file).unwrap_or_else(|error| panic!("{error}"))).collect()
 }
 
-fn cells<const D: usize>(case: &Case) -> usize
-where
-    Dim<D>: Space<D>,
-{
-    let particle =
-        |spec: &ParticleSpec| Particle::new(Vector::<D>::from_fn(|d, _| spec.position[d]), spec.radius);
-    let particles: Vec<_> = case.particles.iter().map(particle).collect();
-    let flow = stokes_flow::<D>(case).unwrap_or_else(|error| panic!("{error}"));
-    flow.cell_count(&particles).unwrap_or_else(|error| panic!("{error}"))
-}
-
 /// Cells there are over cells that were expected.
 fn ratio(case: &Case) -> Option<f64> {
     let expected = MeshEstimate::of(case)?.cell_count;
-    let built = if case.dimension == 2 { cells::<2>(case) } else { cells::<3>(case) };
+    let built = MeshSize::of(case).unwrap_or_else(|error| panic!("{error}"));
+    let built = built.expect("a mesh").cell_count;
     let ratio = built as f64 / expected;
     println!("{}, {}: {built} cells, {expected:.0} expected: {ratio:.2}", case.name, case.flow.formulation);
     Some(ratio)

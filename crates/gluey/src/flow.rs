@@ -11,7 +11,7 @@ mod prepared;
 
 use std::time::Instant;
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Fields, Film, FlowStatistics, Hydrodynamics, Prediction, ResumeError};
 use gluey_stokes::{
@@ -92,20 +92,6 @@ where
     let (suspension, params) = (suspension(case)?, flow_params::<D>(case));
     let solver = FlowSolver::new(params)?;
     Ok(StokesFlow { suspension, params, solver, last: None, places: Vec::new(), strain: 0.0 })
-}
-
-impl<const D: usize> StokesFlow<D>
-where
-    Dim<D>: Space<D>,
-{
-    /// Number of cells of the mesh around `particles`, which is built for it.
-    ///
-    /// # Errors
-    /// [`FlowError`] if the box cannot be meshed.
-    pub fn cell_count(&self, particles: &[Particle<D>]) -> Result<usize, FlowError> {
-        let balls = self.suspension.balls(&Configuration::at(0.0, particles));
-        Ok(self.suspension.mesh(&balls)?.cell_count())
-    }
 }
 
 impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>

@@ -14,7 +14,7 @@ use gluey_geom::{Dim, Space};
 use gluey_motion::Configuration;
 use gluey_stokes::{Discretisation, Refinement};
 
-use super::{FlowError, refinement, suspension};
+use super::{FlowError, refinement, stokes_flow};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 
 /// Unknowns per cell: nodes of velocities and pressures, hanging ones included. A uniform mesh has 9 and 25.
@@ -103,7 +103,7 @@ fn counts<const D: usize>(case: &Case) -> Result<(usize, usize), FlowError>
 where
     Dim<D>: Space<D>,
 {
-    let suspension = suspension::<D>(case)?;
+    let suspension = stokes_flow::<D>(case)?.suspension;
     let balls = suspension.balls(&Configuration::at(0.0, &case.start()));
     let discretisation = Discretisation::new(suspension.mesh(&balls)?);
     Ok((discretisation.mesh.cell_count(), discretisation.dof_count()))
