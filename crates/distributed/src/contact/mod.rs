@@ -142,7 +142,7 @@ where
         Self { ranks, memory: None, lead: Lead::new(contact), part, load, centers }
     }
 
-    /// The same with ranks that [`Suspension::follow`](crate::Suspension::follow), and the memory of the flow
+    /// The same with ranks that [follow](crate::SharedSuspension::follow), and the memory of the flow
     /// that they share.
     pub fn leading(contact: PairContact<D, WithFixed>, ranks: &'a Ranks, memory: Rc<Memory<D>>) -> Self {
         Self { memory: Some(memory), ..Self::new(contact, ranks) }

@@ -20,8 +20,8 @@ use crate::report::RunReport;
 /// Iterations after which a flow is given up.
 const MOST_ITERATIONS: usize = 500;
 
-/// Runs `case` like [`run`] with flow and contact that `ranks` share. All ranks call this; rank zero moves
-/// the particles, writes the results and returns a report.
+/// Runs `case` like [`super::run`] with flow and contact that `ranks` share. All ranks call this; rank zero
+/// moves the particles, writes the results and returns a report.
 pub fn run_shared(
     case: &Case,
     options: &RunOptions,
