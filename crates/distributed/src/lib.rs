@@ -37,7 +37,9 @@ mod contact;
 mod cuts;
 mod flow;
 mod levels;
+mod memory;
 mod moving;
+mod orders;
 mod space;
 mod surface;
 mod warm_start;
@@ -45,10 +47,9 @@ mod warm_start;
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError};
-pub use moving::{
-    Follower, FrameName, Memory, SharedHydrodynamics, SharedSuspension, SuspensionError, ask_for_fields,
-    ask_to_keep,
-};
+pub use memory::Memory;
+pub use moving::{Follower, SharedHydrodynamics, SharedSuspension, SuspensionError};
+pub use orders::{FrameName, ask_for_fields, ask_to_keep};
 pub use surface::SurfaceBodies;
 pub use warm_start::{PieceError, SavedPiece};
 

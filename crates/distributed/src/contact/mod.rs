@@ -17,7 +17,8 @@ use gluey_contact::{
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_parallel::{Communicator, Ranks};
 
-use crate::moving::{Memory, Order};
+use crate::memory::Memory;
+use crate::orders::Order;
 use messages::{Verdict, collect, deal};
 use partners::Sharers;
 use words::Outcome;

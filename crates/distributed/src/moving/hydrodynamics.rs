@@ -6,9 +6,11 @@ use gluey_geom::{Dim, Space};
 use gluey_motion::{Configuration, Fields, Film, FlowStatistics, Hydrodynamics, Prediction, ResumeError};
 use gluey_parallel::Ranks;
 
-use super::told::{Order, Told};
-use super::{Memory, SharedSuspension, SuspensionError};
+use super::step_input::StepInput;
+use super::suspension::{SharedSuspension, SuspensionError};
 use crate::flow::MyFlow;
+use crate::memory::Memory;
+use crate::orders::Order;
 
 /// The flow of a suspension as a model of how its particles move.
 pub struct SharedHydrodynamics<'a, const D: usize>
@@ -17,8 +19,8 @@ where
 {
     suspension: &'a SharedSuspension<D>,
     ranks: &'a Ranks,
-    told: Told<D>,
-    /// Whether others follow and are to be told of the end.
+    input: StepInput<D>,
+    /// Whether others follow and are to be input of the end.
     leads: bool,
     /// Of the last prediction, if it succeeded.
     last: Option<MyFlow<D>>,
@@ -32,8 +34,8 @@ where
 {
     /// For ranks that all make the same predictions.
     pub fn beside(suspension: &'a SharedSuspension<D>, ranks: &'a Ranks) -> Self {
-        let told = Told::new(&suspension.suspension);
-        Self { suspension, ranks, told, leads: false, last: None, memory: Rc::default() }
+        let input = StepInput::new(&suspension.suspension);
+        Self { suspension, ranks, input, leads: false, last: None, memory: Rc::default() }
     }
 
     /// For rank zero, while the others [`SharedSuspension::follow`].
@@ -74,14 +76,14 @@ where
     type Error = SuspensionError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, SuspensionError> {
-        let Self { suspension, ranks, told, memory, .. } = self;
-        *told = Told::of(&suspension.suspension, configuration);
+        let Self { suspension, ranks, input, memory, .. } = self;
+        *input = StepInput::of(&suspension.suspension, configuration);
         memory.is_sharing.set(true);
         Order::Predict.share(ranks);
-        told.share(ranks);
+        input.share(ranks);
         self.last = None;
         let start = std::time::Instant::now();
-        let found = suspension.solve_from(ranks, &told.configuration(), memory);
+        let found = suspension.solve_from(ranks, &input.configuration(), memory);
         memory.is_sharing.set(false);
         let (flow, prediction) = found?;
         let statistics = FlowStatistics {
@@ -124,6 +126,6 @@ where
 
     /// Those in the cells of this rank.
     fn fields(&self) -> Option<Fields<D>> {
-        self.last.as_ref().map(|flow| self.suspension.fields(flow, &self.told))
+        self.last.as_ref().map(|flow| self.suspension.fields(flow, &self.input))
     }
 }

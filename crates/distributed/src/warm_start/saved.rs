@@ -7,7 +7,8 @@ use gluey_geom::{Aabb, Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 use serde::{Deserialize, Serialize};
 
-use super::{KeptFilm, MOST, Piece, Small, WarmStart};
+use super::films::KeptFilm;
+use super::kept::{MOST, Piece, Small, WarmStart};
 use crate::bodies::rigid;
 
 /// The flows in the cells of one run in the order of cells, of how many runs, and what belongs to no mesh.

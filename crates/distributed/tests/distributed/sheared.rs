@@ -203,7 +203,7 @@ where
                 own.push(pieces[0].clone());
             }
             let memory = Rc::new(Memory::default());
-            memory.restore(&suspension, ranks, own).unwrap();
+            memory.restore(&suspension.suspension, ranks, own).unwrap();
             predict(&mut SharedHydrodynamics::beside(&suspension, ranks).remembering(memory), last)
         });
         let (before, after) = (&before[0].1, &after.unwrap()[0]);
@@ -239,11 +239,11 @@ fn pieces_of_something_else_are_refused() {
         let changed = |key: &str, value: serde_json::Value| {
             let mut numbers = serde_json::to_value(&saved).unwrap();
             numbers[0][key] = value;
-            memory.restore(&suspension, ranks, serde_json::from_value(numbers).unwrap())
+            memory.restore(&suspension.suspension, ranks, serde_json::from_value(numbers).unwrap())
         };
         [
-            memory.restore(&fewer, ranks, saved.clone()),
-            memory.restore(&suspension, ranks, Vec::new()),
+            memory.restore(&fewer.suspension, ranks, saved.clone()),
+            memory.restore(&suspension.suspension, ranks, Vec::new()),
             changed("firsts", [1, 0].into()),
             changed("levels", [9; 4].into()),
             changed("flows", serde_json::json!([[[0.5], [0.5]]])),

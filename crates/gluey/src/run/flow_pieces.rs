@@ -49,7 +49,7 @@ where
         let Some(pieces) = Checkpoint::<D>::read(case, checkpoint)?.pieces else { return Ok(()) };
         let saved = own_pieces(checkpoint, &pieces, ranks)?;
         let failed = |message| CheckpointError::Piece { path: checkpoint.to_owned(), message };
-        memory.restore(suspension, ranks, saved).map_err(|error| failed(error.to_string()))
+        memory.restore(&suspension.suspension, ranks, saved).map_err(|error| failed(error.to_string()))
     };
     agreed(checkpoint, ranks, read())
 }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
 use gluey_parallel::Ranks;
+use gluey_stokes::Suspension;
 
-use super::SharedSuspension;
 use crate::warm_start::{PieceError, SavedPiece, WarmStart};
 
 /// The flows that the next one starts from, as far as they are on this rank, and those that a checkpoint of
 /// the step before would have.
 pub struct Memory<const D: usize> {
-    pub(super) last: RefCell<Option<Arc<WarmStart<D>>>>,
+    pub(crate) last: RefCell<Option<Arc<WarmStart<D>>>>,
     remembered: RefCell<Option<Arc<WarmStart<D>>>>,
     /// Whether something that ranks share has begun and not ended.
     pub(crate) is_sharing: Cell<bool>,
@@ -29,7 +29,7 @@ where
     Dim<D>: Space<D>,
 {
     /// Keeps what the next flow starts from for a checkpoint.
-    pub(super) fn remember(&self) {
+    pub(crate) fn remember(&self) {
         self.remembered.replace(self.last.borrow().clone());
     }
 
@@ -51,11 +51,10 @@ where
     /// [`PieceError`] for pieces that do not belong to the suspension; nothing has changed then.
     pub fn restore(
         &self,
-        suspension: &SharedSuspension<D>,
+        suspension: &Suspension<D>,
         ranks: &Ranks,
         saved: Vec<SavedPiece>,
     ) -> Result<(), PieceError> {
-        let suspension = &suspension.suspension;
         let tree_box = (suspension.domain, suspension.roots, suspension.periodic());
         let restored = WarmStart::restored(tree_box, suspension.radii.len(), ranks, saved)?;
         self.last.replace(Some(Arc::new(restored)));

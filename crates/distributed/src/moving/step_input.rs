@@ -1,70 +1,13 @@
-//! What rank zero tells the others between two flows.
+//! The input of a step, which rank zero sends to the others.
 
 use gluey_geom::{Dim, Matrix, Particle, Space, Vector, Wrench};
 use gluey_motion::Configuration;
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::Suspension;
 
-/// A frame with the fields of the last flow that rank zero wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameName {
-    /// Which of several streams of frames it belongs to.
-    pub stream: u32,
-    /// Its step.
-    pub step: u32,
-}
-
-/// What rank zero wants of the others.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Order {
-    End,
-    Predict,
-    Show(FrameName),
-    Remember,
-    Keep(u64),
-    Contact,
-}
-
-impl Order {
-    /// What rank zero wants, on all ranks.
-    pub fn share(self, ranks: &Ranks) -> Self {
-        let mut numbers = match self {
-            Self::End => [0.0; 3],
-            Self::Predict => [1.0, 0.0, 0.0],
-            Self::Show(FrameName { stream, step }) => [2.0, f64::from(stream), f64::from(step)],
-            Self::Remember => [3.0, 0.0, 0.0],
-            Self::Contact => [5.0, 0.0, 0.0],
-            Self::Keep(name) => [4.0, (name >> 32) as f64, (name & u64::from(u32::MAX)) as f64],
-        };
-        ranks.share(&mut numbers);
-        let [order, first, second] = numbers.map(|number| number as u32);
-        match order {
-            0 => Self::End,
-            1 => Self::Predict,
-            2 => Self::Show(FrameName { stream: first, step: second }),
-            3 => Self::Remember,
-            5 => Self::Contact,
-            _ => Self::Keep(u64::from(first) << 32 | u64::from(second)),
-        }
-    }
-}
-
-/// For rank zero between two flows: has the others, who
-/// [`SharedSuspension::follow_and_show`](super::SharedSuspension::follow_and_show), show the fields of the
-/// last one.
-pub fn ask_for_fields(ranks: &Ranks, frame: FrameName) {
-    Order::Show(frame).share(ranks);
-}
-
-/// For rank zero between two flows: has the others keep, under a name, what the flow after the step that was
-/// checkpointed last starts from.
-pub fn ask_to_keep(ranks: &Ranks, name: u64) {
-    Order::Keep(name).share(ranks);
-}
-
-/// What rank zero tells the others: a [`Configuration`], in numbers of which all know how many there are.
+/// The input of a step: a [`Configuration`], in numbers of which all ranks know how many there are.
 #[derive(Clone, Debug)]
-pub(super) struct Told<const D: usize>
+pub struct StepInput<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -76,7 +19,7 @@ where
     pair_stress: Matrix<D>,
 }
 
-impl<const D: usize> Told<D>
+impl<const D: usize> StepInput<D>
 where
     Dim<D>: Space<D>,
 {
@@ -108,8 +51,8 @@ where
             numbers.extend(wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)));
         }
         ranks.share(&mut numbers);
-        let mut told = numbers.into_iter();
-        let mut next = || told.next().unwrap_or_default();
+        let mut said = numbers.into_iter();
+        let mut next = || said.next().unwrap_or_default();
         [self.shear_factor, self.strain] = [next(), next()];
         self.with_stress = next() > 0.0;
         self.pair_stress.iter_mut().for_each(|x| *x = next());
