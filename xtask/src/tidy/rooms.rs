@@ -6,9 +6,6 @@ use super::law::Law;
 use super::modules::{self, Use};
 use super::sources::Source;
 
-/// Crates whose files are not looked at, as they are being joined with others.
-const LEFT_OUT: &[&str] = &["crates/distributed"];
-
 /// Uses of higher rooms, rooms that the law does not list, listed ones that do not exist, and cycles, in the
 /// crates in these folders.
 pub fn offences(law: &Law, folders: &[String], sources: &[Source]) -> anyhow::Result<Vec<String>> {
@@ -17,7 +14,7 @@ pub fn offences(law: &Law, folders: &[String], sources: &[Source]) -> anyhow::Re
     let unknown = law.rooms.keys().filter(is_unknown);
     let mut offences: Vec<String> =
         unknown.map(|name| format!("ARCHITECTURE.md: rooms of `{name}`, which is not a crate")).collect();
-    for crate_folder in folders.iter().filter(|folder| !LEFT_OUT.contains(&folder.as_str())) {
+    for crate_folder in folders {
         let folder = format!("{crate_folder}/src");
         let rooms = law.rooms.get(&name(crate_folder)).map_or(&[][..], Vec::as_slice);
         let uses = modules::uses(&folder, sources)?;
