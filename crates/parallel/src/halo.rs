@@ -76,8 +76,8 @@ impl Halo {
         self.0.as_deref().map_or([0; 2], |shared| [shared.plan.ghost_count(), shared.plan.neighbour_count()])
     }
 
-    /// A failure of one rank is one of all, who are told the first of them; a rank that failed in the same way
-    /// keeps its own. All ranks call this.
+    /// A failure of one rank is one of all, who are told the first of them; a rank that failed in the same
+    /// way keeps its own. All ranks call this.
     ///
     /// # Errors
     /// The failure of another rank.

@@ -22,7 +22,7 @@ use crate::space::Discretisation;
 pub use crate::film::{FilmNetwork, FilmRow, SharedTwists};
 pub use crate::flow::MOST_ROUNDS;
 pub use crate::precondition::schur::SchurInverse;
-pub use crate::precondition::surface::{SurfaceCorrection, SurfaceSmoother};
+pub use crate::precondition::surface::SurfaceSmoother;
 pub use crate::precondition::velocity::{
     Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarsest_level,
 };
@@ -30,7 +30,7 @@ pub use crate::surface::WeakCell;
 
 /// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two
 /// cells away, and what else that root carries.
-const RINGS: usize = 4;
+const RINGS: usize = 5;
 
 /// `unfitted` with penalties as the flows so far want them.
 #[derive(Clone, Debug)]

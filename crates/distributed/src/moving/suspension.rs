@@ -108,14 +108,14 @@ where
         self.suspension.in_space(fields, flow.shear(), input.shear_factor)
     }
 
-    /// Does what rank zero asks for with its [`crate::SharedHydrodynamics::leading`], until that ends. All other
-    /// ranks call this.
+    /// Does what rank zero asks for with its [`crate::SharedHydrodynamics::leading`], until that ends. All
+    /// other ranks call this.
     pub fn follow(&self, ranks: &Ranks) {
         self.follow_and_show(ranks, &mut |_, _| {});
     }
 
-    /// The same, and hands `show` the fields in the cells of this rank when rank zero [asks](crate::ask_for_fields)
-    /// for them: none if there is no flow.
+    /// The same, and hands `show` the fields in the cells of this rank when rank zero
+    /// [asks](crate::ask_for_fields) for them: none if there is no flow.
     pub fn follow_and_show(&self, ranks: &Ranks, show: &mut dyn FnMut(FrameName, Option<Fields<D>>)) {
         self.follow_for(ranks, &Memory::default(), &mut Showing(show));
     }

@@ -4,7 +4,7 @@ use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_linalg::KrylovError;
 use gluey_parallel::{Communicator, Halo, Traffic};
-use gluey_stokes::part::{AssembledSmoother, SurfaceCorrection, VCycle};
+use gluey_stokes::part::VCycle;
 use gluey_stokes::{
     Conditions, Given, GivenOf, MultigridSolver, NodalFields, Problem, SaddleSolver, SolveReport,
     StokesError, Stress,
@@ -44,9 +44,10 @@ where
     /// The flow with the penalties of a problem. All ranks call this.
     pub fn attempt(
         &self,
-        (tree, halos): (&ImplicitTree<'_, D>, &PartHalos),
+        tree: &ImplicitTree<'_, D>,
+        halos: &PartHalos,
         cycle: VCycle<D>,
-        (problem, smoother): (&Problem<D>, AssembledSmoother<'_, D>),
+        problem: &Problem<D>,
         before: Option<&mut Moved>,
     ) -> Result<Attempt<D>, FlowError> {
         let (ranks, system) = (self.shared.ranks, &problem.system);
@@ -54,20 +55,12 @@ where
         if let Some(finest) = sizes.last_mut() {
             [finest.neighbours, finest.ghost_nodes] = halos.neighbours::<D>();
         }
-        let smoother = agreed(
-            ranks,
-            self.named(smoother.completed([halos.of_system[1].clone(), halos.of_twist_blocks.clone()])),
-        )?;
-        let rigid = &cycle.levels[cycle.levels.len() - 1].space;
-        let surfaces = SurfaceCorrection::with_smoother(smoother, &system.space, rigid);
-        let cycle = cycle.with_surfaces(surfaces);
         let schur = self.named(problem.schur_inverse(&cycle)).map_err(FlowError::agreed)?;
-        let all = (self.shared.bodies.balls().len(), self.shared.held);
-        let network = agreed(ranks, network(ranks, system, &self.bodies, all))?;
+        let network = agreed(ranks, network(system, &self.bodies, &self.shared))?;
         let (lift, mut b) = self.data(problem)?;
-        let mut x = self.guess((tree, problem), &b, before);
+        let mut x = self.guess(tree, problem, &b, before);
         system.complete(&mut b);
-        let mut solver = MultigridSolver::of_parts(system, (cycle, schur), network, self.flow.max_iterations);
+        let mut solver = MultigridSolver::of_parts(system, cycle, schur, network, self.flow.max_iterations);
         let before = ranks.traffic();
         let report = match solver.solve(system, &b, &mut x, self.flow.tolerance) {
             Err(StokesError::Krylov(error)) => Err(error),
@@ -104,7 +97,8 @@ where
     /// ranks call this.
     fn guess(
         &self,
-        (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
+        tree: &ImplicitTree<'_, D>,
+        problem: &Problem<D>,
         b: &[f64],
         before: Option<&mut Moved>,
     ) -> Vec<f64> {

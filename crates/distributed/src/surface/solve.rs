@@ -190,7 +190,7 @@ where
         let (ranks, mut earlier) = (self.shared.ranks, Before::default());
         loop {
             let mut problem = agreed(ranks, self.problem(tree, &method))?;
-            let halos = PartHalos::new(tree, &self.shared, &self.level, (&problem, &self.bodies));
+            let halos = PartHalos::new(tree, &self.shared, &self.level, &problem, &self.bodies);
             problem.system.share(halos.of_system.clone());
             let smoother = self.named(AssembledSmoother::new(&problem));
             if let Some(stiffer) = self.stiffened(&method, &smoother) {
@@ -198,8 +198,10 @@ where
                 earlier.raised.doubled += 1;
                 continue;
             }
-            let smoother = agreed(ranks, smoother)?;
-            let attempt = self.attempt((tree, &halos), cycle, (&problem, smoother), before.as_mut())?;
+            let of_smoother = [halos.of_system[1].clone(), halos.of_twist_blocks.clone()];
+            let smoother = agreed(ranks, self.named(agreed(ranks, smoother)?.completed(of_smoother)))?;
+            let cycle_around = cycle.with_surfaces(smoother, &problem.system.space);
+            let attempt = self.attempt(tree, &halos, cycle_around, &problem, before.as_mut())?;
             let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
             let Some(&[_, _, body, share]) = weak.first() else {
                 return self.finished((tree, &problem), attempt, &earlier, before);

@@ -40,7 +40,8 @@ impl PartHalos {
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'_, '_, D>,
         level: &LevelSpace<D>,
-        (problem, bodies): (&Problem<D>, &NearBodies<D>),
+        problem: &Problem<D>,
+        bodies: &NearBodies<D>,
     ) -> Self
     where
         Dim<D>: Space<D>,

@@ -1,4 +1,5 @@
-//! The viscous operator as a sum over cells, its diagonal, and what comes to the viscosity of the fluid in them.
+//! The viscous operator as a sum over cells, its diagonal, and what comes to the viscosity of the fluid in
+//! them.
 
 use std::fmt::Debug;
 

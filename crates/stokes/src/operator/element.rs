@@ -95,8 +95,8 @@ where
         &self.system.cells
     }
 
-    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where the
-    /// viscosity varies.
+    /// The multiple of the viscous reference matrix that a cell has, and the matrix that comes to it where
+    /// the viscosity varies.
     pub fn viscous(&self, index: usize) -> (f64, Option<&[f64]>) {
         (self.viscous[index], self.own.get(index).and_then(Option::as_deref))
     }

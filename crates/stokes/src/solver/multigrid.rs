@@ -5,8 +5,8 @@
 //! `V` one V-cycle on the velocity. Steps are in `f32`, with a residual in `f64` now and then, or in `f64`
 //! where rounding would disturb them ([`rounding_noise`]). The levels are the tree's own: level `l` is the
 //! mesh cut at depth `l`. On every level the solid nodes of that level are eliminated; a coarse correction
-//! enters as the rigid motion that fits it best. Errors that the levels do not reduce are left to a correction
-//! that the formulation has.
+//! enters as the rigid motion that fits it best. Errors that the levels do not reduce are left to a
+//! correction that the formulation has.
 
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::{Dim, Space};
@@ -70,7 +70,8 @@ where
     /// A solver whose ranks have prepared the parts of it, which gives up after so many iterations.
     pub fn of_parts(
         system: &StokesSystem<D>,
-        (cycle, schur): (VCycle<D>, SchurInverse<D>),
+        cycle: VCycle<D>,
+        schur: SchurInverse<D>,
         films: Option<FilmNetwork>,
         max_iterations: usize,
     ) -> Self {

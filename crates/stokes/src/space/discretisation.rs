@@ -33,8 +33,8 @@ impl<const D: usize> Discretisation<D> {
         Self { mesh: Arc::new(mesh), velocity, pressure, chunks, partition: None }
     }
 
-    /// A part of a larger mesh: operators are sums over the cells of `partition`, sums over all cells those of
-    /// all parts.
+    /// A part of a larger mesh: operators are sums over the cells of `partition`, sums over all cells those
+    /// of all parts.
     pub fn of_part(
         mesh: Arc<TreeMesh<D>>,
         [velocity, pressure]: [Arc<NodeMap<D>>; 2],

@@ -42,8 +42,8 @@ impl<const D: usize> Partition<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The halos of reduced velocities, and of a square matrix for each twist: of the bodies with needed nodes,
-    /// and of all with nodes in the part, for nodes that are `solid`. All ranks call this.
+    /// The halos of reduced velocities, and of a square matrix for each twist: of the bodies with needed
+    /// nodes, and of all with nodes in the part, for nodes that are `solid`. All ranks call this.
     pub fn halos(&self, solid: &[Option<u32>]) -> [Halo; 2] {
         let (n, size, first) = (Dim::<D>::RIGID, Dim::<D>::RIGID * Dim::<D>::RIGID, solid.len() * D);
         let [mut here, mut needed] = [(); 2].map(|()| vec![false; self.bodies.len()]);

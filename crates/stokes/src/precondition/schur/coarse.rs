@@ -74,7 +74,8 @@ where
     pub fn new(
         meshes: &[Discretisation<D>],
         viscosity: f64,
-        (before, halo): (Option<Self>, &Halo),
+        before: Option<Self>,
+        halo: &Halo,
     ) -> Result<Option<Self>, StokesError> {
         let holds_all = meshes[0].partition().is_none_or(|part| part.is_whole);
         let with_coarsest = match holds_all {
@@ -270,13 +271,13 @@ mod tests {
     fn a_box_of_many_roots_is_coarsened_until_its_matrix_is_small() {
         let meshes = long_box(20);
         assert!(meshes[0].pressure.node_count() > MOST_PRESSURES);
-        let mut correction = CoarseSchur::new(&meshes, 2.0, (None, &Halo::default())).unwrap().unwrap();
+        let mut correction = CoarseSchur::new(&meshes, 2.0, None, &Halo::default()).unwrap().unwrap();
         assert_eq!(correction.meshes.len(), 3);
         assert_eq!(correction.whole.as_ref().unwrap().unknowns.len(), 41 * 9);
         let [x, y] = [1, 2].map(|seed| loads(&meshes[1], seed));
         let (xy, yx) = (product(&mut correction, &x, &y), product(&mut correction, &y, &x));
         assert!((xy - yx).abs() < 1e-4 * xy.abs(), "{xy} {yx}");
-        assert!(CoarseSchur::new(&long_box(300), 2.0, (None, &Halo::default())).unwrap().is_none());
+        assert!(CoarseSchur::new(&long_box(300), 2.0, None, &Halo::default()).unwrap().is_none());
     }
 
     /// A negative viscosity makes a negative mass.
@@ -294,11 +295,11 @@ mod tests {
     #[test]
     fn the_matrix_is_kept_while_coarsest_mesh_and_viscosity_stand() {
         let meshes = long_box(3);
-        let first = CoarseSchur::new(&meshes, 2.0, (None, &Halo::default())).unwrap().unwrap();
+        let first = CoarseSchur::new(&meshes, 2.0, None, &Halo::default()).unwrap().unwrap();
         let matrix = first.whole.as_ref().unwrap().correction.clone();
-        let again = CoarseSchur::new(&meshes, 2.0, (Some(first), &Halo::default())).unwrap().unwrap();
+        let again = CoarseSchur::new(&meshes, 2.0, Some(first), &Halo::default()).unwrap().unwrap();
         assert_eq!(again.whole.as_ref().unwrap().correction, matrix);
-        let thicker = CoarseSchur::new(&meshes, 4.0, (Some(again), &Halo::default())).unwrap().unwrap();
+        let thicker = CoarseSchur::new(&meshes, 4.0, Some(again), &Halo::default()).unwrap().unwrap();
         assert!((thicker.whole.unwrap().correction - matrix.scale(2.0)).amax() < 1e-4 * matrix.amax());
     }
 }

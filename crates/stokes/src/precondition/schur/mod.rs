@@ -68,7 +68,7 @@ where
         let (viscosity, mut halo) = (system.viscosity(), system.pressure.halo().clone());
         let mass = pressure_matrix(elements, viscosity)?;
         let before = before.and_then(|before| before.coarse);
-        let coarse = CoarseSchur::new(meshes, viscosity, (before, &halo))?;
+        let coarse = CoarseSchur::new(meshes, viscosity, before, &halo)?;
         let mut diagonal: Vec<f32> = mass.diagonal().into_iter().map(|m| m as f32).collect();
         halo.sum(&mut diagonal);
         if !halo.is_empty() {
@@ -84,8 +84,8 @@ where
         Ok(Self { mass, jacobi, chebyshev, coarse, halo })
     }
 
-    /// `z` close to `S^-1 r`, up to a constant, for vectors that hold the same at ghosts as at their owners. `r` is zero but at unknowns, where its sum vanishes; so is
-    /// `z`.
+    /// `z` close to `S^-1 r`, up to a constant, for vectors that hold the same at ghosts as at their owners.
+    /// `r` is zero but at unknowns, where its sum vanishes; so is `z`.
     pub fn apply(&mut self, space: &PressureSpace<D>, r: &[f32], z: &mut [f32]) {
         let mut mass = Summed { operator: &mut self.mass, halo: &mut self.halo };
         self.chebyshev.smooth(&mut mass, &mut self.jacobi, r, z, Guess::Zero);

@@ -142,7 +142,7 @@ where
         let reference = system.discretisation().reference();
         let (bodies, rigid) = (system.space.body_count(), Dim::<D>::RIGID);
         let start = system.discretisation().pseudo_random_velocities(bodies, rigid);
-        let interval = interval((&mut operator, start), &mut diagonal, &near, &reference, &mut halo)?;
+        let interval = interval(&mut operator, start, &mut diagonal, &near, &reference, &mut halo)?;
         operator.take_applications();
         failure.map_or(Ok(()), Err)?;
         let dim = operator.dim();
@@ -207,7 +207,8 @@ where
 /// which may be several times that in the fluid: half of the excess, in powers, goes into the diagonal there,
 /// half into the interval.
 fn interval<const D: usize>(
-    (operator, start): (&mut ViscousOperator<D>, Vec<f32>),
+    operator: &mut ViscousOperator<D>,
+    start: Vec<f32>,
     diagonal: &mut BlockDiagonal,
     near: &[u32],
     reference: &ReferenceMatrices<D>,

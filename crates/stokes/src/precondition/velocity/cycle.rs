@@ -9,7 +9,7 @@ use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
 use crate::error::{StokesError, agreed};
 use crate::precondition::Correction;
-use crate::precondition::surface::SurfaceCorrection;
+use crate::precondition::surface::{SurfaceCorrection, SurfaceSmoother};
 use crate::space::{VelocitySpace, norm};
 
 /// A level that a cycle is to have.
@@ -92,9 +92,11 @@ where
         halo.sum(x);
     }
 
-    /// The same levels around the surfaces of another system, or of the same with other penalties.
+    /// The same levels under this smoother of the velocities `space` around surfaces.
     #[must_use]
-    pub fn with_surfaces(self, surfaces: SurfaceCorrection<D>) -> Self {
+    pub fn with_surfaces(self, smoother: SurfaceSmoother<D>, space: &VelocitySpace<D>) -> Self {
+        let rigid = &self.levels[self.levels.len() - 1].space;
+        let surfaces = SurfaceCorrection::with_smoother(smoother, space, rigid);
         Self { correction: Some(Box::new(surfaces)), ..self }
     }
 }
@@ -127,8 +129,8 @@ where
         self.rigid_cycle(f, u);
     }
 
-    /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero at
-    /// ghosts.
+    /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero
+    /// at ghosts.
     pub fn answer<S: Scalar>(
         &mut self,
         r: &[S],
