@@ -10,6 +10,9 @@ use gluey_linalg::{BlockError, Jagged, parallel};
 
 use crate::space::{ActiveCell, Discretisation, VelocitySpace};
 
+/// What is called with a cell, a scale and the matrix that it is of, if it has its own.
+pub type CellVisitor<'a> = dyn FnMut(u32, f64, Option<&[f64]>) + 'a;
+
 /// A viscosity beside that of the fluid, which may vary inside cells: in one pass with the fluid.
 pub trait AddedViscosity<const D: usize>: Debug + Send + Sync {
     /// The largest viscosity over that of the fluid.
@@ -20,7 +23,7 @@ pub trait AddedViscosity<const D: usize>: Debug + Send + Sync {
 
     /// Calls `visit(cell, scale, matrix)` for every cell in which it is: its viscous matrix there is `scale`
     /// times the one given, or times that of the reference.
-    fn for_each_matrix(&self, visit: &mut dyn FnMut(u32, f64, Option<&[f64]>));
+    fn for_each_matrix(&self, visit: &mut CellVisitor<'_>);
 
     /// What stands for the mass of the pressures over the viscosity in the cells in which that varies. A cell
     /// is given by `viscous`, `divergence` and `own` of its matrices `viscous K + own` and `divergence B`.

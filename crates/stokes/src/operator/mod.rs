@@ -11,7 +11,7 @@ mod system;
 mod viscous;
 
 pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, factorised};
-pub use cells::{AddedViscosity, CellViscosities, viscous_diagonal};
+pub use cells::{AddedViscosity, CellViscosities, CellVisitor, viscous_diagonal};
 pub use diagonal::{BlockDiagonal, DiagonalSums, nodal_diagonal};
 pub use element::{Elements, Source};
 pub use pressure_forces::PressureForces;

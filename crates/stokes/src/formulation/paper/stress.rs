@@ -15,7 +15,7 @@ use gluey_linalg::BlockError;
 use super::pressures::pressure_matrices;
 use super::quadrature::PointMatrices;
 use super::region::{SolidCell, SolidRegion};
-use crate::operator::{AddedViscosity, CellViscosities};
+use crate::operator::{AddedViscosity, CellViscosities, CellVisitor};
 use crate::space::Discretisation;
 
 /// The viscous stress of the penalised solid and the factor it enters the operator with.
@@ -41,7 +41,7 @@ where
     }
 
     /// Cells wholly inside have a multiple of the reference; for cut ones the matrix is integrated.
-    fn for_each_matrix(&self, visit: &mut dyn FnMut(u32, f64, Option<&[f64]>)) {
+    fn for_each_matrix(&self, visit: &mut CellVisitor<'_>) {
         let SolidStress { cells, scales, matrices, .. } = &self.stress;
         for (solid, &scale) in cells.iter().zip(scales.iter()) {
             match solid.fraction.is_empty() {
