@@ -28,9 +28,10 @@ pub use crate::precondition::velocity::{
 };
 pub use crate::surface::WeakCell;
 
-/// Cells around own ones that cut cells depend on, without films: nodes of a bad cell, its root up to two
-/// cells away, and what else that root carries.
-const RINGS: usize = 5;
+/// Cells around own ones, without films, in 2D and in 3D. Cut cells depend on four: nodes of a bad cell, its
+/// root up to two cells away, and what else that root carries. Weights of the pressures at surfaces take in
+/// more cells; with four rings in 2D clusters of discs take up to six iterations more than one process.
+const RINGS: [usize; 2] = [6, 4];
 
 /// `unfitted` with penalties as the flows so far want them.
 #[derive(Clone, Debug)]
@@ -83,13 +84,13 @@ pub fn rings_around_surfaces<const D: usize>(
     wanted: &dyn Fn(&Film<D>) -> bool,
 ) -> usize {
     if lubrication == Lubrication::None {
-        return RINGS;
+        return RINGS[D - 2];
     }
     let heights = lubrication.heights::<D>(cell_size);
     let films = thin_films(bodies, domain, &heights);
     let edge = |film: &Film<D>| film.shape(film.height(&heights)).edge();
     let widest = films.iter().filter(|film| wanted(film)).map(edge).fold(0.0, f64::max);
-    RINGS + (widest / cell_size).ceil() as usize
+    RINGS[D - 2] + (widest / cell_size).ceil() as usize
 }
 
 /// Numbers that [`NodalFields::films`] has for a film: a body, its partner (negative for walls), and vectors.

@@ -16,3 +16,7 @@ mod sums;
 mod weak;
 
 pub use context::{SharedTree, SurfaceBodies};
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+mod tests;

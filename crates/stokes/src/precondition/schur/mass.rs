@@ -15,8 +15,8 @@ use crate::operator::{Elements, StokesSystem};
 use crate::space::pressure_expansion;
 use crate::surface::SurfaceCoupling;
 
-/// The share of own cells in `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`] in
-/// its place, scaled by the weights of the pressures. All ranks call this.
+/// The share of own cells in `T`: the pressure mass matrix over twice the viscosity, or [`PressureMatrices`]
+/// in its place, scaled by the weights of the pressures. All ranks call this.
 pub fn pressure_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     viscosity: f64,
