@@ -10,7 +10,7 @@ use super::sources::Source;
 /// Most parameters of a function, the receiver and the parts of tuples included.
 const MOST_PARAMETERS: usize = 6;
 /// Most parameters of all functions that are tuples without a name: they may only become fewer.
-const MOST_TUPLES: usize = 73;
+const MOST_TUPLES: usize = 66;
 /// Most lines of a function, from `fn` to the last brace.
 const LONGEST_FUNCTION: usize = 60;
 /// Most columns of a comment, as for code.

@@ -37,7 +37,7 @@ where
             region.touched_nodes(&discretisation.velocity, balls)
         }
         // All around the surface: forces on it are those on all these nodes.
-        Formulation::Unfitted { .. } => solid_nodes(&discretisation, balls, -2.0),
+        Formulation::Unfitted { .. } => solid_nodes(discretisation, balls, -2.0),
     }
 }
 
