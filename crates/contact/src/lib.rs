@@ -40,6 +40,7 @@
 //! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
 
 pub mod broadphase;
+mod coordinator;
 mod delassus;
 mod domain;
 mod error;
@@ -47,7 +48,6 @@ mod grid;
 mod island_projection;
 mod islands;
 mod key;
-mod lead;
 mod memory;
 mod mobility;
 mod model;

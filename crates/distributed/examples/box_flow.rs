@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use common::{Spread, TrafficRecord, fail, hash, on_ranks};
-use gluey_distributed::{BoxFlow, LevelSizes, MyFlow, SurfaceBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, LevelSizes, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -177,7 +177,7 @@ struct Record {
 }
 
 impl Record {
-    fn new<const D: usize>(options: &Options, ranks: &Ranks, mine: &MyFlow<D>) -> Self
+    fn new<const D: usize>(options: &Options, ranks: &Ranks, mine: &LocalFlow<D>) -> Self
     where
         Dim<D>: Space<D>,
     {

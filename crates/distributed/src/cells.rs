@@ -13,7 +13,7 @@ use crate::space::{LevelSpace, Nodes};
 
 /// What a rank knows of the flow at the nodes of its own cells, whoever owns these.
 #[derive(Clone, Debug)]
-pub struct MyCells<const D: usize> {
+pub struct LocalFields<const D: usize> {
     part: Arc<Part<D>>,
     velocity_nodes: Arc<Nodes<D>>,
     pressure_nodes: Arc<Nodes<D>>,
@@ -23,7 +23,7 @@ pub struct MyCells<const D: usize> {
     pressure: Vec<f64>,
 }
 
-impl<const D: usize> MyCells<D> {
+impl<const D: usize> LocalFields<D> {
     pub fn new(space: &LevelSpace<D>, viscosity: f64, velocity: Vec<f64>, pressure: Vec<f64>) -> Self {
         Self {
             part: space.part.clone(),

@@ -7,7 +7,7 @@ use gluey_motion::Fields;
 use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_stokes::{RaisedPenalties, StokesError, Stress};
 
-use crate::cells::MyCells;
+use crate::cells::LocalFields;
 use crate::space::LevelSpace;
 
 /// A fluid, and how well its flow is to be known.
@@ -128,7 +128,7 @@ pub struct LevelSizes {
 /// The part of a flow at the nodes of one rank. The parts of all ranks, in their order, are the flow at all
 /// nodes in the order of the serial solver.
 #[derive(Clone, Debug)]
-pub struct MyFlow<const D: usize>
+pub struct LocalFlow<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -169,10 +169,10 @@ where
     pub setup_traffic: Traffic,
     /// What it sent in the solve.
     pub solve_traffic: Traffic,
-    pub(crate) cells: MyCells<D>,
+    pub(crate) cells: LocalFields<D>,
 }
 
-impl<const D: usize> MyFlow<D>
+impl<const D: usize> LocalFlow<D>
 where
     Dim<D>: Space<D>,
 {

@@ -10,7 +10,7 @@ use gluey_stokes::{Discretisation, Partition, VelocitySpace, solid_nodes};
 
 use crate::bodies::{NearBodies, Shared, rigid};
 use crate::flow::{FlowError, LevelSizes};
-use crate::space::{Around, LevelSpace, wanted_nodes};
+use crate::space::{GhostLayer, LevelSpace, wanted_nodes};
 
 /// The levels of a rank.
 pub struct Levels<const D: usize>
@@ -42,7 +42,7 @@ where
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'_, '_, D>,
         viscosity: f64,
-        around: &Around<'_, D>,
+        around: &GhostLayer<'_, D>,
     ) -> Result<Self, FlowError> {
         let depths = coarsest_level(tree.frame().roots()).min(tree.max_level())..=tree.max_level();
         let mut parts: Vec<_> = depths.map(|depth| PartOfLevel::new(tree, shared, depth, around)).collect();
@@ -72,12 +72,12 @@ where
         tree: &mut ImplicitTree<'_, D>,
         shared: &Shared<'_, '_, D>,
         depth: u8,
-        around: &Around<'_, D>,
+        around: &GhostLayer<'_, D>,
     ) -> Self {
         let coarsest = coarsest_level(tree.frame().roots()).min(tree.max_level());
         // Rank zero holds all of the coarsest level: what it lacks are ghosts.
         let all = (depth == coarsest && shared.ranks.rank() == 0).then(|| 0..tree.end());
-        let near_bodies = Around { rings: 1 + RELAXED_RINGS, spreads: &|_: &Cell<D>| true };
+        let near_bodies = GhostLayer { rings: 1 + RELAXED_RINGS, spreads: &|_: &Cell<D>| true };
         let coarse = (D <= RELAXED_DIMENSIONS).then_some(&near_bodies);
         let around = if depth == tree.max_level() { Some(around) } else { coarse };
         let level = LevelSpace::new(tree, depth, shared, all, around);
@@ -133,7 +133,7 @@ fn discretised<const D: usize>(
     Discretisation::of_part(part.mesh.clone(), nodes, chunks.clone(), partition)
 }
 
-/// Level of the smallest cell at each velocity node. Around nodes of inner cells all cells are there; at
+/// Level of the smallest cell at each velocity node. GhostLayer nodes of inner cells all cells are there; at
 /// others the tree is asked.
 fn finest_levels<const D: usize>(tree: &mut ImplicitTree<'_, D>, level: &LevelSpace<D>) -> Vec<u8> {
     let (mesh, map) = (&level.part.mesh, &level.velocity.map);

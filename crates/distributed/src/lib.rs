@@ -46,7 +46,7 @@ mod warm_start;
 
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
-pub use flow::{BoxFlow, FlowError, LevelSizes, MyFlow, PartError};
+pub use flow::{BoxFlow, FlowError, LevelSizes, LocalFlow, PartError};
 pub use memory::Memory;
 pub use moving::{Follower, SharedHydrodynamics, SharedSuspension, SuspensionError};
 pub use orders::{FrameName, ask_for_fields, ask_to_keep};

@@ -19,7 +19,7 @@ pub struct LevelSpace<const D: usize> {
 }
 
 /// What else a part of the finest level holds.
-pub struct Around<'a, const D: usize> {
+pub struct GhostLayer<'a, const D: usize> {
     /// How many rings of cells around its own.
     pub rings: usize,
     /// By which cells all but the first of them spread.
@@ -80,7 +80,7 @@ impl<const D: usize> LevelSpace<D> {
         depth: u8,
         shared: &Shared<'_, '_, D>,
         inner: Option<Range<u64>>,
-        around: Option<&Around<'_, D>>,
+        around: Option<&GhostLayer<'_, D>>,
     ) -> Self {
         let own = shared.cuts.of(shared.ranks.rank());
         let inner = inner.unwrap_or(own.clone());

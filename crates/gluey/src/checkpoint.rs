@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Case;
+use crate::checksum::{Kind, Unopened};
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::output::csv::CsvMarks;
 use crate::output::{Mark, OutputError, write_atomically};
 use crate::phases::PhaseTable;
-use crate::sealed::{Kind, Unopened};
 use crate::simulation::{RestoreError, SimulationState};
 use crate::tally::Tally;
 

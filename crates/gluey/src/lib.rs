@@ -21,12 +21,14 @@
 
 pub mod case;
 mod checkpoint;
+mod checksum;
 pub mod flow;
 mod hydrodynamics;
 mod interpolate;
 mod measures;
 pub mod memory;
 mod near_pairs;
+mod number_text;
 pub mod output;
 mod phases;
 pub mod progress;
@@ -34,8 +36,6 @@ pub mod reference;
 mod report;
 pub mod rheology;
 mod run;
-mod sealed;
-mod shown;
 mod simulation;
 pub mod summary;
 pub mod sweep;
@@ -50,6 +50,7 @@ pub use flow::FlowError;
 pub use hydrodynamics::HydrodynamicsError;
 pub use memory::TooLarge;
 pub use near_pairs::{NearPairs, PairGap};
+pub use number_text::{shown, shown_to};
 pub use output::{ClaimError, OutputError, ResultPaths, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
@@ -61,7 +62,6 @@ pub use run::{
     ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
     recorded_runs, run,
 };
-pub use shown::{shown, shown_to};
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
 pub use tally::{Motion, Tally};

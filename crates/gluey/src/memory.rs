@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::case::Case;
 use crate::flow::MeshEstimate;
-use crate::shown::shown_to;
+use crate::number_text::shown_to;
 
 /// Nodes and cells are numbered in 32 bits.
 const MOST_UNKNOWNS: f64 = u32::MAX as f64;

@@ -1,13 +1,13 @@
 //! Files of a run on disk. Nothing appears under its final name before it is complete, nothing is deleted
 //! that a run did not make, and what another run is writing is not touched.
 
+mod append_log;
 mod claim;
 pub mod csv;
-mod draft;
 pub mod forces;
-pub mod made;
 mod pair_forces;
 mod paths;
+pub mod product_names;
 mod pvd;
 pub mod rheology;
 pub mod solver_log;
@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+pub(crate) use append_log::Draft;
+pub use append_log::{Mark, RowsError};
 pub use claim::ClaimError;
 pub(crate) use claim::{Claim, is_claimed};
-pub(crate) use draft::Draft;
-pub use draft::{Mark, RowsError};
 pub use pair_forces::PairForces;
 pub use paths::ResultPaths;
 

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use gluey_motion::FilmError;
 
 use crate::case::{Case, IdleKey};
+use crate::number_text::shown;
 use crate::output::solver_log::SolverRow;
-use crate::shown::shown;
 use crate::tally::Tally;
 
 /// Where a run is.

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Strategy};
 use crate::measures::Measures;
+use crate::number_text::shown_to;
 use crate::phases::PhaseTable;
 use crate::rheology::RheologyMeans;
-use crate::shown::shown_to;
 use crate::tally::Tally;
 use crate::trajectory::PairHistory;
 

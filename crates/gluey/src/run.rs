@@ -10,19 +10,19 @@ mod flow_pieces;
 mod frames;
 mod last_step;
 mod last_steps;
-mod leftovers;
 mod log;
-mod occupied;
 mod options;
+mod overwrite_guard;
 #[cfg(feature = "ranks")]
 mod pieces;
-mod record;
-mod recorded;
-mod recorder;
-mod replaced;
-mod resumption;
 #[cfg(feature = "ranks")]
-mod shared;
+mod ranks;
+mod record;
+mod recorder;
+mod removal;
+mod resumption;
+mod runs_of_folder;
+mod stale_files;
 mod start;
 mod stress;
 mod tables;
@@ -38,14 +38,14 @@ use gluey_geom::{Dim, Space};
 
 pub use error::RunError;
 pub use last_steps::{Ended, LastSteps};
-pub use occupied::OccupiedError;
 pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
-pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
-pub(crate) use recorded::TABLE_OF_STUDY;
-pub use recorded::{FolderError, recorded_runs};
-pub use resumption::{ResumeError, Resumption};
+pub use overwrite_guard::OccupiedError;
 #[cfg(feature = "ranks")]
-pub use shared::run_shared;
+pub use ranks::run_shared;
+pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
+pub use resumption::{ResumeError, Resumption};
+pub(crate) use runs_of_folder::TABLE_OF_STUDY;
+pub use runs_of_folder::{FolderError, recorded_runs};
 
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
@@ -77,8 +77,8 @@ pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result
     case.check()?;
     crate::memory::check_within(case, options.memory_limit)?;
     let _claims = claim_outputs(case, options, progress)?;
-    occupied::check_free(case, options)?;
-    leftovers::remove(case, options)?;
+    overwrite_guard::check_free(case, options)?;
+    stale_files::remove(case, options)?;
     logged(case, options, progress, |log| match case.dimension {
         2 => run_2d(case, options, log),
         _ => run_3d(case, options, log),

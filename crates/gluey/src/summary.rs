@@ -4,7 +4,7 @@ use gluey_suspension::ball_volume;
 use serde::Serialize;
 
 use crate::case::Case;
-use crate::shown::{shown, shown_to};
+use crate::number_text::{shown, shown_to};
 
 /// What a case is, in a few numbers.
 #[derive(Clone, Debug, Serialize)]

@@ -26,14 +26,14 @@ pub struct PairCoefficients {
 /// One row in the variables in which it is interpolated: all three are smooth in `ln xi` and nearly straight
 /// at both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Row {
+struct Separation {
     /// `ln xi`, `xi` the gap in radii.
     log_gap: f64,
     /// `ln((1-A)/A)`, `ln((1-B)/B)`, `ln C`.
     logs: [f64; 3],
 }
 
-impl Row {
+impl Separation {
     fn coefficients(logs: [f64; 3]) -> PairCoefficients {
         let share = |y: f64| 1.0 / (1.0 + (-y).exp());
         PairCoefficients { one_minus_a: share(logs[0]), one_minus_b: share(logs[1]), spin: logs[2].exp() }
@@ -75,7 +75,7 @@ impl Lubricated {
 /// `A`, `B` and `C` at any gap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MobilityTable {
-    rows: Vec<Row>,
+    rows: Vec<Separation>,
     /// `(1-A)/xi` at contact.
     normal_slope: f64,
     tangential: Lubricated,
@@ -104,16 +104,16 @@ impl MobilityTable {
         } else if xi > FAR {
             far_field(xi + 2.0)
         } else {
-            Row::coefficients(interpolate(self.window(xi.ln()), xi.ln()))
+            Separation::coefficients(interpolate(self.window(xi.ln()), xi.ln()))
         }
     }
 
-    fn from_rows(rows: Vec<Row>) -> Self {
-        let first = Row::coefficients(rows[0].logs);
+    fn from_rows(rows: Vec<Separation>) -> Self {
+        let first = Separation::coefficients(rows[0].logs);
         let near = rows[0].log_gap.exp();
         let fit = |value: fn(&PairCoefficients) -> f64| {
             Lubricated::through(
-                [0, 1, 2].map(|i| (-rows[i].log_gap, value(&Row::coefficients(rows[i].logs)))),
+                [0, 1, 2].map(|i| (-rows[i].log_gap, value(&Separation::coefficients(rows[i].logs)))),
             )
         };
         let (tangential, spin) = (fit(|c| c.one_minus_b), fit(|c| c.spin));
@@ -129,7 +129,7 @@ impl MobilityTable {
     }
 
     /// The nodes around `log_gap`, half of them on each side where the table allows.
-    fn window(&self, log_gap: f64) -> &[Row] {
+    fn window(&self, log_gap: f64) -> &[Separation] {
         let above = self.rows.partition_point(|row| row.log_gap < log_gap);
         let start = above.saturating_sub(NODE_COUNT / 2).min(self.rows.len() - NODE_COUNT);
         &self.rows[start..start + NODE_COUNT]
@@ -137,7 +137,7 @@ impl MobilityTable {
 }
 
 /// Lagrange's polynomial through `nodes`.
-fn interpolate(nodes: &[Row], log_gap: f64) -> [f64; 3] {
+fn interpolate(nodes: &[Separation], log_gap: f64) -> [f64; 3] {
     let mut logs = [0.0; 3];
     for (i, node) in nodes.iter().enumerate() {
         let mut weight = 1.0;
@@ -164,15 +164,18 @@ fn far_field(r: f64) -> PairCoefficients {
 }
 
 /// Rows of the table, columns `r, xi, A, B, 1-A, 1-B, C`, gaps increasing.
-fn parse(table: &str) -> Vec<Row> {
+fn parse(table: &str) -> Vec<Separation> {
     let numbers = |line: &str| -> Vec<f64> {
         line.split(',').map(|field| field.trim().parse().expect("the embedded table holds numbers")).collect()
     };
     let lines = table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
-    let mut rows: Vec<Row> = lines
+    let mut rows: Vec<Separation> = lines
         .map(|line| {
             let row = numbers(line);
-            Row { log_gap: row[1].ln(), logs: [(row[4] / row[2]).ln(), (row[5] / row[3]).ln(), row[6].ln()] }
+            Separation {
+                log_gap: row[1].ln(),
+                logs: [(row[4] / row[2]).ln(), (row[5] / row[3]).ln(), row[6].ln()],
+            }
         })
         .collect();
     // The last gap stands there twice.
@@ -197,7 +200,7 @@ mod tests {
         assert_eq!(table.rows.len(), 100);
         for row in &table.rows {
             let there = table.at(row.log_gap.exp());
-            assert!(difference(&there, &Row::coefficients(row.logs)) < 1e-12, "{row:?}");
+            assert!(difference(&there, &Separation::coefficients(row.logs)) < 1e-12, "{row:?}");
         }
     }
 
@@ -209,7 +212,7 @@ mod tests {
             let mut fewer = rows.clone();
             fewer.remove(out);
             let there = MobilityTable::from_rows(fewer).at(rows[out].log_gap.exp());
-            worst = worst.max(difference(&there, &Row::coefficients(rows[out].logs)));
+            worst = worst.max(difference(&there, &Separation::coefficients(rows[out].logs)));
         }
         println!("left-out error {worst:e}");
         // With the spacing doubled at the point: at the true spacing the polynomial is better still.
@@ -230,7 +233,7 @@ mod tests {
     fn lubrication_forms_predict_the_table_from_below() {
         let rows = parse(TABLE);
         let nearer = MobilityTable::from_rows(rows[1..].to_vec());
-        let jump = difference(&nearer.at(1e-7), &Row::coefficients(rows[0].logs));
+        let jump = difference(&nearer.at(1e-7), &Separation::coefficients(rows[0].logs));
         println!("extrapolation by a factor of three: {jump:e}");
         assert!(jump < 2e-5, "{jump:e}");
         let contact = nearer.at(0.0);

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 /// A matrix of numbers as Python holds it.
 pub type Numbers<'py> = PyReadonlyArray2<'py, f64>;
 /// A row of numbers as Python holds it.
-pub type Row<'py> = PyReadonlyArray1<'py, f64>;
+pub type FloatArray<'py> = PyReadonlyArray1<'py, f64>;
 
 /// The rows of an `(N, D)` array.
 pub fn vectors<const D: usize>(array: &Numbers<'_>) -> PyResult<Vec<Vector<D>>> {

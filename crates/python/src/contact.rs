@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, Row, array, of_vectors, vectors};
+use crate::arrays::{FloatArray, Numbers, array, of_vectors, vectors};
 use crate::errors::plain;
 use crate::pool::compute;
 
@@ -47,7 +47,7 @@ struct Parameters<'py> {
     periods: Vec<Option<f64>>,
     /// Unit vectors into the fluid.
     wall_normals: Numbers<'py>,
-    wall_offsets: Row<'py>,
+    wall_offsets: FloatArray<'py>,
 }
 
 /// A step; a dictionary with these keys.
@@ -55,7 +55,7 @@ struct Parameters<'py> {
 #[pyo3(from_item_all)]
 struct Step<'py> {
     positions: Numbers<'py>,
-    radii: Row<'py>,
+    radii: FloatArray<'py>,
     velocities: Numbers<'py>,
     drift: Numbers<'py>,
     dt: f64,
@@ -71,8 +71,8 @@ struct Memory<'py> {
     second: PyReadonlyArray1<'py, i64>,
     wall: PyReadonlyArray1<'py, i64>,
     image: numpy::PyReadonlyArray2<'py, i64>,
-    force: Row<'py>,
-    gamma: Row<'py>,
+    force: FloatArray<'py>,
+    gamma: FloatArray<'py>,
 }
 
 #[pymethods]

@@ -166,12 +166,12 @@ struct Listener<'py> {
 /// What a run told last.
 #[derive(Default)]
 struct Watch {
-    told: Mutex<Told>,
+    told: Mutex<RunState>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct Told {
+struct RunState {
     state: Option<State>,
     notices: Vec<String>,
 }
@@ -197,7 +197,7 @@ impl Watch {
 
     /// Hands on what was told since the last time.
     fn tell(&self, py: Python<'_>, listener: &Listener<'_>, name: &str) -> PyResult<()> {
-        let Told { state, notices } =
+        let RunState { state, notices } =
             std::mem::take(&mut *self.told.lock().unwrap_or_else(PoisonError::into_inner));
         for notice in notices {
             listener.notice.call1((notice, true))?;

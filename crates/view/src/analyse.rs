@@ -20,7 +20,7 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-use gluey::output::made::is_table;
+use gluey::output::product_names::is_table;
 use gluey::output::{OutputError, prepare_folder_of, rows_of, write_atomically};
 use gluey::rheology::{RheologyError, RheologyMeans};
 use gluey_contact::ContactError;

@@ -200,7 +200,7 @@ fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gluey::output::made::is_picture;
+    use gluey::output::product_names::is_picture;
 
     /// A run that replaces another one takes its pictures away, by their names.
     #[test]

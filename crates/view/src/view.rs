@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey::output::made::PAGE_NAME;
+use gluey::output::product_names::PAGE_NAME;
 use gluey::output::xyz::XyzFrame;
 use gluey::output::{OutputError, name_of, prepare_folder_of, write_atomically};
 use gluey_geom::{Dim, Space};
@@ -160,7 +160,7 @@ fn triple(x: &[f64]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use gluey::output::made::PAGE_HEAD;
+    use gluey::output::product_names::PAGE_HEAD;
 
     use super::PAGE;
 

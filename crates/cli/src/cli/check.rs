@@ -16,7 +16,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::failure::Failure;
-use super::manner::Manner;
+use super::run_mode::Manner;
 use crate::terminal::{Reporter, print_lines};
 
 /// Steps of a trial.

@@ -8,7 +8,7 @@ use gluey::{Case, FolderError, ResumeError, Resumption};
 
 use super::failure::Failure;
 use super::interrupt::Requests;
-use super::manner::Manner;
+use super::run_mode::Manner;
 use crate::terminal::print_report;
 
 /// Arguments of `gluey resume`.

@@ -10,8 +10,8 @@ use gluey_parallel::{Communicator, RankFailure, Ranks};
 
 use super::failure::Failure;
 use super::interrupt::Requests;
-use super::manner::Manner;
 use super::output::{OutputArguments, by_name};
+use super::run_mode::Manner;
 use crate::terminal::{print_report, say};
 
 /// Arguments of `gluey run`.

@@ -13,8 +13,8 @@ use thiserror::Error;
 
 use super::failure::{Failure, INTERRUPTED};
 use super::interrupt::Requests;
-use super::manner::Manner;
 use super::output::{OutputArguments, at_least_one};
+use super::run_mode::Manner;
 use crate::terminal::{print_table, say};
 
 /// Arguments of `gluey sweep`.

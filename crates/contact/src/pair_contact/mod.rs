@@ -1,7 +1,7 @@
 //! The contact step: find pairs, project, re-linearise, remember.
 
 mod admission;
-mod lead;
+mod coordinator;
 mod part;
 mod velocity_correction;
 

@@ -7,7 +7,7 @@ use crate::island_projection::{IslandWorkspace, SharedContext};
 use crate::islands::{Grouping, Islands, SortedParticles};
 use crate::memory::GammaRule;
 use crate::neighbours::{Ownership, PartSearch};
-use crate::part::{Dealt, PartFailure, PartFrame, PartMemory, PartOutcome, Partners};
+use crate::part::{PartFailure, PartFrame, PartMemory, PartOutcome, Partners, RankShare};
 use crate::projection::Failure;
 use crate::rows::{GROUND, Row};
 use crate::solver::ELSEWHERE;
@@ -17,9 +17,9 @@ use crate::{
 
 /// Mobilities as they are told.
 #[derive(Clone, Debug, Default)]
-struct Told(Vec<f64>);
+struct ReplicatedMobility(Vec<f64>);
 
-impl<const D: usize> Mobility<D> for Told {
+impl<const D: usize> Mobility<D> for ReplicatedMobility {
     fn own(&self, particle: usize, _radius: f64) -> f64 {
         self.0[particle]
     }
@@ -28,7 +28,7 @@ impl<const D: usize> Mobility<D> for Told {
 /// Contact of the particles of one rank: see [`crate::part`].
 #[derive(Debug)]
 pub struct PartContact<const D: usize> {
-    contact: PairContact<D, Told>,
+    contact: PairContact<D, ReplicatedMobility>,
     particles: Particles<D>,
     /// Rows in islands that reach across ranks.
     shared: Islands<D>,
@@ -54,7 +54,7 @@ struct Particles<const D: usize> {
 impl<const D: usize> Default for PartContact<D> {
     fn default() -> Self {
         Self {
-            contact: PairContact::with_mobility(ContactParams::default(), Told::default()),
+            contact: PairContact::with_mobility(ContactParams::default(), ReplicatedMobility::default()),
             particles: Particles::default(),
             shared: Islands::default(),
             workspace: IslandWorkspace::default(),
@@ -77,11 +77,11 @@ where
     pub fn correct(
         &mut self,
         frame: &PartFrame<D>,
-        dealt: &Dealt<D>,
+        shares: &RankShare<D>,
         partners: &dyn Partners<D>,
     ) -> Result<PartOutcome, PartFailure> {
         let mut buffers = std::mem::take(&mut self.contact.buffers);
-        let outcome = self.step(frame, dealt, partners, &mut buffers);
+        let outcome = self.step(frame, shares, partners, &mut buffers);
         self.contact.buffers = buffers;
         outcome
     }
@@ -91,12 +91,12 @@ where
         &self.contact.record.contacts
     }
 
-    /// Changes of the velocities in the last step, one for each particle that was dealt.
+    /// Changes of the velocities in the last step, one for each particle that was sent here.
     pub fn changes(&self) -> &[Vector<D>] {
         &self.contact.buffers.changes
     }
 
-    /// Displacements in the last step, one for each particle that was dealt.
+    /// Displacements in the last step, one for each particle that was sent here.
     pub fn displacements(&self) -> &[Vector<D>] {
         &self.contact.buffers.displacements
     }
@@ -110,11 +110,11 @@ where
     fn step(
         &mut self,
         frame: &PartFrame<D>,
-        dealt: &Dealt<D>,
+        shares: &RankShare<D>,
         partners: &dyn Partners<D>,
         buffers: &mut Buffers<D>,
     ) -> Result<PartOutcome, PartFailure> {
-        self.load(frame, dealt);
+        self.load(frame, shares);
         let mut particles = std::mem::take(&mut self.particles);
         let mut ownership = std::mem::take(&mut particles.ownership);
         let step = StepGeometry {
@@ -137,11 +137,11 @@ where
     }
 
     /// Takes over particles and memory, and searches.
-    fn load(&mut self, frame: &PartFrame<D>, dealt: &Dealt<D>) {
+    fn load(&mut self, frame: &PartFrame<D>, shares: &RankShare<D>) {
         let Self { contact, particles, .. } = self;
         contact.params = frame.params.clone();
         contact.domain = frame.domain.clone();
-        let of = &dealt.particles;
+        let of = &shares.particles;
         let own = |list: &mut Vec<f64>, value: fn(&crate::part::PartParticle<D>) -> f64| {
             list.clear();
             list.extend(of.iter().map(value));
@@ -157,7 +157,7 @@ where
         names.clear();
         names.extend(of.iter().map(|particle| particle.index));
         is_own.clear();
-        is_own.extend(of.iter().map(|particle| particle.owner == dealt.rank));
+        is_own.extend(of.iter().map(|particle| particle.owner == shares.rank));
         contact.record.contacts.clear();
         contact.record.state.pairs.clear();
         let place =
@@ -170,7 +170,7 @@ where
             };
             PairState { pair, gamma: memory.gamma, lambda: memory.lambda }
         };
-        contact.record.state.pairs.extend(dealt.memory.iter().map(state));
+        contact.record.state.pairs.extend(shares.memory.iter().map(state));
     }
 
     fn solve(

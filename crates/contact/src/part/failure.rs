@@ -61,7 +61,7 @@ impl PartFailure {
                     .extend(history.entries.iter().flat_map(|(k, residual)| [*k as u64, residual.to_bits()]));
                 words
             }
-            // All others show where particles are dealt, before there is anything to solve.
+            // All others show where particles are sent, before there is anything to solve.
             _ => Vec::new(),
         }
     }

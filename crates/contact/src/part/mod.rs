@@ -1,24 +1,24 @@
 //! Contact of particles that several ranks share, each with those in its part of space: what one rank does,
 //! and what it asks of the others. How messages travel is the affair of who implements [`Partners`].
 //!
-//! [`Lead`] stands where all particles are known. It deals them to ranks along a Morton curve through the
-//! cells of the neighbour grid ([`Dealt`]): those that a rank owns, and copies of others that come near them.
-//! A [`PartContact`] searches among these and has the rows of the pairs whose particle with the smaller
-//! number its rank owns. Islands whose rows are all on one rank are solved there, as without ranks and to
-//! the same bits. Those that reach across ranks are one problem, by the same methods: rows stay where they
-//! are, forces on copies are added to those on the owner's particle, which tells how it moves, and products
-//! and residuals are sums and maxima over all ranks.
+//! [`Coordinator`] stands where all particles are known. It partitions them among ranks along a Morton curve
+//! through the cells of the neighbour grid ([`RankShare`]): those that a rank owns, and copies of others that
+//! come near them. A [`PartContact`] searches among these and has the rows of the pairs whose particle with
+//! the smaller number its rank owns. Islands whose rows are all on one rank are solved there, as without
+//! ranks and to the same bits. Those that reach across ranks are one problem, by the same methods: rows stay
+//! where they are, forces on copies are added to those on the owner's particle, which tells how it moves, and
+//! products and residuals are sums and maxima over all ranks.
 //!
 //! The documentation of `gluey-distributed` has what runs on this.
 
-pub(crate) mod deal;
 mod failure;
+pub(crate) mod partition;
 
 use gluey_geom::Vector;
 
 use crate::{ContactError, ContactParams, ContactReport, Domain, PairKey};
 
-pub use crate::lead::Lead;
+pub use crate::coordinator::Coordinator;
 pub use crate::pair_contact::PartContact;
 pub use failure::{PAIR_WORDS, pair_of, pair_words};
 
@@ -48,9 +48,9 @@ pub trait Partners<const D: usize> {
     /// Sets the values of copies to those of the owners' particles.
     fn update(&self, values: &mut [Vector<D>]);
 
-    /// From now on values are those of these particles of the [`Dealt`], in this order; of all, in theirs,
-    /// where nothing is given. Values without a particle are this rank's own affair. If a rank lists a copy,
-    /// its owner lists the particle.
+    /// From now on values are those of these particles of the [`RankShare`], in this order; of all, in
+    /// theirs, where nothing is given. Values without a particle are this rank's own affair. If a rank lists
+    /// a copy, its owner lists the particle.
     fn select(&self, particles: Option<&[Option<u32>]>);
 }
 
@@ -59,7 +59,7 @@ pub trait Partners<const D: usize> {
 pub struct PartParticle<const D: usize> {
     /// Its index among all particles.
     pub index: u32,
-    /// Its rank in the order of space of all particles.
+    /// Its Morton index: its place among all particles in the order of space.
     pub order: u32,
     /// The rank that owns it.
     pub owner: u32,
@@ -89,7 +89,7 @@ pub struct PartMemory {
 /// What a rank gets for a step: its own particles and copies of others, in the order of space, and the
 /// memory of its pairs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Dealt<const D: usize> {
+pub struct RankShare<const D: usize> {
     /// The rank.
     pub rank: u32,
     /// Own particles and copies.
@@ -126,7 +126,7 @@ impl<const D: usize> Default for PartFrame<D> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartOutcome {
     /// Whether the search went far enough, on all ranks. Otherwise nothing but [`PartContact::displacements`]
-    /// is of use, and particles are to be dealt anew.
+    /// is of use, and particles are to be partitioned anew.
     pub is_complete: bool,
     /// Effort, and the pairs of this rank.
     pub report: ContactReport,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_testkit::packing::Packing;
 
-use super::{Dealt, Lead};
+use super::{Coordinator, RankShare};
 use crate::neighbours::{NeighbourList, Ownership, PartSearch};
 use crate::{ContactParams, Domain, PairContact, PairKey, StepGeometry, Wall};
 
@@ -64,11 +64,11 @@ where
     }
 
     /// The candidates of a rank.
-    fn of_rank(&self, dealt: &Dealt<D>) -> Vec<PairKey> {
-        let of = &dealt.particles;
+    fn of_rank(&self, shares: &RankShare<D>) -> Vec<PairKey> {
+        let of = &shares.particles;
         let mut ownership = Ownership {
             names: of.iter().map(|particle| particle.index).collect(),
-            is_own: of.iter().map(|particle| particle.owner == dealt.rank).collect(),
+            is_own: of.iter().map(|particle| particle.owner == shares.rank).collect(),
         };
         let [positions, free] = [
             of.iter().map(|particle| particle.position).collect::<Vec<_>>(),
@@ -88,25 +88,26 @@ where
     fn ranks_find_what_one_search_does(&self, what: &str) {
         let (serial, free) = self.serial();
         assert!(serial.len() > 100, "{what}: {} pairs", serial.len());
-        let mut lead = Lead::new(PairContact::new(ContactParams::default()).within(self.domain.clone()));
+        let mut lead =
+            Coordinator::new(PairContact::new(ContactParams::default()).within(self.domain.clone()));
         for size in SIZES {
-            let dealt = lead.begin(&self.step(), &self.twists, size).expect("a good step");
+            let shares = lead.begin(&self.step(), &self.twists, size).expect("a good step");
             assert_eq!(lead.free(), free);
-            let mut found: Vec<_> = dealt.iter().flat_map(|dealt| self.of_rank(dealt)).collect();
+            let mut found: Vec<_> = shares.iter().flat_map(|shares| self.of_rank(shares)).collect();
             found.sort_unstable();
             assert_eq!(found, serial, "{what}, {size} ranks: each pair once");
-            self.particles_are_dealt_evenly(&dealt);
+            self.particles_are_dealt_evenly(&shares);
         }
     }
 
-    fn particles_are_dealt_evenly(&self, dealt: &[Dealt<D>]) {
+    fn particles_are_dealt_evenly(&self, shares: &[RankShare<D>]) {
         let mut owners = BTreeMap::new();
-        for Dealt { rank, particles, .. } in dealt {
+        for RankShare { rank, particles, .. } in shares {
             assert!(particles.is_sorted_by(|a, b| a.order < b.order));
             let own = particles.iter().filter(|particle| particle.owner == *rank);
             let count =
                 own.map(|particle| owners.insert(particle.index, rank)).filter(Option::is_none).count();
-            assert!(count.abs_diff(self.positions.len() / dealt.len()) <= 1, "{count}");
+            assert!(count.abs_diff(self.positions.len() / shares.len()) <= 1, "{count}");
         }
         assert_eq!(owners.len(), self.positions.len(), "each particle once");
     }
@@ -153,9 +154,9 @@ fn memory_goes_with_the_first_particle() {
     let state = |k: usize| crate::PairState { pair: PairKey::new(k, 199 - k), gamma: -0.1, lambda: k as f64 };
     let pairs = (0..100).map(state).collect();
     crate::ContactModel::resume(&mut contact, crate::ContactState { pairs }).expect("a memory");
-    let dealt = Lead::new(contact).begin(&cloud.step(), &cloud.twists, 8).expect("a good step");
+    let shares = Coordinator::new(contact).begin(&cloud.step(), &cloud.twists, 8).expect("a good step");
     let mut found = 0;
-    for Dealt { rank, particles, memory } in &dealt {
+    for RankShare { rank, particles, memory } in &shares {
         let at = |order: u32| particles.binary_search_by_key(&order, |of| of.order).map(|k| particles[k]);
         for of in memory {
             let (first, second) = of.pair.particles();

@@ -1,13 +1,13 @@
 //! Messages of a step: what rank zero says to all, what it deals to each, what it hears from each.
 
-use gluey_contact::part::{Dealt, PartFrame};
+use gluey_contact::part::{PartFrame, RankShare};
 use gluey_parallel::{Communicator, Message, Number, Ranks};
 
 use super::words;
 
 /// What all ranks do next.
 pub(super) enum Verdict<const D: usize> {
-    /// Take what is dealt, and solve.
+    /// Take what was sent, and solve.
     Deal(PartFrame<D>),
     Done,
     Failed(String),
@@ -43,7 +43,7 @@ impl<const D: usize> Verdict<D> {
 }
 
 /// What each rank gets from rank zero, who has it for all.
-pub(super) fn deal<const D: usize>(ranks: &Ranks, mut all: Vec<Dealt<D>>) -> Dealt<D> {
+pub(super) fn partition<const D: usize>(ranks: &Ranks, mut all: Vec<RankShare<D>>) -> RankShare<D> {
     let others = all.split_off(all.len().min(1));
     match all.pop() {
         Some(own) => {

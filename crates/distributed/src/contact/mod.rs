@@ -9,7 +9,7 @@ mod words;
 
 use std::rc::Rc;
 
-use gluey_contact::part::{Dealt, Lead, PartContact, PartFrame};
+use gluey_contact::part::{Coordinator, PartContact, PartFrame, RankShare};
 use gluey_contact::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
     Domain, MemoryError, PairContact, StepGeometry, WithFixed,
@@ -19,7 +19,7 @@ use gluey_parallel::{Communicator, Ranks};
 
 use crate::memory::Memory;
 use crate::orders::Order;
-use messages::{Verdict, collect, deal};
+use messages::{Verdict, collect, partition};
 use partners::Sharers;
 use words::Outcome;
 
@@ -33,7 +33,7 @@ pub struct SharedContact<'a, const D: usize> {
     /// Knows whether the others, who follow a [`Suspension`](crate::Suspension), wait for this rank; none
     /// where they know themselves when a step comes.
     memory: Option<Rc<Memory<D>>>,
-    lead: Lead<D, WithFixed>,
+    lead: Coordinator<D, WithFixed>,
     part: PartContact<D>,
     load: ContactLoad,
     centers: [Vec<Vector<D>>; 2],
@@ -65,7 +65,7 @@ pub struct ContactFailure {
 }
 
 /// What rank zero has to hear after a part of a step.
-enum Told<const D: usize> {
+enum StepOutcome<const D: usize> {
     Done(Vec<Outcome<D>>),
     /// Displacements of all particles.
     Incomplete(Vec<Vector<D>>),
@@ -84,8 +84,8 @@ where
         loop {
             match Verdict::hear(ranks) {
                 Verdict::Deal(frame) => {
-                    let dealt = deal(ranks, Vec::new());
-                    work(&mut self.part, &frame, &dealt, ranks);
+                    let shares = partition(ranks, Vec::new());
+                    work(&mut self.part, &frame, &shares, ranks);
                 }
                 Verdict::Done => return Ok(()),
                 Verdict::Failed(message) => return Err(ContactFailure { message }),
@@ -98,22 +98,22 @@ where
 fn work<const D: usize>(
     part: &mut PartContact<D>,
     frame: &PartFrame<D>,
-    dealt: &Dealt<D>,
+    shares: &RankShare<D>,
     ranks: &Ranks,
-) -> Option<Told<D>>
+) -> Option<StepOutcome<D>>
 where
     Dim<D>: Space<D>,
 {
-    match part.correct(frame, dealt, &Sharers::new(ranks, dealt)) {
+    match part.correct(frame, shares, &Sharers::new(ranks, shares)) {
         Ok(outcome) if outcome.is_complete => {
-            let own = Outcome::of(&outcome, part, dealt);
-            Some(Told::Done(
+            let own = Outcome::of(&outcome, part, shares);
+            Some(StepOutcome::Done(
                 collect(ranks, &own.words())?.iter().filter_map(|w| Outcome::from_words(w)).collect(),
             ))
         }
         Ok(_) => {
             let own =
-                dealt.particles.iter().zip(part.displacements()).filter(|(of, _)| of.owner == dealt.rank);
+                shares.particles.iter().zip(part.displacements()).filter(|(of, _)| of.owner == shares.rank);
             let moves = own.map(|(particle, change)| (particle.index, *change)).collect();
             let own = Outcome { changes: moves, ..Outcome::default() };
             let all = collect(ranks, &own.words())?;
@@ -123,11 +123,11 @@ where
                 .flat_map(|of: Outcome<D>| of.changes)
                 .collect();
             moves.sort_unstable_by_key(|of| of.0);
-            Some(Told::Incomplete(moves.into_iter().map(|of| of.1).collect()))
+            Some(StepOutcome::Incomplete(moves.into_iter().map(|of| of.1).collect()))
         }
         Err(failure) => {
             let all = collect(ranks, &failure.words())?;
-            Some(Told::Failed(failure.of_all(&all)))
+            Some(StepOutcome::Failed(failure.of_all(&all)))
         }
     }
 }
@@ -140,7 +140,7 @@ where
     pub fn new(contact: PairContact<D, WithFixed>, ranks: &'a Ranks) -> Self {
         let (part, load) = (PartContact::default(), ContactLoad::default());
         let centers = [Vec::new(), Vec::new()];
-        Self { ranks, memory: None, lead: Lead::new(contact), part, load, centers }
+        Self { ranks, memory: None, lead: Coordinator::new(contact), part, load, centers }
     }
 
     /// The same with ranks that [follow](crate::SharedSuspension::follow), and the memory of the flow
@@ -203,16 +203,16 @@ where
         step: &StepGeometry<'_, D>,
         twists: &[Twist<D>],
     ) -> Result<Vec<Outcome<D>>, ContactError> {
-        let mut dealt = self.lead.begin(step, twists, self.ranks.size())?;
+        let mut shares = self.lead.begin(step, twists, self.ranks.size())?;
         loop {
             Verdict::Deal(self.lead.frame().clone()).tell(self.ranks);
-            let own = deal(self.ranks, dealt);
+            let own = partition(self.ranks, shares);
             match work(&mut self.part, self.lead.frame(), &own, self.ranks) {
-                Some(Told::Done(outcomes)) => return Ok(outcomes),
-                Some(Told::Incomplete(moves)) => {
-                    dealt = self.lead.widen(step, &moves, self.ranks.size())?;
+                Some(StepOutcome::Done(outcomes)) => return Ok(outcomes),
+                Some(StepOutcome::Incomplete(moves)) => {
+                    shares = self.lead.widen(step, &moves, self.ranks.size())?;
                 }
-                Some(Told::Failed(error)) => return Err(error),
+                Some(StepOutcome::Failed(error)) => return Err(error),
                 None => return Ok(Vec::new()),
             }
         }

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use gluey_contact::part::{Dealt, Partners};
+use gluey_contact::part::{Partners, RankShare};
 use gluey_geom::Vector;
 use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted};
 
@@ -11,7 +11,7 @@ use super::messages::{collect, scatter};
 /// The ranks that share a step.
 pub(super) struct Sharers<'a, const D: usize> {
     ranks: &'a Ranks,
-    /// Of all particles that were dealt, and of those selected.
+    /// Of all particles that were sent, and of those selected.
     all: RefCell<Border>,
     selected: RefCell<Option<Border>>,
     /// Values by particle.
@@ -39,9 +39,9 @@ impl Border {
 
 impl<'a, const D: usize> Sharers<'a, D> {
     /// Finds out who has copies of which particles. All ranks call this.
-    pub fn new(ranks: &'a Ranks, dealt: &Dealt<D>) -> Self {
-        let particles = &dealt.particles;
-        let copies = (0u32..).zip(particles).filter(|(_, particle)| particle.owner != dealt.rank);
+    pub fn new(ranks: &'a Ranks, shares: &RankShare<D>) -> Self {
+        let particles = &shares.particles;
+        let copies = (0u32..).zip(particles).filter(|(_, particle)| particle.owner != shares.rank);
         let wanted = copies.map(|(place, particle)| Wanted {
             owner: particle.owner as usize,
             key: u64::from(particle.order),

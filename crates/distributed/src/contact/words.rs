@@ -1,7 +1,7 @@
 //! Frames, particles and outcomes of a step as numbers.
 
 use gluey_contact::part::{
-    Dealt, PAIR_WORDS, PartContact, PartFrame, PartMemory, PartOutcome, PartParticle, pair_of, pair_words,
+    PAIR_WORDS, PartContact, PartFrame, PartMemory, PartOutcome, PartParticle, RankShare, pair_of, pair_words,
 };
 use gluey_contact::{
     Contact, ContactLaw, ContactParams, ContactReport, Domain, GammaUpdate, SolverKind, Wall, WorstPair,
@@ -70,15 +70,15 @@ pub(super) fn frame_of<const D: usize>(numbers: &[f64]) -> PartFrame<D> {
 }
 
 /// What a rank gets, as numbers: how many particles, they, what pairs remember.
-pub(super) fn of_dealt<const D: usize>(dealt: &Dealt<D>) -> Vec<u64> {
-    let mut words = Vec::with_capacity(1 + dealt.particles.len() * (6 + 2 * D));
-    words.push(dealt.particles.len() as u64);
-    for particle in &dealt.particles {
+pub(super) fn of_dealt<const D: usize>(shares: &RankShare<D>) -> Vec<u64> {
+    let mut words = Vec::with_capacity(1 + shares.particles.len() * (6 + 2 * D));
+    words.push(shares.particles.len() as u64);
+    for particle in &shares.particles {
         let PartParticle { index, order, owner, position, free, radius, mobility, reach } = particle;
         words.extend([*index, *order, *owner].map(u64::from));
         words.extend(position.iter().chain(free).chain([radius, mobility, reach]).map(|x| x.to_bits()));
     }
-    for PartMemory { pair, gamma, lambda } in &dealt.memory {
+    for PartMemory { pair, gamma, lambda } in &shares.memory {
         words.extend(pair_words(*pair));
         words.extend([gamma, lambda].map(|x| x.to_bits()));
     }
@@ -86,7 +86,7 @@ pub(super) fn of_dealt<const D: usize>(dealt: &Dealt<D>) -> Vec<u64> {
 }
 
 /// What rank `rank` gets, from such numbers.
-pub(super) fn dealt_of<const D: usize>(rank: usize, words: &[u64]) -> Dealt<D> {
+pub(super) fn dealt_of<const D: usize>(rank: usize, words: &[u64]) -> RankShare<D> {
     let (count, words) = words.split_first().map_or((0, words), |(count, words)| (*count as usize, words));
     let (of_particles, of_memory) = words.split_at(count * (6 + 2 * D));
     let particle = |words: &[u64]| {
@@ -108,7 +108,7 @@ pub(super) fn dealt_of<const D: usize>(rank: usize, words: &[u64]) -> Dealt<D> {
         gamma: f64::from_bits(*gamma),
         lambda: f64::from_bits(*lambda),
     };
-    Dealt {
+    RankShare {
         rank: rank as u32,
         particles: of_particles.chunks_exact(6 + 2 * D).map(particle).collect(),
         memory: of_memory.as_chunks().0.iter().map(memory).collect(),
@@ -131,8 +131,8 @@ where
     Dim<D>: Space<D>,
 {
     /// What came of it where it was solved.
-    pub fn of(outcome: &PartOutcome, part: &PartContact<D>, dealt: &Dealt<D>) -> Self {
-        let own = dealt.particles.iter().zip(part.changes()).filter(|(of, _)| of.owner == dealt.rank);
+    pub fn of(outcome: &PartOutcome, part: &PartContact<D>, shares: &RankShare<D>) -> Self {
+        let own = shares.particles.iter().zip(part.changes()).filter(|(of, _)| of.owner == shares.rank);
         let changed = own.filter(|(_, change)| change.amax() > 0.0);
         Self {
             report: outcome.report,

@@ -8,7 +8,7 @@ use gluey_parallel::Ranks;
 
 use super::step_input::StepInput;
 use super::suspension::{SharedSuspension, SuspensionError};
-use crate::flow::MyFlow;
+use crate::flow::LocalFlow;
 use crate::memory::Memory;
 use crate::orders::Order;
 
@@ -23,7 +23,7 @@ where
     /// Whether others follow and are to be input of the end.
     leads: bool,
     /// Of the last prediction, if it succeeded.
-    last: Option<MyFlow<D>>,
+    last: Option<LocalFlow<D>>,
     /// What the next flow starts from.
     memory: Rc<Memory<D>>,
 }

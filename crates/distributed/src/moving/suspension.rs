@@ -10,7 +10,7 @@ use gluey_stokes::{Conditions, Drive, FlowOfBodies, NotDriven, Suspension};
 use super::step_input::StepInput;
 use crate::contact::ContactFollower;
 use crate::cuts::cuts_of_work;
-use crate::flow::{BoxFlow, FlowError, MyFlow};
+use crate::flow::{BoxFlow, FlowError, LocalFlow};
 use crate::memory::Memory;
 use crate::orders::{FrameName, Order};
 use crate::surface::{SharedTree, SurfaceBodies};
@@ -43,7 +43,7 @@ pub enum SuspensionError {
 }
 
 /// Solves for a flow under some conditions.
-type Solve<'s, const D: usize> = dyn FnMut(&Conditions<'_, D>) -> Result<MyFlow<D>, FlowError> + 's;
+type Solve<'s, const D: usize> = dyn FnMut(&Conditions<'_, D>) -> Result<LocalFlow<D>, FlowError> + 's;
 
 impl<const D: usize> SharedSuspension<D>
 where
@@ -58,7 +58,7 @@ where
         &self,
         ranks: &Ranks,
         configuration: &Configuration<'_, D>,
-    ) -> Result<MyFlow<D>, SuspensionError> {
+    ) -> Result<LocalFlow<D>, SuspensionError> {
         Ok(self.solve_from(ranks, configuration, &Memory::default())?.0)
     }
 
@@ -69,7 +69,7 @@ where
         ranks: &Ranks,
         configuration: &Configuration<'_, D>,
         memory: &Memory<D>,
-    ) -> Result<(MyFlow<D>, Prediction<D>), SuspensionError> {
+    ) -> Result<(LocalFlow<D>, Prediction<D>), SuspensionError> {
         let Self { flow: BoxFlow { viscosity, .. }, suspension } = self;
         let balls = suspension.balls(configuration);
         let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
@@ -103,7 +103,7 @@ where
     }
 
     /// The fields of a flow in the cells of a rank, in space.
-    pub(super) fn fields(&self, flow: &MyFlow<D>, input: &StepInput<D>) -> Fields<D> {
+    pub(super) fn fields(&self, flow: &LocalFlow<D>, input: &StepInput<D>) -> Fields<D> {
         let fields = flow.fields(&self.suspension.balls(&input.configuration()));
         self.suspension.in_space(fields, flow.shear(), input.shear_factor)
     }
@@ -117,12 +117,12 @@ where
     /// The same, and hands `show` the fields in the cells of this rank when rank zero
     /// [asks](crate::ask_for_fields) for them: none if there is no flow.
     pub fn follow_and_show(&self, ranks: &Ranks, show: &mut dyn FnMut(FrameName, Option<Fields<D>>)) {
-        self.follow_for(ranks, &Memory::default(), &mut Showing(show));
+        self.follow_for(ranks, &Memory::default(), &mut ShowOnly(show));
     }
 
     /// The same with flows in `memory`, for a follower who keeps them too.
     pub fn follow_for(&self, ranks: &Ranks, memory: &Memory<D>, follower: &mut dyn Follower<D>) {
-        let (mut input, mut last) = (StepInput::new(&self.suspension), None::<MyFlow<D>>);
+        let (mut input, mut last) = (StepInput::new(&self.suspension), None::<LocalFlow<D>>);
         let mut contact = ContactFollower::default();
         loop {
             match Order::End.share(ranks) {
@@ -152,7 +152,7 @@ where
 fn solve_driven<const D: usize>(
     drive: &Drive<'_, D>,
     solve: &mut Solve<'_, D>,
-) -> Result<(MyFlow<D>, f64), SuspensionError>
+) -> Result<(LocalFlow<D>, f64), SuspensionError>
 where
     Dim<D>: Space<D>,
 {
@@ -172,11 +172,11 @@ where
     Ok((both, rate))
 }
 
-fn of_bodies<const D: usize>(flow: &MyFlow<D>) -> FlowOfBodies<'_, D>
+fn of_bodies<const D: usize>(flow: &LocalFlow<D>) -> FlowOfBodies<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    let MyFlow { twists, wrenches, mean_velocity, mean_force, stress, .. } = flow;
+    let LocalFlow { twists, wrenches, mean_velocity, mean_force, stress, .. } = flow;
     let (mean_velocity, mean_force, stress) = (*mean_velocity, *mean_force, stress.as_ref());
     FlowOfBodies { twists, wrenches, mean_velocity, mean_force, stress }
 }
@@ -191,9 +191,9 @@ pub trait Follower<const D: usize> {
 }
 
 /// Shows fields and keeps nothing.
-struct Showing<'s, const D: usize>(&'s mut dyn FnMut(FrameName, Option<Fields<D>>));
+struct ShowOnly<'s, const D: usize>(&'s mut dyn FnMut(FrameName, Option<Fields<D>>));
 
-impl<const D: usize> Follower<D> for Showing<'_, D> {
+impl<const D: usize> Follower<D> for ShowOnly<'_, D> {
     fn show(&mut self, frame: FrameName, fields: Option<Fields<D>>) {
         (self.0)(frame, fields);
     }

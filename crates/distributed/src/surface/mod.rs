@@ -6,13 +6,13 @@
 //! smoother. Only sums over cells go between ranks. Coarser levels are those of bodies whose nodes move with
 //! them.
 
-mod attempt;
 mod conditions;
 mod context;
 mod films;
 mod solve;
 mod space;
 mod sums;
+mod trial;
 mod weak;
 
 pub use context::{SharedTree, SurfaceBodies};

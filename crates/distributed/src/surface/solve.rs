@@ -13,18 +13,18 @@ use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::part::{AssembledSmoother, MOST_ROUNDS, PartMethod, VCycle, rings_around_surfaces};
 use gluey_stokes::{Conditions, Film, GivenOf, Lubrication, Problem, StokesError};
 
-use super::attempt::Attempt;
 use super::conditions::{check_count, given};
 use super::context::{SharedTree, SolveContext, SurfaceBodies};
 use super::space::{PartHalos, is_near_surface, owner_of_film};
+use super::trial::Trial;
 use super::weak::Before;
 use crate::agreement::{agreed, gathered};
 use crate::bodies::Shared;
-use crate::cells::MyCells;
-use crate::flow::{BoxFlow, FlowError, MyFlow, counts_of_all};
+use crate::cells::LocalFields;
+use crate::flow::{BoxFlow, FlowError, LocalFlow, counts_of_all};
 use crate::levels::Levels;
-use crate::space::Around;
-use crate::warm_start::{Moved, WarmStart};
+use crate::space::GhostLayer;
+use crate::warm_start::{TransferredFlows, WarmStart};
 
 impl BoxFlow {
     /// The flow with the velocity `walls` on the walls of the box. All ranks call this with the same tree and
@@ -38,7 +38,7 @@ impl BoxFlow {
         cuts: &Cuts,
         ranks: &Ranks,
         walls: &dyn Fn(&Vector<D>) -> Vector<D>,
-    ) -> Result<MyFlow<D>, FlowError>
+    ) -> Result<LocalFlow<D>, FlowError>
     where
         Dim<D>: Space<D>,
     {
@@ -62,7 +62,7 @@ impl BoxFlow {
         cuts: &Cuts,
         ranks: &Ranks,
         conditions: &Conditions<'_, D>,
-    ) -> Result<MyFlow<D>, FlowError>
+    ) -> Result<LocalFlow<D>, FlowError>
     where
         Dim<D>: Space<D>,
     {
@@ -79,7 +79,7 @@ impl BoxFlow {
         leaves: &mut SharedTree<'_, '_, D>,
         conditions: &Conditions<'_, D>,
         kept: Option<&mut Option<Arc<WarmStart<D>>>>,
-    ) -> Result<MyFlow<D>, FlowError>
+    ) -> Result<LocalFlow<D>, FlowError>
     where
         Dim<D>: Space<D>,
     {
@@ -104,7 +104,7 @@ impl BoxFlow {
         let is_own = |film: &Film<D>| owner_of_film(tree, &shared, film) == ranks.rank();
         let all = (around.balls, frame.domain());
         let rings = rings_around_surfaces(around.lubrication, all, cell_size, &is_own);
-        let wide = Around { rings, spreads: &spreads };
+        let wide = GhostLayer { rings, spreads: &spreads };
         let Levels { cycle, finest: level, discretisation, bodies, sizes } =
             Levels::new(tree, &shared, self.viscosity, &wide)?;
         let setting = SolveContext {
@@ -140,7 +140,7 @@ impl BoxFlow {
         leaves: &mut SharedTree<'_, '_, D>,
         conditions: &Conditions<'_, D>,
         kept: Option<&mut Option<Arc<WarmStart<D>>>>,
-    ) -> Result<MyFlow<D>, FlowError>
+    ) -> Result<LocalFlow<D>, FlowError>
     where
         Dim<D>: Space<D>,
     {
@@ -185,8 +185,8 @@ where
         tree: &mut ImplicitTree<'_, D>,
         mut cycle: VCycle<D>,
         mut method: PartMethod,
-        mut before: Option<Moved>,
-    ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
+        mut before: Option<TransferredFlows>,
+    ) -> Result<(LocalFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
         let (ranks, mut earlier) = (self.shared.ranks, Before::default());
         loop {
             let mut problem = agreed(ranks, self.problem(tree, &method))?;
@@ -201,22 +201,22 @@ where
             let of_smoother = [halos.of_system[1].clone(), halos.of_twist_blocks.clone()];
             let smoother = agreed(ranks, self.named(agreed(ranks, smoother)?.completed(of_smoother)))?;
             let cycle_around = cycle.with_surfaces(smoother, &problem.system.space);
-            let attempt = self.attempt(tree, &halos, cycle_around, &problem, before.as_mut())?;
-            let weak = gathered(ranks, &self.weak_cells(tree, &problem, &attempt));
+            let trial = self.trial(tree, &halos, cycle_around, &problem, before.as_mut())?;
+            let weak = gathered(ranks, &self.weak_cells(tree, &problem, &trial));
             let Some(&[_, _, body, share]) = weak.first() else {
-                return self.finished((tree, &problem), attempt, &earlier, before);
+                return self.finished((tree, &problem), trial, &earlier, before);
             };
             let rounds = earlier.raised.solved_again;
             if rounds == MOST_ROUNDS {
-                attempt.report.map_err(FlowError::Krylov)?;
+                trial.report.map_err(FlowError::Krylov)?;
                 let (body, share) = (body as usize, f64::from_bits(share));
                 return Err(FlowError::WeakSurface { body, share, rounds });
             }
             earlier.raised.cells += weak.len();
             earlier.raised.solved_again += 1;
-            earlier.iterations += attempt.report.as_ref().map_or(0, |report| report.iterations);
+            earlier.iterations += trial.report.as_ref().map_or(0, |report| report.iterations);
             method = method.raised(self.found(tree, &weak).into_iter());
-            cycle = attempt.cycle;
+            cycle = trial.cycle;
         }
     }
 
@@ -243,18 +243,18 @@ where
     fn finished(
         &self,
         (tree, problem): (&ImplicitTree<'_, D>, &Problem<D>),
-        attempt: Attempt<D>,
+        trial: Trial<D>,
         earlier: &Before,
-        before: Option<Moved>,
-    ) -> Result<(MyFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
-        let Attempt { velocity, pressure, deviation, sizes, report, .. } = attempt;
+        before: Option<TransferredFlows>,
+    ) -> Result<(LocalFlow<D>, Option<Arc<WarmStart<D>>>), FlowError> {
+        let Trial { velocity, pressure, deviation, sizes, report, .. } = trial;
         let (report, level) = (report.map_err(FlowError::Krylov)?, &self.level);
         let here = (tree, &self.shared);
         let kept = deviation.map(|last| WarmStart::new(here, level, &self.bodies, last, before).into());
         let (points, nodal) = (&level.velocity, level.nodal_dim());
         let counts = counts_of_all(level, self.shared.ranks);
         let reference = if report.reference > 0.0 { report.reference } else { 1.0 };
-        let flow = MyFlow {
+        let flow = LocalFlow {
             points: points.owned.clone().map(|node| points.map.point(node)).collect(),
             velocity: velocity[..nodal].as_chunks::<D>().0[points.owned.clone()]
                 .iter()
@@ -268,14 +268,14 @@ where
             raised_penalties: earlier.raised,
             iterations: earlier.iterations + report.iterations,
             relative_residual: report.residuals.last().map_or(0.0, |last| last / reference),
-            wrenches: attempt.wrenches,
-            mean_velocity: attempt.mean_velocity,
+            wrenches: trial.wrenches,
+            mean_velocity: trial.mean_velocity,
             mean_force: Vector::zeros(),
-            stress: attempt.stress,
+            stress: trial.stress,
             levels: sizes,
-            setup_traffic: attempt.setup_traffic,
-            solve_traffic: attempt.solve_traffic,
-            cells: MyCells::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
+            setup_traffic: trial.setup_traffic,
+            solve_traffic: trial.solve_traffic,
+            cells: LocalFields::new(level, self.flow.viscosity, velocity[..nodal].to_vec(), pressure),
         };
         Ok((flow, kept))
     }

@@ -12,7 +12,7 @@ use super::space::PartHalos;
 use crate::bodies::Shared;
 use crate::cuts::equal_cuts;
 use crate::levels::Levels;
-use crate::space::Around;
+use crate::space::GhostLayer;
 
 /// What ranks say of masses that one of them multiplies by `factor`.
 fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
@@ -24,7 +24,7 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
             let none: [Ball<2>; 0] = [];
             let bodies = BallTree::new(&none);
             let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, held: &[] };
-            let around = Around { rings: 1, spreads: &|_: &Cell<2>| false };
+            let around = GhostLayer { rings: 1, spreads: &|_: &Cell<2>| false };
             let levels = Levels::new(&mut tree, &shared, 1.0, &around).unwrap();
             let viscosity = if ranks.rank() == 1 { factor.recip() } else { 1.0 };
             let method = PartMethod::new(Lubrication::None);

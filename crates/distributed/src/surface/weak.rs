@@ -7,12 +7,12 @@ use gluey_stokes::part::WeakCell;
 use gluey_stokes::{Problem, RaisedPenalties};
 use rustc_hash::FxHashMap;
 
-use super::attempt::Attempt;
 use super::context::SolveContext;
+use super::trial::Trial;
 
 /// A cell whose penalty is too small, as ranks tell each other: its key, the factor, a body and the share of
 /// energy that it takes.
-pub(super) type Named = [u64; 4];
+pub(super) type WeakCellRecord = [u64; 4];
 
 /// What came before a flow that can be trusted.
 #[derive(Default)]
@@ -33,12 +33,12 @@ where
         &self,
         tree: &ImplicitTree<'_, D>,
         problem: &Problem<D>,
-        attempt: &Attempt<D>,
-    ) -> Vec<Named> {
-        if !matches!(attempt.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
+        trial: &Trial<D>,
+    ) -> Vec<WeakCellRecord> {
+        if !matches!(trial.report, Ok(_) | Err(KrylovError::NotConverged { .. })) {
             return Vec::new();
         }
-        let weak = problem.weak_cells(&attempt.velocity, &self.conditions.strain);
+        let weak = problem.weak_cells(&trial.velocity, &self.conditions.strain);
         let cells = self.level.part.mesh.cells();
         let named = |weak: &WeakCell| {
             let body = u64::from(self.bodies.ids[weak.body as usize]);
@@ -49,7 +49,7 @@ where
     }
 
     /// Those of named cells that the part holds, with their factors.
-    pub(super) fn found(&self, tree: &ImplicitTree<'_, D>, named: &[Named]) -> Vec<(u32, f64)> {
+    pub(super) fn found(&self, tree: &ImplicitTree<'_, D>, named: &[WeakCellRecord]) -> Vec<(u32, f64)> {
         let cells = self.level.part.mesh.cells().iter().zip(0..);
         let places: FxHashMap<u64, u32> = cells.map(|(cell, place)| (tree.key(cell), place)).collect();
         let found = named.iter().map(|&[key, factor, ..]| (places.get(&key), f64::from_bits(factor)));

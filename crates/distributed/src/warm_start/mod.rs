@@ -7,11 +7,11 @@
 //! to the owner of its first body, who has it for the rank that the film belongs to now.
 
 mod films;
-mod kept;
-mod moved;
+mod flows;
+mod pieces;
 mod points;
-mod saved;
+mod transfer;
 
-pub use kept::WarmStart;
-pub use moved::Moved;
-pub use saved::{PieceError, SavedPiece};
+pub use flows::WarmStart;
+pub use pieces::{PieceError, SavedPiece};
+pub use transfer::TransferredFlows;

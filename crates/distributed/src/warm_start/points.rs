@@ -6,8 +6,8 @@ use gluey_fem::{Evaluator, NodeMap};
 use gluey_geom::Vector;
 use gluey_parallel::{Communicator, Ranks, route};
 
-use super::kept::{MOST, Piece, WarmStart};
-use super::saved::SavedPiece;
+use super::flows::{MOST, Piece, WarmStart};
+use super::pieces::SavedPiece;
 
 /// Numbers of a question: who asks, for which node, the run and up to three coordinates.
 const QUESTION: usize = 6;

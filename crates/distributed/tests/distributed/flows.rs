@@ -1,6 +1,6 @@
 //! Flows on several ranks: those of one rank, and those of the serial solver.
 
-use gluey_distributed::{BoxFlow, FlowError, MyFlow, equal_cuts, weighted_cuts};
+use gluey_distributed::{BoxFlow, FlowError, LocalFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::{Ranks, Threads};
@@ -36,7 +36,7 @@ impl Example {
         }
     }
 
-    fn solve<const D: usize>(self, ranks: &Ranks) -> MyFlow<D>
+    fn solve<const D: usize>(self, ranks: &Ranks) -> LocalFlow<D>
     where
         Dim<D>: Space<D>,
     {
@@ -56,7 +56,7 @@ fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
 }
 
 /// Velocities and pressures of all ranks, one after the other.
-fn joined<const D: usize>(parts: &[MyFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>)
+fn joined<const D: usize>(parts: &[LocalFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>)
 where
     Dim<D>: Space<D>,
 {

@@ -1,7 +1,7 @@
 //! Rigid bodies whose cells ranks share: their flow and their motions are those of the serial solver, and the
 //! same on any number of ranks.
 
-use gluey_distributed::{BoxFlow, FlowError, MyFlow, PartError, SurfaceBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, FlowError, LocalFlow, PartError, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -75,7 +75,7 @@ impl Example<'_> {
         (0..self.bodies.len()).map(wrench).collect()
     }
 
-    fn solve<const D: usize>(&self, ranks: &Ranks) -> MyFlow<D>
+    fn solve<const D: usize>(&self, ranks: &Ranks) -> LocalFlow<D>
     where
         Dim<D>: Space<D>,
     {
@@ -144,7 +144,7 @@ where
         println!("{size} ranks: {difference:.1e}, {motion:.1e}, iterations {}", parts[0].iterations);
         assert!(difference < 7.5e-10, "{size} ranks: velocities {difference:e}");
         assert!(motion < 1.4e-9, "{size} ranks: bodies {motion:e}");
-        let is_close = |part: &MyFlow<D>| part.iterations.abs_diff(alone.iterations) <= 1;
+        let is_close = |part: &LocalFlow<D>| part.iterations.abs_diff(alone.iterations) <= 1;
         assert!(parts.iter().all(is_close), "{} {}", parts[0].iterations, alone.iterations);
         assert!(parts.iter().all(|part| part.twists == parts[0].twists), "ranks agree on all bodies");
         let again = run();

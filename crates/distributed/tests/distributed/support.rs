@@ -1,6 +1,6 @@
 //! Set-ups and measurements that the tests share.
 
-use gluey_distributed::MyFlow;
+use gluey_distributed::LocalFlow;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, LevelSet};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
@@ -31,7 +31,7 @@ where
 }
 
 /// Velocities of all ranks, one after the other.
-pub fn velocities<const D: usize>(parts: &[MyFlow<D>]) -> Vec<Vector<D>>
+pub fn velocities<const D: usize>(parts: &[LocalFlow<D>]) -> Vec<Vector<D>>
 where
     Dim<D>: Space<D>,
 {

@@ -1,7 +1,7 @@
 //! Bodies whose surfaces cut the mesh: flows on ranks beside those of the serial solver of `unfitted`, at its
 //! tolerance and in as many iterations.
 
-use gluey_distributed::{BoxFlow, MyFlow, SurfaceBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -84,7 +84,7 @@ where
         (0..self.bodies.len()).map(wrench).collect()
     }
 
-    fn solve(&self, ranks: &Ranks) -> MyFlow<D> {
+    fn solve(&self, ranks: &Ranks) -> LocalFlow<D> {
         let (balls, refinement) = (self.balls(), self.refinement());
         let tree_of_balls = BallTree::new(&balls);
         let wants = |lower: &Vector<D>, h: f64, level: u8| refinement.wants(lower, h, level, &tree_of_balls);
@@ -143,7 +143,7 @@ where
 
     /// Forces and torques on bodies, mean velocity and mean force beside those of the serial solver, over the
     /// largest force.
-    fn largest_wrench_difference(&self, part: &MyFlow<D>, serial: &Flow<D>) -> f64 {
+    fn largest_wrench_difference(&self, part: &LocalFlow<D>, serial: &Flow<D>) -> f64 {
         assert_eq!(part.mean_velocity.is_some(), serial.mean_velocity.is_some());
         let mean = part.mean_velocity.zip(serial.mean_velocity).map_or(0.0, |(a, b)| (a - b).norm());
         let scale = serial.wrenches.iter().map(|wrench| wrench.force.norm()).fold(0.0, f64::max);

@@ -13,7 +13,7 @@ use super::mesh::FINEST_LEVEL;
 use super::names::UnknownName;
 use super::particle_problem::ParticleProblem;
 use super::suggest::former;
-use crate::shown::{shown, shown_to};
+use crate::number_text::{shown, shown_to};
 use crate::text::{named, visible};
 
 /// A case could not be used.

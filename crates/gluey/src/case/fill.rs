@@ -12,7 +12,7 @@ use super::idle::idle_in_suspension;
 use super::particle_problem::ParticleProblem;
 use super::particles_file::ParticleList;
 use super::{Case, ParticleSpec, SuspensionSpec, particles_file};
-use crate::shown::shown;
+use crate::number_text::shown;
 
 /// So many particles can be generated: the range of `suspension.count`.
 const MOST_PARTICLES: f64 = 1e6;

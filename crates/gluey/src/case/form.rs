@@ -9,7 +9,7 @@ use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::names::UnknownName;
 use super::suggest::{closest, synonym};
-use crate::shown::shown;
+use crate::number_text::shown;
 
 /// Notes everything in `value`, which stands at `key`, that `schema` does not allow.
 pub(super) fn check(value: &Value, schema: &Schema, key: &Key, findings: &mut Findings) {

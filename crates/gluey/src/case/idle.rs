@@ -8,7 +8,7 @@ use super::{
     Boundary, Case, ContactSpec, FlowSpec, Formulation, Hydrodynamics, RepulsionSpec, Strategy,
     SuspensionSpec,
 };
-use crate::shown::shown;
+use crate::number_text::shown;
 
 impl Case {
     /// The keys of a checked case that do nothing. Those with the value that they would have anyway are not

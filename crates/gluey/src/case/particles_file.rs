@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::error::{CaseIssue, KeyPart, Place};
 use super::findings::Violation;
 use super::{ParticleProblem, ParticleSpec};
-use crate::shown::shown;
+use crate::number_text::shown;
 use crate::text::{self, NotText};
 
 /// The header of a file.

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use gluey_geom::{Dim, Space, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::draft::{Draft, Mark, RowsError, line_of};
+use super::append_log::{Draft, Mark, RowsError, line_of};
 use super::pair_forces::{ContactForces, PairForces};
 use super::{OutputError, ResultPaths};
 use crate::measures::Instant;

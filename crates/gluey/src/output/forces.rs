@@ -8,7 +8,7 @@
 use gluey_geom::{Dim, Space};
 use gluey_motion::Holding;
 
-use super::draft::line_of;
+use super::append_log::line_of;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

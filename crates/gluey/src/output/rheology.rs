@@ -10,7 +10,7 @@
 
 use gluey_motion::MeanStress;
 
-use super::draft::line_of;
+use super::append_log::line_of;
 
 /// The first line in 3D; in 2D there is no `N2`, and forces of contacts have no unit of force.
 const NAMES: [&str; 11] = [

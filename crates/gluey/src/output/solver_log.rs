@@ -10,7 +10,7 @@ use std::path::Path;
 use gluey_contact::ContactReport;
 use gluey_motion::FlowStatistics;
 
-use super::draft::{Draft, Mark, RowsError};
+use super::append_log::{Draft, Mark, RowsError};
 use super::{OutputError, ResultPaths};
 use crate::phases::PhaseTable;
 use crate::tally::Motion;

@@ -5,7 +5,7 @@ use std::fmt;
 use gluey_suspension::statistics::Estimate;
 use serde::{Deserialize, Serialize};
 
-use crate::shown::shown_to;
+use crate::number_text::shown_to;
 
 /// Intervals below this part of the mean are rounding.
 const ROUNDING: f64 = 1e-12;

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::last_steps::Ended;
-use super::occupied::OccupiedError;
+use super::overwrite_guard::OccupiedError;
 use crate::case::CaseError;
 use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::TooLarge;
+use crate::number_text::shown;
 use crate::output::{ClaimError, OutputError, RowsError};
 use crate::rheology::RheologyError;
-use crate::shown::shown;
 use crate::simulation::StepError;
 
 /// Why a run failed.

@@ -8,8 +8,8 @@ use gluey_parallel::{Communicator, Ranks};
 
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
+use crate::checksum::Kind;
 use crate::output::{OutputError, write_atomically};
-use crate::sealed::Kind;
 
 const KIND: Kind = Kind { magic: b"gluey-fp", layout: 1 };
 

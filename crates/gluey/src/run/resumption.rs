@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::options::{RecordOptions, RunOptions};
 use super::record::{RecordError, RunRecord, RunState};
-use super::recorded::{FolderError, recorded_runs};
+use super::runs_of_folder::{FolderError, recorded_runs};
 use crate::output::ResultPaths;
 
 /// How to go on with a run: its case file and its options, at the places where its results are now.

@@ -4,7 +4,7 @@ use gluey_contact::{ContactError, MemoryError};
 use gluey_motion::{FilmError, NoForces, ResumeError};
 use thiserror::Error;
 
-use crate::shown::shown;
+use crate::number_text::shown;
 
 /// A step could not be done.
 #[derive(Debug, Error)]

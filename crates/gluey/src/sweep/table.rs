@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Axis;
+use crate::number_text::shown_to;
 use crate::report::RunReport;
-use crate::shown::shown_to;
 
 /// What came out of a point.
 #[derive(Clone, Debug, Serialize)]

@@ -24,9 +24,9 @@ use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 use super::deficit::Deficits;
+use super::flux::FilmFlow;
 use super::near::{Film, Heights, Partner};
 use super::network::FilmRow;
-use super::through::FilmFlow;
 use crate::space::VelocitySpace;
 use crate::term::{Load, Product, Scratch, Term};
 

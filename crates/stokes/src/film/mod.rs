@@ -10,15 +10,15 @@
 
 mod coupling;
 mod deficit;
+mod flux;
 mod near;
 mod network;
-mod through;
 
 pub use coupling::{FilmCoupling, FilmForce};
 pub use deficit::FilmShape;
+pub use flux::FilmFlow;
 pub use near::{Film, Heights, Partner, films, thin_films};
 pub use network::{FilmCorrection, FilmNetwork, FilmRow, SharedTwists};
-pub use through::FilmFlow;
 
 /// Treatment of films between bodies that are too thin for the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -49,10 +49,10 @@ where
             let force = |_: &Vector<D>| unit;
             let conditions = Conditions::at_rest().with_force(Some(&force)).with_bodies(&at_rest);
             let guess = vec![0.0; problem.system.dim()];
-            let trusted = self.trusted(problem, method, &conditions, &guess)?;
-            is_raised |= trusted.is_raised;
-            permeability.set_column(axis, &trusted.flow.mean_velocity.unwrap_or_else(Vector::zeros));
-            driven.push(trusted.flow);
+            let adapted = self.solve_with_adaptive_penalty(problem, method, &conditions, &guess)?;
+            is_raised |= adapted.is_raised;
+            permeability.set_column(axis, &adapted.flow.mean_velocity.unwrap_or_else(Vector::zeros));
+            driven.push(adapted.flow);
         }
         let Some(inverse) = permeability.try_inverse() else {
             return unsupported("flows without mean flow around bodies that let nothing through");

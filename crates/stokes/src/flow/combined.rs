@@ -10,8 +10,8 @@ use gluey_geom::{Dim, Space, Wrench};
 use gluey_levelset::Ball;
 use gluey_linalg::vector;
 
+use super::adaptive_penalty::FlowWithAdaptedPenalty;
 use super::conditions::{Conditions, Given};
-use super::trusted::Trusted;
 use super::{Effort, Flow, FlowSolver, PhaseTimes, flow_of};
 use crate::error::StokesError;
 
@@ -43,13 +43,13 @@ where
         self.prepare(&mut problem, &mut method)?;
         let prepared = Instant::now();
         let (guess, before) = self.initial_guess(&problem, conditions)?;
-        let Trusted { flow: first, mut x, .. } =
-            self.trusted(&mut problem, &mut method, conditions, &guess)?;
+        let FlowWithAdaptedPenalty { flow: first, mut x, .. } =
+            self.solve_with_adaptive_penalty(&mut problem, &mut method, conditions, &guess)?;
         self.keep_for_next(&problem, &x, &first.pressure, before);
         let pushed =
             Conditions { stress: conditions.stress, ..Conditions::at_rest().with_wrenches(wrenches) };
         let guess = vec![0.0; x.len()];
-        let second = self.trusted(&mut problem, &mut method, &pushed, &guess)?;
+        let second = self.solve_with_adaptive_penalty(&mut problem, &mut method, &pushed, &guess)?;
         let factor = factor(&first, &second.flow)?;
         vector::axpy(factor, &second.x, &mut x);
         let pushes: Vec<Wrench<D>> = wrenches.iter().map(|wrench| *wrench * factor).collect();

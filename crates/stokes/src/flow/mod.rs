@@ -1,5 +1,6 @@
 //! The flow around rigid bodies: prediction after prediction, in one of the [`Formulation`]s.
 
+mod adaptive_penalty;
 mod balance;
 mod combined;
 mod conditions;
@@ -8,7 +9,6 @@ mod prepared;
 mod raised;
 mod refinement;
 mod stress;
-mod trusted;
 mod warm_start;
 
 use std::sync::Arc;
@@ -24,13 +24,13 @@ use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, sy
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 
+pub use adaptive_penalty::MOST_ROUNDS;
 pub use conditions::{Conditions, Field, Given, GivenOf};
 pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
 pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
 pub use stress::Stress;
-pub use trusted::MOST_ROUNDS;
 pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 
@@ -233,8 +233,8 @@ where
         self.prepare(&mut problem, &mut method)?;
         let prepared = Instant::now();
         let (guess, before) = self.initial_guess(&problem, conditions)?;
-        let trusted = self.trusted(&mut problem, &mut method, conditions, &guess)?;
-        let (mut flow, x) = (trusted.flow, trusted.x);
+        let adapted = self.solve_with_adaptive_penalty(&mut problem, &mut method, conditions, &guess)?;
+        let (mut flow, x) = (adapted.flow, adapted.x);
         self.keep_for_next(&problem, &x, &flow.pressure, before);
         if conditions.without_mean {
             (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;

@@ -14,8 +14,8 @@ use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
+use super::adaptive_penalty::FlowWithAdaptedPenalty;
 use super::conditions::Conditions;
-use super::trusted::Trusted;
 use super::{Flow, FlowSolver, film_moments};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem, symmetric_and_traceless};
@@ -120,8 +120,8 @@ where
         self.make_ready(conditions)?;
         let guess = vec![0.0; self.problem.system.dim()];
         let Self { solver, problem, method, ready } = self;
-        let Trusted { mut flow, mut is_raised, .. } =
-            solver.get().trusted(problem, method, conditions, &guess)?;
+        let FlowWithAdaptedPenalty { mut flow, mut is_raised, .. } =
+            solver.get().solve_with_adaptive_penalty(problem, method, conditions, &guess)?;
         if conditions.without_mean {
             let raised;
             (flow, raised) = solver.get().balanced(problem, method, conditions, flow)?;

@@ -157,7 +157,7 @@ where
     let reference = discretisation.reference();
     let around = corners_of(system, special);
     let diagonal = diagonal_near(elements, &around);
-    let ratio = |row: &mut Row<D>, (q, around): (usize, &Vec<Corner>)| {
+    let ratio = |row: &mut DivergenceRow<D>, (q, around): (usize, &Vec<Corner>)| {
         let mut mass = 0.0;
         for &(index, corner, weight) in around {
             let (scale, matrix) = matrices.of(index);
@@ -172,7 +172,7 @@ where
         (q, row.take_sum(&diagonal) / mass)
     };
     let around = around.par_iter().enumerate().filter(|(_, around)| !around.is_empty());
-    around.map_init(Row::default, ratio).collect()
+    around.map_init(DivergenceRow::default, ratio).collect()
 }
 
 /// A corner of an active cell: index of the cell, corner, and the weight with which a pressure acts there.
@@ -220,12 +220,12 @@ where
 
 /// A row of `B` in nodal velocities, empty between two uses.
 #[derive(Default)]
-struct Row<const D: usize> {
+struct DivergenceRow<const D: usize> {
     place: FxHashMap<u32, usize>,
     terms: Vec<(u32, [f64; D])>,
 }
 
-impl<const D: usize> Row<D> {
+impl<const D: usize> DivergenceRow<D> {
     fn add(&mut self, node: u32, divergence: [f64; D]) {
         let place = *self.place.entry(node).or_insert(self.terms.len());
         match self.terms.get_mut(place) {

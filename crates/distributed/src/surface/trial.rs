@@ -15,10 +15,10 @@ use super::films::network;
 use super::space::PartHalos;
 use crate::agreement::agreed;
 use crate::flow::{FlowError, LevelSizes};
-use crate::warm_start::Moved;
+use crate::warm_start::TransferredFlows;
 
 /// A flow with the penalties that were tried.
-pub struct Attempt<const D: usize>
+pub struct Trial<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -42,14 +42,14 @@ where
     Dim<D>: Space<D>,
 {
     /// The flow with the penalties of a problem. All ranks call this.
-    pub fn attempt(
+    pub fn trial(
         &self,
         tree: &ImplicitTree<'_, D>,
         halos: &PartHalos,
         cycle: VCycle<D>,
         problem: &Problem<D>,
-        before: Option<&mut Moved>,
-    ) -> Result<Attempt<D>, FlowError> {
+        before: Option<&mut TransferredFlows>,
+    ) -> Result<Trial<D>, FlowError> {
         let (ranks, system) = (self.shared.ranks, &problem.system);
         let mut sizes = self.sizes.clone();
         if let Some(finest) = sizes.last_mut() {
@@ -78,7 +78,7 @@ where
             self.stress(problem, [&velocity, &pressure], &whole)
         });
         let stress = stress.transpose()?;
-        Ok(Attempt {
+        Ok(Trial {
             cycle: solver.into_cycle().ok_or_else(|| FlowError::of_all(StokesError::NotPrepared))?,
             velocity,
             pressure,
@@ -100,7 +100,7 @@ where
         tree: &ImplicitTree<'_, D>,
         problem: &Problem<D>,
         b: &[f64],
-        before: Option<&mut Moved>,
+        before: Option<&mut TransferredFlows>,
     ) -> Vec<f64> {
         let system = &problem.system;
         let Some(before) = before else { return vec![0.0; system.dim()] };

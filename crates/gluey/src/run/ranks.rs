@@ -9,7 +9,7 @@ use gluey_parallel::{Communicator, Ranks};
 use super::contacts::{self, Contacts};
 use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
-use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, leftovers, logged, occupied};
+use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, logged, overwrite_guard, stale_files};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 use crate::flow::suspension;
 use crate::hydrodynamics::HydrodynamicsError;
@@ -64,8 +64,8 @@ where
     let models = (leader, Contacts::by(contact));
     let others = OtherRanks { ranks, memory };
     let _claims = claim_outputs(case, options, progress)?;
-    occupied::check_free(case, options)?;
-    leftovers::remove(case, options)?;
+    overwrite_guard::check_free(case, options)?;
+    stale_files::remove(case, options)?;
     let report = logged(case, options, progress, |log| {
         Run::start(case, options, log, models, Some(&others))?.finish()
     })?;

@@ -1,9 +1,9 @@
-//! Particles dealt to ranks by space: along a Morton curve through the cells of a grid, cut into equal
-//! numbers.
+//! The partition of particles among ranks by space: along a Morton curve through the cells of a grid, cut
+//! into equal numbers.
 
 use gluey_geom::Vector;
 
-use super::{Dealt, PartMemory, PartParticle};
+use super::{PartMemory, PartParticle, RankShare};
 use crate::grid::{Grid, sort_by_key};
 use crate::neighbours::{Moves, SpatialOrder, for_each_image, wrap};
 use crate::{ContactError, Domain, PairKey, PairState, Partner, StepGeometry};
@@ -27,7 +27,7 @@ pub(crate) struct Motion<'a, const D: usize> {
 
 /// Deals particles to ranks.
 #[derive(Debug, Default)]
-pub(crate) struct Dealer<const D: usize> {
+pub(crate) struct Partitioner<const D: usize> {
     spatial: SpatialOrder,
     wrapped: Vec<Vector<D>>,
     windings: Vec<[i32; 3]>,
@@ -108,15 +108,15 @@ impl Cells {
     }
 }
 
-impl<const D: usize> Dealer<D> {
+impl<const D: usize> Partitioner<D> {
     /// What each of so many ranks gets.
-    pub(crate) fn deal(
+    pub(crate) fn partition(
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,
         motion: &Motion<'_, D>,
         rank_count: usize,
-    ) -> Result<Vec<Dealt<D>>, ContactError> {
+    ) -> Result<Vec<RankShare<D>>, ContactError> {
         self.order(step, domain, motion)?;
         let widest = self.reach.iter().copied().fold(0.0, f64::max);
         let grid = Grid::over(&self.wrapped, 2.0 * widest, CELLS_PER_PARTICLE * self.wrapped.len());
@@ -124,22 +124,23 @@ impl<const D: usize> Dealer<D> {
         let mut holders: Vec<Vec<u32>> = vec![Vec::new(); rank_count];
         self.hold(&grid, domain, 2.0 * widest, &mut holders);
         let ranks = 0..rank_count as u32;
-        let mut dealt: Vec<Dealt<D>> = ranks.map(|rank| Dealt { rank, ..Dealt::default() }).collect();
+        let mut shares: Vec<RankShare<D>> =
+            ranks.map(|rank| RankShare { rank, ..RankShare::default() }).collect();
         let mut partners: Vec<Vec<u32>> = vec![Vec::new(); rank_count];
         for state in motion.memory {
             let (owner, memory, second) = self.remembered(state);
-            dealt[owner].memory.push(memory);
+            shares[owner].memory.push(memory);
             partners[owner].extend(second.filter(|place| holders[owner].binary_search(place).is_err()));
         }
-        for ((places, dealt), partners) in holders.iter_mut().zip(&mut dealt).zip(&partners) {
+        for ((places, shares), partners) in holders.iter_mut().zip(&mut shares).zip(&partners) {
             if !partners.is_empty() {
                 places.extend(partners);
                 places.sort_unstable();
                 places.dedup();
             }
-            dealt.particles.extend(places.iter().map(|&place| self.particle(place, step, motion)));
+            shares.particles.extend(places.iter().map(|&place| self.particle(place, step, motion)));
         }
-        Ok(dealt)
+        Ok(shares)
     }
 
     /// Orders particles by space, and finds how far to search around each.

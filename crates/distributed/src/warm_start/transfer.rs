@@ -6,15 +6,15 @@ use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::NodalFields;
 
 use super::films::{self, KeptFilm};
-use super::kept::{MOST, Piece, Small, Values, WarmStart};
+use super::flows::{GlobalState, MOST, Piece, Values, WarmStart};
 use crate::bodies::{NearBodies, Shared, rigid};
 use crate::space::LevelSpace;
 
 /// The last flows at the nodes of other cells.
-pub struct Moved {
+pub struct TransferredFlows {
     /// At all nodes of the part; right at those of own cells.
     pub flows: Vec<Values>,
-    pub small: Small,
+    pub small: GlobalState,
 }
 
 impl<const D: usize> WarmStart<D>
@@ -28,10 +28,10 @@ where
         level: &LevelSpace<D>,
         bodies: &NearBodies<D>,
         last: NodalFields,
-        before: Option<Moved>,
+        before: Option<TransferredFlows>,
     ) -> Self {
         let NodalFields { velocity, pressure, bodies: motions, films } = last;
-        let (mut flows, mut small) = (vec![[velocity, pressure]], Small::default());
+        let (mut flows, mut small) = (vec![[velocity, pressure]], GlobalState::default());
         small.bodies.push(motions_of_all(shared, bodies, &motions));
         small.films = films::kept::<D>(&bodies.ids, &films);
         if let Some(before) = before {
@@ -54,16 +54,16 @@ where
     }
 
     /// The flows at the nodes of the cells of this rank. All ranks call this.
-    pub fn moved(&self, ranks: &Ranks, level: &LevelSpace<D>) -> Moved {
+    pub fn moved(&self, ranks: &Ranks, level: &LevelSpace<D>) -> TransferredFlows {
         let own = level.part.own();
         let [velocities, pressures] = [(&level.velocity, D), (&level.pressure, 1)]
             .map(|(nodes, components)| self.at_nodes(ranks, (&nodes.map, own.clone()), components));
         let flows = velocities.into_iter().zip(pressures).map(|(velocity, pressure)| [velocity, pressure]);
-        Moved { flows: flows.collect(), small: self.small.clone() }
+        TransferredFlows { flows: flows.collect(), small: self.small.clone() }
     }
 }
 
-impl Moved {
+impl TransferredFlows {
     /// The last flow and the one before, with the bodies and films near a part, if they are known. Keeps what
     /// all ranks know of films by first bodies that this rank owns. All ranks call this.
     pub fn near<const D: usize>(

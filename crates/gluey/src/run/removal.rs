@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::output::made::{PAGE_NAME, is_page, is_picture, is_table};
+use crate::output::product_names::{PAGE_NAME, is_page, is_picture, is_table};
 use crate::output::{OutputError, ResultPaths, drafts, entries, is_claimed, name_of, undrafted};
 
 /// Series of frames, by the beginnings of their names.

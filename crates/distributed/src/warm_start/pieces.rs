@@ -8,7 +8,7 @@ use gluey_parallel::{Communicator, Ranks};
 use serde::{Deserialize, Serialize};
 
 use super::films::KeptFilm;
-use super::kept::{MOST, Piece, Small, WarmStart};
+use super::flows::{GlobalState, MOST, Piece, WarmStart};
 use crate::bodies::rigid;
 
 /// The flows in the cells of one run in the order of cells, of how many runs, and what belongs to no mesh.
@@ -123,7 +123,7 @@ where
         let films = saved.iter().flat_map(|piece| piece.films.iter().copied()).collect();
         let pieces: Result<Vec<_>, _> =
             saved.into_iter().map(|piece| restored_piece(&frame, (&cuts, flow_count), piece)).collect();
-        Ok(Self { pieces: pieces?, small: Small { bodies: any.bodies, films }, frame, cuts })
+        Ok(Self { pieces: pieces?, small: GlobalState { bodies: any.bodies, films }, frame, cuts })
     }
 }
 

@@ -20,7 +20,7 @@ pub struct WarmStart<const D: usize> {
     /// Between the runs of the pieces.
     pub cuts: Cuts,
     pub pieces: Vec<Piece<D>>,
-    pub small: Small,
+    pub small: GlobalState,
 }
 
 /// The flows in the cells of one run, the last one first.
@@ -36,7 +36,7 @@ pub struct Piece<const D: usize> {
 
 /// What belongs to no mesh: of the last flow first.
 #[derive(Clone, Default)]
-pub struct Small {
+pub struct GlobalState {
     /// Motions of all bodies, of each flow.
     pub bodies: Vec<Vec<f64>>,
     pub films: Vec<KeptFilm>,

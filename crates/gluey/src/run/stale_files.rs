@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::frames::StreamOptions;
 use super::options::RunOptions;
-use super::replaced::{self, is_frame, list, remove_file};
+use super::removal::{self, is_frame, list, remove_file};
 use crate::case::Case;
 use crate::output::{OutputError, ResultPaths, drafts, name_of, undrafted};
 
@@ -17,7 +17,7 @@ pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), OutputErro
         drafts(&whole)?.iter().try_for_each(|draft| remove_file(draft))?;
     }
     if record.force && options.resume.is_none() {
-        replaced::remove(&paths)?;
+        removal::remove(&paths)?;
     }
     let streams = StreamOptions::of_run(case, options).into_iter().map(|stream| stream.folder);
     let mut folders: Vec<_> = [paths.vtk(), paths.xyz()].into_iter().chain(streams).collect();

@@ -16,7 +16,7 @@ use crate::formulation::{Method, Problem};
 pub const MOST_ROUNDS: usize = 6;
 
 /// A flow whose penalties are large enough, and the reduced vector it belongs to.
-pub(super) struct Trusted<const D: usize>
+pub(super) struct FlowWithAdaptedPenalty<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -72,13 +72,13 @@ where
     ///
     /// # Errors
     /// Those of the solver, [`StokesError::WeakSurface`].
-    pub(super) fn trusted(
+    pub(super) fn solve_with_adaptive_penalty(
         &mut self,
         problem: &mut Problem<D>,
         method: &mut Arc<dyn Method<D>>,
         conditions: &Conditions<'_, D>,
         guess: &[f64],
-    ) -> Result<Trusted<D>, StokesError> {
+    ) -> Result<FlowWithAdaptedPenalty<D>, StokesError> {
         let mut wasted = Effort::default();
         for rounds in 0.. {
             let mut x = guess.to_vec();
@@ -95,7 +95,7 @@ where
                 let mut flow = solved?;
                 flow.solve_count += wasted.solve_count;
                 flow.iteration_count += wasted.iteration_count;
-                return Ok(Trusted { flow, x, is_raised: rounds > 0 });
+                return Ok(FlowWithAdaptedPenalty { flow, x, is_raised: rounds > 0 });
             };
             let [cell, body] = [first.cell, first.body].map(|index| index as usize);
             let error = StokesError::WeakSurface { body, cell, share: first.share, rounds };

@@ -1,21 +1,21 @@
-//! Where all particles are known: the step is checked and dealt there, and its outcome comes together.
+//! Where all particles are known: the step is checked and partitioned there, and its outcome comes together.
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use crate::part::deal::{Dealer, Motion};
-use crate::part::{Dealt, PartFrame};
+use crate::part::partition::{Motion, Partitioner};
+use crate::part::{PartFrame, RankShare};
 use crate::{Contact, ContactError, ContactParams, Domain, Mobility, PairContact, StepGeometry};
 
 /// Contact of particles that ranks share, as the rank that knows all particles sees it.
 ///
-/// A step begins with [`Lead::begin`]. While some rank found that the search had not gone far enough,
-/// [`Lead::widen`] deals the particles anew; then [`Lead::finish`] takes over what came of it. Contacts and
-/// memory stay here, and change at the end of a step only.
+/// A step begins with [`Coordinator::begin`]. While some rank found that the search had not gone far enough,
+/// [`Coordinator::widen`] partitions the particles anew; then [`Coordinator::finish`] takes over what came of
+/// it. Contacts and memory stay here, and change at the end of a step only.
 #[derive(Debug)]
-pub struct Lead<const D: usize, M> {
+pub struct Coordinator<const D: usize, M> {
     /// The model on one rank, which has memory and surroundings.
     contact: PairContact<D, M>,
-    dealer: Dealer<D>,
+    dealer: Partitioner<D>,
     /// By particle.
     free: Vec<Vector<D>>,
     mobilities: Vec<f64>,
@@ -23,13 +23,13 @@ pub struct Lead<const D: usize, M> {
     frame: PartFrame<D>,
 }
 
-impl<const D: usize, M: Mobility<D>> Lead<D, M>
+impl<const D: usize, M: Mobility<D>> Coordinator<D, M>
 where
     Dim<D>: Space<D>,
 {
     /// What `contact` does alone, for ranks.
     pub fn new(contact: PairContact<D, M>) -> Self {
-        let (dealer, frame) = (Dealer::default(), PartFrame::default());
+        let (dealer, frame) = (Partitioner::default(), PartFrame::default());
         Self { contact, dealer, free: Vec::new(), mobilities: Vec::new(), widening: 1.0, frame }
     }
 
@@ -67,7 +67,7 @@ where
         step: &StepGeometry<'_, D>,
         twists: &[Twist<D>],
         rank_count: usize,
-    ) -> Result<Vec<Dealt<D>>, ContactError> {
+    ) -> Result<Vec<RankShare<D>>, ContactError> {
         let tolerance = self.contact.check(step, twists, &mut self.free)?;
         self.mobilities.clear();
         self.mobilities
@@ -81,7 +81,7 @@ where
             tolerance,
             wall_slack: 0.0,
         };
-        self.deal(step, &self.free.clone(), rank_count)
+        self.partition(step, &self.free.clone(), rank_count)
     }
 
     /// Deals the particles anew, for a search that finds what these displacements (by particle) close.
@@ -93,21 +93,21 @@ where
         step: &StepGeometry<'_, D>,
         needed: &[Vector<D>],
         rank_count: usize,
-    ) -> Result<Vec<Dealt<D>>, ContactError> {
+    ) -> Result<Vec<RankShare<D>>, ContactError> {
         self.widening *= 2.0;
         for wall in &self.frame.domain.walls {
             let farthest = needed.iter().map(|s| wall.normal.dot(s).abs()).fold(0.0, f64::max);
             self.frame.wall_slack = self.frame.wall_slack.max(farthest);
         }
-        self.deal(step, needed, rank_count)
+        self.partition(step, needed, rank_count)
     }
 
-    fn deal(
+    fn partition(
         &mut self,
         step: &StepGeometry<'_, D>,
         needed: &[Vector<D>],
         rank_count: usize,
-    ) -> Result<Vec<Dealt<D>>, ContactError> {
+    ) -> Result<Vec<RankShare<D>>, ContactError> {
         let motion = Motion {
             free: &self.free,
             needed,
@@ -115,7 +115,7 @@ where
             mobilities: &self.mobilities,
             memory: self.contact.memory(),
         };
-        self.dealer.deal(step, &self.frame.domain, &motion, rank_count)
+        self.dealer.partition(step, &self.frame.domain, &motion, rank_count)
     }
 
     /// Displacements without contact of the step that was begun, by particle.
