@@ -338,12 +338,40 @@ mod tests {
     use super::*;
     use crate::operator::system::SystemOperator;
     use crate::space::{Discretisation, solid_nodes};
+    use crate::term::{Product, Scratch, Term};
     use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
     use gluey_levelset::Ball;
-    use gluey_linalg::LinOp;
+    use gluey_linalg::{LinOp, Scalar};
 
-    /// Two bodies whose cells touch, on a mesh with hanging nodes.
+    /// A term that ties velocities by a force of its own.
+    #[derive(Debug)]
+    struct Tie([(u32, f64); 2]);
+
+    impl<X: Scalar, T> Product<X, T> for Tie {
+        fn add(&self, [x, _, g]: [&[X]; 3], [y, _, z]: [&mut [X]; 3], _: &mut Scratch<T>) {
+            for (k, weight) in self.0 {
+                z[0] += X::from_f64(weight * x[k as usize].to_f64());
+                y[k as usize] += X::from_f64(weight * g[0].to_f64());
+            }
+            z[0] += X::from_f64(-g[0].to_f64());
+        }
+    }
+
+    impl<const D: usize> Term<D> for Tie
+    where
+        Dim<D>: Space<D>,
+    {
+        fn row_count(&self) -> usize {
+            1
+        }
+
+        fn row(&self, _: usize) -> &[(u32, f64)] {
+            &self.0
+        }
+    }
+
+    /// Two bodies whose cells touch, on a mesh with hanging nodes, and a term of which no other code knows.
     fn assembled_and_matrix_free_agree<const D: usize>()
     where
         Dim<D>: Space<D>,
@@ -356,7 +384,10 @@ mod tests {
         let discretisation = Discretisation::new(mesh);
         let solid = solid_nodes(&discretisation, &balls, 0.0);
         let space = VelocitySpace::new(&discretisation, &balls, &solid);
-        let system = StokesSystem::new(space, 1.5);
+        let free: Vec<usize> = (0..space.nodes().node_count()).filter(|&node| space.is_free(node)).collect();
+        let tie = Tie([(free[2] as u32 * D as u32, 0.7), (space.full_dim() as u32, -0.4)]);
+        let mut system = StokesSystem::new(space, 1.5);
+        system.terms.push(Arc::new(tie));
         let assembled = assemble_stokes(&system).unwrap();
         let unknowns = &assembled.unknowns;
         let x: Vec<f64> = (0..unknowns.len()).map(|i| (0.37 * i as f64).sin()).collect();
@@ -368,7 +399,8 @@ mod tests {
         let mut gathered = vec![0.0; x.len()];
         unknowns.gather(&image, &mut gathered);
         // The operator makes its divergences sum to zero, so they may differ by one number.
-        let is_pressure = |i: usize| unknowns.positions()[i] as usize >= system.velocity_dim();
+        let pressures = system.velocity_dim()..system.dim() - 1;
+        let is_pressure = |i: usize| pressures.contains(&(unknowns.positions()[i] as usize));
         let first = (0..y.len()).find(|&i| is_pressure(i)).unwrap();
         let shift = y[first] - gathered[first];
         for i in 0..y.len() {
