@@ -30,8 +30,8 @@ use words::Outcome;
 /// everything where there is one rank.
 pub struct SharedContact<'a, const D: usize> {
     ranks: &'a Ranks,
-    /// Knows whether the others, who follow a [`Suspension`](crate::Suspension), wait for this rank; none
-    /// where they know themselves when a step comes.
+    /// Knows whether the others, who follow a [`SharedSuspension`](crate::SharedSuspension), wait for this
+    /// rank; none where they know themselves when a step comes.
     memory: Option<Rc<Memory<D>>>,
     lead: Coordinator<D, WithFixed>,
     part: PartContact<D>,
