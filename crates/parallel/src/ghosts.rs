@@ -164,45 +164,6 @@ impl GhostPlan {
         Self { owned: self.owned.filtered(|_| wanted.next() == Some(&1)), ghosts: self.ghosts.filtered(keep) }
     }
 
-    /// Lists of any length from the owners, which `write` them, for each ghost here.
-    pub fn lists(
-        &self,
-        ranks: &dyn Communicator,
-        mut write: impl FnMut(u32, &mut Vec<u64>),
-    ) -> Vec<(u32, Vec<u64>)> {
-        let mut list = Vec::new();
-        let mut message = |(rank, places): (usize, &Vec<u32>)| {
-            let mut numbers: Vec<u64> = Vec::new();
-            for &place in places {
-                list.clear();
-                write(place, &mut list);
-                numbers.push(list.len() as u64);
-                numbers.extend_from_slice(&list);
-            }
-            let mut bytes = Vec::new();
-            write_all(&numbers, &mut bytes);
-            Message { rank, bytes }
-        };
-        let told: Vec<Message> = self.owned.by_rank().map(&mut message).collect();
-        let lengths = told.iter().map(|m| Message { rank: m.rank, bytes: length_of(m) });
-        let empty = |(rank, _): (usize, &Vec<u32>)| Message { rank, bytes: vec![0; u64::SIZE] };
-        let mut coming: Vec<Message> = self.ghosts.by_rank().map(empty).collect();
-        ranks.exchange(&lengths.collect::<Vec<_>>(), &mut coming);
-        for message in &mut coming {
-            message.bytes = vec![0; u64::read(&message.bytes) as usize];
-        }
-        ranks.exchange(&told, &mut coming);
-        let mut lists = Vec::with_capacity(self.ghost_count());
-        for ((_, places), message) in self.ghosts.by_rank().zip(&coming) {
-            let mut numbers = read_all(&message.bytes);
-            for &place in places {
-                let length = numbers.next().map_or(0, |length: u64| length as usize);
-                lists.push((place, numbers.by_ref().take(length).collect()));
-            }
-        }
-        lists
-    }
-
     /// Number of ghosts here.
     pub fn ghost_count(&self) -> usize {
         self.ghosts.count()

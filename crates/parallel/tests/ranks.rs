@@ -259,20 +259,6 @@ fn restricted_plans_leave_out_what_a_rank_does_not_keep() {
     }
 }
 
-#[test]
-fn owners_send_lists_of_any_length() {
-    for size in SIZES {
-        Threads::run(size, |ranks| {
-            let Line { plan, first, .. } = line(ranks);
-            let list_of = |k: usize| (0..k % 4).map(|n| (10 * k + n) as u64).collect::<Vec<u64>>();
-            let lists = plan.lists(ranks, |place, list| list.extend(list_of(first + place as usize)));
-            assert_eq!(lists.len(), plan.ghost_count());
-            assert!(lists.iter().all(|(place, list)| *list == list_of(first + *place as usize)));
-        })
-        .unwrap();
-    }
-}
-
 /// Records come by rank, of each in the order in which they were given, those of a rank for itself among
 /// them.
 #[test]

@@ -143,12 +143,6 @@ impl<const D: usize> StokesSystem<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The own cells that no surface cuts.
-    pub fn own_fluid_cells(&self) -> impl Iterator<Item = usize> + '_ {
-        let cells = self.cells.iter().map(|cell| cell.cell as usize);
-        cells.filter(|&cell| self.discretisation().is_own(cell))
-    }
-
     /// The own cells that surfaces cut.
     pub fn own_cut_cells(&self) -> impl Iterator<Item = usize> + '_ {
         let cut = self.surfaces().into_iter().flat_map(|surfaces| &surfaces.cut.cells);
