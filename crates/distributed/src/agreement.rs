@@ -9,12 +9,9 @@ use crate::flow::{FlowError, PartError};
 
 /// A failure of one rank is one of all, who say what the first of them said. All ranks call this.
 pub fn agreed<T>(ranks: &Ranks, outcome: Result<T, impl Into<PartError>>) -> Result<T, FlowError> {
-    let outcome = outcome.map_err(Into::into);
-    let own = outcome.as_ref().err().map(ToString::to_string);
-    match (ranks.first_failure(own.clone()), outcome) {
-        (None, outcome) => outcome.map_err(FlowError::Part),
-        (Some(first), Err(error)) if own.as_ref() == Some(&first.message) => Err(FlowError::Part(error)),
-        (Some(first), _) => Err(FlowError::Elsewhere { rank: first.rank, message: first.message }),
+    match ranks.agreed(outcome.map_err(Into::into)) {
+        Ok(outcome) => outcome.map_err(FlowError::Part),
+        Err(first) => Err(FlowError::Elsewhere { rank: first.rank, message: first.message }),
     }
 }
 

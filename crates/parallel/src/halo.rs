@@ -76,17 +76,14 @@ impl Halo {
         self.0.as_deref().map_or([0; 2], |shared| [shared.plan.ghost_count(), shared.plan.neighbour_count()])
     }
 
-    /// A failure of one rank is one of all, who are told the first of them; a rank that failed in the same
-    /// way keeps its own. All ranks call this.
+    /// [`Ranks::agreed`] of the ranks that have the ghosts.
     ///
     /// # Errors
     /// The failure of another rank.
     pub fn agreed<T, E: Display>(&self, outcome: Result<T, E>) -> Result<Result<T, E>, RankFailure> {
-        let Some(Shared { ranks, .. }) = self.0.as_deref() else { return Ok(outcome) };
-        let own = outcome.as_ref().err().map(ToString::to_string);
-        match ranks.first_failure(own.clone()) {
-            Some(first) if own.as_ref() != Some(&first.message) => Err(first),
-            _ => Ok(outcome),
+        match self.0.as_deref() {
+            Some(Shared { ranks, .. }) => ranks.agreed(outcome),
+            None => Ok(outcome),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The handle by which a program knows its rank.
 
+use std::fmt::Display;
 use std::sync::{Arc, Mutex};
 
 use crate::alone::Alone;
@@ -14,6 +15,19 @@ impl Ranks {
     /// The rank that speaks by this communicator.
     pub fn new(communicator: impl Communicator + 'static) -> Self {
         Self(Arc::new(communicator))
+    }
+
+    /// A failure of one rank is one of all, who are told the first of them; a rank that failed in the same
+    /// way keeps its own. All ranks call this.
+    ///
+    /// # Errors
+    /// The failure of another rank.
+    pub fn agreed<T, E: Display>(&self, outcome: Result<T, E>) -> Result<Result<T, E>, RankFailure> {
+        let own = outcome.as_ref().err().map(ToString::to_string);
+        match self.first_failure(own.clone()) {
+            Some(first) if own.as_ref() != Some(&first.message) => Err(first),
+            _ => Ok(outcome),
+        }
     }
 
     /// The only rank of a program.
