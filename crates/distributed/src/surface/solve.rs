@@ -190,7 +190,7 @@ where
         let (ranks, mut earlier) = (self.shared.ranks, Before::default());
         loop {
             let mut problem = agreed(ranks, self.problem(tree, &method))?;
-            let halos = PartHalos::new(tree, &self.shared, &self.level, &problem, &self.bodies);
+            let halos = PartHalos::new(tree, &self.shared, &self.level, &problem);
             problem.system.share(halos.of_system.clone());
             let smoother = self.named(AssembledSmoother::new(&problem));
             if let Some(stiffer) = self.stiffened(&method, &smoother) {

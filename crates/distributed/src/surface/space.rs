@@ -3,10 +3,10 @@
 use gluey_fem::{Cell, Constraint, ImplicitTree, TreeMesh};
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::BallTree;
-use gluey_parallel::{Communicator, GhostPlan, Halo, Ranks, Wanted};
+use gluey_parallel::{GhostPlan, Halo};
 use gluey_stokes::{Film, Partner, PressureSpace, Problem, StokesSystem};
 
-use crate::bodies::{NearBodies, Shared, rigid};
+use crate::bodies::{Shared, rigid};
 use crate::space::{LevelSpace, Nodes, wanted_nodes};
 
 /// Cells between the middle of a cell and a surface, at most, if the part is to hold what is around it.
@@ -41,7 +41,6 @@ impl PartHalos {
         shared: &Shared<'_, '_, D>,
         level: &LevelSpace<D>,
         problem: &Problem<D>,
-        bodies: &NearBodies<D>,
     ) -> Self
     where
         Dim<D>: Space<D>,
@@ -55,15 +54,16 @@ impl PartHalos {
         };
         let nodes = plan_of(&masters.needed(level, system));
         let around = plan_of(&masters.around(level, system));
-        let twists = twist_plan(ranks, bodies, &bodies_here(level, problem));
+        let here = bodies_here(level, problem);
+        let partition = problem.discretisation().partition().expect("the mesh is a part");
+        let twists = partition.twists(&here);
         let pressures = pressure_plan(tree, shared, level, &system.pressure);
         let (first_twist, first_pressure) = (system.space.full_dim(), system.velocity_dim());
         let films = system.dim() - system.row_count()..system.dim();
         let own_nodes = level.velocity.owned.start * D..level.velocity.owned.end * D;
         let own_pressures = level.pressure.owned.clone();
         let own_twists = |first: usize, width: usize| {
-            let own = bodies.owned(ranks.rank()).into_iter().map(|body| body as usize);
-            own.map(move |body| first + body * width..first + (body + 1) * width)
+            partition.own_bodies().map(move |body| first + body * width..first + (body + 1) * width)
         };
         let own_velocities: Vec<_> =
             std::iter::once(own_nodes.clone()).chain(own_twists(first_twist, n)).collect();
@@ -186,19 +186,6 @@ where
         }
     }
     here
-}
-
-/// The plan of the twists of other ranks' bodies, by their places among those near the part.
-fn twist_plan<const D: usize>(ranks: &Ranks, bodies: &NearBodies<D>, here: &[bool]) -> GhostPlan {
-    let rank = ranks.rank();
-    let ghost = |place: &usize| here[*place] && bodies.owners[*place] != rank;
-    let wanted = (0..bodies.ids.len()).filter(ghost).map(|place| Wanted {
-        owner: bodies.owners[place],
-        key: u64::from(bodies.ids[place]),
-        place: place as u32,
-    });
-    let find = |key: u64| bodies.ids.binary_search(&(key as u32)).ok().map(|place| place as u32);
-    GhostPlan::new(ranks, wanted.collect(), find)
 }
 
 /// Whether the part is to hold what is around a cell: whether a surface is near it.

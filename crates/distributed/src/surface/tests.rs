@@ -29,7 +29,7 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
             let viscosity = if ranks.rank() == 1 { factor.recip() } else { 1.0 };
             let method = PartMethod::new(Lubrication::None);
             let mut problem = method.problem(&levels.discretisation, &none, viscosity, &|_| true).unwrap();
-            let halos = PartHalos::new(&mut tree, &shared, &levels.finest, &problem, &levels.bodies);
+            let halos = PartHalos::new(&mut tree, &shared, &levels.finest, &problem);
             problem.system.share(halos.of_system);
             problem.schur_inverse(&levels.cycle).err().map(|error| error.to_string())
         })

@@ -64,8 +64,9 @@ where
         ]
     }
 
-    /// The plan of the twists of other ranks' bodies, of those `here`.
-    fn twists(&self, here: &[bool]) -> GhostPlan {
+    /// The plan of the twists of other ranks' bodies, of those `here`, by their places among those near the
+    /// part. All ranks call this.
+    pub fn twists(&self, here: &[bool]) -> GhostPlan {
         let is_ghost = |&place: &usize| here[place] && self.owners[place] != self.ranks.rank();
         let wanted = (0..self.bodies.len()).filter(is_ghost).map(|place| Wanted {
             owner: self.owners[place],
