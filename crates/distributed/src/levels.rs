@@ -4,7 +4,8 @@ use gluey_fem::{Cell, ImplicitTree};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, GhostPlan, Halo};
 use gluey_stokes::part::{
-    Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarse_offset, coarsest_level,
+    self, Hierarchy, LevelPlan, RELAXED_DIMENSIONS, RELAXED_RINGS, Smoothing, VCycle, coarse_offset,
+    coarsest_level,
 };
 use gluey_stokes::{Discretisation, Partition, VelocitySpace, solid_nodes};
 
@@ -137,12 +138,10 @@ fn discretised<const D: usize>(
 /// others the tree is asked.
 fn finest_levels<const D: usize>(tree: &mut ImplicitTree<'_, D>, level: &LevelSpace<D>) -> Vec<u8> {
     let (mesh, map) = (&level.part.mesh, &level.velocity.map);
-    let [mut finest, mut is_surrounded] = [(); 2].map(|()| vec![0; map.node_count()]);
-    for (index, cell) in mesh.cells().iter().enumerate() {
-        map.cell(index).iter().for_each(|&n| finest[n as usize] = cell.level.max(finest[n as usize]));
-    }
-    map.cells(level.part.inner()).iter().for_each(|&node| is_surrounded[node as usize] = 1);
-    for node in (0..map.node_count()).filter(|&node| is_surrounded[node] == 0) {
+    let mut finest = part::finest_levels(mesh, map);
+    let mut is_surrounded = vec![false; map.node_count()];
+    map.cells(level.part.inner()).iter().for_each(|&node| is_surrounded[node as usize] = true);
+    for node in (0..map.node_count()).filter(|&node| !is_surrounded[node]) {
         finest[node] = tree.finest_touching(mesh.max_level(), 2, map.lattice_point(node));
     }
     finest

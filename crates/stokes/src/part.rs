@@ -19,6 +19,8 @@ use crate::operator::{Elements, StokesSystem};
 use crate::precondition::surface;
 use crate::space::Discretisation;
 
+pub use crate::space::finest_levels;
+
 pub use crate::film::{FilmNetwork, FilmRow, SharedTwists};
 pub use crate::flow::MOST_ROUNDS;
 pub use crate::precondition::schur::SchurInverse;

@@ -117,13 +117,7 @@ impl<const D: usize> Discretisation<D> {
         if let Some(part) = self.partition() {
             return Cow::Borrowed(&part.finest);
         }
-        let mut finest = vec![0; self.velocity.node_count()];
-        for (index, cell) in self.mesh.cells().iter().enumerate() {
-            for &node in self.velocity.cell(index) {
-                finest[node as usize] = cell.level.max(finest[node as usize]);
-            }
-        }
-        Cow::Owned(finest)
+        Cow::Owned(finest_levels(&self.mesh, &self.velocity))
     }
 
     /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.
@@ -145,4 +139,15 @@ impl<const D: usize> Discretisation<D> {
     pub fn cell_size(&self, cell: usize) -> f64 {
         self.mesh.size(self.mesh.cells()[cell].level)
     }
+}
+
+/// Level of the smallest cell of a mesh at each node.
+pub fn finest_levels<const D: usize>(mesh: &TreeMesh<D>, nodes: &NodeMap<D>) -> Vec<u8> {
+    let mut finest = vec![0; nodes.node_count()];
+    for (index, cell) in mesh.cells().iter().enumerate() {
+        for &node in nodes.cell(index) {
+            finest[node as usize] = cell.level.max(finest[node as usize]);
+        }
+    }
+    finest
 }

@@ -13,7 +13,7 @@ use gluey_linalg::vector;
 use gluey_parallel::Halo;
 
 pub use cells::{ActiveCell, active_cells, all_cells, own_cells};
-pub use discretisation::Discretisation;
+pub use discretisation::{Discretisation, finest_levels};
 pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{around_finest_cells, cells_touching, moves_as_one, nodes_of_cells_with, solid_nodes};
 pub use partition::Partition;
