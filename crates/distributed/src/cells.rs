@@ -46,7 +46,7 @@ impl<const D: usize> LocalFields<D> {
         self.part.mesh.shear()
     }
 
-    /// The same numbers as the serial solver gives at the same places.
+    /// The same numbers as one process gives at the same places.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         let balls = BallTree::new(balls);
         let (mesh, pressures) = (&self.part.mesh, &self.pressure_nodes.map);

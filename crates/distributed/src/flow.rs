@@ -35,7 +35,7 @@ pub enum PartError {
         /// Its rows.
         source: BlockError,
     },
-    /// What the serial solver says: of the pressures of the box, and of surfaces.
+    /// What the solver says: of the pressures of the box, and of surfaces.
     #[error(transparent)]
     Stokes(#[from] StokesError),
     /// A matrix of pressures is too large.
@@ -126,7 +126,7 @@ pub struct LevelSizes {
 }
 
 /// The part of a flow at the nodes of one rank. The parts of all ranks, in their order, are the flow at all
-/// nodes in the order of the serial solver.
+/// nodes in the order of one process.
 #[derive(Clone, Debug)]
 pub struct LocalFlow<const D: usize>
 where
@@ -177,7 +177,7 @@ where
     Dim<D>: Space<D>,
 {
     /// The fields in the cells of the rank, around the bodies of the flow: cells of all ranks, in their
-    /// order, are those of the serial solver, each once. Points on borders are points of every rank that has
+    /// order, are those of one process, each once. Points on borders are points of every rank that has
     /// a cell there.
     pub fn fields(&self, balls: &[Ball<D>]) -> Fields<D> {
         self.cells.fields(balls)

@@ -1,7 +1,7 @@
 //! Stokes flow around rigid bodies in a box whose cells are shared by ranks.
 //!
 //! `-div(2 eta eps(u)) + grad p = 0`, `div u = 0`, `u = g` on the walls, rigid motions under given forces and
-//! torques in the bodies: the same elements, kernels and Krylov method as in the serial solver, and multigrid
+//! torques in the bodies: the solver of `gluey-stokes` on the part of a rank, with multigrid
 //! on the same levels. A rank holds the cells of its run in the Morton order of the tree, with those around
 //! them, on every level; no vector is longer than that, and no rank has the whole tree.
 //!

@@ -1,7 +1,7 @@
-//! Flows around the true surfaces of bodies, the formulation `unfitted` of the serial solver, on cells that
+//! Flows around the true surfaces of bodies, the formulation `unfitted`, on cells that
 //! ranks share.
 //!
-//! A rank sets the serial solver's problem up on its part of the finest mesh, which reaches far enough around
+//! A rank sets the problem of one process up on its part of the finest mesh, which reaches far enough around
 //! surfaces for all that follows from places alone: cut cells, aggregates, penalties, films, blocks of the
 //! smoother. Only sums over cells go between ranks. Coarser levels are those of bodies whose nodes move with
 //! them.

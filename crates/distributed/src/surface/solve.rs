@@ -179,7 +179,7 @@ impl<'a, const D: usize> SolveContext<'_, 'a, D>
 where
     Dim<D>: Space<D>,
 {
-    /// The flow with penalties that are large enough, as in the serial solver.
+    /// The flow with penalties that are large enough, as in one process.
     fn trusted(
         &self,
         tree: &mut ImplicitTree<'_, D>,

@@ -26,7 +26,7 @@ where
         FluidIntegrals { volume: sums[0], pressure: sums[1], velocity }
     }
 
-    /// The mean velocity over fluid and bodies, as in the serial solver: the bodies take what the fluid
+    /// The mean velocity over fluid and bodies, as in one process: the bodies take what the fluid
     /// leaves of the box, in proportion to their volumes.
     fn mean_velocity(
         &self,

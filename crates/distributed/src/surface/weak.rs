@@ -27,7 +27,7 @@ impl<'a, const D: usize> SolveContext<'_, 'a, D>
 where
     Dim<D>: Space<D>,
 {
-    /// Own cells whose penalty is too small for what was found, as in the serial solver also for a flow that
+    /// Own cells whose penalty is too small for what was found, as in one process also for a flow that
     /// did not converge.
     pub(super) fn weak_cells(
         &self,

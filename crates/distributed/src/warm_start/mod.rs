@@ -1,5 +1,5 @@
 //! Initial guesses on ranks: the last two flows, which belong to another mesh with other owners, extrapolated
-//! in time as in the serial solver.
+//! in time as in one process.
 //!
 //! Flows are kept in pieces, one for the run of each rank in the order of cells, right at the nodes of the
 //! cells in it. Each rank asks for the values at the nodes of its new cells: the key of a point says which
