@@ -13,6 +13,9 @@ use gluey_stokes::{
 use crate::support::{is_in_fluid, velocities};
 
 const TOLERANCE: f64 = 1e-11;
+/// What one rank may differ from one process by: only sums over bodies and cells for means are in another
+/// order.
+const ALONE: f64 = 1.4e-15;
 
 /// What drives a flow beside the walls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,6 +136,10 @@ where
             );
             assert!(difference < limit && of_twists < limit, "{size} ranks: {difference:e} {of_twists:e}");
             assert!(of_wrenches < limit, "{size} ranks: {of_wrenches:e}");
+            assert!(
+                size > 1 || difference.max(of_twists).max(of_wrenches) < ALONE,
+                "one rank is one process"
+            );
             let solves = parts[0].solve_count;
             assert_eq!(solves, serial.solve_count, "{size} ranks");
             assert!(iterations[0].abs_diff(iterations[1]) <= solves, "{size} ranks: {iterations:?}");
@@ -205,35 +212,31 @@ fn fifty(levels: [u8; 2], lubrication: Lubrication) -> Example<3> {
 
 #[test]
 fn bodies_apart_move_as_in_the_serial_solver() {
-    three::<2>(0.5, [4, 5], Lubrication::None).check(&[1, 2, 3, 4, 8], 1.2e-10);
-    three::<3>(0.5, [3, 4], Lubrication::None).check(&[1, 2, 3, 8], 3.6e-12);
+    three::<2>(0.5, [4, 5], Lubrication::None).check(&[1, 2, 3, 4, 8], TOLERANCE);
+    three::<3>(0.5, [3, 4], Lubrication::None).check(&[1, 2, 3, 8], 1e-12);
 }
 
 #[test]
 fn films_are_those_of_the_serial_solver() {
-    for (gap, limits) in [(0.3, [1.2e-10, 8e-13]), (0.02, [3.9e-11, 1.8e-11]), (1e-4, [1.2e-10, 4.2e-12])] {
-        three::<2>(gap, [4, 5], Lubrication::Deficit).check(&[1, 2, 3, 4, 8], limits[0]);
-        three::<3>(gap, [3, 4], Lubrication::Deficit).check(&[1, 2, 3, 8], limits[1]);
+    for gap in [0.3, 0.02, 1e-4] {
+        three::<2>(gap, [4, 5], Lubrication::Deficit).check(&[1, 2, 3, 4, 8], TOLERANCE);
+        three::<3>(gap, [3, 4], Lubrication::Deficit).check(&[1, 2, 3, 8], 8e-13);
     }
 }
 
 #[test]
 fn fifty_spheres_move_as_in_the_serial_solver() {
-    fifty([3, 4], Lubrication::Deficit).check(&[3], 2.2e-10);
+    fifty([3, 4], Lubrication::Deficit).check(&[3], TOLERANCE);
 }
 
 /// A force on the fluid, a body that is driven, and one in a box without walls where nothing flows on the
 /// mean.
 #[test]
 fn forces_on_the_fluid_and_given_motions_are_those_of_the_serial_solver() {
-    for (drive, limits) in [
-        (Drive::Force, [2.2e-10, 2.7e-12]),
-        (Drive::Motion, [5.8e-10, 5.2e-12]),
-        (Drive::MotionWithoutMean, [8.1e-11, 1e-12]),
-    ] {
+    for drive in [Drive::Force, Drive::Motion, Drive::MotionWithoutMean] {
         let flat = three::<2>(0.1, [4, 5], Lubrication::Deficit);
-        Example { drive, ..flat }.check(&[1, 2, 5], limits[0]);
+        Example { drive, ..flat }.check(&[1, 2, 5], TOLERANCE);
         let solid = three::<3>(0.1, [3, 4], Lubrication::Deficit);
-        Example { drive, ..solid }.check(&[1, 3], limits[1]);
+        Example { drive, ..solid }.check(&[1, 3], 1e-12);
     }
 }

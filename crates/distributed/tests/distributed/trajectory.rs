@@ -199,7 +199,7 @@ where
 fn ranks_take_particles_where_the_serial_solver_does_in_2d() {
     let take = ranks_take_particles_where_the_serial_solver_does::<2>;
     for (lubrication, sizes, limit) in
-        [(Lubrication::None, &[1, 2, 3, 4, 8][..], 4.8e-12), (Lubrication::Deficit, &[2, 8], 3e-13)]
+        [(Lubrication::None, &[1, 2, 3, 4, 8][..], 1e-12), (Lubrication::Deficit, &[2, 8], 3e-13)]
     {
         assert!(!take((PAIR, lubrication), sizes, limit), "the film keeps discs apart");
     }
@@ -208,7 +208,7 @@ fn ranks_take_particles_where_the_serial_solver_does_in_2d() {
 #[test]
 fn ranks_take_three_discs_through_contact_where_the_serial_solver_does() {
     let take = ranks_take_particles_where_the_serial_solver_does::<2>;
-    assert!(take((TRIO, Lubrication::None), &[1, 2, 3, 4, 8], 5.7e-10), "particles meet");
+    assert!(take((TRIO, Lubrication::None), &[1, 2, 3, 4, 8], 3.9e-10), "particles meet");
 }
 
 #[test]
