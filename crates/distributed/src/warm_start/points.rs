@@ -127,7 +127,7 @@ impl<const D: usize> Piece<D> {
         let mut values = vec![vec![0.0; points.0 * components]; self.flows.len()];
         let from = self.flows.iter().map(|flow| &flow[kind][..]);
         let mut pairs: Vec<_> = from.zip(values.iter_mut().map(Vec::as_mut_slice)).collect();
-        Evaluator::new(&self.mesh).transfer_to_points(nodes, components, points, &mut pairs);
+        Evaluator::new(&self.mesh).transfer_to_points(nodes, components, points.0, points.1, &mut pairs);
         values
     }
 }

@@ -191,7 +191,7 @@ impl<const D: usize> Chunks<D> {
     }
 }
 
-/// What [`Chunks`] hold of one chunk, whose masters are counted from its first.
+/// Entries of [`Chunks`] for one chunk, whose masters are counted from its first.
 #[derive(Default)]
 struct Piece {
     pressure_locals: Vec<u16>,

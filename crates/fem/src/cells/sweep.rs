@@ -171,12 +171,12 @@ impl<T: CellScalar, const D: usize> CellOperator<T, D> {
     #[inline(always)]
     fn uniform_cells<V: Lanes<Scalar = T>, const VISCOUS: bool, const PRESSURE: bool>(
         &self,
-        (start, end): (u32, u32),
+        range: (u32, u32),
         x: &Nodes<T>,
         y: &mut Nodes<T>,
         registers: &mut Registers<'_, V>,
     ) {
-        for first in (start..end).step_by(V::COUNT) {
+        for first in (range.0..range.1).step_by(V::COUNT) {
             self.cells::<V, VISCOUS, PRESSURE, false>(first as usize, &[], x, y, registers);
         }
     }

@@ -81,16 +81,16 @@ impl Disc {
         let mut rays = Rays { at: [0.0; RAYS], middle: [0.0; RAYS], half: [0.0; RAYS], weight: [0.0; RAYS] };
         for q in 0..RAYS {
             let [s, c] = sin_cos_of_small(length * rule.points[q]);
-            let ray = self.ray((sin * c + cos * s, cos * c - sin * s), length * rule.weights[q]);
+            let ray = self.ray([sin * c + cos * s, cos * c - sin * s], length * rule.weights[q]);
             (rays.at[q], rays.middle[q], rays.half[q], rays.weight[q]) =
                 (ray.at, ray.middle, ray.half, ray.weight);
         }
         rays
     }
 
-    /// The ray through the disc at an angle, for a part of the angle.
+    /// The ray through the disc at an angle of this sine and cosine, for a part of the angle.
     #[inline(always)]
-    pub fn ray(&self, (sin, cos): (f64, f64), weight: f64) -> Ray {
+    pub fn ray(&self, [sin, cos]: [f64; 2], weight: f64) -> Ray {
         let Self { along, across, radius, widths, lean } = self;
         Ray {
             at: across + widths[1] * radius * sin,
@@ -105,7 +105,7 @@ impl Disc {
         let sin = (at - self.across) / (self.widths[1] * self.radius);
         let cos = ((1.0 - sin) * (1.0 + sin)).sqrt();
         // Exactly where it was wanted: a flat may lie there.
-        (sin.abs() < 1.0).then(|| Ray { at, ..self.ray((sin, cos), 0.0) })
+        (sin.abs() < 1.0).then(|| Ray { at, ..self.ray([sin, cos], 0.0) })
     }
 }
 

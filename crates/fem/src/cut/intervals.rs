@@ -46,7 +46,7 @@ impl Parts {
         mut visit: impl FnMut(f64, f64),
     ) {
         for part in self.split(range, breakpoints) {
-            rule.iter().map(|&point| part.mapped(point)).for_each(|(x, weight)| visit(x, weight));
+            rule.iter().map(|&(t, weight)| part.mapped(t, weight)).for_each(|(x, weight)| visit(x, weight));
         }
     }
 
@@ -83,7 +83,7 @@ impl Parts {
 
 impl Part {
     /// A point of a rule on `[0, 1]`, with its weight.
-    fn mapped(&self, (t, weight): (f64, f64)) -> (f64, f64) {
+    fn mapped(&self, t: f64, weight: f64) -> (f64, f64) {
         let Self { from, to, roots } = self;
         let length = to - from;
         match roots {

@@ -28,7 +28,8 @@ pub fn for_each_plane(
     ball: &BallInCell<3>,
     frame: &Frame,
     flats: &[HalfSpace],
-    (rule, parts): (&[(f64, f64)], &mut Parts),
+    rule: &[(f64, f64)],
+    parts: &mut Parts,
     mut visit: impl FnMut(Disc, f64, f64),
 ) {
     let radius = ball.radius;

@@ -107,7 +107,7 @@ impl<const D: usize> Sections<D> {
         let half_spaces: Vec<HalfSpace> =
             flats.iter().map(|flat| frame.half_space(&in_3d, &flat.in_3d())).collect();
         let mut inner = Parts::default();
-        for_each_plane(&in_3d, frame, &half_spaces, (&self.heights, parts), |disc, z, width| {
+        for_each_plane(&in_3d, frame, &half_spaces, &self.heights, parts, |disc, z, width| {
             let slice = Slice { disc, edges: edges(frame, flats, z) };
             if !slice.is_empty() {
                 self.add_plane(&slice, &legendre(z).map(|p| p * width), &mut sums, &mut inner);

@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 
 use super::tree::{COORD_BITS, Cell, MeshError, TreeMesh, offsets};
 
-/// Which cells are wanted finer, by lower corner, size and level.
+/// Criterion for cells that are wanted finer, by lower corner, size and level.
 type Wants<'a, const D: usize> = dyn Fn(&Vector<D>, f64, u8) -> bool + 'a;
 
 /// The tree of [`TreeMesh::refine`], known cell by cell.

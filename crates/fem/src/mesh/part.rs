@@ -104,7 +104,7 @@ impl<const D: usize> Part<D> {
         let before_own = leaves.iter().take_while(|cell| tree.key(cell) < own.start).count();
         let own_count = leaves.iter().filter(|cell| owned(cell)).count();
         let mut around = tree.surroundings(depth, &leaves);
-        spread(tree, depth, (&leaves, &mut around), rings, spreads);
+        spread(tree, depth, &leaves, &mut around, rings, spreads);
         let before = around.iter().filter(|cell| tree.key(cell) < first).count();
         leaves.extend(around);
         let own = before + before_own..before + before_own + own_count;
@@ -128,7 +128,8 @@ impl<const D: usize> Part<D> {
 fn spread<const D: usize>(
     tree: &mut ImplicitTree<'_, D>,
     depth: u8,
-    (leaves, around): (&[Cell<D>], &mut Vec<Cell<D>>),
+    leaves: &[Cell<D>],
+    around: &mut Vec<Cell<D>>,
     rings: usize,
     spreads: &dyn Fn(&Cell<D>) -> bool,
 ) {

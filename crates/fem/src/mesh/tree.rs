@@ -40,7 +40,7 @@ impl<const D: usize> Cell<D> {
     }
 }
 
-/// Why a mesh cannot be built.
+/// Reason why a mesh cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// The root cells would not be cubes.

@@ -33,8 +33,8 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         to_nodes: &NodeMap<D>,
         fields: &mut [(&[f64], &mut [f64])],
     ) {
-        let points = (to_nodes.node_count(), |node| to_nodes.point(node));
-        self.transfer_to_points(from_nodes, components, points, fields);
+        let point = |node| to_nodes.point(node);
+        self.transfer_to_points(from_nodes, components, to_nodes.node_count(), point, fields);
     }
 
     /// The same for a number of points, `to[k] = field(x_k)`.
@@ -42,7 +42,8 @@ impl<'a, const D: usize> Evaluator<'a, D> {
         &self,
         from_nodes: &NodeMap<D>,
         components: usize,
-        (count, point): (usize, impl Fn(usize) -> Vector<D> + Sync),
+        count: usize,
+        point: impl Fn(usize) -> Vector<D> + Sync,
         fields: &mut [(&[f64], &mut [f64])],
     ) {
         let mut parts: Vec<Vec<(&[f64], &mut [f64])>> =

@@ -23,7 +23,7 @@ use crate::operator::Preconditioner;
 use crate::sparse::SparseMatrix;
 use crate::vector;
 
-/// When [`DirectIndefinite`] regularises zero diagonal entries.
+/// Condition under which [`DirectIndefinite`] regularises zero diagonal entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regularise {
     /// A factor that fails its test is an error.

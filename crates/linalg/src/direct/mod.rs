@@ -45,7 +45,7 @@ pub enum Ordering<'a> {
     Custom(&'a [usize]),
 }
 
-/// Why a direct solver refused or failed.
+/// Reason why a direct solver refused or failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DirectError {
     /// The pattern is not symmetric or has no complete diagonal.

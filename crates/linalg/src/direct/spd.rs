@@ -109,7 +109,7 @@ impl DirectSpd {
 impl Preconditioner<f64> for Substitution<'_> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let DirectSpd { symbolic, factor, factorised, .. } = self.solver;
-        answer(symbolic, factorised.then_some(factor), &mut self.scratch, (r, z));
+        answer(symbolic, factorised.then_some(factor), &mut self.scratch, r, z);
     }
 }
 
@@ -118,7 +118,7 @@ impl Preconditioner<f64> for Substitution<'_> {
 impl Preconditioner<f64> for DirectSpd {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let Self { symbolic, factor, factorised, solve_scratch, .. } = self;
-        answer(symbolic, factorised.then_some(factor), solve_scratch, (r, z));
+        answer(symbolic, factorised.then_some(factor), solve_scratch, r, z);
     }
 }
 
@@ -127,7 +127,8 @@ fn answer(
     symbolic: &Symbolic,
     factor: Option<&Vec<f64>>,
     scratch: &mut Scratch,
-    (r, z): (&[f64], &mut [f64]),
+    r: &[f64],
+    z: &mut [f64],
 ) {
     match factor {
         None => z.fill(f64::NAN),

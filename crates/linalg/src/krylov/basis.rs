@@ -110,7 +110,7 @@ impl<T: Scalar> Basis<T> {
         coefficient: impl FnMut(f64),
     ) -> Remainder {
         let (used, w) = self.vectors.used_and_next();
-        let last = take_out_all((used, &self.norms), w, &complete, coefficient);
+        let last = take_out_all(used, &self.norms, w, &complete, coefficient);
         let terms =
             |at: usize, block: &[T]| [dot_block(block, block), dot_block(&r[at..][..block.len()], block)];
         let mut sums = pass(w, last, terms);
@@ -123,7 +123,7 @@ impl<T: Scalar> Basis<T> {
     /// Makes `r` orthogonal to the basis, passes its products with the normalised vectors to `coefficient`
     /// and returns the norm of what is left.
     pub fn take_out(&self, r: &mut [T], complete: impl Fn(&mut [f64]), coefficient: impl FnMut(f64)) -> f64 {
-        let last = take_out_all((self.vectors.used(), &self.norms), r, &complete, coefficient);
+        let last = take_out_all(self.vectors.used(), &self.norms, r, &complete, coefficient);
         norm_after(r, last, complete)
     }
 
@@ -132,21 +132,25 @@ impl<T: Scalar> Basis<T> {
         let last = self.vectors.count.saturating_sub(1);
         let mut h = [0.0; GROUP];
         h[0] = multiple / self.norms.last().copied().unwrap_or(1.0);
-        norm_after(r, (&self.vectors.used()[last..], h), complete)
+        norm_after(r, Pending { group: &self.vectors.used()[last..], multiples: h }, complete)
     }
 }
 
 /// Vectors of a group, and their multiples that are still to be subtracted.
-type Pending<'a, T> = (&'a [Vec<T>], [f64; GROUP]);
+struct Pending<'a, T> {
+    group: &'a [Vec<T>],
+    multiples: [f64; GROUP],
+}
 
 /// Takes all groups but the last out of `w`; what is to be subtracted of that one is returned.
 fn take_out_all<'a, T: Scalar>(
-    (vectors, norms): (&'a [Vec<T>], &[f64]),
+    vectors: &'a [Vec<T>],
+    norms: &[f64],
     w: &mut [T],
     complete: &impl Fn(&mut [f64]),
     mut coefficient: impl FnMut(f64),
 ) -> Pending<'a, T> {
-    let mut before: Pending<'a, T> = (&[], [0.0; GROUP]);
+    let mut before = Pending { group: &[], multiples: [0.0; GROUP] };
     for (group, norms) in vectors.chunks(GROUP).zip(norms.chunks(GROUP)) {
         let mut h = pass(w, before, |at, block| products(group, at, block));
         complete(&mut h[..group.len()]);
@@ -155,7 +159,7 @@ fn take_out_all<'a, T: Scalar>(
             coefficient(*h);
             *h /= norm;
         }
-        before = (group, h);
+        before = Pending { group, multiples: h };
     }
     before
 }
@@ -167,18 +171,18 @@ fn norm_after<T: Scalar>(w: &mut [T], pending: Pending<'_, T>, complete: impl Fn
     square[0].sqrt()
 }
 
-/// Subtracts the multiples `h` of `group` from `w` and sums `terms(first index, block)` over the blocks of
+/// Subtracts what is pending from `w` and sums `terms(first index, block)` over the blocks of
 /// the result.
 fn pass<T: Scalar, const N: usize>(
     w: &mut [T],
-    (group, h): Pending<'_, T>,
+    pending: Pending<'_, T>,
     terms: impl Fn(usize, &[T]) -> [f64; N] + Sync,
 ) -> [f64; N] {
     parallel::update_and_sum(w, |first, piece| {
         let mut sums = [0.0; N];
         for (k, block) in piece.chunks_mut(BLOCK).enumerate() {
             let at = first + k * BLOCK;
-            subtract(group, &h, at, block);
+            subtract(pending.group, &pending.multiples, at, block);
             let terms = terms(at, block);
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
         }

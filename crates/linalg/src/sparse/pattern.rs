@@ -15,7 +15,7 @@ pub struct Pattern {
     rows: Jagged<u32>,
 }
 
-/// Why a pattern or a matrix was refused.
+/// Reason why a pattern or a matrix was refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SparseError {
     /// A row or column lies outside the matrix.

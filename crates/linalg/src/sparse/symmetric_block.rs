@@ -6,7 +6,7 @@ use crate::jagged::Jagged;
 use crate::operator::LinOp;
 use crate::parallel;
 
-/// One row per component of the row's node.
+/// Block with a row per component of the row's node.
 type Block<const B: usize> = [[f64; B]; B];
 
 /// Rows of blocks.

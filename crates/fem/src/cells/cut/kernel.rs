@@ -59,7 +59,7 @@ pub(super) const fn numbers<const D: usize>() -> usize {
     D + 2
 }
 
-/// What a vector of pieces is: one number per lane.
+/// Pieces side by side in vectors: one number per lane.
 pub(super) struct Pieces<'a, V: Lanes> {
     /// Moments times `eta h^(D-2)`, point by point, [`numbers`] each, `step` apart.
     pub moments: &'a [V::Scalar],
