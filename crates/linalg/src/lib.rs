@@ -39,7 +39,7 @@ pub use affine::AffineConstraints;
 pub use dense::{BlockError, DenseSymmetric, invert_spd, vectorised};
 pub use direct::{
     DirectError, DirectIndefinite, DirectSpd, FactorReport, IndefiniteParams, Ordering, RefinementParams,
-    Regularise, SolveReport, Substitution, Symbolic,
+    RefinementReport, Regularise, Substitution, Symbolic,
 };
 pub use jagged::Jagged;
 pub use krylov::{

@@ -134,7 +134,7 @@ impl<const D: usize> Chunks<D> {
         };
         let constraint_of = |node: &u32| Some(constraint_of[*node as usize]).filter(|&k| k != u32::MAX);
         let piece = |chunk: usize| {
-            let mut piece = Piece::default();
+            let mut piece = ChunkEntries::default();
             piece.place_pressures(&chunks, velocity, pressure, chunk);
             let local = |node: u32| chunks.velocity.local(chunk, node);
             let nodes = chunks.velocity.local_nodes(chunk);
@@ -143,7 +143,7 @@ impl<const D: usize> Chunks<D> {
             piece.place_hanging(velocity, nodes.filter_map(constraint_of).collect(), local);
             piece
         };
-        let pieces: Vec<Piece> = (0..chunks.count()).into_par_iter().map(piece).collect();
+        let pieces: Vec<ChunkEntries> = (0..chunks.count()).into_par_iter().map(piece).collect();
         pieces.into_iter().for_each(|piece| chunks.push(piece));
         chunks
     }
@@ -159,7 +159,7 @@ impl<const D: usize> Chunks<D> {
     }
 
     /// Appends what belongs to the next chunk.
-    fn push(&mut self, mut piece: Piece) {
+    fn push(&mut self, mut piece: ChunkEntries) {
         self.pressure_locals.append(&mut piece.pressure_locals);
         self.ghost_pressure_locals.append(&mut piece.ghost_pressure_locals);
         self.boundary.push(piece.boundary);
@@ -193,7 +193,7 @@ impl<const D: usize> Chunks<D> {
 
 /// Entries of [`Chunks`] for one chunk, whose masters are counted from its first.
 #[derive(Default)]
-struct Piece {
+struct ChunkEntries {
     pressure_locals: Vec<u16>,
     ghost_pressure_locals: Vec<u16>,
     hanging: Vec<Hanging>,
@@ -202,7 +202,7 @@ struct Piece {
     boundary: Vec<u16>,
 }
 
-impl Piece {
+impl ChunkEntries {
     fn place_pressures<const D: usize>(
         &mut self,
         chunks: &Chunks<D>,

@@ -1,6 +1,6 @@
 //! Sections of balls with planes of rays, and the rays, one by one or those of a part of an angle together.
 
-use super::intervals::{LONGEST, Part};
+use super::intervals::{Interval, LONGEST};
 use crate::element::gauss;
 
 /// Rays of a part of an angle: points of a Gauss rule.
@@ -75,7 +75,7 @@ impl Rays {
 impl Disc {
     /// The rays at the points of the rule on a part of the angle.
     #[inline(always)]
-    pub fn rays(&self, part: &Part, rule: &AngleRule) -> Rays {
+    pub fn rays(&self, part: &Interval, rule: &AngleRule) -> Rays {
         let length = part.to - part.from;
         let (sin, cos) = (0.5 * (part.from + part.to)).sin_cos();
         let mut rays = Rays { at: [0.0; RAYS], middle: [0.0; RAYS], half: [0.0; RAYS], weight: [0.0; RAYS] };

@@ -15,14 +15,14 @@ use super::flat::FlatInCell;
 
 /// The map to coordinates in which a ball is round.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct SectionFrame {
     /// Axis along the rays, across them, across their planes.
     pub axes: [usize; 3],
     /// `T`, its upper triangle.
     factor: [[f64; 3]; 3],
 }
 
-impl Frame {
+impl SectionFrame {
     /// The frame of rays in a direction through cells with this shear.
     pub fn new<const D: usize>(shear: f64, direction: usize) -> Self {
         let axes = std::array::from_fn(|k| (direction + k) % D);

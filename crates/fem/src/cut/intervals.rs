@@ -17,7 +17,7 @@ pub struct Breakpoint {
 
 /// A part of an interval on which a function is analytic, but for square roots at its ends.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
+pub struct Interval {
     /// Where it begins.
     pub from: f64,
     /// Where it ends.
@@ -28,14 +28,14 @@ pub struct Part {
 
 /// Memory for the parts of an interval.
 #[derive(Debug, Default)]
-pub struct Parts {
+pub struct Intervals {
     breakpoints: Vec<Breakpoint>,
     cuts: Vec<f64>,
     stack: Vec<[f64; 2]>,
-    parts: Vec<Part>,
+    parts: Vec<Interval>,
 }
 
-impl Parts {
+impl Intervals {
     /// Calls `visit(x, weight)` for the points of a composite Gauss rule on `[from, to]`, cut at the
     /// breakpoints inside.
     pub fn for_each_point(
@@ -52,7 +52,11 @@ impl Parts {
 
     /// The parts of `[from, to]`, cut at the breakpoints inside, in ascending order. They are no longer than
     /// twice their distance from a square root, wherever that is.
-    pub fn split(&mut self, [from, to]: [f64; 2], breakpoints: impl Iterator<Item = Breakpoint>) -> &[Part] {
+    pub fn split(
+        &mut self,
+        [from, to]: [f64; 2],
+        breakpoints: impl Iterator<Item = Breakpoint>,
+    ) -> &[Interval] {
         let Self { breakpoints: all, cuts, stack, parts } = self;
         all.clear();
         all.extend(breakpoints);
@@ -74,14 +78,14 @@ impl Parts {
                 let middle = 0.5 * (start + end);
                 stack.extend([[middle, end], [start, middle]]);
             } else {
-                parts.push(Part { from: start, to: end, roots });
+                parts.push(Interval { from: start, to: end, roots });
             }
         }
         parts
     }
 }
 
-impl Part {
+impl Interval {
     /// A point of a rule on `[0, 1]`, with its weight.
     fn mapped(&self, t: f64, weight: f64) -> (f64, f64) {
         let Self { from, to, roots } = self;
@@ -106,9 +110,12 @@ mod tests {
         let rule = gauss(12);
         let integral = |breakpoints: &[Breakpoint]| {
             let mut sum = 0.0;
-            Parts::default().for_each_point([0.0, 1.0], breakpoints.iter().copied(), &rule, |x, weight| {
-                sum += weight * f(x)
-            });
+            Intervals::default().for_each_point(
+                [0.0, 1.0],
+                breakpoints.iter().copied(),
+                &rule,
+                |x, weight| sum += weight * f(x),
+            );
             sum
         };
         let point = |at, is_root| Breakpoint { at, is_root };
@@ -116,7 +123,7 @@ mod tests {
             let mut sum = 0.0;
             for k in 0..20_000 {
                 let part = [k as f64 / 2e4, (k + 1) as f64 / 2e4];
-                Parts::default()
+                Intervals::default()
                     .for_each_point(part, std::iter::empty(), &rule, |x, weight| sum += weight * f(x));
             }
             sum

@@ -37,5 +37,5 @@ pub use ball::BallInCell;
 pub use flat::FlatInCell;
 pub use moments::{CutMoments, CutRules, SurfaceMoments};
 pub use polynomials::POINTS;
-pub use products::{Lines, Products};
+pub use products::{PairLines, Products};
 pub use viscous::{ViscousMatrices, ViscousWeights};

@@ -21,9 +21,9 @@ type PairLine = [[f64; PAIRS]; POINTS];
 
 /// The lines of a cell by direction and by whether the first and the second function are derived.
 #[derive(Clone, Debug)]
-pub struct Lines<const D: usize>([[[PairLine; 2]; 2]; D]);
+pub struct PairLines<const D: usize>([[[PairLine; 2]; 2]; D]);
 
-impl<const D: usize> Lines<D> {
+impl<const D: usize> PairLines<D> {
     /// For the functions of a cell that lies this many cells before.
     pub fn new(offset: [f64; D]) -> Self {
         let rule = gauss(POINTS);
@@ -89,7 +89,7 @@ impl<const D: usize> Products<D> {
     }
 
     /// Adds what comes from weights of the points of a cell, x fastest.
-    pub fn add(&mut self, lines: &Lines<D>, weights: &[f64]) {
+    pub fn add(&mut self, lines: &PairLines<D>, weights: &[f64]) {
         vectorised(
             #[inline(always)]
             || {
@@ -135,7 +135,7 @@ impl<const D: usize> Products<D> {
 /// Adds `sum_q w_q D_0 phi_i D_1 phi_j` for the derivatives `D_0`, `D_1` along an axis each, or the values.
 #[inline(always)]
 pub fn add_products<const D: usize>(
-    Lines(lines): &Lines<D>,
+    PairLines(lines): &PairLines<D>,
     derived: [Option<usize>; 2],
     weights: &[f64],
     to: &mut [f64],
@@ -183,7 +183,7 @@ mod tests {
         let rule = gauss_cube::<D>(POINTS);
         let weights: Vec<f64> = (0..rule.len()).map(|q| (3.0 * q as f64).sin()).collect();
         let mut products = Products::zeros();
-        products.add(&Lines::new(offset), &weights);
+        products.add(&PairLines::new(offset), &weights);
         products.shear(shear);
         let slope = |node: usize, x: &[f64; D]| {
             let mut slope = gradient::<D>(2, node, &std::array::from_fn(|d| x[d] + offset[d]));

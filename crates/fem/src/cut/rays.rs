@@ -10,13 +10,13 @@
 use super::ball::BallInCell;
 use super::corners::{self, HalfSpace};
 use super::disc::Disc;
-use super::frame::Frame;
-use super::intervals::{Breakpoint, Part, Parts};
+use super::frame::SectionFrame;
+use super::intervals::{Breakpoint, Interval, Intervals};
 use super::slice::Slice;
 
 /// The parts of the angle of the rays through the disc of `slice` that lie in the unit interval, on each of
 /// which chords are analytic.
-pub fn parts_of_rays<'a>(slice: &Slice, parts: &'a mut Parts) -> &'a [Part] {
+pub fn parts_of_rays<'a>(slice: &Slice, parts: &'a mut Intervals) -> &'a [Interval] {
     let disc = &slice.disc;
     let corners = slice.ends_on_faces().chain(slice.corners());
     let kinks = corners.map(|at| Breakpoint { at, is_root: false });
@@ -26,10 +26,10 @@ pub fn parts_of_rays<'a>(slice: &Slice, parts: &'a mut Parts) -> &'a [Part] {
 /// Calls `visit(disc, z, width)` for the planes of rays across a ball, cut by these flats.
 pub fn for_each_plane(
     ball: &BallInCell<3>,
-    frame: &Frame,
+    frame: &SectionFrame,
     flats: &[HalfSpace],
     rule: &[(f64, f64)],
-    parts: &mut Parts,
+    parts: &mut Intervals,
     mut visit: impl FnMut(Disc, f64, f64),
 ) {
     let radius = ball.radius;

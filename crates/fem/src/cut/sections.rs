@@ -4,8 +4,8 @@ use super::ball::BallInCell;
 use super::corners::HalfSpace;
 use super::disc::{AngleRule, Lanes, RAYS, Ray, Rays};
 use super::flat::FlatInCell;
-use super::frame::Frame;
-use super::intervals::{Part, Parts};
+use super::frame::SectionFrame;
+use super::intervals::{Interval, Intervals};
 use super::polynomials::{Line, POINTS, Polynomials, integrals, legendre};
 use super::rays::{for_each_plane, parts_of_rays};
 use super::slice::{Edge, End, Slice};
@@ -34,7 +34,7 @@ pub struct Body<const D: usize> {
 /// The rules and the frames of cells with the same shear.
 pub struct Sections<const D: usize> {
     /// By the direction of the rays.
-    frames: [Frame; D],
+    frames: [SectionFrame; D],
     /// On parts of the angles of planes.
     heights: Vec<(f64, f64)>,
     /// On those of the angles of rays.
@@ -53,7 +53,7 @@ impl<const D: usize> Sections<D> {
     /// For this shear.
     pub fn new(shear: f64) -> Self {
         Self {
-            frames: std::array::from_fn(|direction| Frame::new::<D>(shear, direction)),
+            frames: std::array::from_fn(|direction| SectionFrame::new::<D>(shear, direction)),
             heights: gauss(RULE),
             angles: AngleRule::new(),
             polynomials: Polynomials::new(),
@@ -63,7 +63,7 @@ impl<const D: usize> Sections<D> {
     /// The integrals over a ball cut flat. Each flat is seen by the rays along its largest component.
     pub fn of_body(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>]) -> Body<D> {
         let zeros = || vec![0.0; POINTS.pow(D as u32)];
-        let mut parts = Parts::default();
+        let mut parts = Intervals::default();
         let mut body = Body {
             volume: zeros(),
             faces: std::array::from_fn(|axis| {
@@ -93,7 +93,7 @@ impl<const D: usize> Sections<D> {
         ball: &BallInCell<D>,
         flats: &[FlatInCell<D>],
         direction: usize,
-        parts: &mut Parts,
+        parts: &mut Intervals,
     ) -> Sums {
         let frame = &self.frames[direction];
         let zeros = [[[0.0; POINTS]; POINTS]; POINTS];
@@ -106,7 +106,7 @@ impl<const D: usize> Sections<D> {
         let in_3d = ball.in_3d();
         let half_spaces: Vec<HalfSpace> =
             flats.iter().map(|flat| frame.half_space(&in_3d, &flat.in_3d())).collect();
-        let mut inner = Parts::default();
+        let mut inner = Intervals::default();
         for_each_plane(&in_3d, frame, &half_spaces, &self.heights, parts, |disc, z, width| {
             let slice = Slice { disc, edges: edges(frame, flats, z) };
             if !slice.is_empty() {
@@ -117,7 +117,7 @@ impl<const D: usize> Sections<D> {
     }
 
     /// Adds the rays of a plane to layers with these weights.
-    fn add_plane(&self, slice: &Slice, layers: &[f64], sums: &mut Sums, parts: &mut Parts) {
+    fn add_plane(&self, slice: &Slice, layers: &[f64], sums: &mut Sums, parts: &mut Intervals) {
         let Sums { volume, flats } = sums;
         let of_flats = |ray: &Ray, ends: &[End; 2]| {
             for end in ends.iter().filter(|end| end.is_in_cell) {
@@ -136,7 +136,7 @@ impl<const D: usize> Sections<D> {
 
     /// The sums of the chords of a plane.
     #[inline(always)]
-    fn plane(&self, slice: &Slice, parts: &[Part], mut visit: impl FnMut(&Ray, &[End; 2])) -> Plane {
+    fn plane(&self, slice: &Slice, parts: &[Interval], mut visit: impl FnMut(&Ray, &[End; 2])) -> Plane {
         // By ray of a part.
         let mut sums = [[[0.0; RAYS]; POINTS]; POINTS];
         for part in parts {
@@ -155,7 +155,7 @@ impl<const D: usize> Sections<D> {
         ball: &BallInCell<D>,
         flats: &[FlatInCell<D>],
         [axis, side]: [usize; 2],
-        parts: &mut Parts,
+        parts: &mut Intervals,
     ) -> [f64; FACE] {
         let (place, frame) = (side as f64, &self.frames[(axis + 1) % D]);
         let mut face = [0.0; FACE];
@@ -205,7 +205,7 @@ impl<const D: usize> Sections<D> {
 }
 
 /// The flats in a plane of rays.
-fn edges<const D: usize>(frame: &Frame, flats: &[FlatInCell<D>], place: f64) -> Vec<Edge> {
+fn edges<const D: usize>(frame: &SectionFrame, flats: &[FlatInCell<D>], place: f64) -> Vec<Edge> {
     let [along, across, height] = frame.axes;
     let edge = |(k, flat): (usize, &FlatInCell<D>)| {
         let normal = flat.normal();

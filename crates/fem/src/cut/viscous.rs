@@ -12,7 +12,7 @@
 use gluey_linalg::vectorised;
 
 use super::polynomials::POINTS;
-use super::products::{Lines, Places, Products, add_products, pair_count};
+use super::products::{PairLines, Places, Products, add_products, pair_count};
 use crate::element::node_count;
 
 /// Points of a cell, at most.
@@ -35,7 +35,7 @@ pub struct ViscousWeights<'a, const D: usize> {
 #[derive(Clone, Debug)]
 pub struct ViscousMatrices<const D: usize> {
     shear: f64,
-    lines: Lines<D>,
+    lines: PairLines<D>,
     places: Places,
     /// `V_ab`.
     volume: Products<D>,
@@ -51,7 +51,7 @@ impl<const D: usize> ViscousMatrices<D> {
         let plane = || vec![0.0; pair_count::<D>()];
         Self {
             shear,
-            lines: Lines::new([0.0; D]),
+            lines: PairLines::new([0.0; D]),
             places: Places::new::<D>(),
             volume: Products::zeros(),
             normal: std::array::from_fn(|_| std::array::from_fn(|_| plane())),

@@ -18,7 +18,9 @@ use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::IntranodeLbltRef;
 
 use super::refinement::{Refinement, rounding_norm};
-use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
+use super::{
+    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, column,
+};
 use crate::operator::Preconditioner;
 use crate::sparse::SparseMatrix;
 use crate::vector;
@@ -148,7 +150,7 @@ impl DirectIndefinite {
     }
 
     /// Solves `A x = rhs` to the tolerance of the parameters. The old content of `x` does not matter.
-    pub fn solve(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<SolveReport, DirectError> {
+    pub fn solve(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<RefinementReport, DirectError> {
         self.symbolic.check_solve(self.factorised, rhs, x)?;
         let Self { symbolic, matrix, factor, refinement, .. } = self;
         refinement.solve(matrix, |x| factor.substitute(symbolic, x), rhs, x)

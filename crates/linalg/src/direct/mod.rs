@@ -10,7 +10,7 @@ mod refinement;
 mod spd;
 
 pub use indefinite::{DirectIndefinite, FactorReport, IndefiniteParams, Regularise};
-pub use refinement::{RefinementParams, SolveReport};
+pub use refinement::{RefinementParams, RefinementReport};
 pub use spd::{DirectSpd, Substitution};
 
 use std::sync::Arc;

@@ -21,7 +21,7 @@ impl Default for RefinementParams {
 
 /// Outcome of a solve whose residual was checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolveReport {
+pub struct RefinementReport {
     /// Refinement steps made.
     pub refinements: usize,
     /// Norm of the true residual.
@@ -67,7 +67,7 @@ impl Refinement {
         mut approximate: impl FnMut(&mut [f64]),
         b: &[f64],
         x: &mut [f64],
-    ) -> Result<SolveReport, DirectError> {
+    ) -> Result<RefinementReport, DirectError> {
         let right_hand_side_norm = vector::norm(b);
         let target_norm = self.params.relative_tolerance * right_hand_side_norm;
         self.history.clear();
@@ -87,7 +87,12 @@ impl Refinement {
         let limited_by_rounding = norm > target_norm && norm <= rounding_norm(a, b, x);
         if norm <= target_norm || limited_by_rounding {
             let refinements = self.history.len() - 1;
-            Ok(SolveReport { refinements, residual_norm: norm, right_hand_side_norm, limited_by_rounding })
+            Ok(RefinementReport {
+                refinements,
+                residual_norm: norm,
+                right_hand_side_norm,
+                limited_by_rounding,
+            })
         } else {
             let history = self.history.clone();
             Err(DirectError::NotConverged { residual_norm: norm, target_norm, history })

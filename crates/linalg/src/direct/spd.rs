@@ -7,7 +7,9 @@ use faer::linalg::solvers::LltError;
 use faer::sparse::linalg::cholesky::LltRef;
 
 use super::refinement::Refinement;
-use super::{DirectError, PAR, RefinementParams, SIDE, Scratch, SolveReport, Symbolic, check_finite, column};
+use super::{
+    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, column,
+};
 use crate::operator::Preconditioner;
 use crate::sparse::SparseMatrix;
 
@@ -71,7 +73,7 @@ impl DirectSpd {
     }
 
     /// Solves `A x = rhs` to the tolerance of the parameters. The old content of `x` does not matter.
-    pub fn solve(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<SolveReport, DirectError> {
+    pub fn solve(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<RefinementReport, DirectError> {
         self.symbolic.check_solve(self.factorised, rhs, x)?;
         let Self { symbolic, matrix, factor, refinement, solve_scratch, .. } = self;
         refinement.solve(matrix, |x| substitute(symbolic, factor, solve_scratch, x), rhs, x)
@@ -123,13 +125,7 @@ impl Preconditioner<f64> for DirectSpd {
 }
 
 /// `z = (L L^T)^-1 r`, NaN without a factor.
-fn answer(
-    symbolic: &Symbolic,
-    factor: Option<&Vec<f64>>,
-    scratch: &mut Scratch,
-    r: &[f64],
-    z: &mut [f64],
-) {
+fn answer(symbolic: &Symbolic, factor: Option<&Vec<f64>>, scratch: &mut Scratch, r: &[f64], z: &mut [f64]) {
     match factor {
         None => z.fill(f64::NAN),
         Some(factor) => {

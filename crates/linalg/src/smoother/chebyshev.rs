@@ -149,10 +149,20 @@ impl<T: Scalar> Chebyshev<T> {
         let weight = T::from_f64(1.0 / theta);
         match guess {
             Guess::Zero => {
-                Step { weight, residual: |b, _| b, next: |_, _| T::ZERO }.take(m, &mut system, before, now);
+                Recurrence { weight, residual: |b, _| b, next: |_, _| T::ZERO }.take(
+                    m,
+                    &mut system,
+                    before,
+                    now,
+                );
             }
             Guess::Given => {
-                Step { weight, residual: |b, z| b - z, next: |x, _| x }.take(m, &mut system, before, now);
+                Recurrence { weight, residual: |b, z| b - z, next: |x, _| x }.take(
+                    m,
+                    &mut system,
+                    before,
+                    now,
+                );
             }
         }
         let sigma = theta / delta;
@@ -163,10 +173,10 @@ impl<T: Scalar> Chebyshev<T> {
             let (weight, old) = (T::from_f64(2.0 * rho_next / delta), T::from_f64(rho_next * rho));
             let residual = |b, z| b - z;
             if k == 1 && guess == Guess::Zero {
-                Step { weight, residual, next: |x, _| x + old * x }.take(m, &mut system, now, before);
+                Recurrence { weight, residual, next: |x, _| x + old * x }.take(m, &mut system, now, before);
             } else {
                 let next = |x: T, before: T| x + old * (x - before);
-                Step { weight, residual, next }.take(m, &mut system, now, before);
+                Recurrence { weight, residual, next }.take(m, &mut system, now, before);
             }
             std::mem::swap(&mut before, &mut now);
             rho = rho_next;
@@ -182,13 +192,13 @@ struct System<'a, T> {
 }
 
 /// `to = next(from, to) + weight M^-1 residual(b, z)`.
-struct Step<T, R, N> {
+struct Recurrence<T, R, N> {
     weight: T,
     residual: R,
     next: N,
 }
 
-impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Step<T, R, N> {
+impl<T: Scalar, R: Fn(T, T) -> T + Sync, N: Fn(T, T) -> T + Sync> Recurrence<T, R, N> {
     /// In one pass where `M` is a diagonal.
     fn take(
         &self,

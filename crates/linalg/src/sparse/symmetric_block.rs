@@ -11,7 +11,7 @@ type Block<const B: usize> = [[f64; B]; B];
 
 /// Rows of blocks.
 #[derive(Clone, Debug)]
-struct Rows<const B: usize> {
+struct BlockRows<const B: usize> {
     /// Columns of each row, ascending.
     columns: Jagged<u32>,
     /// One block per column.
@@ -42,7 +42,7 @@ struct Rows<const B: usize> {
 /// ```
 #[derive(Clone, Debug)]
 pub struct SymmetricBlockMatrix<const B: usize> {
-    lower: Rows<B>,
+    lower: BlockRows<B>,
 }
 
 /// A block row of a matrix that a node of a small dense matrix stands for.
@@ -66,14 +66,14 @@ impl<const B: usize> SymmetricBlockMatrix<B> {
             columns.push(all.take_while(|&column| column as usize <= row));
         }
         let blocks = parallel::filled([[0.0; B]; B], columns.items().len());
-        Self { lower: Rows { columns, blocks } }
+        Self { lower: BlockRows { columns, blocks } }
     }
 
     /// Adds `C^T K C` for a symmetric dense matrix `K` of the nodes of a cell, given row by row, and the
     /// terms of `C`, sorted by their rows.
     pub fn add_local(&mut self, terms: &[LocalTerm], dense: &[f64]) {
         let size = dense.len().isqrt();
-        let Rows { columns, blocks } = &mut self.lower;
+        let BlockRows { columns, blocks } = &mut self.lower;
         for row in terms {
             let range = columns.range(row.row as usize);
             let (columns, blocks) = (&columns.items()[range.clone()], &mut blocks[range]);
@@ -179,7 +179,7 @@ impl<const B: usize> SymmetricBlockMatrix<B> {
     }
 }
 
-impl<const B: usize> Rows<B> {
+impl<const B: usize> BlockRows<B> {
     fn row(&self, row: usize) -> impl Iterator<Item = (u32, &Block<B>)> {
         self.columns[row].iter().copied().zip(&self.blocks[self.columns.range(row)])
     }
@@ -249,8 +249,8 @@ fn sum_of_rows<const B: usize>(
     row_count: usize,
     column_count: usize,
     mut fill: impl FnMut(usize, &mut Sum<B>),
-) -> Rows<B> {
-    let mut new = Rows { columns: Jagged::with_capacity(row_count, 0), blocks: Vec::new() };
+) -> BlockRows<B> {
+    let mut new = BlockRows { columns: Jagged::with_capacity(row_count, 0), blocks: Vec::new() };
     let mut sum = Sum { place: vec![u32::MAX; column_count], columns: Vec::new(), blocks: Vec::new() };
     for row in 0..row_count {
         fill(row, &mut sum);
@@ -270,7 +270,7 @@ impl<const B: usize> SymmetricBlockMatrix<B> {
     /// The blocks of a matrix whose unknowns are the components of node after node.
     pub(crate) fn from_sparse(matrix: &SparseMatrix) -> Self {
         let pattern = matrix.pattern();
-        let mut lower = Rows { columns: Jagged::default(), blocks: Vec::new() };
+        let mut lower = BlockRows { columns: Jagged::default(), blocks: Vec::new() };
         for row in 0..pattern.row_count() / B {
             let columns = pattern.columns_of(row * B).iter().step_by(B).map(|column| column / B as u32);
             let columns: Vec<u32> = columns.take_while(|&column| column as usize <= row).collect();

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use gluey_fem::cut::{Lines, POINTS, Products};
+use gluey_fem::cut::{POINTS, PairLines, Products};
 use gluey_fem::element::{gauss_cube, node_count};
 use gluey_geom::Vector;
 use gluey_levelset::nearest_image;
@@ -74,7 +74,7 @@ pub fn penalties<const D: usize>(
     let mut members: Vec<(u32, u32)> = aggregates.roots.iter().copied().zip(0..).collect();
     members.sort_unstable();
     let clusters: Vec<&[(u32, u32)]> = members.chunk_by(|a, b| a.0 == b.0).collect();
-    let at_home = Lines::<D>::new([0.0; D]);
+    let at_home = PairLines::<D>::new([0.0; D]);
     let of_cluster = |cluster: &&[(u32, u32)]| {
         let root = cluster[0].0 as usize;
         let [mut volume, mut surface] = [Products::<D>::zeros(), Products::zeros()];
@@ -86,7 +86,7 @@ pub fn penalties<const D: usize>(
             let cell = &cut.cells[k as usize];
             let moments = &cell.moments;
             let elsewhere = (cell.cell as usize != root)
-                .then(|| Lines::new(offset(discretisation, root, cell.cell as usize)));
+                .then(|| PairLines::new(offset(discretisation, root, cell.cell as usize)));
             let lines = elsewhere.as_ref().unwrap_or(&at_home);
             volume.add(lines, &moments.volume);
             moments.surfaces.iter().for_each(|part| surface.add(lines, &part.area));

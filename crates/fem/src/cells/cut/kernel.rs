@@ -255,7 +255,8 @@ impl<V: Lanes> Planes<V> {
         let mut pressure_sum = [zero::<V>(); 2];
         for q in 0..POINTS {
             let [shape, slope] = [0, 1].map(|kind| &shapes.velocity[kind][q]);
-            let mut point = Point::<V> { value: [zero(); MOST], gradient: [[zero(); MOST]; MOST], p: zero() };
+            let mut point =
+                PointValues::<V> { value: [zero(); MOST], gradient: [[zero(); MOST]; MOST], p: zero() };
             for c in 0..D {
                 let field = &self.velocity[c];
                 point.value[c] = dot(shape, &field[0][line]);
@@ -327,14 +328,14 @@ impl<V: Lanes> Pieces<'_, V> {
 }
 
 /// Values at a point, or what tests values and gradients there.
-struct Point<V> {
+struct PointValues<V> {
     value: [V; MOST],
     /// `gradient[c][d] = d u_c / d x_d`.
     gradient: [[V; MOST]; MOST],
     p: V,
 }
 
-impl<V: Lanes> Point<V> {
+impl<V: Lanes> PointValues<V> {
     /// What the values, gradients and pressures of test functions are multiplied by.
     #[inline(always)]
     fn tested<const D: usize>(
