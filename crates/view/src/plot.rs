@@ -163,7 +163,7 @@ fn runs(options: &PlotOptions, tables: &Tables<'_>) -> Result<Vec<Results>, Plot
 
 fn wanted(options: &PlotOptions) -> impl Iterator<Item = Figure> {
     let is_wanted = |figure: &Figure| options.only.is_empty() || options.only.contains(figure);
-    Figure::ALL.into_iter().filter(is_wanted)
+    Figure::ALL.iter().copied().filter(is_wanted)
 }
 
 /// A picture; none where there is nothing for it and it was not asked for by name.
@@ -205,7 +205,7 @@ mod tests {
     /// A run that replaces another one takes its pictures away, by their names.
     #[test]
     fn pictures_are_known_by_their_names() {
-        for figure in Figure::ALL {
+        for &figure in Figure::ALL {
             for format in [Format::Svg, Format::Png] {
                 assert!(is_picture(&format!("{}.{}", figure.as_str(), format.extension())), "{figure:?}");
             }

@@ -62,38 +62,19 @@ impl Viewpoint {
     }
 }
 
-/// What the colours of particles tell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coloring {
-    /// How fast the centre moves.
-    #[default]
-    Speed,
-    /// How fast it turns.
-    Spin,
-    /// The smallest gap to another particle, on a logarithmic scale.
-    Gap,
-    /// The sum of the forces of its contacts, over `6 pi eta`.
-    ContactForce,
-}
-
-impl Coloring {
-    const ALL: [Self; 4] = [Self::Speed, Self::Spin, Self::Gap, Self::ContactForce];
-
-    fn as_str(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::Spin => "spin",
-            Self::Gap => "gap",
-            Self::ContactForce => "contact-force",
-        }
-    }
-}
-
-impl FromStr for Coloring {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        named(text, Self::ALL, Self::as_str)
+named! {
+    /// What the colours of particles tell.
+    #[derive(Default)]
+    Coloring {
+        /// How fast the centre moves.
+        #[default]
+        Speed = "speed",
+        /// How fast it turns.
+        Spin = "spin",
+        /// The smallest gap to another particle, on a logarithmic scale.
+        Gap = "gap",
+        /// The sum of the forces of its contacts, over `6 pi eta`.
+        ContactForce = "contact-force",
     }
 }
 

@@ -7,32 +7,21 @@ use super::super::figure::named;
 /// Names of the axes.
 pub(super) const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// What is drawn in colours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Length of the velocity.
-    Speed,
-    /// Pressure, but for the same number everywhere.
-    Pressure,
-    /// `sqrt(2 E : E)` of the symmetric part `E` of the velocity gradient.
-    StrainRate,
-    /// Component of the curl of the velocity along the axis across the picture.
-    Vorticity,
+named! {
+    /// What is drawn in colours.
+    Quantity {
+        /// Length of the velocity.
+        Speed = "speed",
+        /// Pressure, but for the same number everywhere.
+        Pressure = "pressure",
+        /// `sqrt(2 E : E)` of the symmetric part `E` of the velocity gradient.
+        StrainRate = "strain-rate",
+        /// Component of the curl of the velocity along the axis across the picture.
+        Vorticity = "vorticity",
+    }
 }
 
 impl Quantity {
-    const ALL: [Self; 4] = [Self::Speed, Self::Pressure, Self::StrainRate, Self::Vorticity];
-
-    /// Name in options and files.
-    pub(super) fn as_str(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::Pressure => "pressure",
-            Self::StrainRate => "strain-rate",
-            Self::Vorticity => "vorticity",
-        }
-    }
-
     /// Name and unit.
     pub(super) fn label(self) -> &'static str {
         match self {
@@ -41,14 +30,6 @@ impl Quantity {
             Self::StrainRate => "strain rate (1 / time)",
             Self::Vorticity => "vorticity (1 / time)",
         }
-    }
-}
-
-impl FromStr for Quantity {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        named(text, Self::ALL, Self::as_str)
     }
 }
 
