@@ -34,6 +34,18 @@ impl Findings {
         self.add(key, Problem::OutOfRange { found, range: range.to_owned() });
     }
 
+    /// Notes that `choice` needs something else than what the case has.
+    pub fn unfit(
+        &mut self,
+        key: Key,
+        choice: impl Into<String>,
+        needs: impl Into<String>,
+        found: impl Into<String>,
+    ) {
+        let (choice, needs, found) = (choice.into(), needs.into(), found.into());
+        self.add(key, Problem::Unfit { choice, needs, found });
+    }
+
     /// Whether nothing was found.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()

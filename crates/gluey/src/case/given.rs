@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use super::error::{Key, Problem};
+use super::error::Key;
 use super::findings::Findings;
 use super::forces::{is_given, vector};
 use super::{Boundary, Case, Formulation, Hydrodynamics, ParticleSpec};
@@ -50,23 +50,22 @@ pub(super) fn check_motion(case: &Case, particle: &ParticleSpec, key: &Key, find
     }
     let motion = if particle.held { "held" } else { "velocity" };
     let name = if particle.held || particle.velocity.is_some() { motion } else { "spin" };
-    let mut unfit = |at: &str, choice: &str, needs: String, found: String| {
-        findings.add(key.name(at), Problem::Unfit { choice: choice.to_owned(), needs, found });
+    let mut unfit = |at: &str, needs: &str, found: &str| {
+        findings.unfit(key.name(at), format!("`{at}`"), needs, found);
     };
     for (at, is_there) in [("velocity", particle.velocity.is_some()), ("spin", particle.spin.is_some())] {
         if particle.held && is_there {
-            let needs = "a particle that is not held".to_owned();
-            unfit(at, &format!("`{at}`"), needs, "held = true".to_owned());
+            unfit(at, "a particle that is not held", "held = true");
         }
     }
     for (at, is_there) in [("force", particle.force.is_some()), ("torque", particle.torque.is_some())] {
         if is_there {
-            let needs = "a particle that is free".to_owned();
-            unfit(at, &format!("`{at}`"), needs, format!("`{name}`, by which it moves whatever acts on it"));
+            let found = format!("`{name}`, by which it moves whatever acts on it");
+            unfit(at, "a particle that is free", &found);
         }
     }
     if let Some((needs, found)) = other_model(case) {
-        unfit(name, &format!("`{name}`"), needs, found);
+        unfit(name, &needs, &found);
     }
 }
 
@@ -87,23 +86,20 @@ fn other_model(case: &Case) -> Option<(String, String)> {
 /// Notes a force on fluid and particles that nothing carries, or that does nothing.
 pub(super) fn check_force_density(case: &Case, key: &Key, findings: &mut Findings) {
     let Some(force) = case.body_force.as_ref().filter(|force| force.len() == case.dimension) else { return };
-    let mut unfit = |needs: String, found: String| {
-        let choice = "`body_force`".to_owned();
-        findings.add(key.clone(), Problem::Unfit { choice, needs, found });
-    };
+    let mut unfit = |needs: &str, found: &str| findings.unfit(key.clone(), "`body_force`", needs, found);
     if let Some((needs, found)) = other_model(case) {
-        return unfit(needs, found);
+        return unfit(&needs, &found);
     }
     let axes = ["x", "y", "z"].iter().zip(force).enumerate();
     let walled = axes.filter(|(axis, (_, f))| **f != 0.0 && case.period(*axis).is_none());
     let walled: Vec<&str> = walled.map(|(_, (name, _))| *name).collect();
     if let [first, ..] = walled[..] {
         let found = format!("domain.boundary = \"{}\"", case.domain.boundary);
-        return unfit(format!("a period along {first}"), found);
+        return unfit(&format!("a period along {first}"), &found);
     }
     let has_walls = case.domain.boundary != Boundary::Sheared;
     if is_given(&case.body_force) && !has_walls && !case.particles.is_empty() && !case.gives_motions() {
-        unfit("a particle that is held, or walls".to_owned(), "neither".to_owned());
+        unfit("a particle that is held, or walls", "neither");
     }
 }
 

@@ -1,24 +1,29 @@
 //! What goes with a shear stress: one that is given instead of a shear rate, and the one that is written.
 
-use super::error::{Key, Problem};
+use super::error::Key;
 use super::findings::Findings;
 use super::{Boundary, Case, ParticleSpec};
+
+/// The choice of a stress.
+const STRESS: &str = "`shear_stress`";
+/// The choice of a table of the rheology.
+const TABLE: &str = "`[rheology]`";
+/// What neither goes with.
+const GIVEN: &str = "a particle that is held or driven";
 
 /// Notes a stress beside a rate, or in a box that is not sheared for ever.
 pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut Findings) {
     if case.shear_stress.is_none() {
         return;
     }
-    let mut unfit = |needs: &str, found: String| {
-        let choice = "`shear_stress`".to_owned();
-        findings.add(root.name("shear_stress"), Problem::Unfit { choice, needs: needs.to_owned(), found });
-    };
+    let key = root.name("shear_stress");
     if case.shear_rate != 1.0 {
-        unfit("no shear_rate beside it", format!("shear_rate = {}", case.shear_rate));
+        let found = format!("shear_rate = {}", case.shear_rate);
+        findings.unfit(key.clone(), STRESS, "no shear_rate beside it", found);
     }
     if !case.is_sheared() {
         let needs = format!("domain.boundary = \"{}\"", Boundary::Sheared);
-        unfit(&needs, format!("\"{}\"", case.domain.boundary));
+        findings.unfit(key, STRESS, needs, format!("\"{}\"", case.domain.boundary));
     }
 }
 
@@ -27,22 +32,18 @@ pub(super) fn check_rheology(case: &Case, key: Key, findings: &mut Findings) {
     if case.rheology.is_none() {
         return;
     }
-    let (needs, found) = match (case.is_sheared(), case.shear_rate == 0.0) {
-        (false, _) => {
-            (format!("domain.boundary = \"{}\"", Boundary::Sheared), format!("\"{}\"", case.domain.boundary))
-        }
-        (true, true) => ("a shear rate that is not 0".to_owned(), "shear_rate = 0".to_owned()),
-        (true, false) => return,
-    };
-    findings.add(key, Problem::Unfit { choice: "`[rheology]`".to_owned(), needs, found });
+    if !case.is_sheared() {
+        let needs = format!("domain.boundary = \"{}\"", Boundary::Sheared);
+        findings.unfit(key, TABLE, needs, format!("\"{}\"", case.domain.boundary));
+    } else if case.shear_rate == 0.0 {
+        findings.unfit(key, TABLE, "a shear rate that is not 0", "shear_rate = 0");
+    }
 }
 
 /// Notes the same where what holds or drives particles makes the stress none of the suspension.
 pub(super) fn check_stress_of_free(case: &Case, key: Key, findings: &mut Findings) {
     if case.rheology.is_some() && case.gives_motions() {
-        let (choice, needs) = ("`[rheology]`".to_owned(), "free particles".to_owned());
-        let found = "a particle that is held or driven".to_owned();
-        findings.add(key, Problem::Unfit { choice, needs, found });
+        findings.unfit(key, TABLE, "free particles", GIVEN);
     }
 }
 
@@ -57,12 +58,10 @@ pub(super) fn check_stress_alone(case: &Case, root: &Key, findings: &mut Finding
         (case.gravity.is_some(), "`gravity`"),
         (case.body_force.is_some(), "`body_force`"),
         (case.particles.iter().any(forces), "a force or torque on a particle"),
-        (case.gives_motions(), "a particle that is held or driven"),
+        (case.gives_motions(), GIVEN),
     ];
     for (_, found) in found.into_iter().filter(|(is_there, _)| *is_there) {
-        let (choice, needs) =
-            ("`shear_stress`".to_owned(), "free particles that nothing acts on from outside");
-        let problem = Problem::Unfit { choice, needs: needs.to_owned(), found: found.to_owned() };
-        findings.add(root.name("shear_stress"), problem);
+        let needs = "free particles that nothing acts on from outside";
+        findings.unfit(root.name("shear_stress"), STRESS, needs, found);
     }
 }

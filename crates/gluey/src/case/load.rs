@@ -138,7 +138,7 @@ fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
         let key = Key::default().name("flow").name(paper);
         let needs = format!("flow.formulation = \"{paper}\"");
         let found = format!("no `flow.formulation`, which means \"{}\"", Formulation::default());
-        findings.add(key, Problem::Unfit { choice: format!("`[flow.{paper}]`"), needs, found });
+        findings.unfit(key, format!("`[flow.{paper}]`"), needs, found);
     }
 }
 

@@ -1,6 +1,6 @@
 //! What does not fit together in a case whose keys and values are right one by one.
 
-use super::comparable::{Mismatch, mismatch};
+use super::comparable::mismatch;
 use super::error::{Key, Problem};
 use super::findings::Findings;
 use super::given::{check_force_density, check_motion};
@@ -20,7 +20,9 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 /// Notes what does not fit together before there are particles.
 pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
     let root = Key::default();
-    check_name(&case.name, root.name("name"), findings);
+    if !is_file_name(&case.name) {
+        findings.add(root.name("name"), Problem::BadName);
+    }
     if findings.are_good(&["flow"]) {
         check_force(&case.gravity, case, &root.name("gravity"), findings);
         if let Some(force) = &case.body_force {
@@ -79,9 +81,6 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
 fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
     for (index, output) in case.output.iter().enumerate() {
         let key = key.index(index);
-        let mut unfit = |name: &str, choice: String, needs: &str, found: String| {
-            findings.add(key.name(name), Problem::Unfit { choice, needs: needs.to_owned(), found });
-        };
         let choice = format!("output {}", index + 1);
         let intervals = [
             ("every", output.every.is_some()),
@@ -92,11 +91,10 @@ fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
             intervals.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
         let one = "one of `every`, `every_strain`, `every_time`";
         match given[..] {
-            [] => unfit("kind", choice, one, "none of them".to_owned()),
-            [first, _, ..] => unfit(first, choice, one, given.join(" and ")),
-            ["every_strain"] if case.shear_rate == 0.0 => {
-                let needs = "a shear rate that is not 0";
-                unfit("every_strain", "every_strain".to_owned(), needs, "shear_rate = 0".to_owned());
+            [] => findings.unfit(key.name("kind"), choice, one, "none of them"),
+            [first, _, ..] => findings.unfit(key.name(first), choice, one, given.join(" and ")),
+            [name @ "every_strain"] if case.shear_rate == 0.0 => {
+                findings.unfit(key.name(name), name, "a shear rate that is not 0", "shear_rate = 0");
             }
             _ => {}
         }
@@ -105,17 +103,11 @@ fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
         if let Some(before) = before {
             let name = if output.label.is_some() { "label" } else { "kind" };
             let found = format!("that of output {}", before + 1);
-            unfit(name, format!("label = \"{label}\""), "a label of its own", found);
+            findings.unfit(key.name(name), format!("label = \"{label}\""), "a label of its own", found);
         }
         if !is_file_name(label) {
             findings.add(key.name("label"), Problem::BadName);
         }
-    }
-}
-
-fn check_name(name: &str, key: Key, findings: &mut Findings) {
-    if !is_file_name(name) {
-        findings.add(key, Problem::BadName);
     }
 }
 
@@ -125,8 +117,8 @@ fn check_reference(case: &Case, key: Key, findings: &mut Findings) {
     else {
         return;
     };
-    if let Some(Mismatch { needs, found }) = mismatch(case, &table) {
-        findings.add(key, Problem::Unfit { choice: format!("\"{name}\""), needs, found });
+    if let Some((needs, found)) = mismatch(case, &table) {
+        findings.unfit(key, format!("\"{name}\""), needs, found);
     }
 }
 
@@ -145,19 +137,16 @@ fn check_box(case: &Case, key: &Key, findings: &mut Findings) {
 /// Boxes that are sheared for ever are those of one formulation; a mesh is made of cubes.
 fn check_boundary(case: &Case, key: &Key, findings: &mut Findings) {
     let (flow, needed) = (&case.flow, Formulation::Unfitted);
-    let unfit = |needs: String, found: &str| Problem::Unfit {
-        choice: format!("\"{}\"", Boundary::Sheared),
-        needs,
-        found: format!("\"{found}\""),
+    let mut unfit = |needs: String, found: &str| {
+        let choice = format!("\"{}\"", Boundary::Sheared);
+        findings.unfit(key.name("boundary"), choice, needs, format!("\"{found}\""));
     };
     let (is_flow, is_sheared) =
         (flow.hydrodynamics == Hydrodynamics::Stokes, case.domain.boundary == Boundary::Sheared);
     if is_sheared && !is_flow {
-        let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
-        findings.add(key.name("boundary"), unfit(needs, flow.hydrodynamics.name()));
+        unfit(format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes), flow.hydrodynamics.name());
     } else if is_sheared && flow.formulation != needed {
-        let needs = format!("flow.formulation = \"{needed}\"");
-        findings.add(key.name("boundary"), unfit(needs, flow.formulation.name()));
+        unfit(format!("flow.formulation = \"{needed}\""), flow.formulation.name());
     }
     if is_flow && case.root_cells().is_none() {
         findings.add(key.name("upper"), Problem::UnevenBox { edges: case.edges() });
@@ -220,9 +209,8 @@ fn check_rotation(what: &'static str, numbers: &[f64], dimension: usize, key: &K
 fn check_answered(case: &Case, key: &Key, findings: &mut Findings) {
     let found = case.flow.hydrodynamics;
     if found != Hydrodynamics::Stokes {
-        let choice = "a force".to_owned();
         let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
-        findings.add(key.clone(), Problem::Unfit { choice, needs, found: format!("\"{found}\"") });
+        findings.unfit(key.clone(), "a force", needs, format!("\"{found}\""));
     }
 }
 
@@ -289,9 +277,7 @@ fn check_time(case: &Case, key: &Key, findings: &mut Findings) {
 /// A shear that oscillates is there, nothing else turns it round, and it does so between steps.
 fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut Findings) {
     let choice = format!("strain_amplitude = {amplitude}");
-    let mut unfit = |needs: &str, found: String| {
-        findings.add(key.clone(), Problem::Unfit { choice: choice.clone(), needs: needs.to_owned(), found });
-    };
+    let mut unfit = |needs: &str, found: String| findings.unfit(key.clone(), &choice, needs, found);
     if let Some(at) = case.time.reverse_at {
         unfit("no time.reverse_at beside it", format!("reverse_at = {at}"));
     }
@@ -319,8 +305,8 @@ fn check_lubrication(case: &Case, key: Key, findings: &mut Findings) {
         return;
     }
     let choice = format!("\"{}\"", Lubrication::Deficit);
-    let needs = format!("flow.formulation = \"{needed}\"");
-    findings.add(key, Problem::Unfit { choice, needs, found: format!("\"{}\"", flow.formulation) });
+    let found = format!("\"{}\"", flow.formulation);
+    findings.unfit(key, choice, format!("flow.formulation = \"{needed}\""), found);
 }
 
 fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
@@ -357,7 +343,6 @@ fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
 /// The analytic model knows two equal spheres in unbounded shear.
 fn check_pair_mobility(case: &Case, key: Key, findings: &mut Findings) {
     let choice = format!("\"{}\"", Hydrodynamics::PairMobility);
-    let needs = "dimension 3 and two particles of equal radius".to_owned();
     let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
     let found = match (case.dimension, radii.as_slice()) {
         (3, [a, b]) if a == b => return,
@@ -365,7 +350,7 @@ fn check_pair_mobility(case: &Case, key: Key, findings: &mut Findings) {
         (3, _) => format!("{} particles", radii.len()),
         (dimension, _) => format!("dimension {dimension}"),
     };
-    findings.add(key, Problem::Unfit { choice, needs, found });
+    findings.unfit(key, choice, "dimension 3 and two particles of equal radius", found);
 }
 
 /// Whether there is a coordinate for each axis; notes it where there is not.
