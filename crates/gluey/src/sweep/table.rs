@@ -28,66 +28,55 @@ pub struct PointResult {
 /// half the width of their 95 % interval beside them, which `blocks_independent` says to hold. No count where
 /// there was nothing to be counted.
 pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
-    let numbers = [
-        "steps",
-        "wall_s",
-        "cells",
-        "dofs",
-        "cells_per_radius",
-        "min_gap_over_a",
-        "end_gap_over_a",
-        "reversibility_error",
-        "end_gap_rel_error",
-        "max_abs_error_over_a",
-        "strain_skipped",
-        "viscosity",
-        "viscosity_half_width",
-        "N1",
-        "N1_half_width",
-        "N2",
-        "N2_half_width",
-        "particle_pressure",
-        "particle_pressure_half_width",
-        "blocks_independent",
-        "halved_steps",
-        "closed_films",
-    ];
     let keys = axes.iter().map(|axis| axis.key.clone());
-    let head = keys.chain(["state"].into_iter().chain(numbers).map(str::to_owned)).collect();
+    let numbers = numbers_of(None).into_iter().map(|(name, _)| name.to_owned());
+    let head = keys.chain(["state".to_owned()]).chain(numbers).collect();
     let line = |result: &PointResult| {
         let values = axes.iter().map(|axis| result.values.get(&axis.key).cloned().unwrap_or_default());
-        let numbers = result.report.as_ref().map_or(vec![String::new(); numbers.len()], numbers_of);
+        let numbers = numbers_of(result.report.as_ref()).into_iter().map(|(_, number)| number);
         values.chain([result.state.to_owned()]).chain(numbers).collect()
     };
     [head].into_iter().chain(results.iter().map(line)).collect()
 }
 
-/// In the order of the head.
-fn numbers_of(report: &RunReport) -> Vec<String> {
-    let number = |value: Option<f64>| value.map_or(String::new(), |value| shown_to(value, 7));
+/// Names and numbers of a report; no numbers without one.
+fn numbers_of(report: Option<&RunReport>) -> Vec<(&'static str, String)> {
+    let text = |of: fn(&RunReport) -> String| report.map_or(String::new(), of);
+    let shown = |value: Option<f64>| value.map_or(String::new(), |value| shown_to(value, 7));
+    let number = |of: fn(&RunReport) -> Option<f64>| shown(report.and_then(of));
     let mut cells = vec![
-        report.steps.to_string(),
-        format!("{:.3}", report.wall_s),
-        report.cells.to_string(),
-        report.dofs.to_string(),
-        number(report.cells_per_radius),
-        number(report.min_gap_over_a),
-        number(report.end_gap_over_a),
-        number(report.reversibility_error),
-        number(report.end_gap_rel_error),
-        number(report.max_abs_error_over_a),
+        ("steps", text(|report| report.steps.to_string())),
+        ("wall_s", text(|report| format!("{:.3}", report.wall_s))),
+        ("cells", text(|report| report.cells.to_string())),
+        ("dofs", text(|report| report.dofs.to_string())),
+        ("cells_per_radius", number(|report| report.cells_per_radius)),
+        ("min_gap_over_a", number(|report| report.min_gap_over_a)),
+        ("end_gap_over_a", number(|report| report.end_gap_over_a)),
+        ("reversibility_error", number(|report| report.reversibility_error)),
+        ("end_gap_rel_error", number(|report| report.end_gap_rel_error)),
+        ("max_abs_error_over_a", number(|report| report.max_abs_error_over_a)),
+        ("strain_skipped", number(|report| Some(report.rheology.as_ref()?.strain_skipped))),
     ];
-    let rheology = report.rheology.as_ref();
-    cells.push(number(rheology.map(|rheology| rheology.strain_skipped)));
-    let means =
-        rheology.map_or([None; 4], |means| [means.viscosity, means.n1, means.n2, means.particle_pressure]);
-    for mean in means {
-        cells.push(number(mean.map(|mean| mean.mean)));
-        cells.push(number(mean.and_then(|mean| mean.half_width)));
+    let rheology = report.and_then(|report| report.rheology.as_ref());
+    let means = [
+        (["viscosity", "viscosity_half_width"], rheology.and_then(|means| means.viscosity)),
+        (["N1", "N1_half_width"], rheology.and_then(|means| means.n1)),
+        (["N2", "N2_half_width"], rheology.and_then(|means| means.n2)),
+        (
+            ["particle_pressure", "particle_pressure_half_width"],
+            rheology.and_then(|means| means.particle_pressure),
+        ),
+    ];
+    for ([name, name_of_width], mean) in means {
+        cells.push((name, shown(mean.map(|mean| mean.mean))));
+        cells.push((name_of_width, shown(mean.and_then(|mean| mean.half_width))));
     }
-    let is_resolved = means.into_iter().flatten().map(|mean| mean.is_resolved).reduce(|all, one| all && one);
-    cells.push(is_resolved.map_or(String::new(), |is| if is { "yes" } else { "no" }.to_owned()));
-    let counts = [report.tally.halved_steps, report.tally.closed_films];
-    cells.extend(counts.map(|count| number((count > 0).then_some(count as f64))));
+    let all = means.into_iter().filter_map(|(_, mean)| mean).map(|mean| mean.is_resolved);
+    let is_resolved = all.reduce(|all, one| all && one);
+    let is_resolved = is_resolved.map_or(String::new(), |is| if is { "yes" } else { "no" }.to_owned());
+    let count = |count: usize| (count > 0).then_some(count as f64);
+    cells.push(("blocks_independent", is_resolved));
+    cells.push(("halved_steps", shown(report.and_then(|report| count(report.tally.halved_steps)))));
+    cells.push(("closed_films", shown(report.and_then(|report| count(report.tally.closed_films)))));
     cells
 }
