@@ -170,7 +170,7 @@ const DISCS: &str = "name = \"discs\"\ndimension = 2\n\
 struct Fault(AtomicBool);
 
 impl Progress for Fault {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         if state.step == 5 && !self.0.swap(true, Ordering::Relaxed) {
             rayon::join(|| (), || panic!("a fault of the program"));
         }

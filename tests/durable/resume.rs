@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use gluey::case::{Formulation, Solver};
 use gluey::{
-    Case, CheckpointError, Progress, ProgressState, RowsError, RunError, RunOptions, Silent, Strategy, run,
+    Case, CheckpointError, Ended, Progress, ProgressState, RowsError, RunError, RunOptions, Silent, Strategy,
+    run,
 };
 use tempfile::TempDir;
 
@@ -23,7 +24,7 @@ struct StopAt {
 }
 
 impl Progress for StopAt {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         if state.step >= self.step {
             self.interrupt.store(true, Ordering::Relaxed);
         }
@@ -40,7 +41,9 @@ fn interrupted(case: &Case, folder: &Path, step: usize) {
     let interrupt = Arc::new(AtomicBool::new(false));
     let options = RunOptions { interrupt: Some(interrupt.clone()), ..options(folder) };
     match run(case, &options, &StopAt { step, interrupt }) {
-        Err(RunError::Interrupted { step: done, checkpoint: Some(_), .. }) => assert_eq!(done, step + 1),
+        Err(RunError::Interrupted(Ended { step: done, checkpoint: Some(_), .. })) => {
+            assert_eq!(done, step + 1)
+        }
         other => panic!("{other:?}"),
     }
     assert!(!options.csv.exists(), "a trajectory that is not complete has its final name");
@@ -149,10 +152,7 @@ fn a_damaged_checkpoint_is_refused() {
     newer[8] = 200;
     assert!(matches!(refusal(&newer), CheckpointError::Version { found: 200, .. }));
     fs::remove_file(&path).expect("a file");
-    assert!(matches!(
-        resumed(&case(), folder.path()),
-        Err(RunError::Checkpoint(CheckpointError::Read { .. }))
-    ));
+    assert!(matches!(resumed(&case(), folder.path()), Err(RunError::Checkpoint(CheckpointError::Read(_)))));
 }
 
 /// Rows that a checkpoint counts on but that are not there, or are others, are missed and not made up for.
@@ -194,7 +194,7 @@ fn rows_beyond_the_end_are_not_lost() {
     let interrupt = Arc::new(AtomicBool::new(false));
     let stop = StopAt { step: 50, interrupt: interrupt.clone() };
     let more = run(&case(), &RunOptions { interrupt: Some(interrupt), ..options }, &stop);
-    assert!(matches!(more, Err(RunError::Interrupted { .. })), "{more:?}");
+    assert!(matches!(more, Err(RunError::Interrupted(_))), "{more:?}");
     let rows = fs::read_to_string(&draft).expect("a draft");
     fs::write(folder.path().join("c.checkpoint"), early).expect("a file");
     let mut short = case();

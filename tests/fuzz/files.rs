@@ -65,7 +65,7 @@ fn signed(head: &[u8], payload: &[u8]) -> Vec<u8> {
 struct Stop(Arc<AtomicBool>);
 
 impl Progress for Stop {
-    fn report(&self, _: &ProgressState<'_>) {
+    fn report(&self, _: &ProgressState) {
         self.0.store(true, Ordering::Relaxed);
     }
 }
@@ -78,7 +78,7 @@ fn stopped_run(case: &Case, folder: &Path) -> RunOptions {
         interrupt: Some(interrupt.clone()),
         ..RunOptions::csv(folder.join("t.csv"))
     };
-    assert!(matches!(run(case, &options, &Stop(interrupt)), Err(RunError::Interrupted { .. })));
+    assert!(matches!(run(case, &options, &Stop(interrupt)), Err(RunError::Interrupted(_))));
     RunOptions { interrupt: None, resume: options.checkpoint.clone(), ..options }
 }
 

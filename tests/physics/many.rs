@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use gluey::output::PairForces;
 use gluey::output::csv::CsvWriter;
-use gluey::{Case, Progress, ProgressState, Row, RunError, RunOptions, Silent, run};
+use gluey::{Case, Ended, Progress, ProgressState, Row, RunError, RunOptions, Silent, run};
 use gluey_contact::Domain;
 use gluey_geom::{Particle, Spin, Twist, Vector};
 use gluey_testkit::cpu_seconds;
@@ -23,7 +23,7 @@ fn output_of(count: usize) -> (u64, u64, f64) {
     let domain = Domain::periodic(&Vector::repeat(packing.side));
     let mut particles: Vec<_> = packing.positions.iter().map(|&x| Particle::new(x, 0.5)).collect();
     let twists = vec![Twist { velocity: Vector::zeros(), spin: Spin::<3>::new(0.0, 0.0, -0.5) }; count];
-    let mut writer = CsvWriter::create(&folder.path().join("t.csv"), count).expect("files");
+    let mut writer = CsvWriter::create::<3>(&folder.path().join("t.csv"), count).expect("files");
     let mut fastest = f64::INFINITY;
     for step in 0..=STEP_COUNT {
         let row = Row { time: 0.01 * step as f64, particles: &particles, twists: &twists, domain: &domain };
@@ -79,7 +79,7 @@ flow.mesh = {{ cells_per_radius = 1.0 }}
 struct StopAt(usize, Arc<AtomicBool>);
 
 impl Progress for StopAt {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         self.1.store(state.step >= self.0, Ordering::Relaxed);
     }
 }
@@ -97,7 +97,7 @@ fn many_particles_resume_bit_by_bit() {
     let interrupt = Arc::new(AtomicBool::new(false));
     let stopped = RunOptions { interrupt: Some(interrupt.clone()), ..options.clone() };
     match run(&case, &stopped, &StopAt(2, interrupt)) {
-        Err(RunError::Interrupted { step: 3, .. }) => {}
+        Err(RunError::Interrupted(Ended { step: 3, .. })) => {}
         other => panic!("{other:?}"),
     }
     let two = run(&case, &RunOptions { resume: checkpoint, ..options }, &Silent);

@@ -233,11 +233,9 @@ where
     let folder = TempDir::new().expect("a folder");
     let out = folder.path().join("out");
     let mut writer = VtkWriter::create(&out.join("known-none-vtk"), &[]).expect("a folder");
-    let particles = [Particle::new(Vector::<D>::repeat(0.5), radius)];
-    let (twists, contacts, domain) = ([Twist::default()], &[], &Domain::default());
-    let fields = known::<D>(flow);
-    let fields = Some(&fields);
-    let (particles, twists, in_box) = (&particles, &twists, None);
+    let particles = vec![Particle::new(Vector::<D>::repeat(0.5), radius)];
+    let (twists, contacts, domain) = (vec![Twist::default()], vec![], Domain::default());
+    let (in_box, fields) = (None, Some(known::<D>(flow)));
     let frame = Frame { step: 20, time: 0.5, particles, twists, contacts, domain, in_box, fields };
     writer.write(&frame).expect("files");
     let center = vec!["0.5"; D].join(", ");

@@ -69,19 +69,19 @@ fn one_cell<const D: usize>() -> Fields<D> {
 }
 
 /// A frame of fields without particles.
-fn frame_of<'a, const D: usize>(domain: &'a Domain<D>, fields: &'a Fields<D>) -> Frame<'a, D>
+fn frame_of<const D: usize>(fields: &Fields<D>) -> Frame<D>
 where
     Dim<D>: Space<D>,
 {
     Frame {
         step: 40,
         time: 1.0,
-        particles: &[],
-        twists: &[],
-        contacts: &[],
-        domain,
+        particles: vec![],
+        twists: vec![],
+        contacts: vec![],
+        domain: Domain::default(),
         in_box: None,
-        fields: Some(fields),
+        fields: Some(fields.clone()),
     }
 }
 
@@ -95,8 +95,7 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     let folder = TempDir::new().expect("a folder");
     let fields = one_cell::<D>();
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let domain = Domain::default();
-    let frame = frame_of(&domain, &fields);
+    let frame = frame_of(&fields);
     writer.write(&frame).expect("files");
     let path = folder.path().join("fields-000040.vtu");
     assert_eq!(read_fields::<D>(&path).expect("what was written"), fields);
@@ -137,8 +136,7 @@ fn fields_in_pieces() {
     let folder = TempDir::new().expect("a folder");
     let (one, mut other) = (one_cell::<2>(), one_cell::<2>());
     other.points.iter_mut().for_each(|x| x[0] += 1.0);
-    let domain = Domain::default();
-    let frame = frame_of(&domain, &one);
+    let frame = frame_of(&one);
     let files = || {
         let files =
             fs::read_dir(folder.path()).expect("a folder").map(|file| file.expect("a file").file_name());
@@ -152,8 +150,8 @@ fn fields_in_pieces() {
     let create = |done| VtkWriter::create(folder.path(), done).expect("a folder");
     create(&[]).write(&frame).expect("files");
     assert_eq!(files(), ["fields-000040.vtu", "fields.pvd"]);
-    write_piece(folder.path(), (40, 1), &other, VtkEncoding::default()).expect("a piece");
-    write_piece(folder.path(), (40, 2), &Fields::<2>::default(), VtkEncoding::default()).expect("no cells");
+    write_piece(folder.path(), 40, 1, &other, VtkEncoding::default()).expect("a piece");
+    write_piece(folder.path(), 40, 2, &Fields::<2>::default(), VtkEncoding::default()).expect("no cells");
     create(&[]).in_pieces(3).write(&frame).expect("files");
     let pieces = ["fields-000040-0000.vtu", "fields-000040-0001.vtu", "fields-000040-0002.vtu"];
     assert_eq!(files(), [&pieces[..], &["fields-000040.pvtu", "fields.pvd"]].concat());
@@ -171,7 +169,7 @@ fn fields_in_pieces() {
     assert!(error.to_string().contains(pieces[1]), "{error}");
 
     // A run that goes on finds the steps before, whoever wrote them.
-    create(&[(40, 1.0)]).write(&Frame { step: 41, time: 1.5, ..frame }).expect("files");
+    create(&[(40, 1.0)]).write(&Frame { step: 41, time: 1.5, ..frame.clone() }).expect("files");
     assert!(
         listed().contains("fields-000040.pvtu") && listed().contains("fields-000041.vtu"),
         "{}",
@@ -198,16 +196,15 @@ fn every_encoding_reads_back() {
     {
         let encoding = VtkEncoding { compression, precision };
         let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder").encoded(encoding);
-        let (contacts, domain, in_box, fields) = (&[], &Domain::default(), None, None);
         let frame = Frame {
             step: 0,
             time: 0.0,
-            particles: &particles,
-            twists: &twists,
-            contacts,
-            domain,
-            in_box,
-            fields,
+            particles: particles.clone(),
+            twists: twists.clone(),
+            contacts: vec![],
+            domain: Domain::default(),
+            in_box: None,
+            fields: None,
         };
         writer.write(&frame).expect("files");
         let path = folder.path().join("particles-000000.vtu");
@@ -247,10 +244,10 @@ fn particles_and_contacts() {
     let frame = Frame {
         step: 0,
         time: 0.0,
-        particles: &particles,
-        twists: &twists,
-        contacts: &contacts,
-        domain: &Domain::default(),
+        particles: particles.clone(),
+        twists: twists.to_vec(),
+        contacts: contacts.to_vec(),
+        domain: Domain::default(),
         in_box: None,
         fields: None,
     };
@@ -287,14 +284,13 @@ fn contacts_with_walls_and_images() {
         gap: 0.1 * lambda,
     });
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let (twists, particles) = ([Twist::default(); 2], &particles);
     let frame = Frame {
         step: 0,
         time: 0.0,
-        particles,
-        twists: &twists,
-        contacts: &contacts,
-        domain: &domain,
+        particles: particles.to_vec(),
+        twists: vec![Twist::default(); 2],
+        contacts: contacts.to_vec(),
+        domain,
         in_box: None,
         fields: None,
     };
@@ -323,7 +319,7 @@ fn a_sheared_box_is_shown_whole() {
     let twists = [Twist { velocity: Vector::<2>::new(1.0, 2.0), ..Twist::default() }; 2];
     let contacts = [Contact { pair: PairKey::across(0, 1, [-5, 2, 0]), lambda: 1.0, gamma: 0.0, gap: 0.0 }];
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let (particles, twists, contacts, domain) = (&particles, &twists, &contacts, &domain);
+    let (particles, twists, contacts) = (particles.to_vec(), twists.to_vec(), contacts.to_vec());
     let frame = Frame { step: 0, time: 0.0, particles, twists, contacts, domain, in_box, fields: None };
     writer.write(&frame).expect("files");
 

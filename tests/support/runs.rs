@@ -76,7 +76,7 @@ pub fn rms_distance<const D: usize>(a: &[Vector<D>], b: &[Vector<D>]) -> f64 {
 struct StopAt(usize, Arc<AtomicBool>);
 
 impl Progress for StopAt {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         if state.step >= self.0 {
             self.1.store(true, Ordering::Relaxed);
         }
@@ -98,7 +98,7 @@ pub fn resumes_bit_by_bit(case: &Case, step: usize, what: &[&str]) {
     let options = RunOptions { checkpoint: Some(checkpoint.clone()), ..RunOptions::csv(&csv) };
     let stopped = RunOptions { interrupt: Some(interrupt.clone()), ..options.clone() };
     match run(case, &stopped, &StopAt(step, interrupt)) {
-        Err(RunError::Interrupted { .. }) => {}
+        Err(RunError::Interrupted(_)) => {}
         other => panic!("{other:?}"),
     }
     let resumed = RunOptions { resume: Some(checkpoint), ..options };

@@ -127,7 +127,7 @@ impl AnalyseArguments {
             gluey_view::analyse(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
         match self.json {
             true => terminal::print_json(&summary),
-            false => terminal::print_summary(&summary),
+            false => terminal::print(&summary.to_string()),
         }
         let tables = self.out.as_ref().unwrap_or(&self.folder).display();
         terminal::say(&format!("tables: {tables}/series.csv and beside it; pictures: gluey plot {tables}"));

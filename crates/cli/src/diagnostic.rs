@@ -5,21 +5,26 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
+use gluey::output::folder_of;
 use gluey::{
-    CaseError, CheckpointError, CheckpointSummary, NotText, OccupiedError, OutputError, ResultPaths,
+    CaseError, CheckpointError, CheckpointSummary, Ended, FileError, NotText, OccupiedError, ResultPaths,
     RowsError, RunError, StepError,
 };
 use gluey_motion::FilmError;
-use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, SourceCode};
+use miette::{Diagnostic, MietteHandlerOpts, NamedSource, SourceSpan};
 
 /// An error with a hint and, for case files, the lines around it.
-#[derive(Debug)]
+#[derive(Debug, Diagnostic)]
 pub struct Diagnosed {
     error: Box<dyn std::error::Error + Send + Sync>,
+    #[help]
     hint: Option<String>,
+    #[source_code]
     source: Option<NamedSource<String>>,
-    label: Option<LabeledSpan>,
+    #[label("here")]
+    label: Option<SourceSpan>,
     /// What a case file has wrong, one by one.
+    #[related]
     related: Vec<Diagnosed>,
 }
 
@@ -54,10 +59,7 @@ impl Diagnosed {
             last => {
                 let text = format!("{}: {count} errors", invalid.file.display());
                 let hint = (shown < count).then(|| format!("{} more are not shown", count - shown));
-                Self {
-                    related: issues.into_iter().chain(last).collect(),
-                    ..Self::with_hint(Text(text), hint)
-                }
+                Self { related: issues.into_iter().chain(last).collect(), ..Self::with_hint(text, hint) }
             }
         }
     }
@@ -69,14 +71,17 @@ impl Diagnosed {
         let Place::Text { span, .. } = &issue.place else { return diagnosed };
         Self {
             source: Some(NamedSource::new(invalid.file.display().to_string(), invalid.text.clone())),
-            label: Some(LabeledSpan::new_with_span(Some("here".into()), span.clone())),
+            label: Some(span.clone().into()),
             ..diagnosed
         }
     }
 
     /// Any other error, and what to do about it.
-    pub fn with_hint(error: impl std::error::Error + Send + Sync + 'static, hint: Option<String>) -> Self {
-        Self { hint, source: None, label: None, related: Vec::new(), error: Box::new(error) }
+    pub fn with_hint(
+        error: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+        hint: Option<String>,
+    ) -> Self {
+        Self { hint, source: None, label: None, related: Vec::new(), error: error.into() }
     }
 }
 
@@ -84,7 +89,7 @@ impl Diagnosed {
 fn hint(error: &RunError, case: &Path) -> Option<String> {
     let go_on = |checkpoint: &Path| go_on(checkpoint, checkpoint, case);
     Some(match error {
-        RunError::Interrupted { checkpoint: Some(checkpoint), .. } => {
+        RunError::Interrupted(Ended { checkpoint: Some(checkpoint), .. }) => {
             format!("to go on: {}", go_on(checkpoint))
         }
         RunError::Stopped { cause, .. } if matches!(**cause, RunError::Step(StepError::Film { .. })) => {
@@ -162,13 +167,13 @@ fn unread_hint(path: &Path) -> String {
 }
 
 /// Whether there is no more room: on the disk, in what a user may take of it, or in a file.
-fn is_full(error: &OutputError) -> bool {
+fn is_full(error: &FileError) -> bool {
     matches!(error.source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
 }
 
 /// What to do about a full disk: an older checkpoint may still be there.
-fn full_disk_hint(error: &OutputError) -> String {
-    let folder = error.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+fn full_disk_hint(error: &FileError) -> String {
+    let folder = folder_of(&error.path);
     let runs = ResultPaths::in_folder(folder).unwrap_or_default();
     match runs.iter().any(|run| run.checkpoint().exists()) {
         true => format!(
@@ -185,21 +190,15 @@ fn go_on(checkpoint: &Path, from: &Path, case: &Path) -> String {
     if run.checkpoint() != checkpoint || !run.record().exists() {
         return format!("gluey run {} --resume {} (with the same options)", case.display(), from.display());
     }
-    let folder = match run.folder() {
-        folder if folder == Path::new("") => Path::new("."),
-        folder => folder,
-    };
-    let is_alone = ResultPaths::in_folder(folder).is_ok_and(|runs| runs.len() == 1);
-    let which = if is_alone { String::new() } else { format!(" --case {}", run.stem()) };
     let generation = if from == checkpoint { "" } else { " --previous" };
-    format!("gluey resume {}{which}{generation}", folder.display())
+    format!("{}{generation}", run.resume_command())
 }
 
 /// Offers the checkpoint before the last, where it is whole.
 fn checkpoint_hint(error: &CheckpointError, case: &Path) -> String {
     let anew = "start without --resume".to_owned();
     let path = match error {
-        CheckpointError::Read { path, .. }
+        CheckpointError::Read(FileError { path, .. })
         | CheckpointError::Foreign { path }
         | CheckpointError::Version { path, .. }
         | CheckpointError::Damaged { path } => path,
@@ -232,18 +231,6 @@ impl From<CaseError> for Diagnosed {
     }
 }
 
-/// A message without a cause.
-#[derive(Debug)]
-struct Text(String);
-
-impl fmt::Display for Text {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Text {}
-
 impl fmt::Display for Diagnosed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.error.fmt(f)
@@ -255,40 +242,14 @@ impl std::error::Error for Diagnosed {
         self.error.source()
     }
 }
-
-impl Diagnostic for Diagnosed {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.hint.as_ref().map(|hint| Box::new(hint) as Box<dyn fmt::Display>)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source.as_ref().map(|source| source as &dyn SourceCode)
-    }
-
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        let related = self.related.iter().map(|issue| issue as &dyn Diagnostic);
-        (!self.related.is_empty()).then(|| Box::new(related) as Box<dyn Iterator<Item = &dyn Diagnostic>>)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.label
-            .clone()
-            .map(|label| Box::new(std::iter::once(label)) as Box<dyn Iterator<Item = LabeledSpan>>)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn what_has_no_record_is_resumed_with_its_case() {
-        let interrupted = RunError::Interrupted {
-            step: 3,
-            steps: 5,
-            time: 0.3,
-            checkpoint: Some("nowhere/pair.checkpoint".into()),
-        };
+        let checkpoint = Some("nowhere/pair.checkpoint".into());
+        let interrupted = Ended { step: 3, steps: 5, time: 0.3, checkpoint }.into();
         assert_eq!(
             hint(&interrupted, Path::new("pair.toml")).as_deref(),
             Some("to go on: gluey run pair.toml --resume nowhere/pair.checkpoint (with the same options)")

@@ -1,14 +1,14 @@
 //! Progress and results in words: a bar on a terminal, plain lines in a log.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use gluey::output::folder_of;
 use gluey::output::solver_log::SolverRow;
 use gluey::progress::Ticker;
 use gluey::{Notice, Progress, ProgressState, ResultPaths, RunReport};
-use gluey_view::{Summary, Viewed};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -82,7 +82,7 @@ impl Reporter {
 }
 
 impl Progress for Reporter {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         match &self.surface {
             Surface::Bar(bar) => {
                 bar.set_length(state.steps as u64);
@@ -119,25 +119,27 @@ pub fn print_report(report: &RunReport, csv: &Path) {
         let share = 100.0 * seconds / total.max(f64::MIN_POSITIVE);
         text.push_str(&format!("  {name:<18} {seconds:>9.3} {share:>6.1} %\n"));
     }
-    let folder = csv.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let (table, folder) = (csv.display(), folder.display());
+    let (table, folder) = (csv.display(), folder_of(csv).display());
     text.push_str(&format!("  results: {table} and beside it; pictures: gluey plot {folder}"));
     let has_frames = ResultPaths::of_csv(csv).xyz().is_dir();
     text.push_str(&if has_frames { format!("; a page: gluey view {folder}\n") } else { "\n".to_owned() });
-    // All results are on disk: that nobody reads this is no failure.
+    print(&text);
+}
+
+/// Prints a text that came out. Results are on disk: that nobody reads this is no failure.
+pub fn print(text: &str) {
     let _ = stdout().write_all(text.as_bytes());
 }
 
 /// Prints `value` as JSON.
 pub fn print_json(value: &impl Serialize) {
     let text = serde_json::to_string_pretty(value).expect("keys are texts, and numbers have a form");
-    let _ = writeln!(stdout(), "{text}");
+    print(&(text + "\n"));
 }
 
 /// Prints lines of a name and what it stands for.
 pub fn print_lines(lines: &[(&str, String)]) {
-    let text: String = lines.iter().map(|(name, value)| format!("{name:<12} {value}\n")).collect();
-    let _ = stdout().write_all(text.as_bytes());
+    print(&lines.iter().map(|(name, value)| format!("{name:<12} {value}\n")).collect::<String>());
 }
 
 /// Prints a table whose first row is its head; columns without any entry are left out.
@@ -149,28 +151,5 @@ pub fn print_table(rows: &[Vec<String>]) {
         let cells = used.iter().map(|&k| format!("{:<width$}", row[k], width = width(k)));
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };
-    let text: String = rows.iter().map(line).collect();
-    let _ = stdout().write_all(text.as_bytes());
-}
-
-/// Prints what an analysis found.
-pub fn print_summary(summary: &Summary) {
-    let _ = stdout().write_all(summary.to_string().as_bytes());
-}
-
-/// Prints which page was written.
-pub fn print_viewed(viewed: &Viewed) {
-    let Viewed { page, frame_count, particle_count, size } = viewed;
-    let megabytes = *size as f64 / 1e6;
-    let text = format!(
-        "{}: {frame_count} frames of {particle_count} particles, {megabytes:.1} MB; open it in a browser\n",
-        page.display()
-    );
-    let _ = stdout().write_all(text.as_bytes());
-}
-
-/// Prints which pictures were written.
-pub fn print_pictures(pictures: &[PathBuf]) {
-    let lines: String = pictures.iter().map(|picture| format!("{}\n", picture.display())).collect();
-    let _ = stdout().write_all(lines.as_bytes());
+    print(&rows.iter().map(line).collect::<String>());
 }

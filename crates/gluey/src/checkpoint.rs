@@ -1,6 +1,6 @@
 //! Checkpoints: everything a run needs to go on, bit for bit, as if it had never stopped.
 //!
-//! Rows of output are not in it, but how far their files had come ([`CsvMarks`]).
+//! Rows of output are not in it, but how far their files had come ([`TableMarks`]).
 //!
 //! A file is a [`Checkpoint`] in postcard encoding, behind a digest. It carries the case, so that it cannot
 //! be taken for one of another case. Where ranks share the flow, what the next one starts from is in files
@@ -17,8 +17,7 @@ use thiserror::Error;
 use crate::case::Case;
 use crate::checksum::{Kind, Unopened};
 use crate::hydrodynamics::HydrodynamicsError;
-use crate::output::csv::CsvMarks;
-use crate::output::{Mark, OutputError, write_atomically};
+use crate::output::{FileError, Mark, write_atomically};
 use crate::phases::PhaseTable;
 use crate::simulation::{RestoreError, SimulationState};
 use crate::tally::Tally;
@@ -37,13 +36,7 @@ where
     /// Particles, history, contact memory, warm start of the flow.
     pub state: SimulationState<D>,
     /// How far the files of rows had come.
-    pub output: CsvMarks,
-    /// How far that of the rheology had come, where there is one.
-    pub rheology: Option<Mark>,
-    /// How far that of what holds particles had come, where there is one.
-    pub forces: Option<Mark>,
-    /// How far that of the solver had come.
-    pub solver: Mark,
+    pub tables: TableMarks,
     /// What was counted so far.
     pub tally: Tally,
     /// Wall time so far, phase by phase.
@@ -54,6 +47,21 @@ where
     pub ranks: usize,
     /// The files with what the next flow starts from, where ranks share it.
     pub pieces: Option<FlowPieces>,
+}
+
+/// How far the tables of a run had come.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TableMarks {
+    /// The trajectory.
+    pub trajectory: Mark,
+    /// The near pairs, where they have a file.
+    pub gaps: Option<Mark>,
+    /// The rheology, where there is one.
+    pub rheology: Option<Mark>,
+    /// What holds particles, where there are such.
+    pub forces: Option<Mark>,
+    /// What steps cost.
+    pub solver: Mark,
 }
 
 /// Files beside a checkpoint with what the next flow starts from, one for the cells of each rank that wrote
@@ -79,13 +87,8 @@ impl FlowPieces {
 #[derive(Debug, Error)]
 pub enum CheckpointError {
     /// It could not be read.
-    #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// It is another kind of file.
     #[error("{}: not a gluey checkpoint", path.display())]
     Foreign {
@@ -145,7 +148,7 @@ impl CheckpointError {
     pub(crate) fn unopened(path: &Path, why: Unopened) -> Self {
         let path = path.to_owned();
         match why {
-            Unopened::Read(source) => Self::Read { path, source },
+            Unopened::Read(source) => FileError::unread(&path, source).into(),
             Unopened::Foreign => Self::Foreign { path },
             Unopened::Layout(found) => Self::Version { path, found },
             Unopened::Damaged => Self::Damaged { path },
@@ -177,14 +180,14 @@ where
     Dim<D>: Space<D>,
 {
     /// Writes the checkpoint of a run of `case`, all or nothing.
-    pub fn write(&self, case: &Case, path: &Path) -> Result<(), OutputError> {
+    pub fn write(&self, case: &Case, path: &Path) -> Result<(), FileError> {
         let encode = || -> io::Result<Vec<u8>> {
             let run = postcard::to_stdvec(self).map_err(io::Error::other)?;
             let gluey = env!("CARGO_PKG_VERSION").to_owned();
             let payload = Payload { gluey, case: canonical(case).map_err(io::Error::other)?, run };
             KIND.sealed(&postcard::to_stdvec(&payload).map_err(io::Error::other)?)
         };
-        let file = encode().map_err(|error| OutputError::new(path, "encode the checkpoint", error))?;
+        let file = encode().map_err(|error| FileError::new(path, "encode the checkpoint", error))?;
         write_atomically(path, &file)
     }
 
@@ -193,9 +196,9 @@ where
     #[must_use]
     pub(crate) fn on(mut self, ranks: usize) -> Self {
         let is_last = self.ranks != ranks;
-        let rows = [Some(&mut self.output.rows), self.output.gaps.as_mut()];
-        let tables = [self.rheology.as_mut(), self.forces.as_mut(), Some(&mut self.solver)];
-        rows.into_iter().chain(tables).flatten().for_each(|mark| mark.is_last = is_last);
+        let TableMarks { trajectory, gaps, rheology, forces, solver } = &mut self.tables;
+        let marks = [Some(trajectory), gaps.as_mut(), rheology.as_mut(), forces.as_mut(), Some(solver)];
+        marks.into_iter().flatten().for_each(|mark| mark.is_last = is_last);
         self
     }
 
@@ -242,9 +245,10 @@ impl CheckpointSummary {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn is_announced_by(path: &Path) -> io::Result<bool> {
+    pub fn is_announced_by(path: &Path) -> Result<bool, FileError> {
         let mut start = Vec::new();
-        fs::File::open(path)?.take(KIND.magic.len() as u64).read_to_end(&mut start)?;
+        let mut read = || fs::File::open(path)?.take(KIND.magic.len() as u64).read_to_end(&mut start);
+        read().map_err(|error| FileError::unread(path, error))?;
         Ok(KIND.begins(&start))
     }
 

@@ -45,13 +45,14 @@ mod text;
 mod trajectory;
 
 pub use case::{Case, CaseError, Formulation, Strategy};
-pub use checkpoint::{CaseDifference, Checkpoint, CheckpointError, CheckpointSummary, FlowPieces};
+pub use checkpoint::{
+    CaseDifference, Checkpoint, CheckpointError, CheckpointSummary, FlowPieces, TableMarks,
+};
 pub use flow::FlowError;
 pub use hydrodynamics::HydrodynamicsError;
 pub use memory::TooLarge;
-pub use near_pairs::{NearPairs, PairGap};
 pub use number_text::{shown, shown_to};
-pub use output::{ClaimError, OutputError, ResultPaths, RowsError};
+pub use output::{ClaimError, FileError, ResultPaths, RowsError};
 pub use phases::PhaseTable;
 pub use progress::{Notice, Progress, ProgressState, Silent};
 pub use report::RunReport;
@@ -59,7 +60,7 @@ pub use report::RunReport;
 pub use run::run_shared;
 pub use run::{
     Ended, FolderError, LastSteps, Machine, OccupiedError, RecordError, RecordOptions, RecordedOptions,
-    ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions,
+    ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions, in_full,
     recorded_runs, run,
 };
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};

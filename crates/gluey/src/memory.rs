@@ -53,16 +53,8 @@ pub fn size(bytes: f64) -> String {
     }
 }
 
-/// Refuses a case whose mesh cannot be numbered, or needs more memory than there is. Where nobody tells how
-/// much there is, only the first is checked.
-///
-/// # Errors
-/// [`TooLarge`] with the size expected.
-pub fn check(case: &Case) -> Result<(), TooLarge> {
-    check_within(case, None)
-}
-
-/// The same, where no more than `limit` bytes may be taken however much there is.
+/// Refuses a case whose mesh cannot be numbered, or needs more memory than there is, or than `limit` bytes
+/// however much there is. Where nobody tells how much there is, and without a limit, only the first is checked.
 ///
 /// # Errors
 /// [`TooLarge`] with the size expected.

@@ -1,7 +1,7 @@
 //! Near pairs, and the smallest gap, at a cost proportional to the number of particles.
 
-use gluey_contact::broadphase::{BestOf, Broadphase};
-use gluey_geom::{Dim, Lattice, Space, Vector};
+use gluey_geom::{Dim, Space, Vector};
+use gluey_suspension::{Container, for_each_pair};
 
 use crate::trajectory::Row;
 
@@ -10,7 +10,7 @@ const SLACK: f64 = 1e-9;
 
 /// Two particles and the smallest gap between their images.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairGap {
+pub(crate) struct PairGap {
     /// Index of the first particle, from 0.
     pub first: usize,
     /// Index of the second particle, larger.
@@ -19,120 +19,46 @@ pub struct PairGap {
     pub gap: f64,
 }
 
-/// Finds near pairs; keeps its buffers.
-#[derive(Debug, Default)]
-pub struct NearPairs<const D: usize> {
-    broadphase: BestOf,
-    centers: Vec<Vector<D>>,
-    reaches: Vec<f64>,
-    /// Particle of each ball: those behind the particles are images across a periodic border.
-    owners: Vec<u32>,
-    meeting: Vec<(u32, u32)>,
-}
-
-impl<const D: usize> NearPairs<D>
+/// All pairs with a gap of at most `reach >= 0`, sorted by particles.
+pub(crate) fn within<const D: usize>(row: &Row<'_, D>, reach: f64) -> Vec<PairGap>
 where
     Dim<D>: Space<D>,
 {
-    /// No buffers yet.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// All pairs with a gap of at most `reach >= 0`, sorted by particles.
-    pub fn within(&mut self, row: &Row<'_, D>, reach: f64) -> Vec<PairGap> {
-        let count = row.particles.len();
-        self.place_balls(row, reach);
-        self.broadphase.meeting(&self.centers, &self.reaches, count, &mut self.meeting);
-        // Of a pair across the border and its mirror image, one stays; a particle's own images do not count.
-        for (first, second) in &mut self.meeting {
-            let owner = self.owners[*second as usize];
-            (*first, *second) = (owner.min(*first), owner.max(*first));
+    let lattice = row.domain.lattice.reduced();
+    let centers: Vec<Vector<D>> = row.particles.iter().map(|particle| particle.pose.position).collect();
+    let largest = row.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
+    let longest = lattice.periods().iter().flatten().copied().fold(0.0, f64::max);
+    let slack = SLACK * (longest + 2.0 * largest + reach);
+    let mut meeting = Vec::new();
+    for_each_pair(&Container::of_lattice(lattice), &centers, 2.0 * largest + reach + slack, |pair| {
+        let touching = row.particles[pair.first].radius + row.particles[pair.second].radius;
+        if pair.first != pair.second && pair.arm.norm() <= touching + reach + slack {
+            meeting.push((pair.first, pair.second));
         }
-        self.meeting.sort_unstable();
-        self.meeting.dedup();
-        let pairs = self.meeting.iter().filter(|(first, second)| first != second);
-        let gaps = pairs.map(|&(first, second)| {
-            let (first, second) = (first as usize, second as usize);
-            PairGap { first, second, gap: row.gap(first, second) }
-        });
-        gaps.filter(|pair| pair.gap <= reach).collect()
-    }
-
-    /// The smallest gap of all pairs, exactly; `None` for fewer than two particles. `near` holds the pairs up
-    /// to `reach`.
-    pub fn smallest(&mut self, row: &Row<'_, D>, near: &[PairGap], mut reach: f64) -> Option<f64> {
-        let smallest = |pairs: &[PairGap]| pairs.iter().map(|pair| pair.gap).reduce(f64::min);
-        let mut found = smallest(near);
-        // No pair is nearer than `reach`, so within twice that a particle has few neighbours, however many
-        // there are.
-        while found.is_none() && row.particles.len() > 1 && reach < f64::MAX {
-            reach *= 2.0;
-            found = smallest(&self.within(row, reach));
-        }
-        found
-    }
-
-    /// One ball per particle, as large as to meet those within `reach`, and the images that could meet one.
-    fn place_balls(&mut self, row: &Row<'_, D>, reach: f64) {
-        let lattice = row.domain.lattice.reduced();
-        let longest = lattice.periods().iter().flatten().copied().fold(0.0, f64::max);
-        self.centers.clear();
-        self.centers.extend(row.particles.iter().map(|p| wrapped(p.pose.position, &lattice)));
-        self.reaches.clear();
-        self.reaches
-            .extend(row.particles.iter().map(|p| (p.radius + 0.5 * reach) * (1.0 + SLACK) + SLACK * longest));
-        self.owners.clear();
-        self.owners.extend(0..row.particles.len() as u32);
-        let margin = 2.0 * self.reaches.iter().copied().fold(0.0, f64::max);
-        // Images across the border in y are moved along x, so x comes last.
-        for axis in (0..D).rev() {
-            if let Some(period) = lattice.periods()[axis] {
-                self.add_images(axis, period, margin, &lattice);
-            }
-        }
-    }
-
-    /// Images of all balls so far, as many periods up or down an axis as come within the margin, or as the
-    /// nearest ones can be.
-    fn add_images(&mut self, axis: usize, period: f64, margin: f64, lattice: &Lattice<D>) {
-        let is_tilted = axis < 2 && lattice.tilt() != 0.0;
-        let across = if is_tilted { &lattice.periods()[..2] } else { &lattice.periods()[axis..=axis] };
-        let farthest = 0.5 * across.iter().flatten().copied().fold(0.0, f64::hypot);
-        let margin = margin.min(farthest * (1.0 + SLACK));
-        let most = (margin / period).ceil() as i32;
-        for ball in 0..self.centers.len() {
-            for up in (-most..=most).filter(|&up| up != 0).map(f64::from) {
-                let mut image = self.centers[ball];
-                image[axis] += up * period;
-                if axis == 1 && lattice.tilt() != 0.0 {
-                    image[0] += up * lattice.tilt();
-                    image = wrapped_along(0, image, lattice);
-                }
-                if image[axis] >= -margin && image[axis] <= period + margin {
-                    self.centers.push(image);
-                    self.reaches.push(self.reaches[ball]);
-                    self.owners.push(self.owners[ball]);
-                }
-            }
-        }
-    }
+    });
+    // Pairs may meet in several images.
+    meeting.sort_unstable();
+    meeting.dedup();
+    let gaps =
+        meeting.into_iter().map(|(first, second)| PairGap { first, second, gap: row.gap(first, second) });
+    gaps.filter(|pair| pair.gap <= reach).collect()
 }
 
-/// A place brought into the periods.
-fn wrapped<const D: usize>(x: Vector<D>, lattice: &Lattice<D>) -> Vector<D> {
-    (0..D).rev().fold(x, |x, axis| wrapped_along(axis, x, lattice))
-}
-
-/// A place brought into the period of one axis.
-fn wrapped_along<const D: usize>(axis: usize, mut x: Vector<D>, lattice: &Lattice<D>) -> Vector<D> {
-    let Some(period) = lattice.periods()[axis] else { return x };
-    let count = (x[axis] / period).floor();
-    x[axis] -= period * count;
-    if axis == 1 {
-        x[0] -= lattice.tilt() * count;
+/// The smallest gap of all pairs, exactly; `None` for fewer than two particles. `near` holds the pairs up to
+/// `reach`.
+pub(crate) fn smallest<const D: usize>(row: &Row<'_, D>, near: &[PairGap], mut reach: f64) -> Option<f64>
+where
+    Dim<D>: Space<D>,
+{
+    let smallest = |pairs: &[PairGap]| pairs.iter().map(|pair| pair.gap).reduce(f64::min);
+    let mut found = smallest(near);
+    // No pair is nearer than `reach`, so within twice that a particle has few neighbours, however many there
+    // are.
+    while found.is_none() && row.particles.len() > 1 && reach < f64::MAX {
+        reach *= 2.0;
+        found = smallest(&within(row, reach));
     }
-    x
+    found
 }
 
 #[cfg(test)]
@@ -157,7 +83,6 @@ mod tests {
         Dim<D>: Space<D>,
     {
         let mut next = numbers();
-        let mut search = NearPairs::new();
         for _ in 0..20 {
             let particles: Vec<Particle<D>> = (0..count)
                 .map(|_| {
@@ -172,11 +97,11 @@ mod tests {
                 .map(|(first, second)| PairGap { first, second, gap: row.gap(first, second) })
                 .collect();
             let reach = radius;
-            let near = search.within(&row, reach);
+            let near = within(&row, reach);
             let expected: Vec<_> = all.iter().copied().filter(|pair| pair.gap <= reach).collect();
             assert_eq!(near, expected);
             let smallest = all.iter().map(|pair| pair.gap).reduce(f64::min);
-            assert_eq!(search.smallest(&row, &near, reach), smallest);
+            assert_eq!(super::smallest(&row, &near, reach), smallest);
         }
     }
 

@@ -28,10 +28,10 @@ pub(crate) use claim::{Claim, is_claimed};
 pub use pair_forces::PairForces;
 pub use paths::ResultPaths;
 
-/// A file could not be written.
+/// A file or folder could not be read or written.
 #[derive(Debug, Error)]
 #[error("{}: cannot {action}", path.display())]
-pub struct OutputError {
+pub struct FileError {
     /// The file or folder.
     pub path: PathBuf,
     /// The action that failed.
@@ -41,10 +41,24 @@ pub struct OutputError {
     pub source: io::Error,
 }
 
-impl OutputError {
-    pub(crate) fn new(path: &Path, action: &'static str, source: io::Error) -> Self {
+impl FileError {
+    /// What failed, in words that follow "cannot".
+    pub fn new(path: &Path, action: &'static str, source: io::Error) -> Self {
         Self { path: path.to_owned(), action, source }
     }
+
+    /// That it cannot be read.
+    pub fn unread(path: &Path, source: io::Error) -> Self {
+        Self::new(path, "be read", source)
+    }
+}
+
+/// A line of a table: numbers with so many decimals behind the first digit, 16 to read back exactly, and empty
+/// cells where there is none.
+pub fn line_of(numbers: impl IntoIterator<Item: Into<Option<f64>>>, decimals: usize) -> String {
+    let cell = |number: Option<f64>| number.map_or(String::new(), |number| format!("{number:.decimals$e}"));
+    let cells: Vec<String> = numbers.into_iter().map(|number| cell(number.into())).collect();
+    cells.join(",") + "\n"
 }
 
 /// `path` with something behind its name.
@@ -77,9 +91,9 @@ fn create_draft(path: &Path) -> io::Result<(u32, File)> {
 }
 
 /// All drafts of `path`, sorted by name.
-pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
+pub(crate) fn drafts(path: &Path) -> Result<Vec<PathBuf>, FileError> {
     let Some(complete) = path.file_name().map(OsStr::to_string_lossy) else { return Ok(Vec::new()) };
-    let failed = |error| OutputError::new(folder_of(path), "list the folder", error);
+    let failed = |error| FileError::new(folder_of(path), "list the folder", error);
     let entries = entries(folder_of(path)).map_err(failed)?;
     let names = entries.iter().filter_map(|entry| entry.file_name()?.to_str());
     let drafts = names.filter(|name| undrafted(name) == Some(&*complete));
@@ -100,11 +114,11 @@ pub fn name_of(path: &Path) -> String {
 }
 
 /// Makes sure that all drafts of these files outlive a power failure.
-pub(crate) fn sync_drafts(paths: &[PathBuf]) -> Result<(), OutputError> {
+pub(crate) fn sync_drafts(paths: &[PathBuf]) -> Result<(), FileError> {
     for path in paths {
         for draft in drafts(path)? {
             let synced = File::options().write(true).open(&draft).and_then(|file| file.sync_data());
-            synced.map_err(|error| OutputError::new(&draft, "write the file", error))?;
+            synced.map_err(|error| FileError::new(&draft, "write the file", error))?;
         }
     }
     Ok(())
@@ -120,26 +134,27 @@ pub fn rows_of(path: &Path) -> Option<PathBuf> {
 }
 
 /// The text of a table up to its last whole line: that of a run that goes on, or was killed, may be half.
-pub fn whole_lines(path: &Path) -> io::Result<String> {
-    let mut text = crate::text::read(path)?;
+pub fn whole_lines(path: &Path) -> Result<String, FileError> {
+    let mut text = crate::text::read(path).map_err(|error| FileError::unread(path, error))?;
     if path.to_str().is_some_and(|name| undrafted(name).is_some()) {
         text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
     }
     Ok(text)
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The folder of a file; `.` for the present one.
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Creates the folder of `path` if it is missing, and makes sure that `path` can be a file in it.
-pub fn prepare_folder_of(path: &Path) -> Result<(), OutputError> {
+pub fn prepare_folder_of(path: &Path) -> Result<(), FileError> {
     if path.file_name().is_none() || path.is_dir() {
         let source = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file");
-        return Err(OutputError::new(path, "write the file", source));
+        return Err(FileError::new(path, "write the file", source));
     }
     let folder = folder_of(path);
-    fs::create_dir_all(folder).map_err(|error| OutputError::new(folder, "create the folder", error))
+    fs::create_dir_all(folder).map_err(|error| FileError::new(folder, "create the folder", error))
 }
 
 /// Gives a complete draft its name, for good: after a power failure it is there, too.
@@ -154,7 +169,7 @@ fn sync_folder_of(path: &Path) -> io::Result<()> {
 }
 
 /// Writes `bytes` so that `path` holds either all of them or what it held before.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let write = || {
         let (number, mut file) = create_draft(path)?;
         let draft = draft_path(path, number);
@@ -166,14 +181,14 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         }
         written
     };
-    write().map_err(|error| OutputError::new(path, "write the file", error))
+    write().map_err(|error| FileError::new(path, "write the file", error))
 }
 
 /// Removes a file that another one takes the place of, if it is there.
-pub(crate) fn remove_stale(path: &Path) -> Result<(), OutputError> {
+pub(crate) fn remove_stale(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(OutputError::new(path, "remove what an earlier run left", error))
+            Err(FileError::new(path, "remove what an earlier run left", error))
         }
         _ => Ok(()),
     }
@@ -181,12 +196,12 @@ pub(crate) fn remove_stale(path: &Path) -> Result<(), OutputError> {
 
 /// Puts a file of an earlier run out of the way, as the first `<path>.earlier-K` that is not there yet;
 /// `None` if there is no such file.
-pub(crate) fn set_aside(path: &Path) -> Result<Option<PathBuf>, OutputError> {
+pub(crate) fn set_aside(path: &Path) -> Result<Option<PathBuf>, FileError> {
     if !path.exists() {
         return Ok(None);
     }
     let names = (1..u32::MAX).map(|number| with_suffix(path, &format!(".earlier-{number}")));
     let Some(free) = names.into_iter().find(|name| !name.exists()) else { return Ok(None) };
-    rename(path, &free).map_err(|error| OutputError::new(path, "set the file aside", error))?;
+    rename(path, &free).map_err(|error| FileError::new(path, "set the file aside", error))?;
     Ok(Some(free))
 }

@@ -15,7 +15,7 @@ use crate::tally::Tally;
 
 /// Where a run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProgressState<'a> {
+pub struct ProgressState {
     /// Steps done.
     pub step: usize,
     /// Steps in all.
@@ -23,14 +23,14 @@ pub struct ProgressState<'a> {
     /// Time reached in the simulation.
     pub time: f64,
     /// The work being done: `flow`, `contact`, `motion` or `output`.
-    pub phase: &'a str,
+    pub phase: &'static str,
     /// Wall time since the run started, in seconds.
     pub wall_s: f64,
     /// Estimate of the wall time left, in seconds; `None` before the first step is done.
     pub left_s: Option<f64>,
 }
 
-impl fmt::Display for ProgressState<'_> {
+impl fmt::Display for ProgressState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let left = self.left_s.map_or("?".into(), duration);
         let rate = match self.left_s {
@@ -54,7 +54,7 @@ pub fn duration(seconds: f64) -> String {
 /// Receives reports while a run goes on, a few times a step.
 pub trait Progress: Sync {
     /// Takes note of where the run is; called from the thread of the run, and expected to return at once.
-    fn report(&self, state: &ProgressState<'_>);
+    fn report(&self, state: &ProgressState);
 
     /// Takes note of what the flow and the contacts of a step took; called as [`Progress::report`] is.
     fn step(&self, _: &SolverRow<'_>) {}
@@ -226,19 +226,17 @@ struct Shared {
     ended: Condvar,
 }
 
-/// What was reported last.
+/// What was reported last, if anything was.
 #[derive(Debug, Default)]
 struct Place {
     has_ended: bool,
-    is_known: bool,
-    numbers: (usize, usize, f64, f64, Option<f64>),
-    phase: String,
+    state: Option<ProgressState>,
 }
 
 impl Ticker {
     /// Calls `say` every `interval` with what was reported last. Where there is no thread to be had, it is
     /// silent.
-    pub fn new(interval: Duration, say: impl Fn(&ProgressState<'_>) + Send + 'static) -> Self {
+    pub fn new(interval: Duration, say: impl Fn(&ProgressState) + Send + 'static) -> Self {
         let shared = Arc::<Shared>::default();
         let of_thread = shared.clone();
         let thread = std::thread::Builder::new().name("ticker".to_owned());
@@ -247,12 +245,8 @@ impl Ticker {
     }
 
     /// Takes note of where it is.
-    pub fn report(&self, state: &ProgressState<'_>) {
-        let mut place = self.shared.place();
-        place.is_known = true;
-        place.numbers = (state.step, state.steps, state.time, state.wall_s, state.left_s);
-        place.phase.clear();
-        place.phase.push_str(state.phase);
+    pub fn report(&self, state: &ProgressState) {
+        self.shared.place().state = Some(*state);
     }
 }
 
@@ -261,7 +255,7 @@ impl Shared {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tick(&self, interval: Duration, say: impl Fn(&ProgressState<'_>)) {
+    fn tick(&self, interval: Duration, say: impl Fn(&ProgressState)) {
         let mut next = Instant::now() + interval;
         let mut place = self.place();
         while !place.has_ended {
@@ -271,10 +265,7 @@ impl Shared {
                 continue;
             }
             next += interval;
-            let (step, steps, time, wall_s, left_s) = place.numbers;
-            if place.is_known {
-                say(&ProgressState { step, steps, time, phase: &place.phase, wall_s, left_s });
-            }
+            place.state.iter().for_each(&say);
         }
     }
 }
@@ -293,7 +284,7 @@ impl Drop for Ticker {
 pub struct Silent;
 
 impl Progress for Silent {
-    fn report(&self, _: &ProgressState<'_>) {}
+    fn report(&self, _: &ProgressState) {}
 }
 
 #[cfg(test)]

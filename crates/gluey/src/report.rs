@@ -67,7 +67,8 @@ impl RunReport {
     pub(crate) fn of<const D: usize>(
         case: &Case,
         measures: &Measures<D>,
-        (flow, tally): (&FlowStatistics, &Tally),
+        flow: &FlowStatistics,
+        tally: &Tally,
         wall_s: f64,
         phases: &PhaseTable,
     ) -> Self {

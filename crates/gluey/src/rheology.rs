@@ -11,7 +11,7 @@ use thiserror::Error;
 
 pub use mean::Mean;
 
-use crate::output::{rows_of, whole_lines};
+use crate::output::{FileError, rows_of, whole_lines};
 use crate::table::{Table, TableError};
 
 /// Means of the columns of `<name>-rheology.csv`, over viscosity and shear rate as they are.
@@ -41,13 +41,8 @@ pub struct RheologyMeans {
 #[derive(Debug, Error)]
 pub enum RheologyError {
     /// The file could not be read.
-    #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// It is no such table.
     #[error("{}: {source}", path.display())]
     Table {
@@ -64,7 +59,7 @@ impl RheologyMeans {
     /// the viscosity by the rule MSER-5, unless it is given as the time at which it is over.
     pub fn read(path: &Path, begin: Option<f64>) -> Result<Option<Self>, RheologyError> {
         let Some(rows) = rows_of(path) else { return Ok(None) };
-        let text = whole_lines(&rows).map_err(|source| RheologyError::Read { path: rows.clone(), source })?;
+        let text = whole_lines(&rows)?;
         let means = Table::parse(&text).and_then(|table| Self::of(&table, begin));
         means.map_err(|source| RheologyError::Table { path: rows, source })
     }

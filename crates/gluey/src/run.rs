@@ -29,7 +29,6 @@ mod tables;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
@@ -42,7 +41,7 @@ pub use options::{RecordOptions, RunOptions, VtkOptions, XyzOptions};
 pub use overwrite_guard::OccupiedError;
 #[cfg(feature = "ranks")]
 pub use ranks::run_shared;
-pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState};
+pub use record::{Machine, RecordError, RecordedOptions, RunRecord, RunState, in_full};
 pub use resumption::{ResumeError, Resumption};
 pub(crate) use runs_of_folder::TABLE_OF_STUDY;
 pub use runs_of_folder::{FolderError, recorded_runs};
@@ -51,23 +50,21 @@ use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
 use crate::measures::{self, Measures};
-use crate::output::csv::CsvWriter;
-use crate::output::solver_log::{SolverLog, SolverRow};
-use crate::output::{Claim, OutputError, ResultPaths};
+use crate::output::solver_log::SolverRow;
+use crate::output::{Claim, FileError, ResultPaths};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
 use crate::tally::Tally;
-use crate::trajectory::Row;
 use checkpoint_file::CheckpointFile;
-use contacts::Contacts;
+use contacts::Surrounded;
 use frames::{Frames, Others, StreamOptions};
 use last_step::LastStep;
 use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
 use start::simulation;
-use tables::{TableMarks, Tables, earlier_drafts};
+use tables::{Tables, earlier_drafts};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -103,25 +100,31 @@ fn logged(
 
 fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => {
-            let models = (stokes::<2>(case)?, Contacts::alone(case));
-            Run::start(case, options, progress, models, None)?.finish()
-        }
+        Hydrodynamics::Stokes => run_alone(case, options, progress, stokes::<2>(case)?),
         Hydrodynamics::PairMobility => Err(HydrodynamicsError::unfit(case).into()),
     }
 }
 
 fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::PairMobility => {
-            let models = (pair_mobility(case), Contacts::alone(case));
-            Run::start(case, options, progress, models, None)?.finish()
-        }
-        Hydrodynamics::Stokes => {
-            let models = (stokes::<3>(case)?, Contacts::alone(case));
-            Run::start(case, options, progress, models, None)?.finish()
-        }
+        Hydrodynamics::PairMobility => run_alone(case, options, progress, pair_mobility(case)),
+        Hydrodynamics::Stokes => run_alone(case, options, progress, stokes::<3>(case)?),
     }
+}
+
+/// Runs `case` in one process.
+fn run_alone<const D: usize, H>(
+    case: &Case,
+    options: &RunOptions,
+    progress: &dyn Progress,
+    hydrodynamics: H,
+) -> Result<RunReport, RunError>
+where
+    Dim<D>: Space<D>,
+    H: gluey_motion::Hydrodynamics<D>,
+    HydrodynamicsError: From<H::Error>,
+{
+    Run::start(case, options, progress, hydrodynamics, contacts::of_case(case), None)?.finish()
 }
 
 /// Makes sure before the first step that files can be written, and that no other run writes them.
@@ -137,19 +140,17 @@ fn claim_outputs(case: &Case, options: &RunOptions, progress: &dyn Progress) -> 
 }
 
 /// A run in progress.
-struct Run<'a, const D: usize, H>
+struct Run<'a, const D: usize, H, C>
 where
     Dim<D>: Space<D>,
 {
     case: &'a Case,
     options: &'a RunOptions,
     progress: &'a dyn Progress,
-    simulation: Simulation<D, H, Contacts<'a, D>>,
+    simulation: Simulation<D, H, C>,
     measures: Measures<D>,
     tally: Tally,
-    csv: CsvWriter<D>,
     tables: Tables,
-    solver: SolverLog,
     frames: Frames<'a, D>,
     last: Arc<Mutex<LastStep<D>>>,
     /// The ranks that share the flow.
@@ -160,10 +161,11 @@ where
     wall_before_s: f64,
 }
 
-impl<'a, const D: usize, H> Run<'a, D, H>
+impl<'a, const D: usize, H, C> Run<'a, D, H, C>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
+    C: Surrounded<D>,
     HydrodynamicsError: From<H::Error>,
 {
     /// At time 0, or at the checkpoint to resume; `others` share flow and contact.
@@ -171,14 +173,15 @@ where
         case: &'a Case,
         options: &'a RunOptions,
         progress: &'a dyn Progress,
-        (hydrodynamics, contact): (H, Contacts<'a, D>),
+        hydrodynamics: H,
+        contact: C,
         others: Option<&'a dyn Others>,
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics, contact);
         let (mut measures, mut tally, mut wall_before_s) = (Measures::new(case), Tally::default(), 0.0);
         let drafts = earlier_drafts(case, &options.csv)?;
         let file = CheckpointFile::new(options, !drafts.is_empty());
-        let (csv, tables, solver) = match &options.resume {
+        let tables = match &options.resume {
             None => {
                 if !drafts.is_empty() {
                     let has_checkpoint = options.checkpoint.as_ref().is_some_and(|file| file.exists());
@@ -186,23 +189,22 @@ where
                         has_checkpoint.then(|| ResultPaths::of_csv(&options.csv).folder().to_owned());
                     progress.notice(&Notice::EarlierDrafts { drafts, folder });
                 }
-                let csv = CsvWriter::create(&options.csv, case.particles.len())?;
-                (csv, Tables::create::<D>(case, &options.csv)?, SolverLog::create(&options.csv)?)
+                Tables::create::<D>(case, &options.csv)?
             }
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?.on(others.map_or(0, Others::rank_count));
                 (wall_before_s, tally) = (checkpoint.wall_s, checkpoint.tally);
-                let Checkpoint { rheology, forces, .. } = checkpoint.clone();
-                let tables = Tables::resume(&options.csv, &TableMarks { rheology, forces })?;
-                let solver = SolverLog::resume(&options.csv, &checkpoint.solver, &checkpoint.phases)?;
-                let csv = go_on(&mut simulation, &mut measures, checkpoint, [path, &options.csv])?;
-                (csv, tables, solver)
+                *simulation.phases_mut() = checkpoint.phases.clone();
+                let restored = simulation.restore(checkpoint.state.clone()).map_err(RestoreError::widen);
+                restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
+                let visit = |row: &measures::Instant<D>| measures.add(row);
+                Tables::resume(&options.csv, &checkpoint, case.particles.len(), visit)?
             }
         };
         let first_step = simulation.step_index();
         let frames = Frames::create(case, options, first_step, others)?;
-        let recorder = Recorder::begin(case, options, first_step, csv.path())?;
-        let last = LastStep::before(case, options, (file, recorder, frames.on_their_way()), first_step);
+        let recorder = Recorder::begin(case, options, first_step, tables.path())?;
+        let last = LastStep::before(case, options, file, recorder, frames.on_their_way(), first_step);
         if let (Some(list), None) = (&options.last_steps, others) {
             list.add(&(last.clone() as Arc<dyn OfRun>));
         }
@@ -213,9 +215,7 @@ where
             simulation,
             measures,
             tally,
-            csv,
             tables,
-            solver,
             frames,
             last,
             others,
@@ -257,12 +257,10 @@ where
     fn complete(self) -> Result<RunReport, RunError> {
         let wall_s = self.wall_s();
         self.frames.finish()?;
-        self.csv.finish()?;
         self.tables.finish()?;
-        self.solver.finish()?;
         let rheology = tables::means_of_rheology(self.case, &self.options.csv)?;
-        let counted = (self.simulation.statistics(), &self.tally);
-        let report = RunReport::of(self.case, &self.measures, counted, wall_s, self.simulation.phases());
+        let (flow, phases) = (self.simulation.statistics(), self.simulation.phases());
+        let report = RunReport::of(self.case, &self.measures, flow, &self.tally, wall_s, phases);
         Ok(RunReport { rheology, ..report })
     }
 
@@ -280,14 +278,14 @@ where
         self.remember()?;
         while self.simulation.step_index() < self.case.step_count() {
             self.observe()?;
-            let at = (self.simulation.step_index(), self.simulation.time());
+            let (step, time) = (self.simulation.step_index(), self.simulation.time());
             self.advance()?;
-            self.log_effort(at)?;
+            self.log_effort(step, time)?;
             self.remember()?;
             self.save_if_due()?;
         }
         self.observe()?;
-        self.log_effort((self.simulation.step_index(), self.simulation.time()))?;
+        self.log_effort(self.simulation.step_index(), self.simulation.time())?;
         // A frame that could not be written is known now.
         Ok(self.frames.flush()?)
     }
@@ -309,7 +307,7 @@ where
 
     /// Counts what the step took that began then, and writes it down if it was done: the velocities at the
     /// end of a run are those of a step that a longer run does.
-    fn log_effort(&mut self, (step, time): (usize, f64)) -> Result<(), RunError> {
+    fn log_effort(&mut self, step: usize, time: f64) -> Result<(), RunError> {
         let (simulation, strain) = (&self.simulation, self.case.strain_after(step));
         let (flow, motion, phases) = (simulation.statistics(), simulation.motion(), simulation.phases());
         let contact = simulation.contact_report();
@@ -319,19 +317,15 @@ where
         self.tally.add(motion, flow);
         Notice::of_first(&before, &self.tally, &row).iter().for_each(|notice| self.progress.notice(notice));
         if motion.parts > 0 {
-            self.solver.write(&row)?;
+            self.tables.write_effort(&row)?;
         }
         Ok(())
     }
 
     fn write(&mut self) -> Result<(), RunError> {
         let simulation = &self.simulation;
-        let (time, particles, twists) = (simulation.time(), simulation.particles(), simulation.twists());
-        let domain = simulation.contact().domain();
-        let forces = simulation.contact().pair_forces(self.case);
-        let row = Row { time, particles, twists, domain };
-        let smallest_gap_over_a = self.csv.write(&row, &forces)?;
-        self.tables.write(simulation, smallest_gap_over_a)?;
+        let smallest_gap_over_a = self.tables.write(self.case, simulation)?;
+        let (time, particles) = (simulation.time(), simulation.particles());
         let centers = particles.iter().map(|particle| particle.pose.position).collect();
         self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
         self.frames.write(self.case, simulation)?;
@@ -384,7 +378,7 @@ where
         match interrupted && step < steps {
             true => {
                 let checkpoint = self.options.checkpoint.clone();
-                Err(RunError::Interrupted { step, steps, time: self.simulation.time(), checkpoint })
+                Err(Ended { step, steps, time: self.simulation.time(), checkpoint }.into())
             }
             false => Ok(()),
         }
@@ -396,13 +390,9 @@ where
         if self.options.checkpoint.is_none() {
             return Ok(());
         }
-        let TableMarks { rheology, forces } = self.tables.marks();
         let checkpoint = Checkpoint {
             state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
-            output: self.csv.marks(),
-            rheology,
-            forces,
-            solver: self.solver.mark(),
+            tables: self.tables.marks(),
             tally: self.tally,
             phases: self.simulation.phases().clone(),
             wall_s: self.wall_s(),
@@ -418,7 +408,7 @@ where
     }
 
     /// Writes what was remembered, after what it counts on.
-    fn save(&mut self) -> Result<(), OutputError> {
+    fn save(&mut self) -> Result<(), FileError> {
         self.frames.flush()?;
         let notices = self.last().save(self.others)?;
         notices.iter().for_each(|notice| self.progress.notice(notice));
@@ -445,7 +435,7 @@ where
         }
     }
 
-    fn tell(&self, phase: &str) {
+    fn tell(&self, phase: &'static str) {
         let (step, steps) = (self.simulation.step_index(), self.case.step_count());
         let seconds = self.started.elapsed().as_secs_f64();
         let done = step - self.first_step;
@@ -463,25 +453,4 @@ where
 fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("no message").to_owned()
-}
-
-/// Brings a simulation and its measures to where `checkpoint`, which was read from `path`, is, and gives the
-/// files of rows that belong to it.
-fn go_on<const D: usize, H>(
-    simulation: &mut Simulation<D, H, Contacts<'_, D>>,
-    measures: &mut Measures<D>,
-    checkpoint: Checkpoint<D>,
-    [path, csv]: [&Path; 2],
-) -> Result<CsvWriter<D>, RunError>
-where
-    Dim<D>: Space<D>,
-    H: gluey_motion::Hydrodynamics<D>,
-    HydrodynamicsError: From<H::Error>,
-{
-    let Checkpoint { state, output, phases, .. } = checkpoint;
-    *simulation.phases_mut() = phases;
-    let restored = simulation.restore(state).map_err(RestoreError::widen);
-    restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
-    let count = simulation.particles().len();
-    Ok(CsvWriter::resume(csv, &output, count, |row| measures.add(row))?)
 }

@@ -228,7 +228,7 @@ where
         }
         self.prediction = flow;
         let (rate, start) = (self.prediction.rate, self.part.start());
-        self.clock.iter_mut().for_each(|clock| clock.reach((step, start), self.dt, rate));
+        self.clock.iter_mut().for_each(|clock| clock.reach(step, start, self.dt, rate));
         match self.twists().iter().position(|twist| !is_finite(twist)) {
             Some(index) => Err(StepError::NotFinite { particle: index + 1, step, time }),
             None => Ok(()),

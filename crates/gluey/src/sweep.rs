@@ -19,7 +19,7 @@ pub use study::Study;
 pub use table::{PointResult, table};
 
 use crate::case::{Case, CaseError, Override};
-use crate::output::{OutputError, ResultPaths};
+use crate::output::{FileError, ResultPaths};
 use crate::report::RunReport;
 use crate::run::{RecordError, RunRecord, RunState};
 
@@ -77,7 +77,7 @@ pub enum SweepError {
     Record(#[from] RecordError),
     /// Something could not be written.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
 }
 
 /// One run of a study.

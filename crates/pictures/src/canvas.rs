@@ -110,7 +110,7 @@ impl Canvas {
 
     /// Slender arrows of one colour, light on dark and dark on light by a border of another one; heads are a
     /// third of an arrow, at most `head` long.
-    pub fn arrows(&mut self, arrows: &[[(f64, f64); 2]], (color, border): (Rgb, Rgb), head: f64) {
+    pub fn arrows(&mut self, arrows: &[[(f64, f64); 2]], color: Rgb, border: Rgb, head: f64) {
         let mut path = String::new();
         for [(x, y), (end_x, end_y)] in arrows {
             let (dx, dy) = (end_x - x, end_y - y);

@@ -75,9 +75,9 @@ pub fn stack_to_width(charts: &[Chart], width: f64, frame_height: impl Fn(&Chart
     let heights = charts.iter().zip(&legends).map(height).sum::<f64>();
     let mut y = GAP + of_all.height(frame_width);
     let mut canvas = Canvas::new(width, y + heights);
-    of_all.draw(&mut canvas, (sides.left, GAP), frame_width);
+    of_all.draw(&mut canvas, sides.left, GAP, frame_width);
     for (chart, legend) in charts.iter().zip(&legends) {
-        legend.draw(&mut canvas, (sides.left, y), frame_width);
+        legend.draw(&mut canvas, sides.left, y, frame_width);
         y += legend.height(frame_width);
         canvas.embed(&chart.svg_between(&sides, width, frame(chart)), 0.0, y);
         let size = (frame_width, frame_height(chart, frame_width));
@@ -159,8 +159,11 @@ impl Chart {
         let svg = SvgBackend::new().render_scene(&render_multiple(plots, layout));
         let under = height - if self.is_crowded_below(frame_width) { LABEL_SIZE + 5.0 } else { 9.0 };
         let places = [(width - sides.right, under, "end"), (sides.left, self.margin_top() - 5.0, "start")];
-        let texts: String =
-            powers.iter().zip(places).filter_map(|(power, at)| power_text((*power)?, at)).collect();
+        let texts: String = powers
+            .iter()
+            .zip(places)
+            .filter_map(|(power, (x, y, anchor))| power_text((*power)?, x, y, anchor))
+            .collect();
         svg.replacen("</svg>", &format!("{texts}</svg>"), 1)
     }
 
@@ -258,7 +261,7 @@ impl Chart {
 }
 
 /// A power of ten at the end of an axis.
-fn power_text(power: i32, (x, y, anchor): (f64, f64, &str)) -> Option<String> {
+fn power_text(power: i32, x: f64, y: f64, anchor: &str) -> Option<String> {
     let label = format!("\u{d7} {}", tenth(power));
     Some(format!(
         r#"<text x="{x:.2}" y="{y:.2}" font-size="{TICK_SIZE}" text-anchor="{anchor}" fill="black">{label}</text>"#

@@ -60,7 +60,7 @@ impl Legend<'_> {
     }
 
     /// Draws it with this upper left corner, so wide.
-    pub fn draw(&self, canvas: &mut Canvas, (left, top): (f64, f64), width: f64) {
+    pub fn draw(&self, canvas: &mut Canvas, left: f64, top: f64, width: f64) {
         let columns = self.columns(width);
         let middle = |row: usize| top + ROW * (row as f64 + 0.5);
         for (i, (label, stroke)) in self.entries.iter().enumerate() {

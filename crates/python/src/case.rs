@@ -64,7 +64,7 @@ impl Case {
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let case = &self.inner;
         let size = compute(py, None, || {
-            memory::check(case).map_err(RunError::from)?;
+            memory::check_within(case, None).map_err(RunError::from)?;
             MeshSize::of(case).map_err(|error| RunError::Flow(error.into()))
         })?;
         let size = size.map_err(|error| of_run(py, &error))?;

@@ -4,7 +4,9 @@ use std::error::Error;
 use std::path::Path;
 
 use gluey::case::{CaseIssue, InvalidCase, Place};
-use gluey::{CaseError, CheckpointError, NotText, ResultPaths, ResumeError, RowsError, RunError};
+use gluey::{
+    CaseError, CheckpointError, Ended, FileError, NotText, ResultPaths, ResumeError, RowsError, RunError,
+};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -88,7 +90,7 @@ pub fn of_run(py: Python<'_>, error: &RunError) -> PyErr {
     let hint = hint(error);
     match error {
         RunError::Case(error) => of_case(py, error),
-        RunError::Interrupted { step, steps, time, checkpoint } => {
+        RunError::Interrupted(Ended { step, steps, time, checkpoint }) => {
             let raised = exception(py, "Interrupted", &in_full(error), hint.as_deref());
             let raised = with(py, raised, "step", *step);
             let raised = with(py, raised, "steps", *steps);
@@ -121,7 +123,7 @@ pub fn of_resume(py: Python<'_>, error: &ResumeError) -> PyErr {
 /// What to do about an error of a run, in words of Python.
 fn hint(error: &RunError) -> Option<String> {
     Some(match error {
-        RunError::Interrupted { checkpoint: Some(checkpoint), .. } => go_on(checkpoint, ""),
+        RunError::Interrupted(Ended { checkpoint: Some(checkpoint), .. }) => go_on(checkpoint, ""),
         RunError::Stopped { checkpoint, cause, .. } => {
             let cure = hint(cause).map_or(String::new(), |cure| format!("{cure}; "));
             format!("{cure}then, {}", go_on(checkpoint, ""))
@@ -135,7 +137,7 @@ fn hint(error: &RunError) -> Option<String> {
         ),
         RunError::Rows(_) => "give the folder of the run that wrote the checkpoint, or start again".into(),
         RunError::Checkpoint(
-            CheckpointError::Read { path, .. }
+            CheckpointError::Read(FileError { path, .. })
             | CheckpointError::Foreign { path }
             | CheckpointError::Version { path, .. }
             | CheckpointError::Damaged { path },
@@ -159,8 +161,5 @@ fn go_on(checkpoint: &Path, options: &str) -> String {
 
 /// The folder of a checkpoint.
 fn folder(checkpoint: &Path) -> String {
-    match ResultPaths::of_csv(checkpoint).folder() {
-        folder if folder == Path::new("") => ".".to_owned(),
-        folder => folder.display().to_string(),
-    }
+    ResultPaths::of_csv(checkpoint).folder().display().to_string()
 }

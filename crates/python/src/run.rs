@@ -1,6 +1,6 @@
 //! Runs on a thread of their own, while the thread of the caller tells where they are and listens to Ctrl-C.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -113,10 +113,9 @@ fn finish(
         shared.changed.notify_all();
         outcome
     });
-    let outcome = follow(py, thread, &watch, &interrupt, (listener, &name))?;
+    let outcome = follow(py, thread, &watch, &interrupt, listener, &name)?;
     outcome.map_err(|error| of_run(py, &error))?;
-    let folder = if paths.folder() == Path::new("") { Path::new(".") } else { paths.folder() };
-    Ok((folder.to_owned(), paths.stem()))
+    Ok((paths.folder().to_owned(), paths.stem()))
 }
 
 /// Waits for the run. Ctrl-C, or an error of the listener, asks it to stop after its step, and is raised once
@@ -126,7 +125,8 @@ fn follow(
     thread: JoinHandle<Result<RunReport, RunError>>,
     watch: &Watch,
     interrupt: &AtomicBool,
-    (listener, name): (&Listener<'_>, &str),
+    listener: &Listener<'_>,
+    name: &str,
 ) -> PyResult<Result<RunReport, RunError>> {
     let mut stopped: Option<PyErr> = None;
     loop {
@@ -172,18 +172,8 @@ struct Watch {
 
 #[derive(Default)]
 struct RunState {
-    state: Option<State>,
+    state: Option<ProgressState>,
     notices: Vec<String>,
-}
-
-/// [`ProgressState`] without borrowed parts.
-struct State {
-    step: usize,
-    steps: usize,
-    time: f64,
-    phase: String,
-    wall_s: f64,
-    left_s: Option<f64>,
 }
 
 impl Watch {
@@ -218,10 +208,8 @@ impl Watch {
 }
 
 impl Progress for Watch {
-    fn report(&self, state: &ProgressState<'_>) {
-        let ProgressState { step, steps, time, phase, wall_s, left_s } = *state;
-        let state = State { step, steps, time, phase: phase.to_owned(), wall_s, left_s };
-        self.told.lock().unwrap_or_else(PoisonError::into_inner).state = Some(state);
+    fn report(&self, state: &ProgressState) {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner).state = Some(*state);
     }
 
     fn notice(&self, notice: &Notice) {

@@ -56,7 +56,7 @@ impl Stokes {
         let case = case.inner();
         let middle = 0.5 * (case.lower()[1] + case.upper()[1]);
         let flows = compute(py, threads, || -> Result<Flows, RunError> {
-            memory::check(case)?;
+            memory::check_within(case, None)?;
             let failed = |error: gluey::FlowError| RunError::Flow(error.into());
             Ok(match case.dimension {
                 2 => Flows::Plane(Around { prepared: prepared_flow(case).map_err(failed)?, middle }),

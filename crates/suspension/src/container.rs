@@ -27,7 +27,7 @@ impl<const D: usize> Container<D> {
 
     /// The space of a lattice, with a corner at the origin, for pairs of particles: where it has no period
     /// there is no end.
-    pub(crate) fn of_lattice(lattice: Lattice<D>) -> Self {
+    pub fn of_lattice(lattice: Lattice<D>) -> Self {
         let upper = Vector::from_fn(|d, _| lattice.periods()[d].unwrap_or(1.0));
         Self { bounds: Aabb { lower: Vector::zeros(), upper }, lattice }
     }
@@ -85,6 +85,26 @@ impl<const D: usize> Container<D> {
             self.lattice.periods()[d].map_or(0, |period| -(place[d] / period).floor() as i32)
         }))
     }
+
+    /// Images of a ball that reach into the box, or nearly so at an edge, without the ball: in how many
+    /// periods each lies along the axes, and its centre.
+    pub fn images_inside(&self, center: &Vector<D>, radius: f64) -> Vec<([i32; D], Vector<D>)> {
+        let all = (0..3_i32.pow(D as u32)).map(|n| std::array::from_fn(|d| n / 3_i32.pow(d as u32) % 3 - 1));
+        let others = all.filter(|image: &[i32; D]| {
+            *image != [0; D] && (0..D).all(|d| image[d] == 0 || !self.is_walled(d))
+        });
+        // The borders across x are slanted: along x they are further away than straight across.
+        let slant = 1f64.hypot(self.lattice.shear());
+        let reaches = |image: &Vector<D>| {
+            let (place, edges) = (self.lattice.to_box(image, self.bounds.lower[1]), &self.bounds);
+            (0..D).all(|d| {
+                let reach = if d == 0 { radius * slant } else { radius };
+                place[d] > edges.lower[d] - reach && place[d] < edges.upper[d] + reach
+            })
+        };
+        let images = others.map(|image| (image, center + self.lattice.shift(&image)));
+        images.filter(|(_, center)| reaches(center)).collect()
+    }
 }
 
 /// Volume of a sphere, area of a disc: `4 pi a^3 / 3`, `pi a^2`.
@@ -111,5 +131,17 @@ mod tests {
     fn volumes_of_balls() {
         assert!((ball_volume::<2>(2.0) - 12.566_370_614_359_172).abs() < 1e-14);
         assert!((ball_volume::<3>(0.5) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn balls_across_periodic_borders_have_images() {
+        let container = Container::<2>::periodic(&Vector::<2>::repeat(1.0)).tilted(0.25);
+        let inside = Vector::<2>::new(0.6, 0.5);
+        assert!(container.images_inside(&inside, 0.1).is_empty());
+        let found = container.images_inside(&Vector::<2>::new(0.5, 0.95), 0.1);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].0, [0, -1]);
+        assert!((found[0].1 - Vector::<2>::new(0.25, -0.05)).norm() < 1e-12, "{found:?}");
+        assert_eq!(container.images_inside(&Vector::<2>::new(0.05, 0.05), 0.1).len(), 3, "in a corner");
     }
 }

@@ -127,7 +127,7 @@ impl<'a, const D: usize> Grid<'a, D> {
                     continue 'cells;
                 }
             }
-            self.visit_cell(first, range, (&cell, &image), visit);
+            self.visit_cell(first, range, &cell, &image, visit);
         }
     }
 
@@ -136,7 +136,8 @@ impl<'a, const D: usize> Grid<'a, D> {
         &self,
         first: usize,
         range: f64,
-        (cell, image): (&[i64; D], &[i32; D]),
+        cell: &[i64; D],
+        image: &[i32; D],
         visit: &mut impl FnMut(&NearPair<D>),
     ) {
         let shift = self.container.lattice().shift(image) - self.positions[first];

@@ -21,7 +21,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use gluey::output::product_names::is_table;
-use gluey::output::{OutputError, prepare_folder_of, rows_of, write_atomically};
+use gluey::output::{FileError, prepare_folder_of, rows_of, write_atomically};
 use gluey::rheology::{RheologyError, RheologyMeans};
 use gluey_contact::ContactError;
 use gluey_geom::{Dim, Space};
@@ -83,7 +83,7 @@ pub enum AnalyseError {
     Contact(#[from] ContactError),
     /// A table could not be written.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
 }
 
 /// Reads the frames of a run, writes the tables and gives the summary.
@@ -133,7 +133,7 @@ fn rheology_beside(frame: &Path) -> Option<PathBuf> {
     tables.into_iter().find(|table| rows_of(table).is_some())
 }
 
-fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), OutputError> {
+fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), FileError> {
     files.iter().try_for_each(|(name, text)| {
         debug_assert!(is_table(name), "{name} is not known as a table");
         let path = folder.join(name);

@@ -1,10 +1,9 @@
 //! The frames of a run: where they lie, and whether they belong together.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use gluey::output::xyz::{self, XyzError, XyzFrame, read_text};
-use gluey::output::{entries, name_of};
+use gluey::output::{FileError, entries, name_of};
 use gluey_geom::{Dim, Space};
 use thiserror::Error;
 
@@ -12,13 +11,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FramesError {
     /// A folder could not be listed.
-    #[error("{}: cannot be listed", folder.display())]
-    List {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    List(#[from] FileError),
     /// No frames.
     #[error(
         "{}: no particles in extended XYZ: run with --xyz N, or with an [[output]] of kind \"xyz\" in the case",
@@ -80,8 +74,7 @@ pub fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
 
 /// Sorted by the length of the names first, so that steps are in order however many digits they have.
 fn list(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
-    let listed = entries(folder);
-    let mut paths = listed.map_err(|source| FramesError::List { folder: folder.to_owned(), source })?;
+    let mut paths = entries(folder).map_err(|error| FileError::new(folder, "be listed", error))?;
     paths.sort_by_key(|path| (name_of(path).len(), name_of(path)));
     Ok(paths)
 }

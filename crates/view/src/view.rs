@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use gluey::output::product_names::PAGE_NAME;
 use gluey::output::xyz::XyzFrame;
-use gluey::output::{OutputError, name_of, prepare_folder_of, write_atomically};
+use gluey::output::{FileError, name_of, prepare_folder_of, write_atomically};
 use gluey_geom::{Dim, Space};
 use serde::Serialize;
 use thiserror::Error;
@@ -51,7 +51,7 @@ pub enum ViewError {
     Frames(#[from] FramesError),
     /// The page could not be written.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
 }
 
 /// Reads the frames of a run and writes the page.

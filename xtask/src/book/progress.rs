@@ -78,7 +78,7 @@ impl RunLine {
 }
 
 impl gluey::Progress for RunLine {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         match &self.bar {
             Some(bar) => {
                 bar.set_length(state.steps as u64);
@@ -98,7 +98,7 @@ fn style() -> ProgressStyle {
 }
 
 /// Phase, rate and time left.
-fn describe(state: &ProgressState<'_>) -> String {
+fn describe(state: &ProgressState) -> String {
     let rate = state.step as f64 / state.wall_s.max(f64::MIN_POSITIVE);
     match state.left_s {
         Some(left) if state.step > 0 => {

@@ -159,7 +159,7 @@ impl Times {
 }
 
 impl Progress for Clock {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         if let Ok(mut times) = self.times.lock() {
             let now = Instant::now();
             if state.phase == "flow" {

@@ -21,7 +21,7 @@ pub struct Failure {
 impl Failure {
     /// A failure of a run, or an interrupt.
     pub fn of_run(error: RunError, case: &Path) -> Self {
-        let exit_code = if matches!(error, RunError::Interrupted { .. }) { INTERRUPTED } else { 1 };
+        let exit_code = if matches!(error, RunError::Interrupted(_)) { INTERRUPTED } else { 1 };
         Self { diagnostic: Box::new(Diagnosed::new(error, case)), exit_code }
     }
 

@@ -1,13 +1,12 @@
 //! `gluey info`.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use gluey::sweep::{PointStage, StudyProgress, SweepError};
 use gluey::{
-    Case, CaseSummary, CheckpointSummary, FolderError, RecordError, ResultPaths, RunRecord, RunState,
-    recorded_runs, shown,
+    Case, CaseSummary, CheckpointSummary, FileError, FolderError, RecordError, ResultPaths, RunRecord,
+    RunState, recorded_runs, shown,
 };
 use serde::Serialize;
 use thiserror::Error;
@@ -31,8 +30,8 @@ pub struct InfoArguments {
 #[derive(Debug, Error)]
 enum InfoError {
     /// It cannot be read.
-    #[error("{}: cannot be read", path.display())]
-    Read { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// A folder without runs.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -121,8 +120,7 @@ impl Info {
         if let Some(paths) = ResultPaths::of_record(path) {
             return Ok(Self::Folder { runs: vec![RunInfo::of(&paths).map_err(failure)?] });
         }
-        let unread = |source| failure(InfoError::Read { path: path.to_owned(), source });
-        if CheckpointSummary::is_announced_by(path).map_err(unread)? {
+        if CheckpointSummary::is_announced_by(path).map_err(|error| failure(error.into()))? {
             let info = CheckpointInfo::of(path).map_err(|error| Failure::new(error, None))?;
             return Ok(Self::Checkpoint(info));
         }

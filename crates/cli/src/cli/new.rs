@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use thiserror::Error;
 
 use super::failure::Failure;
+use crate::terminal::print;
 
 /// What stands for the name of the case in a template, up to the column of comments.
 const NAME: &str = "\"@name@\"         ";
@@ -68,9 +69,7 @@ impl NewArguments {
             };
             Failure::new(error, Some(hint.to_owned()))
         })?;
-        let text = format!("{} is written; to run it: gluey run {0} --out out\n", path.display());
-        // That nobody reads this is no failure.
-        let _ = io::stdout().write_all(text.as_bytes());
+        print(&format!("{} is written; to run it: gluey run {0} --out out\n", path.display()));
         Ok(())
     }
 

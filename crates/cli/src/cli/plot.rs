@@ -1,5 +1,6 @@
 //! Arguments of `gluey plot`.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -48,7 +49,7 @@ pub struct PlotArguments {
     #[arg(long, value_name = "WHAT", default_value = "speed", requires = "frames")]
     colour: Coloring,
     /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.
-    #[arg(long, value_name = "GAP", value_parser = reach, allow_negative_numbers = true, requires = "frames")]
+    #[arg(long, value_name = "GAP", value_parser = number(0.0..=10.0, "mean radii"), allow_negative_numbers = true, requires = "frames")]
     contacts: Option<f64>,
     /// Animate the particles of all frames that were written with --xyz, as a GIF.
     #[arg(long, group = "frames")]
@@ -58,13 +59,13 @@ pub struct PlotArguments {
     #[arg(value_parser = clap::value_parser!(u32).range(100..=4000))]
     pixels: u32,
     /// Frames a second of an animation.
-    #[arg(long, value_name = "FPS", default_value_t = 12.0, requires = "animation", value_parser = rate)]
+    #[arg(long, value_name = "FPS", default_value_t = 12.0, requires = "animation", value_parser = number(0.1..=50.0, "frames a second"))]
     rate: f64,
     /// How to write it: svg, png.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "svg,png")]
     format: Vec<Format>,
     /// Width on paper in millimetres.
-    #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = width)]
+    #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = number(60.0..=400.0, "millimetres"))]
     width: f64,
 }
 
@@ -73,7 +74,7 @@ impl PlotArguments {
     pub fn run(&self) -> Result<(), Failure> {
         let pictures =
             gluey_view::plot(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
-        terminal::print_pictures(&pictures);
+        pictures.iter().for_each(|picture| terminal::print(&format!("{}\n", picture.display())));
         Ok(())
     }
 
@@ -87,23 +88,13 @@ impl PlotArguments {
     }
 }
 
-fn width(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(width) if (60.0..=400.0).contains(&width) => Ok(width),
-        _ => Err("must be a number from 60 to 400 (millimetres)".into()),
-    }
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(rate) if (0.1..=50.0).contains(&rate) => Ok(rate),
-        _ => Err("must be a number from 0.1 to 50 (frames a second)".into()),
-    }
-}
-
-fn reach(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(reach) if (0.0..=10.0).contains(&reach) => Ok(reach),
-        _ => Err("must be a number from 0 to 10 (mean radii)".into()),
+/// Reads a number in a range, in this unit.
+fn number(
+    range: RangeInclusive<f64>,
+    unit: &'static str,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!("must be a number from {} to {} ({unit})", range.start(), range.end())),
     }
 }

@@ -8,7 +8,7 @@ use std::thread;
 use clap::Args;
 use gluey::progress::duration;
 use gluey::sweep::{Axis, Point, PointResult, PointState, Study, SweepError, points, table};
-use gluey::{RunError, RunOptions, RunReport};
+use gluey::{RunError, RunOptions, RunReport, in_full};
 use thiserror::Error;
 
 use super::failure::{Failure, INTERRUPTED};
@@ -130,9 +130,9 @@ impl SweepArguments {
     fn of_run(&self, point: &Point, ran: Result<RunReport, RunError>) -> PointResult {
         match ran {
             Ok(report) => PointResult { report: Some(report), ..self.result(point, "complete", None) },
-            Err(RunError::Interrupted { .. }) => self.result(point, "interrupted", None),
+            Err(RunError::Interrupted(_)) => self.result(point, "interrupted", None),
             Err(error) => {
-                let text = causes(&error);
+                let text = in_full(&error);
                 let failure = Failure::of_run(error, &point.paths.case_file());
                 say(&format!("{}: {:?}", point.name, miette::Report::new(*failure.diagnostic)));
                 self.result(point, "failed", Some(text))
@@ -156,12 +156,6 @@ impl SweepArguments {
         });
         say(&format!("point {} of {count}, {}: {}{time}", index + 1, result.name, result.state));
     }
-}
-
-/// An error with all its causes.
-fn causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |cause| cause.source());
-    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 /// Why a study was not begun, and what to do about it.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gluey_view::ViewOptions;
+use gluey_view::{ViewOptions, Viewed};
 
 use super::Failure;
 use crate::terminal;
@@ -27,7 +27,11 @@ impl ViewArguments {
     pub fn run(&self) -> Result<(), Failure> {
         let viewed =
             gluey_view::view(&self.options()).map_err(|error| Failure::of_results(error, &self.folder))?;
-        terminal::print_viewed(&viewed);
+        let Viewed { page, frame_count, particle_count, size } = viewed;
+        let (page, megabytes) = (page.display(), size as f64 / 1e6);
+        terminal::print(&format!(
+            "{page}: {frame_count} frames of {particle_count} particles, {megabytes:.1} MB; open it in a browser\n"
+        ));
         Ok(())
     }
 

@@ -56,7 +56,7 @@ impl Case {
             Some((case, _)) if findings.is_empty() => Ok(case),
             case => {
                 let list = case.and_then(|(_, list)| list);
-                Err(source.errors(tree.get_ref(), (findings, list.as_ref()), overrides))
+                Err(source.errors(tree.get_ref(), findings, list.as_ref(), overrides))
             }
         }
     }

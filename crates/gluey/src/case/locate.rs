@@ -59,7 +59,8 @@ impl Source<'_> {
     pub fn errors(
         &self,
         tree: &DeTable<'_>,
-        (findings, particles): (Findings, Option<&ParticleList>),
+        findings: Findings,
+        particles: Option<&ParticleList>,
         overrides: &[Override],
     ) -> CaseError {
         let (list, more) = findings.into_parts();

@@ -1,12 +1,12 @@
 //! Particles of a case that are near each other, across periodic borders too.
 
-use gluey_contact::broadphase::{BestOf, Broadphase};
-use gluey_geom::Vector;
+use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::nearest_image;
+use gluey_suspension::for_each_pair;
 
 use super::Case;
 
-/// Rounding of the search, which compares squares.
+/// Rounding of the search, relative to lengths.
 const ROUNDING: f64 = 1e-9;
 
 /// Two particles and the distance of their surfaces.
@@ -25,17 +25,10 @@ pub(crate) struct Neighbours {
 /// The pairs whose surfaces are nearer than `reach`, in the order of the second, then of the first particle.
 /// Centres have `dimension` coordinates and lie in the box.
 pub(crate) fn nearer_than(case: &Case, reach: f64) -> Vec<Neighbours> {
-    let mut pairs: Vec<(usize, usize)> = Vec::new();
-    let (centers, owners) = with_images(case, reach);
-    let radii: Vec<f64> =
-        owners.iter().map(|&owner| (case.particles[owner].radius + 0.5 * reach) * (1.0 + ROUNDING)).collect();
-    let mut found = Vec::new();
-    // Discs are looked for as spheres in one plane.
-    Broadphase::<3>::meeting(&mut BestOf::default(), &centers, &radii, case.particles.len(), &mut found);
-    for (i, j) in found {
-        let (i, j) = (owners[i as usize], owners[j as usize]);
-        pairs.push((i.max(j), i.min(j)));
-    }
+    let mut pairs = match case.dimension {
+        2 => candidates::<2>(case, reach),
+        _ => candidates::<3>(case, reach),
+    };
     pairs.sort_unstable();
     pairs.dedup();
     let near = pairs.into_iter().map(|(second, first)| neighbours(case, first, second));
@@ -49,32 +42,22 @@ fn neighbours(case: &Case, first: usize, second: usize) -> Neighbours {
     Neighbours { first, second, distance, contact_distance: a.radius + b.radius }
 }
 
-/// Centres of the particles, then of their images that particles in the box can meet; and which particle each
-/// is.
-fn with_images(case: &Case, reach: f64) -> (Vec<Vector<3>>, Vec<usize>) {
-    let center = |position: &Vec<f64>| Vector::<3>::from_fn(|d, _| position.get(d).copied().unwrap_or(0.0));
-    let mut centers: Vec<_> = case.particles.iter().map(|particle| center(&particle.position)).collect();
-    let mut owners: Vec<usize> = (0..centers.len()).collect();
-    let largest = case.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
-    let (lower, upper) = (case.lower(), case.upper());
-    for axis in 0..case.dimension {
-        let Some(period) = case.period(axis) else { continue };
-        for k in 0..centers.len() {
-            let width = case.particles[owners[k]].radius + largest + reach;
-            for (is_near, shift) in [
-                (centers[k][axis] - lower[axis] < width, period),
-                (upper[axis] - centers[k][axis] < width, -period),
-            ] {
-                if is_near {
-                    let mut image = centers[k];
-                    image[axis] += shift;
-                    centers.push(image);
-                    owners.push(owners[k]);
-                }
-            }
+/// The second and the first of pairs that are about as near as that, in any image.
+fn candidates<const D: usize>(case: &Case, reach: f64) -> Vec<(usize, usize)>
+where
+    Dim<D>: Space<D>,
+{
+    let particles = case.start::<D>();
+    let centers: Vec<Vector<D>> = particles.iter().map(|particle| particle.pose.position).collect();
+    let largest = particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
+    let mut pairs = Vec::new();
+    for_each_pair(&case.container(), &centers, (2.0 * largest + reach) * (1.0 + ROUNDING), |pair| {
+        let touching = particles[pair.first].radius + particles[pair.second].radius;
+        if pair.first != pair.second && pair.arm.norm() <= (touching + reach) * (1.0 + ROUNDING) {
+            pairs.push((pair.second, pair.first));
         }
-    }
-    (centers, owners)
+    });
+    pairs
 }
 
 #[cfg(test)]

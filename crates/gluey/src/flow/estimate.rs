@@ -62,8 +62,8 @@ impl MeshEstimate {
         let cell_count = tree.cell_count(case);
         let unknown_count = cell_count * UNKNOWNS_PER_CELL[case.dimension - 2];
         let bytes = match ranks {
-            0 | 1 => memory(case, &tree, (cell_count, unknown_count)),
-            _ => memory_of_rank(case, &tree, (cell_count, unknown_count), ranks as f64),
+            0 | 1 => memory(case, &tree, cell_count, unknown_count),
+            _ => memory_of_rank(case, &tree, cell_count, unknown_count, ranks as f64),
         };
         Some(Self { cell_count, unknown_count, bytes })
     }
@@ -93,7 +93,7 @@ impl MeshSize {
             2 => counts::<2>(case)?,
             _ => counts::<3>(case)?,
         };
-        let bytes = memory(case, &tree, (cell_count as f64, dof_count as f64));
+        let bytes = memory(case, &tree, cell_count as f64, dof_count as f64);
         Ok(Some(Self { cell_count, dof_count, bytes }))
     }
 }
@@ -184,17 +184,17 @@ fn cells_met(dimension: i32, radius: f64) -> f64 {
 }
 
 /// Memory that a run with so many cells and unknowns takes, in bytes (measured: see `docs/robustness.md`).
-fn memory(case: &Case, tree: &Tree, counts: (f64, f64)) -> f64 {
+fn memory(case: &Case, tree: &Tree, cell_count: f64, unknown_count: f64) -> f64 {
     let of_cuts = match case.flow.formulation {
         Formulation::Unfitted => CUT_CELL[case.dimension - 2] * tree.cells_cut(case),
         Formulation::Paper => 0.0,
     };
-    PROGRAM + of_cuts + memory_of_solver(case, tree, counts)
+    PROGRAM + of_cuts + memory_of_solver(case, tree, cell_count, unknown_count)
 }
 
 /// Memory of one of the processes that share a case, in bytes (measured: see `docs/ranks.md`). Each holds
 /// its cells and those around them, in layers like those of a cube of them: one, or as many as surfaces need.
-fn memory_of_rank(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64), ranks: f64) -> f64 {
+fn memory_of_rank(case: &Case, tree: &Tree, cell_count: f64, unknown_count: f64, ranks: f64) -> f64 {
     let side = (cell_count / ranks).powf(1.0 / case.dimension as f64);
     let with_layers = |count: f64| (1.0 + 2.0 * count / side).powi(case.dimension as i32).min(ranks);
     let of_unknowns = |bytes: f64| PROGRAM_OF_RANK + bytes * unknown_count / ranks * with_layers(1.0);
@@ -202,7 +202,7 @@ fn memory_of_rank(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f
     of_unknowns(OF_RANK) + of_cuts * with_layers(LAYERS_AT_SURFACES)
 }
 
-fn memory_of_solver(case: &Case, tree: &Tree, (cell_count, unknown_count): (f64, f64)) -> f64 {
+fn memory_of_solver(case: &Case, tree: &Tree, cell_count: f64, unknown_count: f64) -> f64 {
     let direct = match case.flow.solver {
         Solver::Direct => true,
         Solver::Multigrid => false,

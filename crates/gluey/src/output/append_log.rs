@@ -4,7 +4,6 @@
 //! the mark: what it writes there is compared with them, byte by byte, until there are no more. One that
 //! cannot have the same bits leaves them where they are and goes on in a draft of its own.
 
-use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -13,10 +12,10 @@ use blake3::Hasher;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{OutputError, create_draft, draft_path, rename};
+use super::{FileError, create_draft, draft_path, rename};
 
 /// How far a file had come.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {
     /// Number of the draft.
     pub draft: u32,
@@ -36,7 +35,7 @@ pub struct Mark {
 pub enum RowsError {
     /// The file system refused.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
     /// The rows that a checkpoint counts on are not there.
     #[error(
         "the {lines} lines that the checkpoint counts on are neither in {} nor in {}",
@@ -86,20 +85,10 @@ pub(crate) struct Draft {
 
 impl Draft {
     /// The first draft of `complete` that is not there yet.
-    pub fn create(complete: &Path) -> Result<Self, OutputError> {
+    pub fn create(complete: &Path) -> Result<Self, FileError> {
         let created = create_draft(complete);
-        let (number, file) = created.map_err(|error| OutputError::new(complete, "create the file", error))?;
-        Ok(Self {
-            complete: complete.to_owned(),
-            number,
-            path: draft_path(complete, number),
-            file,
-            on_disk: 0,
-            bytes: 0,
-            lines: 0,
-            hasher: Hasher::new(),
-            buffer: Vec::new(),
-        })
+        let draft = created.and_then(|(number, _)| Self::open(complete, number, &Mark::default()));
+        draft.map_err(|error| FileError::new(complete, "create the file", error))
     }
 
     /// The same for a table with this header.
@@ -114,7 +103,7 @@ impl Draft {
     /// replaces it.
     pub fn resume(complete: &Path, mark: &Mark) -> Result<Self, RowsError> {
         let path = draft_path(complete, mark.draft);
-        let failed = |error| OutputError::new(complete, "go on with the file", error);
+        let failed = |error| FileError::new(complete, "go on with the file", error);
         if holds(&path, mark).map_err(failed)? {
             if mark.is_last {
                 let copy = copy(&path, complete, mark.bytes).map_err(failed)?;
@@ -154,7 +143,7 @@ impl Draft {
 
     /// Visits the lines up to here; `visit` says whether it could read the line.
     pub fn visit(&mut self, mut visit: impl FnMut(u64, &str) -> bool) -> Result<(), RowsError> {
-        let failed = |error| OutputError::new(&self.path, "read the file", error);
+        let failed = |error| FileError::new(&self.path, "read the file", error);
         self.file.rewind().map_err(failed)?;
         for (line, text) in (1..).zip(BufReader::new((&self.file).take(self.bytes)).lines()) {
             if !visit(line, &text.map_err(failed)?) {
@@ -170,7 +159,7 @@ impl Draft {
         let known = text.len().min((self.on_disk - self.bytes) as usize);
         let (known, new) = text.as_bytes().split_at(known);
         self.compare(known)?;
-        self.file.write_all(new).map_err(|error| OutputError::new(&self.path, "write a row", error))?;
+        self.file.write_all(new).map_err(|error| FileError::new(&self.path, "write a row", error))?;
         self.hasher.update(text.as_bytes());
         self.bytes += text.len() as u64;
         self.lines += text.lines().count() as u64;
@@ -184,7 +173,7 @@ impl Draft {
         if self.on_disk == self.bytes {
             return self.write(&format!("{fixed}{varying}\n"));
         }
-        let failed = |error| OutputError::new(&self.path, "read the file", error);
+        let failed = |error| FileError::new(&self.path, "read the file", error);
         let mut found = Vec::new();
         BufReader::new(&self.file).read_until(b'\n', &mut found).map_err(failed)?;
         if !found.starts_with(fixed.as_bytes()) {
@@ -201,7 +190,7 @@ impl Draft {
     fn compare(&mut self, expected: &[u8]) -> Result<(), RowsError> {
         self.buffer.resize(expected.len(), 0);
         let read = self.file.read_exact(&mut self.buffer);
-        read.map_err(|error| OutputError::new(&self.path, "read the file", error))?;
+        read.map_err(|error| FileError::new(&self.path, "read the file", error))?;
         match self.buffer.iter().zip(expected).position(|(found, expected)| found != expected) {
             None => Ok(()),
             Some(place) => {
@@ -224,7 +213,7 @@ impl Draft {
 
     /// Gives the complete file its name. Where an earlier run had come further than this one goes, its rows
     /// stay in the draft.
-    pub fn finish(self) -> Result<(), OutputError> {
+    pub fn finish(self) -> Result<(), FileError> {
         let finish = || -> io::Result<()> {
             if self.bytes == self.on_disk {
                 self.file.sync_all()?;
@@ -233,24 +222,8 @@ impl Draft {
             let copy = copy(&self.path, &self.complete, self.bytes)?;
             rename(&draft_path(&self.complete, copy), &self.complete)
         };
-        finish().map_err(|error| OutputError::new(&self.complete, "complete the file", error))
+        finish().map_err(|error| FileError::new(&self.complete, "complete the file", error))
     }
-}
-
-/// A line of a table: numbers with 17 significant digits, so that they read back exactly, and empty cells
-/// where there is none.
-pub(super) fn line_of(numbers: impl IntoIterator<Item: Into<Option<f64>>>) -> String {
-    let mut text = String::new();
-    for number in numbers {
-        if let Some(number) = number.into() {
-            // Writing to a string cannot fail.
-            let _ = write!(text, "{number:.16e}");
-        }
-        text.push(',');
-    }
-    text.pop();
-    text.push('\n');
-    text
 }
 
 /// Whether the file is there and begins as it was marked.

@@ -10,7 +10,7 @@ use std::process;
 
 use thiserror::Error;
 
-use super::{OutputError, prepare_folder_of, with_suffix};
+use super::{FileError, prepare_folder_of, with_suffix};
 
 /// Results could not be taken possession of.
 #[derive(Debug, Error)]
@@ -32,7 +32,7 @@ pub enum ClaimError {
     },
     /// The folder or the lock file could not be written.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
 }
 
 /// The right to write one result, until it is dropped.
@@ -50,7 +50,7 @@ impl Claim {
     pub fn new(result: &Path) -> Result<Self, ClaimError> {
         let lock = with_suffix(result, ".lock");
         prepare_folder_of(&lock)?;
-        let failed = |error| OutputError::new(&lock, "write the lock file", error);
+        let failed = |error| FileError::new(&lock, "write the lock file", error);
         loop {
             let options = File::options().read(true).write(true).create(true).truncate(false).open(&lock);
             let mut file = options.map_err(failed)?;

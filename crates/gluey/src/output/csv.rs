@@ -14,13 +14,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use gluey_geom::{Dim, Space, Vector};
-use serde::{Deserialize, Serialize};
 
-use super::append_log::{Draft, Mark, RowsError, line_of};
+use super::append_log::{Draft, Mark, RowsError};
 use super::pair_forces::{ContactForces, PairForces};
-use super::{OutputError, ResultPaths};
+use super::{FileError, ResultPaths, line_of};
 use crate::measures::Instant;
-use crate::near_pairs::{NearPairs, PairGap};
+use crate::near_pairs::{self, PairGap};
 use crate::trajectory::Row;
 
 /// Gaps up to this many mean radii are listed one by one where pairs have no columns.
@@ -34,46 +33,40 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 /// The first line of the file of near pairs.
 const GAPS_HEADER: &str = "t,i,j,gap_over_a,contact_force,repulsion_force,partner";
 
-/// How far the files of a run had come, for checkpoints.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CsvMarks {
-    /// The trajectory.
-    pub rows: Mark,
-    /// The near pairs, where they have a file.
-    pub gaps: Option<Mark>,
-}
-
 /// Writes rows as they come to `<path>.partial-K`, with the first `K` that no earlier run left, and gives the
 /// file its name when it is complete; the file of near pairs likewise.
 #[derive(Debug)]
-pub struct CsvWriter<const D: usize> {
+pub struct CsvWriter {
     rows: Draft,
     gaps: Option<Draft>,
-    near: NearPairs<D>,
 }
 
-impl<const D: usize> CsvWriter<D>
-where
-    Dim<D>: Space<D>,
-{
+impl CsvWriter {
     /// Starts the files of a run of so many particles.
-    pub fn create(path: &Path, particle_count: usize) -> Result<Self, RowsError> {
+    pub fn create<const D: usize>(path: &Path, particle_count: usize) -> Result<Self, RowsError>
+    where
+        Dim<D>: Space<D>,
+    {
         let rows = Draft::with_header(path, &header::<D>(particle_count))?;
         let gaps = gaps_path(path, particle_count);
         let gaps = gaps.map(|path| Draft::with_header(&path, GAPS_HEADER)).transpose()?;
-        Ok(Self { rows, gaps, near: NearPairs::new() })
+        Ok(Self { rows, gaps })
     }
 
-    /// Goes on with the files of a run of so many particles at `marks`; `visit` sees the rows up to there.
+    /// Goes on with the files of a run of so many particles at these marks; `visit` sees the rows up to there.
     /// Rows behind them stay, and are compared with those that are written.
-    pub(crate) fn resume(
+    pub(crate) fn resume<const D: usize>(
         path: &Path,
-        marks: &CsvMarks,
+        rows: &Mark,
+        gaps: Option<&Mark>,
         particle_count: usize,
         mut visit: impl FnMut(&Instant<D>),
-    ) -> Result<Self, RowsError> {
-        let mut rows = Draft::resume(path, &marks.rows)?;
-        let gaps = gaps_path(path, particle_count).zip(marks.gaps.as_ref());
+    ) -> Result<Self, RowsError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let mut rows = Draft::resume(path, rows)?;
+        let gaps = gaps_path(path, particle_count).zip(gaps);
         let mut gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
         if let Some(gaps) = &mut gaps {
             gaps.visit(|line, text| line > 1 || text == GAPS_HEADER)?;
@@ -82,20 +75,27 @@ where
             1 => text == header::<D>(particle_count),
             _ => parse(text, particle_count).map(|instant| visit(&instant)).is_some(),
         })?;
-        Ok(Self { rows, gaps, near: NearPairs::new() })
+        Ok(Self { rows, gaps })
     }
 
     /// Adds one row, which is with the operating system when this returns, and gives the smallest gap of any
     /// pair in mean radii, if there is one.
-    pub fn write(&mut self, row: &Row<'_, D>, forces: &PairForces<'_>) -> Result<Option<f64>, RowsError> {
+    pub fn write<const D: usize>(
+        &mut self,
+        row: &Row<'_, D>,
+        forces: &PairForces<'_>,
+    ) -> Result<Option<f64>, RowsError>
+    where
+        Dim<D>: Space<D>,
+    {
         let a = row.mean_radius();
         let smallest = match &mut self.gaps {
             None => row.pairs().map(|(first, second)| row.gap(first, second)).reduce(f64::min),
             Some(gaps) => {
                 let cutoff = GAP_CUTOFF_OVER_A * a;
-                let near = self.near.within(row, cutoff);
+                let near = near_pairs::within(row, cutoff);
                 gaps.write(&gap_lines(row, &near, cutoff, forces))?;
-                self.near.smallest(row, &near, cutoff)
+                near_pairs::smallest(row, &near, cutoff)
             }
         };
         let smallest = smallest.map(|gap| gap / a);
@@ -108,13 +108,13 @@ where
         self.rows.path()
     }
 
-    /// How far the files have come.
-    pub(crate) fn marks(&self) -> CsvMarks {
-        CsvMarks { rows: self.rows.mark(), gaps: self.gaps.as_ref().map(Draft::mark) }
+    /// How far the rows and the near pairs have come.
+    pub(crate) fn marks(&self) -> (Mark, Option<Mark>) {
+        (self.rows.mark(), self.gaps.as_ref().map(Draft::mark))
     }
 
     /// Gives the complete files their names.
-    pub fn finish(self) -> Result<(), OutputError> {
+    pub fn finish(self) -> Result<(), FileError> {
         self.gaps.map_or(Ok(()), Draft::finish)?;
         self.rows.finish()
     }
@@ -160,7 +160,7 @@ where
         false => row.pairs().map(|(first, second)| row.gap(first, second) / a).collect(),
     };
     let spins = row.twists.iter().flat_map(|twist| Dim::<D>::spin_slice(&twist.spin).iter().copied());
-    line_of([row.time].into_iter().chain(centers).chain(gaps).chain(spins))
+    line_of([row.time].into_iter().chain(centers).chain(gaps).chain(spins), 16)
 }
 
 /// Reads a row of so many particles back.
@@ -277,7 +277,7 @@ mod tests {
         let floor = Wall::new(&Vector::<2>::new(0.0, 1.0), &Vector::<2>::y());
         let domain = Domain::default().with_period(0, 30.5).with_wall(floor);
         let twists = vec![Twist::default(); 10];
-        let mut writer = CsvWriter::create(&path, 10).expect("files");
+        let mut writer = CsvWriter::create::<2>(&path, 10).expect("files");
         let row = Row { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
         let contact = |pair, lambda| Contact { pair, lambda, gamma: 0.0, gap: 0.5 };
         let contacts = [contact(PairKey::across(0, 9, [-1, 0, 0]), 3.0), contact(PairKey::wall(0, 0), 7.0)];

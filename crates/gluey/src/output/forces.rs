@@ -8,7 +8,7 @@
 use gluey_geom::{Dim, Space};
 use gluey_motion::Holding;
 
-use super::append_log::line_of;
+use super::line_of;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -36,7 +36,7 @@ where
         wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)).copied().collect::<Vec<f64>>()
     });
     let of_box = holding.mean_velocity.iter().chain(&holding.force_density).copied();
-    line_of([time].into_iter().chain(of_box).chain(of_particles))
+    line_of([time].into_iter().chain(of_box).chain(of_particles), 16)
 }
 
 #[cfg(test)]

@@ -50,9 +50,16 @@ impl ResultPaths {
         is_claimed(&self.csv())
     }
 
-    /// The folder.
+    /// The folder; `.` for the present one.
     pub fn folder(&self) -> &Path {
-        &self.folder
+        if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder }
+    }
+
+    /// The command that goes on with the run, which is named where others are in its folder.
+    pub fn resume_command(&self) -> String {
+        let is_alone = Self::in_folder(self.folder()).is_ok_and(|runs| runs.len() == 1);
+        let which = if is_alone { String::new() } else { format!(" --case {}", self.stem()) };
+        format!("gluey resume {}{which}", self.folder().display())
     }
 
     /// What all names begin with.

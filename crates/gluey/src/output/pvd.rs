@@ -3,10 +3,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{OutputError, write_atomically};
+use super::{FileError, write_atomically};
 
 /// Writes a collection of files, named relative to its own folder, with the time of each.
-pub fn write(path: &Path, entries: &[(f64, String)]) -> Result<(), OutputError> {
+pub fn write(path: &Path, entries: &[(f64, String)]) -> Result<(), FileError> {
     write_atomically(path, document(entries).as_bytes())
 }
 

@@ -10,7 +10,7 @@
 
 use gluey_motion::MeanStress;
 
-use super::append_log::line_of;
+use super::line_of;
 
 /// The first line in 3D; in 2D there is no `N2`, and forces of contacts have no unit of force.
 const NAMES: [&str; 11] = [
@@ -62,7 +62,7 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
     let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]).map(Some);
     let more = row.time_and_rate.into_iter().flatten().map(Some);
     let numbers = first.into_iter().chain(others).chain(shares).chain(normal);
-    line_of(numbers.chain([row.smallest_gap_over_a]).chain(more))
+    line_of(numbers.chain([row.smallest_gap_over_a]).chain(more), 16)
 }
 
 #[cfg(test)]

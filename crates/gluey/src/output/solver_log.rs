@@ -11,7 +11,7 @@ use gluey_contact::ContactReport;
 use gluey_motion::FlowStatistics;
 
 use super::append_log::{Draft, Mark, RowsError};
-use super::{OutputError, ResultPaths};
+use super::{FileError, ResultPaths};
 use crate::phases::PhaseTable;
 use crate::tally::Motion;
 
@@ -99,7 +99,7 @@ impl SolverLog {
     }
 
     /// Gives the complete file its name.
-    pub fn finish(self) -> Result<(), OutputError> {
+    pub fn finish(self) -> Result<(), FileError> {
         self.draft.finish()
     }
 }

@@ -27,7 +27,7 @@ use gluey_contact::{Contact, Domain, Partner};
 use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
 use gluey_motion::Fields;
 
-use super::{OutputError, prepare_folder_of, pvd, remove_stale};
+use super::{FileError, prepare_folder_of, pvd, remove_stale};
 
 pub use crate::case::Precision;
 pub(crate) use background::{FrameWriter, OnTheirWay};
@@ -44,8 +44,8 @@ use xml::{Array, Piece};
 const ROUNDING: f64 = 1e-6;
 
 /// Particles, contacts and fields at one instant.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame<'a, const D: usize>
+#[derive(Clone, Debug)]
+pub struct Frame<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -54,17 +54,17 @@ where
     /// Time.
     pub time: f64,
     /// Particles.
-    pub particles: &'a [Particle<D>],
+    pub particles: Vec<Particle<D>>,
     /// Their velocities.
-    pub twists: &'a [Twist<D>],
+    pub twists: Vec<Twist<D>>,
     /// Contacts.
-    pub contacts: &'a [Contact],
+    pub contacts: Vec<Contact>,
     /// Their walls and periods.
-    pub domain: &'a Domain<D>,
+    pub domain: Domain<D>,
     /// The box that particles are shown in; where they are, if there is none.
     pub in_box: Option<ShownBox<D>>,
     /// Flow fields, where the model has any.
-    pub fields: Option<&'a Fields<D>>,
+    pub fields: Option<Fields<D>>,
 }
 
 /// Writes frames into a folder and keeps the collections up to date.
@@ -87,7 +87,7 @@ struct Series {
 impl VtkWriter {
     /// Prepares `folder`. Of the steps already done when a run goes on from a checkpoint, given as `(step,
     /// time)`, those with a file in the folder stay in the collections.
-    pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, OutputError> {
+    pub fn create(folder: &Path, done: &[(usize, f64)]) -> Result<Self, FileError> {
         prepare_folder_of(&folder.join("fields.pvd"))?;
         let series = [FIELDS, "particles", "contacts"].map(|name| {
             let files = |step| [file_name(name, step), pieces::index_name(name, step)];
@@ -113,13 +113,13 @@ impl VtkWriter {
     }
 
     /// Writes one instant.
-    pub fn write<const D: usize>(&mut self, frame: &Frame<'_, D>) -> Result<(), OutputError>
+    pub fn write<const D: usize>(&mut self, frame: &Frame<D>) -> Result<(), FileError>
     where
         Dim<D>: Space<D>,
     {
-        let balls = shown(frame.particles, frame.in_box.as_ref());
+        let balls = shown(&frame.particles, frame.in_box.as_ref());
         let pieces = [
-            frame.fields.map(fields_piece),
+            frame.fields.as_ref().map(fields_piece),
             Some(particles_piece(frame, &balls)),
             Some(contacts_piece(frame, &balls)),
         ];
@@ -140,7 +140,7 @@ impl Series {
         time: f64,
         piece: Piece,
         encoding: VtkEncoding,
-    ) -> Result<(), OutputError> {
+    ) -> Result<(), FileError> {
         let (whole, index) = (file_name(self.name, step), pieces::index_name(self.name, step));
         // A run that was resumed may have written the step in the other way before.
         let (file, other) = match self.pieces {
@@ -149,7 +149,7 @@ impl Series {
                 (whole, index)
             }
             Some(count) => {
-                pieces::write_first(folder, (self.name, step, count), piece, encoding)?;
+                pieces::write_first(folder, self.name, step, count, piece, encoding)?;
                 (index, whole)
             }
         };
@@ -163,11 +163,11 @@ fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
 }
 
-fn particles_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
+fn particles_piece<const D: usize>(frame: &Frame<D>, balls: &[Shown<D>]) -> Piece
 where
     Dim<D>: Space<D>,
 {
-    let (particles, twists) = (frame.particles, frame.twists);
+    let (particles, twists) = (&frame.particles, &frame.twists);
     let count = balls.len();
     let velocity = |ball: &Shown<D>| {
         let mut velocity = twists[ball.particle].velocity;
@@ -198,16 +198,16 @@ where
 
 /// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images
 /// follow the centres, without a vertex.
-fn contacts_piece<const D: usize>(frame: &Frame<'_, D>, balls: &[Shown<D>]) -> Piece
+fn contacts_piece<const D: usize>(frame: &Frame<D>, balls: &[Shown<D>]) -> Piece
 where
     Dim<D>: Space<D>,
 {
-    let (contacts, count) = (frame.contacts, frame.particles.len());
+    let (contacts, count) = (&frame.contacts, frame.particles.len());
     let positions: Vec<Vector<D>> = frame.particles.iter().map(|particle| particle.pose.position).collect();
     let mut points = centers(&balls[..count]);
     let mut connectivity: Vec<u64> = (0..count as u64).collect();
     for Contact { pair, .. } in contacts {
-        let branch = pair.branch(&positions, frame.domain).unwrap_or_else(Vector::zeros);
+        let branch = pair.branch(&positions, &frame.domain).unwrap_or_else(Vector::zeros);
         let end = points[pair.first as usize] + branch;
         let second = match pair.second {
             // Where both are shown side by side the line ends at the vertex.

@@ -18,7 +18,7 @@ use flate2::write::GzEncoder;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_suspension::Container;
 
-use super::{OutputError, prepare_folder_of, write_atomically};
+use super::{FileError, prepare_folder_of, write_atomically};
 
 pub use read::{XyzError, dimension, read_text};
 
@@ -64,7 +64,8 @@ where
         time: f64,
         strain: f64,
         container: Container<D>,
-        (particles, twists): (&[Particle<D>], &[Twist<D>]),
+        particles: &[Particle<D>],
+        twists: &[Twist<D>],
     ) -> Self {
         Self {
             time,
@@ -156,13 +157,13 @@ pub struct XyzWriter {
 
 impl XyzWriter {
     /// Prepares `folder`.
-    pub fn create(folder: &Path, gzip: bool) -> Result<Self, OutputError> {
+    pub fn create(folder: &Path, gzip: bool) -> Result<Self, FileError> {
         prepare_folder_of(&folder.join("particles.xyz"))?;
         Ok(Self { folder: folder.to_owned(), gzip })
     }
 
     /// Writes the frame of a step, `particles-<step>.xyz`, which appears when it is complete.
-    pub fn write<const D: usize>(&self, step: usize, frame: &XyzFrame<D>) -> Result<(), OutputError>
+    pub fn write<const D: usize>(&self, step: usize, frame: &XyzFrame<D>) -> Result<(), FileError>
     where
         Dim<D>: Space<D>,
     {
@@ -173,7 +174,7 @@ impl XyzWriter {
         }
         let mut encoder = GzEncoder::new(Vec::new(), Compression::new(COMPRESSION_LEVEL));
         let bytes = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
-        let bytes = bytes.map_err(|error| OutputError::new(&path, "compress the file", error))?;
+        let bytes = bytes.map_err(|error| FileError::new(&path, "compress the file", error))?;
         write_atomically(&path, &bytes)
     }
 }
@@ -195,7 +196,7 @@ mod tests {
             .map(|n| Particle::new(Vector::<D>::repeat(f64::from(n) / 3.0), 0.125 * f64::from(n + 1)))
             .collect();
         let twist = Twist { velocity: Vector::repeat(-1.0 / 7.0), ..Twist::default() };
-        let mut frame = XyzFrame::of(0.1, -0.3, container, (&particles, &[twist; 3]));
+        let mut frame = XyzFrame::of(0.1, -0.3, container, &particles, &[twist; 3]);
         frame.spins[1][2] = 1e-20 / 3.0;
         frame
     }

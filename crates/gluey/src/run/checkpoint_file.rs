@@ -11,7 +11,7 @@ use super::frames::Others;
 use super::options::RunOptions;
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
-use crate::output::{OutputError, ResultPaths, set_aside};
+use crate::output::{FileError, ResultPaths, set_aside};
 use crate::progress::Notice;
 
 /// Checkpoints that are there at a time.
@@ -82,12 +82,12 @@ impl CheckpointFile {
         checkpoint: &Checkpoint<D>,
         case: &Case,
         others: Option<&dyn Others>,
-    ) -> Result<Vec<Notice>, OutputError>
+    ) -> Result<Vec<Notice>, FileError>
     where
         Dim<D>: Space<D>,
     {
         let Some(others) = others else { return self.write_alone(checkpoint, case) };
-        let encode = |error| OutputError::new(&self.path, "encode the checkpoint", io::Error::other(error));
+        let encode = |error| FileError::new(&self.path, "encode the checkpoint", io::Error::other(error));
         let digest = blake3::hash(&postcard::to_stdvec(&checkpoint.state).map_err(encode)?);
         let name = digest.as_bytes()[..8].iter().fold(0, |name, &byte| name << 8 | u64::from(byte));
         let pieces = others.write_flow(&self.path, name)?;
@@ -97,7 +97,7 @@ impl CheckpointFile {
     }
 
     /// Removes pieces of checkpoints that are not there any more.
-    fn remove_old_pieces(&mut self) -> Result<(), OutputError> {
+    fn remove_old_pieces(&mut self) -> Result<(), FileError> {
         while self.pieces.len() > GENERATIONS {
             let Some(old) = self.pieces.pop_front().flatten() else { continue };
             if self.pieces.contains(&Some(old.clone())) {
@@ -105,7 +105,7 @@ impl CheckpointFile {
             }
             for path in (0..old.count).map(|run| old.path(&self.path, run)) {
                 remove(&path)
-                    .map_err(|error| OutputError::new(&path, "remove an old piece of a flow", error))?;
+                    .map_err(|error| FileError::new(&path, "remove an old piece of a flow", error))?;
             }
         }
         Ok(())
@@ -116,12 +116,12 @@ impl CheckpointFile {
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
-    ) -> Result<Vec<Notice>, OutputError>
+    ) -> Result<Vec<Notice>, FileError>
     where
         Dim<D>: Space<D>,
     {
         let older = ResultPaths::previous(&self.path);
-        let failed = |error| OutputError::new(&older, "keep the checkpoint before the last", error);
+        let failed = |error| FileError::new(&older, "keep the checkpoint before the last", error);
         let away: &[&PathBuf] = match std::mem::replace(&mut self.found, Found::Own) {
             Found::Own => {
                 keep(&self.path, &older).map_err(failed)?;

@@ -11,7 +11,7 @@ use crate::checkpoint::CheckpointError;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::TooLarge;
 use crate::number_text::shown;
-use crate::output::{ClaimError, OutputError, RowsError};
+use crate::output::{ClaimError, FileError, RowsError};
 use crate::rheology::RheologyError;
 use crate::simulation::StepError;
 
@@ -26,7 +26,7 @@ pub enum RunError {
     TooLarge(#[from] TooLarge),
     /// Something could not be written.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Output(#[from] FileError),
     /// Another run is writing the same results.
     #[error(transparent)]
     InUse(ClaimError),
@@ -83,17 +83,8 @@ pub enum RunError {
         message: String,
     },
     /// The run was asked to stop.
-    #[error("interrupted after step {step} of {steps} (t = {})", shown(*time))]
-    Interrupted {
-        /// Steps done.
-        step: usize,
-        /// Steps in all.
-        steps: usize,
-        /// Time reached.
-        time: f64,
-        /// Where the run can go on from.
-        checkpoint: Option<PathBuf>,
-    },
+    #[error(transparent)]
+    Interrupted(#[from] Ended),
     /// The run failed, and can go on from the last good step.
     #[error("the run stopped; {} holds it after {step} good steps", checkpoint.display())]
     Stopped {
@@ -105,12 +96,6 @@ pub enum RunError {
         #[source]
         cause: Box<RunError>,
     },
-}
-
-impl From<Ended> for RunError {
-    fn from(Ended { step, steps, time, checkpoint }: Ended) -> Self {
-        Self::Interrupted { step, steps, time, checkpoint }
-    }
 }
 
 impl From<ClaimError> for RunError {

@@ -9,7 +9,7 @@ use gluey_parallel::{Communicator, Ranks};
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
 use crate::checksum::Kind;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{FileError, write_atomically};
 
 const KIND: Kind = Kind { magic: b"gluey-fp", layout: 1 };
 
@@ -19,7 +19,7 @@ pub(super) fn write(
     checkpoint: &Path,
     name: u64,
     saved: &[SavedPiece],
-) -> Result<Option<FlowPieces>, OutputError> {
+) -> Result<Option<FlowPieces>, FileError> {
     let Some(first) = saved.first() else { return Ok(None) };
     let stem = checkpoint.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let pieces = FlowPieces { stem, name, count: first.run_count() };
@@ -27,7 +27,7 @@ pub(super) fn write(
         let path = pieces.path(checkpoint, piece.run());
         let encoded = postcard::to_stdvec(piece).map_err(std::io::Error::other);
         let file = encoded.and_then(|bytes| KIND.sealed(&bytes));
-        write_atomically(&path, &file.map_err(|error| OutputError::new(&path, "encode the flow", error))?)?;
+        write_atomically(&path, &file.map_err(|error| FileError::new(&path, "encode the flow", error))?)?;
     }
     Ok(Some(pieces))
 }
@@ -37,7 +37,8 @@ pub(super) fn write(
 /// # Errors
 /// On rank zero why it failed, wherever it did. On other ranks if it failed on any.
 pub(super) fn restore<const D: usize>(
-    (case, checkpoint): (&Case, &Path),
+    case: &Case,
+    checkpoint: &Path,
     suspension: &SharedSuspension<D>,
     ranks: &Ranks,
     memory: &Memory<D>,

@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{ContactLaw, ContactModel, ContactNetwork};
+use gluey_contact::ContactLaw;
 use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::Container;
 
-use super::contacts::Contacts;
+use super::contacts::Surrounded;
 use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use crate::case::{Case, Interval, OutputKind};
 use crate::checkpoint::FlowPieces;
 use crate::output::vtk::{Frame, FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
-use crate::output::{OutputError, ResultPaths};
+use crate::output::{FileError, ResultPaths};
 use crate::simulation::{Simulation, StepError};
 
 /// The other ranks that share the flow of a run.
@@ -23,11 +23,11 @@ pub(super) trait Others {
 
     /// Has them write the fields in their cells at a step, as one of the streams of the run. All are on disk
     /// then.
-    fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError>;
+    fn write_fields(&self, stream: usize, step: usize) -> Result<(), FileError>;
 
     /// Writes, with them, what the flow after the last step that was remembered starts from, in files for a
     /// checkpoint that is to be written next; none if it starts from nothing. All are on disk then.
-    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, OutputError>;
+    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, FileError>;
 }
 
 /// A stream of frames that a run is to write.
@@ -113,7 +113,7 @@ where
         options: &RunOptions,
         step: usize,
         others: Option<&'a dyn Others>,
-    ) -> Result<Self, OutputError> {
+    ) -> Result<Self, FileError> {
         let on_their_way = OnTheirWay::default();
         let stream = |stream: StreamOptions| {
             let StreamOptions { folder, interval, format } = stream;
@@ -140,13 +140,10 @@ where
     }
 
     /// Writes what is due of the simulation as it is.
-    pub fn write<H>(
-        &mut self,
-        case: &Case,
-        simulation: &Simulation<D, H, Contacts<'_, D>>,
-    ) -> Result<(), RunError>
+    pub fn write<H, C>(&mut self, case: &Case, simulation: &Simulation<D, H, C>) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
+        C: Surrounded<D>,
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         let (particles, twists) = (simulation.particles(), simulation.twists());
@@ -155,21 +152,27 @@ where
         for (index, (_, stream)) in self.streams.iter_mut().enumerate().filter(|(_, (every, _))| due(every)) {
             match stream {
                 Stream::Vtk { writer, with_fields } => {
-                    let (contacts, domain) = (simulation.contacts(), simulation.contact().domain());
-                    let container = container(case, simulation);
-                    let in_box =
-                        domain.is_periodic().then_some(ShownBox { container, slide: simulation.slide() });
-                    let frame =
-                        Frame { step, time, particles, twists, contacts, domain, in_box, fields: None };
                     if let (true, Some(others)) = (*with_fields, self.others) {
                         others.write_fields(index, step)?;
                     }
-                    writer.write(&frame, with_fields.then(|| simulation.fields()).flatten())?;
+                    let domain = simulation.contact().domain().clone();
+                    let shown =
+                        || ShownBox { container: container(case, simulation), slide: simulation.slide() };
+                    writer.write(Frame {
+                        step,
+                        time,
+                        particles: particles.to_vec(),
+                        twists: twists.to_vec(),
+                        contacts: simulation.contacts().to_vec(),
+                        in_box: domain.is_periodic().then(shown),
+                        domain,
+                        fields: with_fields.then(|| simulation.fields()).flatten(),
+                    })?;
                 }
                 Stream::Xyz(writer) => {
                     let container = container(case, simulation);
                     let strain = case.strain_after(step);
-                    let frame = XyzFrame::of(time, strain, container, (particles, twists));
+                    let frame = XyzFrame::of(time, strain, container, particles, twists);
                     let frame = match contact_forces(simulation)? {
                         Some(forces) => frame.with_contact_forces(forces),
                         None => frame,
@@ -182,7 +185,7 @@ where
     }
 
     /// Returns when all frames are on disk.
-    pub fn flush(&mut self) -> Result<(), OutputError> {
+    pub fn flush(&mut self) -> Result<(), FileError> {
         self.streams.iter_mut().try_for_each(|(_, stream)| match stream {
             Stream::Vtk { writer, .. } => writer.flush(),
             Stream::Xyz(_) => Ok(()),
@@ -190,7 +193,7 @@ where
     }
 
     /// Ends all streams when their frames are on disk.
-    pub fn finish(self) -> Result<(), OutputError> {
+    pub fn finish(self) -> Result<(), FileError> {
         self.streams.into_iter().try_for_each(|(_, stream)| match stream {
             Stream::Vtk { writer, .. } => writer.finish(),
             Stream::Xyz(_) => Ok(()),
@@ -199,37 +202,35 @@ where
 }
 
 /// What contacts exert on each particle; nothing where there is no contact model.
-fn contact_forces<const D: usize, H>(
-    simulation: &Simulation<D, H, Contacts<'_, D>>,
+fn contact_forces<const D: usize, H, C>(
+    simulation: &Simulation<D, H, C>,
 ) -> Result<Option<Vec<Vector<D>>>, RunError>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
+    C: Surrounded<D>,
 {
     let contact = simulation.contact();
     if contact.params().law == ContactLaw::None {
         return Ok(None);
     }
-    let centers: Vec<Vector<D>> =
-        simulation.particles().iter().map(|particle| particle.pose.position).collect();
-    let radii: Vec<f64> = simulation.particles().iter().map(|particle| particle.radius).collect();
-    let network = ContactNetwork::new(contact.contacts(), &centers, &radii, contact.domain());
     let (step, time) = (simulation.step_index(), simulation.time());
-    let network = network.map_err(|source| StepError::Contact { step, time, source })?;
-    Ok(Some(network.forces()))
+    let forces = contact.of_network(simulation.particles(), |network| network.forces());
+    Ok(Some(forces.map_err(|source| StepError::Contact { step, time, source })?))
 }
 
 /// The box as it is sheared now.
-fn container<const D: usize, H>(case: &Case, simulation: &Simulation<D, H, Contacts<'_, D>>) -> Container<D>
+fn container<const D: usize, H, C>(case: &Case, simulation: &Simulation<D, H, C>) -> Container<D>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
+    C: Surrounded<D>,
 {
     let container = case.container();
     container.tilted(simulation.strain() * container.bounds().extent()[1])
 }
 
-fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, OutputError> {
+fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, FileError> {
     let strain = case.shear_rate * case.time.step;
     let done = (0..step).filter(|&step| interval.is_due(step, strain, case.time.step));
     let done: Vec<(usize, f64)> = done.map(|step| (step, step as f64 * case.time.step)).collect();

@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex};
 use gluey_geom::{Dim, Space};
 
 use super::checkpoint_file::CheckpointFile;
-use super::error::RunError;
 use super::frames::Others;
 use super::last_steps::{Ended, OfRun, locked};
 use super::log;
@@ -16,7 +15,7 @@ use super::recorder::Recorder;
 use crate::case::Case;
 use crate::checkpoint::Checkpoint;
 use crate::output::vtk::OnTheirWay;
-use crate::output::{OutputError, ResultPaths, sync_drafts};
+use crate::output::{FileError, ResultPaths, sync_drafts};
 use crate::progress::Notice;
 
 /// The last whole step of a run, and the files that tell of it.
@@ -47,7 +46,9 @@ where
     pub fn before(
         case: &Case,
         options: &RunOptions,
-        (file, recorder, frames): (Option<CheckpointFile>, Option<Recorder>, OnTheirWay),
+        file: Option<CheckpointFile>,
+        recorder: Option<Recorder>,
+        frames: OnTheirWay,
         step: usize,
     ) -> Arc<Mutex<Self>> {
         let saved = file.as_ref().filter(|file| file.is_own()).map(|_| step);
@@ -62,7 +63,7 @@ where
     }
 
     /// Writes a checkpoint after what it counts on, if that was not done, and gives what should be known.
-    pub fn save(&mut self, others: Option<&dyn Others>) -> Result<Vec<Notice>, OutputError> {
+    pub fn save(&mut self, others: Option<&dyn Others>) -> Result<Vec<Notice>, FileError> {
         let (Some(file), Some(checkpoint)) = (&mut self.file, &self.checkpoint) else {
             return Ok(Vec::new());
         };
@@ -112,7 +113,7 @@ where
         }
         let mut notices = last.save_or_tell();
         let ended = last.ended();
-        log::note(&last.paths, &RunError::from(ended.clone()).to_string());
+        log::note(&last.paths, &ended.to_string());
         notices.extend(last.recorder.as_mut().and_then(|recorder| recorder.interrupted(ended.step)));
         // The run waits for this lock before it writes anything else of its state.
         std::mem::forget(last);

@@ -6,6 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread::sleep;
 use std::time::Duration;
 
+use thiserror::Error;
+
+use crate::number_text::shown;
 use crate::progress::Notice;
 
 /// The last whole steps of the runs of a program that are going on. What asks the program to stop can have
@@ -16,7 +19,8 @@ use crate::progress::Notice;
 pub struct LastSteps(Arc<Mutex<Vec<Weak<dyn OfRun>>>>);
 
 /// Where a run ended that was asked to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("interrupted after step {step} of {steps} (t = {})", shown(*time))]
 pub struct Ended {
     /// Steps done.
     pub step: usize,

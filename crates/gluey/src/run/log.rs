@@ -4,17 +4,16 @@
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::error::RunError;
-use super::last_steps::locked;
 use super::options::RunOptions;
 use super::record::{in_full, now};
 use crate::case::Case;
 use crate::memory;
 use crate::output::solver_log::SolverRow;
-use crate::output::{OutputError, ResultPaths};
+use crate::output::{FileError, ResultPaths};
 use crate::progress::{Notice, Progress, ProgressState, Ticker};
 use crate::report::RunReport;
 
@@ -24,25 +23,20 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// Hands on what a run tells, and writes it down.
 pub(super) struct Log<'a> {
     listener: &'a dyn Progress,
-    file: Option<Arc<Mutex<Lines>>>,
+    file: Option<Arc<File>>,
     /// Writes where the run is.
     ticker: Option<Ticker>,
 }
 
-struct Lines {
-    file: File,
-}
-
-impl Lines {
-    /// That a line is lost, as on a full disk, is no reason to end a run: its rows are.
-    fn add(&mut self, line: &str) {
-        let _ = writeln!(self.file, "{} {line}", now());
-    }
+/// Adds a line. That one is lost, as on a full disk, is no reason to end a run: its rows are.
+fn add(mut file: &File, line: &str) {
+    // At once, so that lines of several threads do not mix.
+    let _ = file.write_all(format!("{} {line}\n", now()).as_bytes());
 }
 
 impl<'a> Log<'a> {
     /// Begins the log of a run that leaves a record, or goes on with that of the run that is resumed.
-    pub fn begin(case: &Case, options: &RunOptions, listener: &'a dyn Progress) -> Result<Self, OutputError> {
+    pub fn begin(case: &Case, options: &RunOptions, listener: &'a dyn Progress) -> Result<Self, FileError> {
         if options.record.is_none() {
             return Ok(Self { listener, file: None, ticker: None });
         }
@@ -52,15 +46,14 @@ impl<'a> Log<'a> {
             Some(_) => open.create(true).append(true).open(&path),
             None => open.create(true).write(true).truncate(true).open(&path),
         };
-        let file = opened.map_err(|error| OutputError::new(&path, "begin the log", error))?;
-        let mut lines = Lines { file };
-        lines.add(&beginning(case, options.resume.as_deref()));
-        let lines = Arc::new(Mutex::new(lines));
-        let of_ticker = lines.clone();
+        let file = opened.map_err(|error| FileError::new(&path, "begin the log", error))?;
+        add(&file, &beginning(case, options.resume.as_deref()));
+        let file = Arc::new(file);
+        let of_ticker = file.clone();
         let ticker = Ticker::new(INTERVAL, move |state| {
-            locked(&of_ticker).add(&format!("step {}/{}, {state}", state.step, state.steps));
+            add(&of_ticker, &format!("step {}/{}, {state}", state.step, state.steps));
         });
-        Ok(Self { listener, file: Some(lines), ticker: Some(ticker) })
+        Ok(Self { listener, file: Some(file), ticker: Some(ticker) })
     }
 
     /// Writes what came out, and how the run ended.
@@ -76,14 +69,14 @@ impl<'a> Log<'a> {
     }
 
     fn add(&self, line: &str) {
-        if let Some(lines) = &self.file {
-            locked(lines).add(line);
+        if let Some(file) = &self.file {
+            add(file, line);
         }
     }
 }
 
 impl Progress for Log<'_> {
-    fn report(&self, state: &ProgressState<'_>) {
+    fn report(&self, state: &ProgressState) {
         self.listener.report(state);
         if let Some(ticker) = &self.ticker {
             ticker.report(state);
@@ -103,7 +96,7 @@ impl Progress for Log<'_> {
 /// Adds a line to the log of a run, where there is one.
 pub(super) fn note(paths: &ResultPaths, line: &str) {
     if let Ok(file) = OpenOptions::new().append(true).open(paths.log()) {
-        Lines { file }.add(line);
+        add(&file, line);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Keeps runs from writing over each other's results.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use thiserror::Error;
 
@@ -79,22 +79,12 @@ pub(super) fn check_free(case: &Case, options: &RunOptions) -> Result<(), Occupi
         RunState::Complete => {
             let RunRecord { steps, ended, .. } = record;
             let is_longer = case.step_count() > steps && paths.checkpoint().exists();
-            let go_on = is_longer.then(|| resume_to(&paths, case.time.end));
+            let go_on =
+                is_longer.then(|| format!("{} --set time.end={}", paths.resume_command(), case.time.end));
             Err(OccupiedError::Complete { record: paths.record(), steps, ended, go_on })
         }
         _ => Ok(()),
     }
-}
-
-/// The command that goes on with the run at `paths` to another end.
-fn resume_to(paths: &ResultPaths, end: f64) -> String {
-    let folder = match paths.folder() {
-        folder if folder == Path::new("") => Path::new("."),
-        folder => folder,
-    };
-    let is_alone = ResultPaths::in_folder(folder).is_ok_and(|runs| runs.len() == 1);
-    let which = if is_alone { String::new() } else { format!(" --case {}", paths.stem()) };
-    format!("gluey resume {}{which} --set time.end={end}", folder.display())
 }
 
 /// The first line, but for its end, in which `case` differs from the one that was run.

@@ -15,7 +15,7 @@ use gluey_parallel::{Communicator, RankFailure, Ranks};
 use super::flow_pieces;
 use super::frames::{Others, StreamOptions};
 use crate::checkpoint::FlowPieces;
-use crate::output::{OutputError, vtk};
+use crate::output::{FileError, vtk};
 
 /// All ranks but zero, as rank zero sees them.
 pub(super) struct OtherRanks<'a, const D: usize> {
@@ -32,15 +32,15 @@ where
         self.ranks.size()
     }
 
-    fn write_fields(&self, stream: usize, step: usize) -> Result<(), OutputError> {
+    fn write_fields(&self, stream: usize, step: usize) -> Result<(), FileError> {
         ask_for_fields(self.ranks, FrameName { stream: stream as u32, step: step as u32 });
         first_failure(self.ranks, None)
     }
 
-    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, OutputError> {
+    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, FileError> {
         if self.memory.is_broken() {
             let source = io::Error::other("the flow that ranks share was broken off");
-            return Err(OutputError::new(checkpoint, "keep the flow for", source));
+            return Err(FileError::new(checkpoint, "keep the flow for", source));
         }
         ask_to_keep(self.ranks, name);
         let own = flow_pieces::write(checkpoint, name, &self.memory.saved());
@@ -84,11 +84,11 @@ fn write_piece<const D: usize>(
     let asked = fields.zip(stream).and_then(|(fields, stream)| Some((fields, stream, stream.encoding()?)));
     let written = match asked {
         Some((fields, stream, encoding)) => {
-            vtk::write_piece(&stream.folder, (step as usize, ranks.rank()), &fields, encoding)
+            vtk::write_piece(&stream.folder, step as usize, ranks.rank(), &fields, encoding)
         }
         None => {
             let path = stream.map_or_else(PathBuf::new, |stream| stream.folder.clone());
-            Err(OutputError::new(&path, "write fields to", io::Error::other("there are none")))
+            Err(FileError::new(&path, "write fields to", io::Error::other("there are none")))
         }
     };
     // What went wrong is told by rank zero.
@@ -96,18 +96,18 @@ fn write_piece<const D: usize>(
 }
 
 /// The failure of the first rank that has one, on all ranks.
-fn first_failure(ranks: &Ranks, own: Option<&OutputError>) -> Result<(), OutputError> {
+fn first_failure(ranks: &Ranks, own: Option<&FileError>) -> Result<(), FileError> {
     ranks.first_failure(own.map(encoded)).map_or(Ok(()), |failure| Err(decoded(&failure)))
 }
 
 /// The file, the number of the system's error, 0 for another one, and what it says: parted by zeros, which no
 /// path has.
-fn encoded(error: &OutputError) -> String {
+fn encoded(error: &FileError) -> String {
     let number = error.source.raw_os_error().unwrap_or(0);
     format!("{}\0{number}\0{}", error.path.display(), error.source)
 }
 
-fn decoded(failure: &RankFailure) -> OutputError {
+fn decoded(failure: &RankFailure) -> FileError {
     let mut words = failure.message.splitn(3, '\0');
     let mut next = || words.next().unwrap_or_default();
     let (path, number, reason) = (PathBuf::from(next()), next(), next());
@@ -116,5 +116,5 @@ fn decoded(failure: &RankFailure) -> OutputError {
         _ => io::ErrorKind::Other,
     };
     let source = io::Error::new(kind, format!("{reason}, on rank {}", failure.rank));
-    OutputError::new(&path, "write the file", source)
+    FileError::new(&path, "write the file", source)
 }

@@ -6,7 +6,7 @@ use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, Sha
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
-use super::contacts::{self, Contacts};
+use super::contacts;
 use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
 use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, logged, overwrite_guard, stale_files};
@@ -51,7 +51,7 @@ where
     let suspension = SharedSuspension { flow, suspension };
     let memory = Rc::new(Memory::default());
     if let Some(checkpoint) = &options.resume {
-        flow_pieces::restore((case, checkpoint), &suspension, ranks, &memory)?;
+        flow_pieces::restore(case, checkpoint, &suspension, ranks, &memory)?;
     }
     if ranks.rank() > 0 {
         let (streams, checkpoint) = (StreamOptions::of_run(case, options), options.checkpoint.clone());
@@ -61,13 +61,12 @@ where
     // However this ends, the others learn of it when the leader is dropped.
     let leader = SharedHydrodynamics::leading(&suspension, ranks).remembering(memory.clone());
     let contact = SharedContact::leading(contacts::of_case(case), ranks, memory.clone());
-    let models = (leader, Contacts::by(contact));
     let others = OtherRanks { ranks, memory };
     let _claims = claim_outputs(case, options, progress)?;
     overwrite_guard::check_free(case, options)?;
     stale_files::remove(case, options)?;
     let report = logged(case, options, progress, |log| {
-        Run::start(case, options, log, models, Some(&others))?.finish()
+        Run::start(case, options, log, leader, contact, Some(&others))?.finish()
     })?;
     Ok(Some(report))
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::options::{RunOptions, VtkOptions, XyzOptions};
-use crate::output::{OutputError, ResultPaths, write_atomically};
+use crate::output::{FileError, ResultPaths, write_atomically};
 use crate::report::RunReport;
 
 /// Counts changes of the layout of [`RunRecord`].
@@ -109,13 +109,8 @@ pub struct RecordedOptions {
 #[derive(Debug, Error)]
 pub enum RecordError {
     /// The file could not be read.
-    #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// It is another kind of file.
     #[error("{}: not the record of a run", path.display())]
     Foreign {
@@ -164,10 +159,7 @@ impl RunRecord {
     /// [`RecordError`] if it is not there, not a record, or of another layout.
     pub fn read(path: &Path) -> Result<Self, RecordError> {
         let path = path.to_owned();
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(source) => return Err(RecordError::Read { path, source }),
-        };
+        let text = fs::read_to_string(&path).map_err(|error| FileError::unread(&path, error))?;
         let foreign = |source| RecordError::Foreign { path: path.clone(), source };
         let value: serde_json::Value = serde_json::from_str(&text).map_err(foreign)?;
         match value.get("layout").and_then(serde_json::Value::as_u64) {
@@ -187,9 +179,9 @@ impl RunRecord {
     }
 
     /// Writes it, all or nothing.
-    pub(super) fn write(&self, path: &Path) -> Result<(), OutputError> {
+    pub(super) fn write(&self, path: &Path) -> Result<(), FileError> {
         let encoded = serde_json::to_string_pretty(self).map_err(io::Error::from);
-        let text = encoded.map_err(|error| OutputError::new(path, "encode the record", error))?;
+        let text = encoded.map_err(|error| FileError::new(path, "encode the record", error))?;
         write_atomically(path, format!("{text}\n").as_bytes())
     }
 
@@ -222,7 +214,7 @@ impl RecordedOptions {
 }
 
 /// An error with all its causes.
-pub(super) fn in_full(error: &dyn std::error::Error) -> String {
+pub fn in_full(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }

@@ -7,7 +7,7 @@ use super::error::RunError;
 use super::options::RunOptions;
 use super::record::{RunRecord, RunState, in_full};
 use crate::case::Case;
-use crate::output::{OutputError, ResultPaths, write_atomically};
+use crate::output::{FileError, ResultPaths, write_atomically};
 use crate::progress::{Notice, Progress};
 use crate::report::RunReport;
 
@@ -26,7 +26,7 @@ impl Recorder {
         options: &RunOptions,
         step: usize,
         rows: &Path,
-    ) -> Result<Option<Self>, OutputError> {
+    ) -> Result<Option<Self>, FileError> {
         if options.record.is_none() {
             return Ok(None);
         }
@@ -49,7 +49,7 @@ impl Recorder {
     }
 
     /// Notes that a checkpoint after `step` steps is on disk.
-    pub fn reached(&mut self, step: usize) -> Result<(), OutputError> {
+    pub fn reached(&mut self, step: usize) -> Result<(), FileError> {
         self.record.steps_done = step;
         self.record.write(&self.path)
     }
@@ -81,7 +81,7 @@ impl Recorder {
                 self.record.write(&self.path)?;
             }
             Err(error) => {
-                let interrupted = matches!(error, RunError::Interrupted { .. });
+                let interrupted = matches!(error, RunError::Interrupted(_));
                 self.record.end(if interrupted { RunState::Interrupted } else { RunState::Failed }, step);
                 self.record.error = (!interrupted).then(|| in_full(error));
                 self.write_or_tell().iter().for_each(|notice| progress.notice(notice));
@@ -91,10 +91,10 @@ impl Recorder {
     }
 }
 
-fn write_case(case: &Case, record: &RunRecord, paths: &ResultPaths) -> Result<(), OutputError> {
+fn write_case(case: &Case, record: &RunRecord, paths: &ResultPaths) -> Result<(), FileError> {
     let path = paths.case_file();
     let encoded = case.to_toml().map_err(io::Error::other);
-    let text = encoded.map_err(|error| OutputError::new(&path, "encode the case", error))?;
+    let text = encoded.map_err(|error| FileError::new(&path, "encode the case", error))?;
     let seed = record
         .seed
         .map_or(String::new(), |seed| format!(" Its particles were generated from the seed {seed}."));

@@ -6,13 +6,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::output::product_names::{PAGE_NAME, is_page, is_picture, is_table};
-use crate::output::{OutputError, ResultPaths, drafts, entries, is_claimed, name_of, undrafted};
+use crate::output::{FileError, ResultPaths, drafts, entries, is_claimed, name_of, undrafted};
 
 /// Series of frames, by the beginnings of their names.
 const SERIES: [&str; 3] = ["fields", "particles", "contacts"];
 
 /// Removes all of the run at `paths`. Its record goes first: what is half removed is no run.
-pub(super) fn remove(paths: &ResultPaths) -> Result<(), OutputError> {
+pub(super) fn remove(paths: &ResultPaths) -> Result<(), FileError> {
     for file in [paths.record(), paths.case_file(), paths.log()] {
         remove_if_there(&file)?;
     }
@@ -51,7 +51,7 @@ fn is_of_run(path: &Path, paths: &ResultPaths, entries: &[PathBuf]) -> bool {
 }
 
 /// Removes frames, tables, pictures and pages from a folder, and the folder where nothing else is in it.
-fn empty(folder: &Path) -> Result<(), OutputError> {
+fn empty(folder: &Path) -> Result<(), FileError> {
     remove_shown(folder)?;
     for path in list(folder)? {
         let name = name_of(&path);
@@ -65,7 +65,7 @@ fn empty(folder: &Path) -> Result<(), OutputError> {
 }
 
 /// Removes the tables of `gluey analyse`, their pictures and the page of `gluey view` from a folder.
-fn remove_shown(folder: &Path) -> Result<(), OutputError> {
+fn remove_shown(folder: &Path) -> Result<(), FileError> {
     // Others may have files of such names.
     let begins = |name: &str, is_ours: fn(&[u8]) -> bool| {
         fs::read(folder.join(name)).is_ok_and(|bytes| is_ours(&bytes))
@@ -92,7 +92,7 @@ fn is_lock(path: &Path) -> bool {
 }
 
 /// Removes a lock that no process holds.
-fn remove_lock(path: &Path) -> Result<(), OutputError> {
+fn remove_lock(path: &Path) -> Result<(), FileError> {
     if is_claimed(&path.with_extension("")) { Ok(()) } else { remove_if_there(path) }
 }
 
@@ -110,19 +110,19 @@ pub(super) fn is_frame(name: &str) -> bool {
     }
 }
 
-pub(super) fn remove_file(path: &Path) -> Result<(), OutputError> {
-    fs::remove_file(path).map_err(|error| OutputError::new(path, "remove what an earlier run left", error))
+pub(super) fn remove_file(path: &Path) -> Result<(), FileError> {
+    fs::remove_file(path).map_err(|error| FileError::new(path, "remove what an earlier run left", error))
 }
 
-fn remove_if_there(path: &Path) -> Result<(), OutputError> {
+fn remove_if_there(path: &Path) -> Result<(), FileError> {
     if path.exists() { remove_file(path) } else { Ok(()) }
 }
 
-fn remove_if_empty(folder: &Path) -> Result<(), OutputError> {
+fn remove_if_empty(folder: &Path) -> Result<(), FileError> {
     if !list(folder)?.is_empty() {
         return Ok(());
     }
-    fs::remove_dir(folder).map_err(|error| OutputError::new(folder, "remove the folder", error))
+    fs::remove_dir(folder).map_err(|error| FileError::new(folder, "remove the folder", error))
 }
 
 fn holds(folder: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
@@ -130,11 +130,10 @@ fn holds(folder: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
 }
 
 /// What is in a folder, sorted; nothing in one that is not there.
-pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>, OutputError> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+pub(super) fn list(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     match entries(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-        listed => listed.map_err(|error| OutputError::new(folder, "list the folder", error)),
+        listed => listed.map_err(|error| FileError::new(folder, "list the folder", error)),
     }
 }
 

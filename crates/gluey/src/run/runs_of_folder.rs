@@ -1,11 +1,10 @@
 //! The runs that left records in a folder.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::output::ResultPaths;
+use crate::output::{FileError, ResultPaths};
 
 /// What `gluey sweep` leaves in its folder.
 pub(crate) const TABLE_OF_STUDY: &str = "sweep.csv";
@@ -14,13 +13,8 @@ pub(crate) const TABLE_OF_STUDY: &str = "sweep.csv";
 #[derive(Debug, Error)]
 pub enum FolderError {
     /// It cannot be listed.
-    #[error("{}: cannot be read", folder.display())]
-    Read {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// It has no record of any run.
     #[error("{}: no run is recorded there (no file *-run.json)", folder.display())]
     NoRun {
@@ -47,6 +41,6 @@ pub fn recorded_runs(folder: &Path) -> Result<Vec<ResultPaths>, FolderError> {
         }
         Ok(runs) if runs.is_empty() => Err(FolderError::NoRun { folder }),
         Ok(runs) => Ok(runs),
-        Err(source) => Err(FolderError::Read { folder, source }),
+        Err(error) => Err(FileError::unread(&folder, error).into()),
     }
 }

@@ -6,11 +6,11 @@ use super::frames::StreamOptions;
 use super::options::RunOptions;
 use super::removal::{self, is_frame, list, remove_file};
 use crate::case::Case;
-use crate::output::{OutputError, ResultPaths, drafts, name_of, undrafted};
+use crate::output::{FileError, ResultPaths, drafts, name_of, undrafted};
 
 /// Removes half files that killed runs left, and all of a run that this one replaces. Otherwise rows are
 /// never among them. The results are claimed: no other run writes them now.
-pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), OutputError> {
+pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), FileError> {
     let Some(record) = options.record else { return Ok(()) };
     let paths = ResultPaths::of_csv(&options.csv);
     for whole in [paths.record(), paths.case_file(), paths.checkpoint(), paths.previous_checkpoint()] {
@@ -27,7 +27,7 @@ pub(super) fn remove(case: &Case, options: &RunOptions) -> Result<(), OutputErro
 }
 
 /// Removes half frames from a folder.
-fn remove_half_frames(folder: &Path) -> Result<(), OutputError> {
+fn remove_half_frames(folder: &Path) -> Result<(), FileError> {
     for path in list(folder)? {
         if undrafted(&name_of(&path)).is_some_and(is_frame) {
             remove_file(&path)?;

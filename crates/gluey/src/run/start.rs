@@ -2,19 +2,20 @@
 
 use gluey_geom::{Dim, Space};
 
-use super::contacts::Contacts;
 use crate::case::Case;
 use crate::simulation::{Simulation, Sliding};
+use gluey_contact::ContactModel;
 
 /// A case at time 0.
-pub(super) fn simulation<'a, const D: usize, H>(
+pub(super) fn simulation<const D: usize, H, C>(
     case: &Case,
     hydrodynamics: H,
-    contact: Contacts<'a, D>,
-) -> Simulation<D, H, Contacts<'a, D>>
+    contact: C,
+) -> Simulation<D, H, C>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
+    C: ContactModel<D>,
 {
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(case.start(), scheme, dt, hydrodynamics, contact);

@@ -1,20 +1,25 @@
-//! The tables beside the trajectory that only some cases have: rheology, and what holds particles.
+//! The tables of a run: trajectory, near pairs and what steps cost, and those that only some cases have:
+//! rheology, and what holds particles.
 
 use std::path::{Path, PathBuf};
 
 use gluey_geom::{Dim, Space};
 use gluey_motion::Hydrodynamics;
 
-use super::contacts::Contacts;
+use super::contacts::Surrounded;
 use super::error::RunError;
 use super::stress::with_contacts;
 use crate::case::Case;
+use crate::checkpoint::{Checkpoint, TableMarks};
 use crate::hydrodynamics::HydrodynamicsError;
-use crate::output::csv::gaps_path;
+use crate::measures::Instant;
+use crate::output::csv::{CsvWriter, gaps_path};
 use crate::output::rheology::{self, Rheology};
-use crate::output::{Draft, Mark, OutputError, ResultPaths, RowsError, drafts, forces};
+use crate::output::solver_log::{SolverLog, SolverRow};
+use crate::output::{Draft, FileError, Mark, ResultPaths, RowsError, drafts, forces};
 use crate::rheology::{RheologyError, RheologyMeans};
 use crate::simulation::{Simulation, StepError};
+use crate::trajectory::Row;
 
 /// Means of the rheology that a run has written, if it writes any.
 ///
@@ -30,19 +35,14 @@ pub(super) fn means_of_rheology(case: &Case, csv: &Path) -> Result<Option<Rheolo
 /// The tables of a run in progress.
 #[derive(Debug)]
 pub(super) struct Tables {
+    trajectory: CsvWriter,
     rheology: Option<Draft>,
     forces: Option<Draft>,
-}
-
-/// How far the tables had come.
-#[derive(Clone, Debug)]
-pub(super) struct TableMarks {
-    pub rheology: Option<Mark>,
-    pub forces: Option<Mark>,
+    solver: SolverLog,
 }
 
 /// Drafts of the tables of a case that earlier runs left.
-pub(super) fn earlier_drafts(case: &Case, csv: &Path) -> Result<Vec<PathBuf>, OutputError> {
+pub(super) fn earlier_drafts(case: &Case, csv: &Path) -> Result<Vec<PathBuf>, FileError> {
     let solver = ResultPaths::of_csv(csv).solver();
     let of_all = [Some(csv.to_owned()), gaps_path(csv, case.particles.len()), Some(solver)];
     let tables = of_all.into_iter().chain(paths(case, csv)).flatten();
@@ -57,43 +57,65 @@ fn paths(case: &Case, csv: &Path) -> [Option<PathBuf>; 2] {
 
 impl Tables {
     /// Starts those that a case has.
-    pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError> {
+    pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError>
+    where
+        Dim<D>: Space<D>,
+    {
         let create = |path: Option<PathBuf>, header: String| {
             path.map(|path| Draft::with_header(&path, &header)).transpose()
         };
         let [rheology, forces] = paths(case, csv);
         Ok(Self {
+            trajectory: CsvWriter::create::<D>(csv, case.particles.len())?,
             rheology: create(rheology, rheology::header::<D>(case.shear_stress.is_some()))?,
             forces: create(forces, forces::header::<D>(case.given_particles()))?,
+            solver: SolverLog::create(csv)?,
         })
     }
 
-    /// Goes on with them at these marks.
-    pub fn resume(csv: &Path, marks: &TableMarks) -> Result<Self, RowsError> {
+    /// Goes on with them where they were at a checkpoint of a run of so many particles; `visit` sees the rows
+    /// of the trajectory up to there.
+    pub fn resume<const D: usize>(
+        csv: &Path,
+        checkpoint: &Checkpoint<D>,
+        particle_count: usize,
+        visit: impl FnMut(&Instant<D>),
+    ) -> Result<Self, RowsError>
+    where
+        Dim<D>: Space<D>,
+    {
+        let TableMarks { trajectory, gaps, rheology, forces, solver } = &checkpoint.tables;
         let paths = ResultPaths::of_csv(csv);
         let resume = |path: PathBuf, mark: &Option<Mark>| {
             mark.as_ref().map(|mark| Draft::resume(&path, mark)).transpose()
         };
         Ok(Self {
-            rheology: resume(paths.rheology(), &marks.rheology)?,
-            forces: resume(paths.forces(), &marks.forces)?,
+            rheology: resume(paths.rheology(), rheology)?,
+            forces: resume(paths.forces(), forces)?,
+            solver: SolverLog::resume(csv, solver, &checkpoint.phases)?,
+            trajectory: CsvWriter::resume(csv, trajectory, gaps.as_ref(), particle_count, visit)?,
         })
     }
 
-    /// Adds the rows of the step that was predicted and corrected last.
-    pub fn write<const D: usize, H>(
+    /// Adds the rows of the step that was predicted and corrected last, and gives the smallest gap of any pair
+    /// in mean radii, if there is one.
+    pub fn write<const D: usize, H, C>(
         &mut self,
-        simulation: &Simulation<D, H, Contacts<'_, D>>,
-        smallest_gap_over_a: Option<f64>,
-    ) -> Result<(), RunError>
+        case: &Case,
+        simulation: &Simulation<D, H, C>,
+    ) -> Result<Option<f64>, RunError>
     where
         Dim<D>: Space<D>,
         H: Hydrodynamics<D>,
+        C: Surrounded<D>,
         HydrodynamicsError: From<H::Error>,
     {
         let (step, time) = (simulation.step_index(), simulation.time());
+        let (particles, twists) = (simulation.particles(), simulation.twists());
+        let row = Row { time, particles, twists, domain: simulation.contact().domain() };
+        let smallest_gap_over_a = self.trajectory.write(&row, &simulation.contact().pair_forces(case))?;
         if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
-            let stress = with_contacts(*stress, simulation.contact(), simulation.particles())
+            let stress = with_contacts(*stress, simulation.contact(), particles)
                 .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
             let time_and_rate = simulation.time_and_rate();
@@ -103,20 +125,30 @@ impl Tables {
         if let (Some(forces), Some(holding)) = (&mut self.forces, simulation.holding()) {
             forces.write(&forces::line(time, holding))?;
         }
-        Ok(())
+        Ok(smallest_gap_over_a)
+    }
+
+    /// Adds what a step cost.
+    pub fn write_effort(&mut self, row: &SolverRow<'_>) -> Result<(), RowsError> {
+        self.solver.write(row)
+    }
+
+    /// The file of the trajectory until it is complete.
+    pub fn path(&self) -> &Path {
+        self.trajectory.path()
     }
 
     /// How far they have come.
     pub fn marks(&self) -> TableMarks {
-        TableMarks {
-            rheology: self.rheology.as_ref().map(Draft::mark),
-            forces: self.forces.as_ref().map(Draft::mark),
-        }
+        let (trajectory, gaps) = self.trajectory.marks();
+        let [rheology, forces] = [&self.rheology, &self.forces].map(|table| table.as_ref().map(Draft::mark));
+        TableMarks { trajectory, gaps, rheology, forces, solver: self.solver.mark() }
     }
 
     /// Gives the complete files their names.
-    pub fn finish(self) -> Result<(), OutputError> {
-        self.rheology.map_or(Ok(()), Draft::finish)?;
-        self.forces.map_or(Ok(()), Draft::finish)
+    pub fn finish(self) -> Result<(), FileError> {
+        self.trajectory.finish()?;
+        [self.rheology, self.forces].into_iter().flatten().try_for_each(Draft::finish)?;
+        self.solver.finish()
     }
 }

@@ -22,7 +22,7 @@ impl StrainClock {
 
     /// Goes on to a prediction after so many steps of the strain `step_length` and a share of the next, where
     /// the rate is `rate`.
-    pub(super) fn reach(&mut self, (step, share): (usize, f64), step_length: f64, rate: f64) {
+    pub(super) fn reach(&mut self, step: usize, share: f64, step_length: f64, rate: f64) {
         let now = rate.abs().recip();
         if let Some((last, last_share, before)) = self.last {
             // Shares are powers of two: exactly one after a whole step.
@@ -41,12 +41,12 @@ mod tests {
     fn time_is_that_of_the_strain_over_the_rate() {
         let mut clock = StrainClock::default();
         for (step, time) in [(0, 0.0), (0, 0.0), (1, 0.3), (1, 0.3), (2, 0.5)] {
-            clock.reach((step, 0.0), 0.1, [0.25, 0.5, 0.5][step]);
+            clock.reach(step, 0.0, 0.1, [0.25, 0.5, 0.5][step]);
             assert!((clock.time() - time).abs() < 1e-15, "{step}: {}", clock.time());
         }
         // A step in two parts.
-        clock.reach((2, 0.5), 0.1, 1.0);
-        clock.reach((3, 0.0), 0.1, 1.0);
+        clock.reach(2, 0.5, 0.1, 1.0);
+        clock.reach(3, 0.0, 0.1, 1.0);
         assert!((clock.time() - 0.625).abs() < 1e-15, "{}", clock.time());
     }
 }

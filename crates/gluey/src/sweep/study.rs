@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{Point, PointState, SweepError};
-use crate::output::{OutputError, write_atomically};
+use crate::output::{FileError, write_atomically};
 use crate::run::TABLE_OF_STUDY;
 
 /// Counts changes of the layout of [`Manifest`].
@@ -111,7 +111,7 @@ impl Study {
     }
 
     /// Writes down the study with its earlier points and these.
-    fn write(&self, mut all: Vec<NamedPoint>, points: &[Point]) -> Result<(), OutputError> {
+    fn write(&self, mut all: Vec<NamedPoint>, points: &[Point]) -> Result<(), FileError> {
         for Point { name, values, .. } in points {
             let point = NamedPoint { name: name.clone(), values: values.clone() };
             if !all.contains(&point) {
@@ -122,9 +122,9 @@ impl Study {
         let manifest = Manifest { layout: LAYOUT, gluey, keys: self.keys.clone(), points: all };
         let path = self.manifest();
         let encoded = serde_json::to_string_pretty(&manifest).map_err(io::Error::from);
-        let text = encoded.map_err(|error| OutputError::new(&path, "encode the study", error))?;
+        let text = encoded.map_err(|error| FileError::new(&path, "encode the study", error))?;
         fs::create_dir_all(&self.folder)
-            .map_err(|error| OutputError::new(&self.folder, "create the folder", error))?;
+            .map_err(|error| FileError::new(&self.folder, "create the folder", error))?;
         write_atomically(&path, format!("{text}\n").as_bytes())
     }
 
@@ -132,7 +132,7 @@ impl Study {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn write_table(&self, rows: &[Vec<String>]) -> Result<(), OutputError> {
+    pub fn write_table(&self, rows: &[Vec<String>]) -> Result<(), FileError> {
         let line =
             |row: &Vec<String>| row.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
         let text: String = rows.iter().map(line).collect();

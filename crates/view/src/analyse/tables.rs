@@ -1,7 +1,6 @@
 //! The tables, as comma-separated values; lengths in mean radii. A cell without a number is empty.
 
-use std::fmt::Write as _;
-
+use gluey::output::line_of;
 use gluey_geom::{Dim, Space};
 use gluey_suspension::structure::GapStatistics;
 
@@ -37,16 +36,7 @@ impl Table {
     }
 
     fn row(&mut self, numbers: impl IntoIterator<Item = Option<f64>>) {
-        let mut separator = "";
-        for number in numbers {
-            self.0.push_str(separator);
-            if let Some(number) = number {
-                // Writing to a string cannot fail.
-                let _ = write!(self.0, "{number:.9e}");
-            }
-            separator = ",";
-        }
-        self.0.push('\n');
+        self.0.push_str(&line_of(numbers, 9));
     }
 }
 

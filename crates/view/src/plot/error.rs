@@ -1,10 +1,9 @@
 //! Why results could not be drawn.
 
-use std::io;
 use std::path::PathBuf;
 
 use gluey::case::CaseError;
-use gluey::output::OutputError;
+use gluey::output::FileError;
 use gluey::output::vtk::VtkReadError;
 use gluey::sweep::SweepError;
 use gluey::table::TableError;
@@ -17,27 +16,11 @@ use crate::frames::FramesError;
 /// Why results could not be drawn.
 #[derive(Debug, Error)]
 pub enum PlotError {
-    /// The folder could not be listed.
-    #[error("{}: cannot be listed", folder.display())]
-    List {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
     /// No trajectory.
     #[error("{}: no trajectory <name>.csv of `gluey run`", folder.display())]
     NoResults {
         /// The folder.
         folder: PathBuf,
-    },
-    /// A file could not be read.
-    #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
     },
     /// A file is no table, or lacks a column.
     #[error("{}: {source}", path.display())]
@@ -192,9 +175,9 @@ pub enum PlotError {
         /// Why.
         source: EncodingError,
     },
-    /// A picture could not be written.
+    /// A file could not be read or written, or a folder not listed.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    File(#[from] FileError),
 }
 
 /// The first, the second and the last.

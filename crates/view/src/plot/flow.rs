@@ -16,7 +16,7 @@ use gluey_pictures::{Canvas, PIXELS_PER_MM, Raster, Stroke, color_scale};
 use gluey_suspension::Container;
 
 use super::error::PlotError;
-use super::snapshot::{EDGE, FrameChoice, PERIODIC, images};
+use super::snapshot::{EDGE, FrameChoice, PERIODIC};
 use super::told::{told, told_to};
 pub use choice::{FlowOptions, Quantity, SliceChoice};
 use files::FlowFrame;
@@ -73,7 +73,7 @@ where
     let view = View::new(&plane, width, MARGIN);
     let (columns, rows) = view.pixels(MOST_PIXELS);
     let sampling = Sampling { fields: &fields, shear, quantity: options.quantity };
-    let samples = sampling.samples(&plane, (columns, rows));
+    let samples = sampling.samples(&plane, columns, rows);
     let circles = circles(&container, &particles, &plane);
     let picture = Picture { plane, view, samples, circles, quantity: options.quantity };
     picture.draw(&caption(frame, &picture.plane), &frame.fields)
@@ -105,7 +105,8 @@ where
     let mut circles = Vec::new();
     for particle in particles {
         let own = container.wrapped(&particle.pose.position);
-        let all = std::iter::once(own).chain(images(container, &own, particle.radius));
+        let images = container.images_inside(&own, particle.radius).into_iter().map(|(_, center)| center);
+        let all = std::iter::once(own).chain(images);
         circles.extend(all.filter_map(|center| {
             let radius = plane.cut(&center, particle.radius)?;
             Some((plane.place(&center), radius))
@@ -136,7 +137,7 @@ impl<const D: usize> Picture<D> {
         let outline = self.plane.corners.map(|corner| self.view.on_paper(corner));
         let head = 0.25 * self.arrow_distance();
         canvas.clipped(&outline, |canvas| {
-            canvas.arrows(&self.arrows(), ([255; 3], [40; 3]), head);
+            canvas.arrows(&self.arrows(), [255; 3], [40; 3], head);
             for (center, radius) in &self.circles {
                 let (center, radius) = (self.view.on_paper(*center), radius * self.view.scale);
                 canvas.circle(center, radius, PARTICLE, PARTICLE_EDGE);
@@ -156,7 +157,7 @@ impl<const D: usize> Picture<D> {
 
     fn is_fluid(&self, pixel: usize) -> bool {
         let (columns, rows) = (self.samples.columns, self.samples.rows);
-        let at = self.plane.middle_of((pixel % columns, pixel / columns), (columns, rows));
+        let at = self.plane.middle_of(pixel % columns, pixel / columns, columns, rows);
         self.circles.iter().all(|(center, radius)| (at.0 - center.0).hypot(at.1 - center.1) > *radius)
     }
 

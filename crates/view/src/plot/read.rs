@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use gluey::ResultPaths;
 use gluey::case::{Case, Hydrodynamics};
-use gluey::output::{entries, rows_of, undrafted, whole_lines};
+use gluey::output::{FileError, entries, rows_of, undrafted, whole_lines};
 use gluey::table::Table;
 use gluey_pictures::Curve;
 
@@ -183,7 +183,7 @@ pub fn results_in(folder: &Path) -> Result<Vec<Results>, PlotError> {
 
 /// What is in a folder, sorted.
 pub(super) fn listed(folder: &Path) -> Result<Vec<PathBuf>, PlotError> {
-    entries(folder).map_err(|source| PlotError::List { folder: folder.to_owned(), source })
+    Ok(entries(folder).map_err(|error| FileError::new(folder, "be listed", error))?)
 }
 
 /// Whether a file begins as trajectories do.
@@ -193,11 +193,11 @@ fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
         File::open(path)?.take(HEADER.len() as u64).read_to_end(&mut start)?;
         Ok(start == HEADER)
     };
-    begins().map_err(|source| PlotError::Read { path: path.to_owned(), source })
+    Ok(begins().map_err(|error| FileError::unread(path, error))?)
 }
 
 fn read(path: PathBuf) -> Result<Source, PlotError> {
-    let text = whole_lines(&path).map_err(|source| PlotError::Read { path: path.clone(), source })?;
+    let text = whole_lines(&path)?;
     match Table::parse(&numbers(&text)) {
         Ok(table) => Ok(Source { path, table }),
         Err(source) => Err(PlotError::Table { path, source }),

@@ -173,9 +173,9 @@ impl Scene {
             let (radius, measure) = (frame.radii[i], measures[i]);
             let own = container.wrapped(position);
             balls.push(Seen { at: view.turned(&own), radius, measure, is_image: false });
-            let images = images(&container, &own, radius);
-            let seen = |x| Seen { at: view.turned(x), radius, measure, is_image: true };
-            balls.extend(images.iter().map(seen));
+            let images = container.images_inside(&own, radius).into_iter();
+            let seen = |(_, x)| Seen { at: view.turned(&x), radius, measure, is_image: true };
+            balls.extend(images.map(seen));
         }
         balls.sort_by(|one, other| one.at[2].total_cmp(&other.at[2]));
         let links = look.network.map_or(Vec::new(), |reach| links(frame, &container, view, reach));
@@ -228,7 +228,7 @@ impl Scene {
         for [from, to] in &self.links {
             canvas.line(on_paper(*from), on_paper(*to), LINK);
         }
-        self.draw_legend(&mut canvas, most, (width, height - legend));
+        self.draw_legend(&mut canvas, most, width, height - legend);
         canvas
     }
 
@@ -279,7 +279,7 @@ impl Scene {
         runs.map(|run| [at(run[0]), at(run[run.len() - 1] + 1)]).collect()
     }
 
-    fn draw_legend(&self, canvas: &mut Canvas, most: f64, (width, top): (f64, f64)) {
+    fn draw_legend(&self, canvas: &mut Canvas, most: f64, width: f64, top: f64) {
         let [name, low, high] = self.look.legend(most);
         let (left, y, length) = (MARGIN, top + 40.0, 0.4 * width);
         canvas.text(left, y - 7.0, 15.0, "start", &name);
@@ -319,25 +319,6 @@ where
     links
 }
 
-/// Images of a ball that reach into the box, without the ball.
-pub(super) fn images<const D: usize>(container: &Container<D>, x: &Vector<D>, radius: f64) -> Vec<Vector<D>> {
-    let (lattice, bounds) = (container.lattice(), container.bounds());
-    let all = (0..3_i32.pow(D as u32)).map(|n| std::array::from_fn(|d| n / 3_i32.pow(d as u32) % 3 - 1));
-    let periodic = all.filter(|image: &[i32; D]| {
-        *image != [0; D] && (0..D).all(|d| image[d] == 0 || !container.is_walled(d))
-    });
-    // Along x a slanted border is further away than it is straight across.
-    let slant = 1.0_f64.hypot(lattice.shear());
-    let reaches = |image: &Vector<D>| {
-        let place = lattice.to_box(image, bounds.lower[1]);
-        (0..D).all(|d| {
-            let reach = if d == 0 { radius * slant } else { radius };
-            place[d] > bounds.lower[d] - reach && place[d] < bounds.upper[d] + reach
-        })
-    };
-    periodic.map(|image| *x + lattice.shift(&image)).filter(reaches).collect()
-}
-
 fn edges<const D: usize>(container: &Container<D>, view: Viewpoint) -> Vec<([[f64; 3]; 2], bool)> {
     let (lattice, bounds) = (container.lattice(), container.bounds());
     let corner = |n: usize| {
@@ -374,17 +355,6 @@ mod tests {
             [[0.0, 0.5], [1.5, 2.0]]
         );
         assert_eq!(scene(vec![ball(-0.6)]).unhidden(edge), [edge]);
-    }
-
-    #[test]
-    fn balls_across_periodic_borders_have_images() {
-        let container = Container::<2>::periodic(&Vector::<2>::repeat(1.0)).tilted(0.25);
-        let inside = Vector::<2>::new(0.6, 0.5);
-        assert!(images(&container, &inside, 0.1).is_empty());
-        let found = images(&container, &Vector::<2>::new(0.5, 0.95), 0.1);
-        assert_eq!(found.len(), 1, "{found:?}");
-        assert!((found[0] - Vector::<2>::new(0.25, -0.05)).norm() < 1e-12, "{found:?}");
-        assert_eq!(images(&container, &Vector::<2>::new(0.05, 0.05), 0.1).len(), 3, "in a corner");
     }
 
     #[test]

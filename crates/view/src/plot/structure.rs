@@ -50,15 +50,16 @@ fn contacts(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
         ("fabric_zz", "fabric *zz*", PALETTE[3]),
     ];
     Ok(vec![
-        of_columns(&source, (name, label), "contacts of a particle", &[("contacts", "", ALONE)], &[0.0])?,
+        of_columns(&source, name, label, "contacts of a particle", &[("contacts", "", ALONE)], &[0.0])?,
         of_columns(
             &source,
-            (name, label),
+            name,
+            label,
             "part in the largest cluster",
             &[("largest_cluster", "", ALONE)],
             &[0.0],
         )?,
-        of_columns(&source, (name, label), "fabric", &fabric, &[0.0])?,
+        of_columns(&source, name, label, "fabric", &fabric, &[0.0])?,
     ])
 }
 
@@ -108,15 +109,15 @@ fn profiles(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
     let Some(source) = tables.table("profile_y.csv", Figure::Profiles, is_needed)? else {
         return Ok(Vec::new());
     };
-    let height = ("y", "height *y* (lengths of the case)");
+    let height = "height *y* (lengths of the case)";
     let velocities = [
         ("velocity_x", "along *x*", PALETTE[0]),
         ("velocity_y", "along *y*", PALETTE[1]),
         ("velocity_z", "along *z*", PALETTE[3]),
     ];
     Ok(vec![
-        of_columns(&source, height, "volume fraction", &[("fraction", "", ALONE)], &[0.0])?,
-        of_columns(&source, height, "velocity (length / time)", &velocities, &[])?,
+        of_columns(&source, "y", height, "volume fraction", &[("fraction", "", ALONE)], &[0.0])?,
+        of_columns(&source, "y", height, "velocity (length / time)", &velocities, &[])?,
     ])
 }
 
@@ -182,7 +183,8 @@ fn clock(
 /// Columns against another one; those of the third axis are there in 3D only.
 fn of_columns(
     source: &Source,
-    (across, label): (&str, &str),
+    across: &str,
+    label: &str,
     name: &str,
     columns: &[Column],
     shown: &[f64],

@@ -10,12 +10,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use gluey_contact::{Contact, Domain};
-use gluey_geom::{Dim, Particle, Space, Twist};
-use gluey_motion::Fields;
+use gluey_geom::{Dim, Space};
 
-use super::{Frame, ShownBox, VtkWriter};
-use crate::output::OutputError;
+use super::{Frame, VtkWriter};
+use crate::output::FileError;
 
 /// Frames that may wait.
 const QUEUE: usize = 1;
@@ -47,28 +45,12 @@ impl Drop for Passage {
     }
 }
 
-/// A frame that outlives its step.
-struct Kept<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    step: usize,
-    time: f64,
-    particles: Vec<Particle<D>>,
-    twists: Vec<Twist<D>>,
-    contacts: Vec<Contact>,
-    domain: Domain<D>,
-    in_box: Option<ShownBox<D>>,
-    fields: Option<Fields<D>>,
-    /// Ends when the frame is on disk, or given up.
-    _passage: Passage,
-}
-
 enum Message<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    Frame(Box<Kept<D>>),
+    /// A frame, and what ends when it is on disk, or given up.
+    Frame(Box<Frame<D>>, Passage),
     /// An answer is due when all frames before are on disk.
     Flush(SyncSender<()>),
 }
@@ -83,7 +65,7 @@ where
     on_their_way: OnTheirWay,
     queue: Option<SyncSender<Message<D>>>,
     /// Nothing once it ended, which it does before it is told to only where a frame could not be written.
-    thread: Option<JoinHandle<Result<(), OutputError>>>,
+    thread: Option<JoinHandle<Result<(), FileError>>>,
 }
 
 impl<const D: usize> FrameWriter<D>
@@ -91,55 +73,45 @@ where
     Dim<D>: Space<D>,
 {
     /// Starts the thread; `on_their_way` counts its frames.
-    pub fn new(writer: VtkWriter, on_their_way: OnTheirWay) -> Result<Self, OutputError> {
+    pub fn new(writer: VtkWriter, on_their_way: OnTheirWay) -> Result<Self, FileError> {
         let folder = writer.folder.clone();
         let (queue, messages) = sync_channel(QUEUE);
         let thread = thread::Builder::new().name("frames".to_owned()).spawn(move || serve(writer, messages));
         let thread =
-            thread.map_err(|error| OutputError::new(&folder, "start a thread for the folder", error))?;
+            thread.map_err(|error| FileError::new(&folder, "start a thread for the folder", error))?;
         Ok(Self { folder, on_their_way, queue: Some(queue), thread: Some(thread) })
     }
 
     /// Has a frame written; waits while two others are on their way.
-    pub fn write(&mut self, frame: &Frame<'_, D>, fields: Option<Fields<D>>) -> Result<(), OutputError> {
-        self.send(Message::Frame(Box::new(Kept {
-            step: frame.step,
-            time: frame.time,
-            particles: frame.particles.to_vec(),
-            twists: frame.twists.to_vec(),
-            contacts: frame.contacts.to_vec(),
-            domain: frame.domain.clone(),
-            in_box: frame.in_box,
-            fields,
-            _passage: self.on_their_way.begin(),
-        })))
+    pub fn write(&mut self, frame: Frame<D>) -> Result<(), FileError> {
+        self.send(Message::Frame(Box::new(frame), self.on_their_way.begin()))
     }
 
     /// Returns when all frames are on disk.
-    pub fn flush(&mut self) -> Result<(), OutputError> {
+    pub fn flush(&mut self) -> Result<(), FileError> {
         let (answer, answered) = sync_channel(1);
         self.send(Message::Flush(answer))?;
         answered.recv().or_else(|_| self.failure())
     }
 
     /// Ends the thread when all frames are on disk.
-    pub fn finish(mut self) -> Result<(), OutputError> {
+    pub fn finish(mut self) -> Result<(), FileError> {
         if self.thread.is_some() { self.end() } else { self.failure() }
     }
 
-    fn send(&mut self, message: Message<D>) -> Result<(), OutputError> {
+    fn send(&mut self, message: Message<D>) -> Result<(), FileError> {
         let sent = self.queue.as_ref().map(|queue| queue.send(message));
         if matches!(sent, Some(Ok(()))) { Ok(()) } else { self.failure() }
     }
 
     /// The error that ended the thread before it was told to.
-    fn failure(&mut self) -> Result<(), OutputError> {
+    fn failure(&mut self) -> Result<(), FileError> {
         self.end()?;
         let lost = io::Error::other("an earlier frame could not be written");
-        Err(OutputError::new(&self.folder, "write into the folder", lost))
+        Err(FileError::new(&self.folder, "write into the folder", lost))
     }
 
-    fn end(&mut self) -> Result<(), OutputError> {
+    fn end(&mut self) -> Result<(), FileError> {
         self.queue = None;
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
@@ -163,22 +135,13 @@ where
     }
 }
 
-fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<Message<D>>) -> Result<(), OutputError>
+fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<Message<D>>) -> Result<(), FileError>
 where
     Dim<D>: Space<D>,
 {
     for message in messages {
         match message {
-            Message::Frame(frame) => writer.write(&Frame {
-                step: frame.step,
-                time: frame.time,
-                particles: &frame.particles,
-                twists: &frame.twists,
-                contacts: &frame.contacts,
-                domain: &frame.domain,
-                in_box: frame.in_box,
-                fields: frame.fields.as_ref(),
-            })?,
+            Message::Frame(frame, _passage) => writer.write(&frame)?,
             // Whoever asked has gone if this fails.
             Message::Flush(answer) => drop(answer.send(())),
         }
@@ -188,22 +151,23 @@ where
 
 #[cfg(test)]
 mod tests {
+    use gluey_contact::Domain;
+
     use super::*;
 
-    fn frame<'a>(step: usize, particles: &'a [Particle<2>], domain: &'a Domain<2>) -> Frame<'a, 2> {
-        let (twists, contacts) = (&[][..], &[][..]);
+    fn frame(step: usize) -> Frame<2> {
+        let (particles, twists, contacts, domain) = (vec![], vec![], vec![], Domain::default());
         Frame { step, time: step as f64, particles, twists, contacts, domain, in_box: None, fields: None }
     }
 
     #[test]
     fn frames_keep_their_order_and_are_there_when_flushed() {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::default();
         let mut frames =
             FrameWriter::new(VtkWriter::create(folder.path(), &[]).expect("a folder"), OnTheirWay::default())
                 .expect("a thread");
         for step in 0..5 {
-            frames.write(&frame(step, &[], &domain), None).expect("a frame");
+            frames.write(frame(step)).expect("a frame");
         }
         frames.flush().expect("on disk");
         frames.on_their_way.wait();
@@ -216,18 +180,17 @@ mod tests {
     #[test]
     fn a_frame_that_cannot_be_written_is_told() {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::default();
         // Where a file should be there is a folder.
         std::fs::create_dir(folder.path().join("particles-000001.vtu")).expect("a folder");
         let writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
         let mut frames = FrameWriter::new(writer, OnTheirWay::default()).expect("a thread");
-        frames.write(&frame(0, &[], &domain), None).expect("a frame");
-        frames.write(&frame(1, &[], &domain), None).expect("not known yet");
+        frames.write(frame(0)).expect("a frame");
+        frames.write(frame(1)).expect("not known yet");
         let error = frames.flush().expect_err("a frame is missing");
         assert!(error.path.ends_with("particles-000001.vtu"), "{error}");
         assert!(frames.flush().is_err(), "the frame is still missing");
         frames.on_their_way.wait();
-        assert!(frames.write(&frame(2, &[], &domain), None).is_err());
+        assert!(frames.write(frame(2)).is_err());
         assert!(frames.finish().is_err());
     }
 }

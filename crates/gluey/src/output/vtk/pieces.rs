@@ -9,25 +9,28 @@ use gluey_motion::Fields;
 use super::grid::{FIELDS, fields_piece};
 use super::xml::{self, Piece, VtkEncoding};
 use crate::case::Precision;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{FileError, write_atomically};
 
 /// Writes the fields in the cells of `rank` at a step into a folder that is there.
 pub fn write_piece<const D: usize>(
     folder: &Path,
-    (step, rank): (usize, usize),
+    step: usize,
+    rank: usize,
     fields: &Fields<D>,
     encoding: VtkEncoding,
-) -> Result<(), OutputError> {
+) -> Result<(), FileError> {
     xml::write(&folder.join(piece_name(FIELDS, step, rank)), fields_piece(fields), encoding)
 }
 
 /// Writes the piece of rank zero and, when those of all others are there, the file that names all `count`.
 pub(super) fn write_first(
     folder: &Path,
-    (series, step, count): (&str, usize, usize),
+    series: &str,
+    step: usize,
+    count: usize,
     piece: Piece,
     encoding: VtkEncoding,
-) -> Result<(), OutputError> {
+) -> Result<(), FileError> {
     let names: Vec<String> = (0..count).map(|rank| piece_name(series, step, rank)).collect();
     let index = index(&piece, encoding.precision, &names);
     xml::write(&folder.join(piece_name(series, step, 0)), piece, encoding)?;

@@ -47,14 +47,10 @@ where
         })
         .collect();
     for own in 0..particles.len() {
-        for number in 0..3_usize.pow(D as u32) {
-            let image: [i32; D] = std::array::from_fn(|d| (number / 3_usize.pow(d as u32) % 3) as i32 - 1);
-            let exists = (0..D).all(|d| image[d] == 0 || !container.is_walled(d));
-            let center = list[own].center + container.lattice().shift(&image);
-            if exists && image != [0; D] && reaches_in(&container, &center, particles[own].radius) {
-                let slide = list[own].slide + f64::from(image[1]) * slide;
-                list.push(Shown { particle: own, center, slide, is_image: true });
-            }
+        let Shown { center, slide: of_own, .. } = list[own];
+        for (image, center) in container.images_inside(&center, particles[own].radius) {
+            let slide = of_own + f64::from(image[1]) * slide;
+            list.push(Shown { particle: own, center, slide, is_image: true });
         }
     }
     list
@@ -63,18 +59,6 @@ where
 /// By how many periods in `y` a displacement leads up.
 fn periods_up<const D: usize>(container: &Container<D>, by: &Vector<D>) -> f64 {
     container.lattice().periods()[1].map_or(0.0, |period| (by[1] / period).round())
-}
-
-/// Whether a ball reaches into the box, or nearly so at an edge.
-fn reaches_in<const D: usize>(container: &Container<D>, center: &Vector<D>, radius: f64) -> bool {
-    let bounds = container.bounds();
-    let place = container.lattice().to_box(center, bounds.lower[1]);
-    // The borders across x are slanted.
-    let slant = 1f64.hypot(container.lattice().shear());
-    (0..D).all(|d| {
-        let reach = radius * if d == 0 { slant } else { 1.0 };
-        place[d] > bounds.lower[d] - reach && place[d] < bounds.upper[d] + reach
-    })
 }
 
 #[cfg(test)]

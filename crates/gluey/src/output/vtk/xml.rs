@@ -18,7 +18,7 @@ use vtkio::model::{
 use vtkio::xml::Compressor;
 
 use crate::case::Precision;
-use crate::output::{OutputError, write_atomically};
+use crate::output::{FileError, write_atomically};
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
@@ -63,9 +63,9 @@ pub(super) struct Piece {
 }
 
 /// Writes the file that holds `piece`, whole or not at all.
-pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), OutputError> {
+pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), FileError> {
     let text = document(piece, encoding);
-    let text = text.map_err(|error| OutputError::new(path, "encode the file", error))?;
+    let text = text.map_err(|error| FileError::new(path, "encode the file", error))?;
     write_atomically(path, text.as_bytes())
 }
 

@@ -1,6 +1,6 @@
 //! Frames in extended XYZ, read back.
 
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
@@ -8,6 +8,7 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_suspension::Container;
 use thiserror::Error;
 
+use super::super::FileError;
 use super::{PROPERTIES, WITH_FORCES, XyzFrame};
 use crate::text::{decoded, visible};
 
@@ -19,13 +20,8 @@ const COUNT_WITH_FORCES: usize = 13;
 #[derive(Debug, Error)]
 pub enum XyzError {
     /// It could not be read.
-    #[error("{}: cannot be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// It has no particles.
     #[error("{}:{line}: no particles", path.display())]
     Empty {
@@ -59,7 +55,7 @@ pub fn read_text(path: &Path) -> Result<String, XyzError> {
         }
         decoded(unpacked)
     };
-    read().map_err(|source| XyzError::Read { path: path.to_owned(), source })
+    Ok(read().map_err(|error| FileError::unread(path, error))?)
 }
 
 /// The dimension of space of a frame.

@@ -70,10 +70,10 @@ impl<const D: usize> Plane<D> {
     }
 
     /// The point of space at a place in the plane.
-    pub fn point(&self, (right, high): (f64, f64)) -> Vector<D> {
+    pub fn point(&self, place: (f64, f64)) -> Vector<D> {
         Vector::from_fn(|d, _| match d {
-            d if d == self.across => right,
-            d if d == self.up => high,
+            d if d == self.across => place.0,
+            d if d == self.up => place.1,
             _ => self.at,
         })
     }
@@ -88,18 +88,14 @@ impl<const D: usize> Plane<D> {
     }
 
     /// The middle of a pixel, whose rows count from above.
-    pub fn middle_of(&self, (column, row): (usize, usize), (columns, rows): (usize, usize)) -> (f64, f64) {
+    pub fn middle_of(&self, column: usize, row: usize, columns: usize, rows: usize) -> (f64, f64) {
         let [left, low, right, high] = self.bounds;
         let part = |n: usize, count: usize| (n as f64 + 0.5) / count as f64;
         (left + part(column, columns) * (right - left), high - part(row, rows) * (high - low))
     }
 
     /// Columns and rows of the pixels whose middles lie in a rectangle: left, low, right, high.
-    pub fn pixels_in(
-        &self,
-        rectangle: [f64; 4],
-        (columns, rows): (usize, usize),
-    ) -> [std::ops::Range<usize>; 2] {
+    pub fn pixels_in(&self, rectangle: [f64; 4], columns: usize, rows: usize) -> [std::ops::Range<usize>; 2] {
         let [left, low, right, high] = self.bounds;
         let range = |from: f64, to: f64, count: usize| {
             let place = |part: f64| (part * count as f64).clamp(0.0, count as f64);
@@ -155,7 +151,8 @@ impl View {
     }
 
     /// A place of the plane.
-    pub fn on_paper(&self, (right, high): (f64, f64)) -> (f64, f64) {
-        (self.corner.0 + self.scale * (right - self.left), self.corner.1 + self.scale * (self.high - high))
+    pub fn on_paper(&self, place: (f64, f64)) -> (f64, f64) {
+        let [right, down] = [place.0 - self.left, self.high - place.1];
+        (self.corner.0 + self.scale * right, self.corner.1 + self.scale * down)
     }
 }

@@ -66,7 +66,7 @@ struct Cell<'a, const D: usize> {
 
 impl<'a, const D: usize> Sampling<'a, D> {
     /// The flow at the middles of the pixels. Of a pixel between cells the last of them decides.
-    pub fn samples(&self, plane: &Plane<D>, (columns, rows): (usize, usize)) -> Samples<D> {
+    pub fn samples(&self, plane: &Plane<D>, columns: usize, rows: usize) -> Samples<D> {
         let mut all = vec![None; columns * rows];
         for nodes in self.fields.cells.chunks_exact(3usize.pow(D as u32)) {
             let cell = self.cell(nodes);
@@ -76,10 +76,10 @@ impl<'a, const D: usize> Sampling<'a, D> {
                 lower[0] += shift;
                 let cell = Cell { lower, ..cell };
                 let Some(rectangle) = cell.rectangle(plane) else { continue };
-                let [across, down] = plane.pixels_in(rectangle, (columns, rows));
+                let [across, down] = plane.pixels_in(rectangle, columns, rows);
                 for row in down {
                     for column in across.clone() {
-                        let x = plane.point(plane.middle_of((column, row), (columns, rows)));
+                        let x = plane.point(plane.middle_of(column, row, columns, rows));
                         if let Some(local) = cell.local(&x) {
                             all[row * columns + column] = Some(self.sample(&cell, &local, plane.normal));
                         }
