@@ -23,7 +23,7 @@ pub struct Reporter {
     steps: Option<Mutex<Instant>>,
 }
 
-/// What progress is shown on.
+/// The surface that progress is shown on.
 enum Surface {
     /// A terminal.
     Bar(ProgressBar),

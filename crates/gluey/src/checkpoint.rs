@@ -49,7 +49,7 @@ where
     pub pieces: Option<FlowPieces>,
 }
 
-/// How far the tables of a run had come.
+/// The places that the tables of a run had come to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TableMarks {
     /// The trajectory.
@@ -223,7 +223,7 @@ fn payload(path: &Path) -> Result<Payload, CheckpointError> {
     postcard::from_bytes(&bytes).map_err(|_| CheckpointError::Damaged { path: path.to_owned() })
 }
 
-/// What a checkpoint says of itself.
+/// The facts that a checkpoint tells of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckpointSummary {
     /// Layout of the file.

@@ -12,14 +12,14 @@ const DIGEST_LENGTH: usize = 32;
 /// Fast: fields of 64-bit numbers hardly get smaller at higher levels.
 const COMPRESSION_LEVEL: u32 = 1;
 
-/// What a kind of file begins with.
+/// A kind of file, by its beginning.
 pub(crate) struct Kind {
     pub magic: &'static [u8; 8],
     /// Counts changes of the layout of what is inside.
     pub layout: u32,
 }
 
-/// Why a file says nothing.
+/// Reasons why a file says nothing.
 #[derive(Debug)]
 pub(crate) enum Unopened {
     Read(io::Error),

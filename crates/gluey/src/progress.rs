@@ -13,7 +13,7 @@ use crate::number_text::shown;
 use crate::output::solver_log::SolverRow;
 use crate::tally::Tally;
 
-/// Where a run is.
+/// The place of a run: step, time and what is being done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProgressState {
     /// Steps done.
@@ -226,7 +226,7 @@ struct Shared {
     ended: Condvar,
 }
 
-/// What was reported last, if anything was.
+/// The last report, if there was any.
 #[derive(Debug, Default)]
 struct Place {
     has_ended: bool,

@@ -31,7 +31,7 @@ pub struct Reference {
     gap: Vec<f64>,
 }
 
-/// How far a run is from a [`Reference`], over the time they have in common.
+/// Distance of a run from a [`Reference`], over the time they have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// Relative error of the gap of particles 1 and 2 at the end.

@@ -75,7 +75,7 @@ where
     phases: PhaseTable,
 }
 
-/// How images slide along each other in simple shear for ever.
+/// Images that slide along each other in simple shear for ever.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sliding {
     /// The shear rate.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::number_text::{shown, shown_to};
 
-/// What a case is, in a few numbers.
+/// A case in a few numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct CaseSummary {
     /// Name of the case.

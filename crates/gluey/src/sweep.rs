@@ -80,7 +80,7 @@ pub enum SweepError {
     Output(#[from] FileError),
 }
 
-/// One run of a study.
+/// A run of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Its name, which its folder has too: `time.step=0.1+contact.strategy=none`.
@@ -93,7 +93,7 @@ pub struct Point {
     pub paths: ResultPaths,
 }
 
-/// How a point is.
+/// The state of a point.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointState {
     /// It was not run, or not as far as the first checkpoint.

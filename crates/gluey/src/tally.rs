@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// run.
 const SMALL_PUSH: f64 = 0.01;
 
-/// How the particles were moved in a step.
+/// The motion of the particles in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// Parts in which the step was done; 0 before it was.

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// What some programs begin a text with.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// Why a file is no text. It is the inside of an [`io::Error`] of the kind `InvalidData`.
+/// A reason why a file is no text. It is the inside of an [`io::Error`] of the kind `InvalidData`.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum NotText {
     /// Two bytes for a letter.

@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
 
 use crate::interpolate::cubic;
 
-/// Where particles are at one instant, and how they move.
+/// Particles at an instant, and how they move.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a, const D: usize>
 where

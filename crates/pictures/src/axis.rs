@@ -15,7 +15,7 @@ const PLAIN: [f64; 2] = [0.01, 1e5];
 /// Most decimals of a label.
 const MOST_DECIMALS: i32 = 14;
 
-/// One axis.
+/// An axis: label, ends and ticks.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Label with the markup of the [crate].

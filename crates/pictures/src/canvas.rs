@@ -35,7 +35,7 @@ pub struct Canvas {
     defined: BTreeSet<String>,
 }
 
-/// Why a drawing could not become a PNG.
+/// A reason why a drawing could not become a PNG.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
     /// The SVG is not readable.

@@ -1,6 +1,6 @@
 //! A curve, and how it is drawn.
 
-/// How a curve is drawn; one style means the same thing in every figure.
+/// The style of a curve, which means the same thing in every figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     /// CSS colour.

@@ -17,7 +17,7 @@ use crate::arrays::{FloatArray, Numbers, array, of_vectors, vectors};
 use crate::errors::plain;
 use crate::pool::compute;
 
-/// What a correction gives: velocities, contacts and a report.
+/// The outcome of a correction: velocities, contacts and a report.
 type Corrected<'py> = (Bound<'py, PyAny>, Bound<'py, PyDict>, Bound<'py, PyDict>);
 
 /// The contact model in a dimension.

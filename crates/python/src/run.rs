@@ -157,13 +157,13 @@ fn follow(
     }
 }
 
-/// Who is told where a run is.
+/// The functions that are told where a run is.
 struct Listener<'py> {
     progress: Option<Bound<'py, PyAny>>,
     notice: Bound<'py, PyAny>,
 }
 
-/// What a run told last.
+/// The last words of a run.
 #[derive(Default)]
 struct Watch {
     told: Mutex<RunState>,

@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use crate::errors::plain;
 use crate::pool::compute;
 
-/// What to draw; a dictionary with these keys.
+/// Options of pictures; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Plot {

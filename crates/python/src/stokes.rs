@@ -38,7 +38,7 @@ where
     middle: f64,
 }
 
-/// What drives a flow; a dictionary with these keys, without `hold` for free particles.
+/// The drive of a flow; a dictionary with these keys, without `hold` for free particles.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Drive<'py> {

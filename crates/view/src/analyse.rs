@@ -33,7 +33,7 @@ pub use summary::Summary;
 use crate::frames::{FramesError, dimension, frame_files, read_frames};
 use observe::{Distributions, Instant};
 
-/// What to analyse, and how.
+/// Options of an analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnalyseOptions {
     /// Folder of a run, or of its files in extended XYZ.
@@ -53,7 +53,7 @@ impl AnalyseOptions {
     }
 }
 
-/// Why a run could not be analysed.
+/// A reason why a run could not be analysed.
 #[derive(Debug, Error)]
 pub enum AnalyseError {
     /// Its frames could not be read.

@@ -48,7 +48,7 @@ pub use snapshot::FrameChoice;
 
 use read::{Results, Tables};
 
-/// How a picture is written.
+/// The format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Scalable, with its font.
@@ -78,7 +78,7 @@ impl FromStr for Format {
     }
 }
 
-/// What to draw, and how.
+/// Options of the pictures of a run or a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlotOptions {
     /// Folder of results, or of a study.

@@ -19,7 +19,7 @@ use crate::frames::{dimension, frame_files, read_frames};
 const PAGE: &str = include_str!("view/viewer.html");
 const SCRIPTS: [&str; 2] = [include_str!("view/viewer.js"), include_str!("view/controls.js")];
 
-/// What to show, and where.
+/// Options of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewOptions {
     /// Folder of a run, or of its files in extended XYZ.
@@ -43,7 +43,7 @@ pub struct Viewed {
     pub size: usize,
 }
 
-/// Why a run could not be shown.
+/// A reason why a run could not be shown.
 #[derive(Debug, Error)]
 pub enum ViewError {
     /// Its frames could not be read.

@@ -52,7 +52,7 @@ enum TrialError {
     Folder(#[source] io::Error),
 }
 
-/// What a run would be.
+/// The size and the cost of a run.
 #[derive(Debug, Serialize)]
 struct Check {
     #[serde(flatten)]
@@ -74,7 +74,7 @@ struct Mesh {
     unknowns: usize,
 }
 
-/// How long trial steps took.
+/// Times that trial steps took.
 #[derive(Debug, Serialize)]
 struct Trial {
     /// Steps that were made.
@@ -138,7 +138,7 @@ struct Clock {
     times: Mutex<Times>,
 }
 
-/// When the flows of a run began, and when it was heard of last.
+/// The times at which the flows of a run began, and that of its last report.
 #[derive(Debug, Default)]
 struct Times {
     flows: Vec<Instant>,

@@ -9,7 +9,7 @@ use crate::diagnostic::Diagnosed;
 /// What a shell reports for a program ended by Ctrl-C.
 pub const INTERRUPTED: u8 = 130;
 
-/// Why a command failed, and what the program's exit says about it.
+/// The failure of a command, and what the program's exit says about it.
 #[derive(Debug)]
 pub struct Failure {
     /// What to show.

@@ -26,7 +26,7 @@ pub struct InfoArguments {
     json: bool,
 }
 
-/// Why there is nothing to say of a path.
+/// A path of which there is nothing to say.
 #[derive(Debug, Error)]
 enum InfoError {
     /// It cannot be read.
@@ -43,7 +43,7 @@ enum InfoError {
     Study(#[from] SweepError),
 }
 
-/// What a path is.
+/// The facts about a path.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum Info {
@@ -53,7 +53,7 @@ enum Info {
     Study(StudyProgress),
 }
 
-/// What a checkpoint says of itself.
+/// The facts that a checkpoint tells of itself.
 #[derive(Debug, Serialize)]
 struct CheckpointInfo {
     file: PathBuf,

@@ -15,7 +15,7 @@ use crate::terminal::say;
 /// theirs to a process and to its group.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
 
-/// What Ctrl-C, a request to terminate or to hang up asks of the runs of a program.
+/// Requests to the runs of a program: Ctrl-C, to terminate or to hang up.
 #[derive(Clone, Debug)]
 pub struct Requests {
     flag: Arc<AtomicBool>,

@@ -29,7 +29,7 @@ pub struct NewArguments {
     dimension: u8,
 }
 
-/// What a new case is like.
+/// Templates of new cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Template {
     /// Two particles that meet in shear flow.
@@ -42,7 +42,7 @@ enum Template {
     Suspension,
 }
 
-/// Why no case was written.
+/// Reasons why no case was written.
 #[derive(Debug, Error)]
 enum NewError {
     /// Results could not have this name.

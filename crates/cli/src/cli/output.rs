@@ -10,7 +10,7 @@ use gluey::{RecordOptions, ResultPaths, RunOptions, VtkOptions, XyzOptions};
 
 use super::interrupt::Requests;
 
-/// What a run writes beside its trajectory.
+/// Arguments about what a run writes beside its trajectory.
 #[derive(Debug, Args)]
 pub struct OutputArguments {
     /// Write fields, particles and contacts for ParaView every N steps.

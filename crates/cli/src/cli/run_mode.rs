@@ -15,7 +15,7 @@ use crate::terminal::{Reporter, print_json};
 /// The most threads that can be asked for.
 const MOST_THREADS: i64 = 4096;
 
-/// With how many threads a run is done, and what it tells of itself.
+/// Arguments about the threads of a run, and about what it tells of itself.
 #[derive(Clone, Debug, Args)]
 pub struct Manner {
     /// Threads, instead of one per processor; results do not depend on them.

@@ -15,7 +15,7 @@ pub(super) fn mismatch(case: &Case, reference: &Reference) -> Option<(String, St
     first.or_else(|| first_stranger(case, reference))
 }
 
-/// Whether something is as a comparison needs it, what that is, and what the case has.
+/// A requirement of a comparison: whether it is met, what it is, and what the case has.
 type Requirement = (bool, String, String);
 
 fn flow(case: &Case, reference: &Reference) -> Vec<Requirement> {

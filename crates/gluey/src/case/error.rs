@@ -32,7 +32,7 @@ pub enum CaseError {
     Invalid(Box<InvalidCase>),
 }
 
-/// All that is wrong in a case. Displays as one line for each issue.
+/// A case with all that is wrong in it. Displays as one line for each issue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InvalidCase {
     /// The file; the name of a case that was not read from one.
@@ -45,7 +45,7 @@ pub struct InvalidCase {
     pub more: usize,
 }
 
-/// One thing that is wrong in a case, and where.
+/// An error in a case, and where it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseIssue {
     /// Where it was written.
@@ -58,7 +58,7 @@ pub struct CaseIssue {
     pub problem: Problem,
 }
 
-/// Where something of a case was written.
+/// The place where something of a case was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In the text of its file.

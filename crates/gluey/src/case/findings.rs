@@ -12,7 +12,7 @@ pub(super) struct Violation {
     pub problem: Problem,
 }
 
-/// What is wrong with a case.
+/// Errors found in a case.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     list: Vec<Violation>,

@@ -6,7 +6,7 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Key(pub Vec<KeyPart>);
 
-/// One step down a [`Key`].
+/// A step down a [`Key`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum KeyPart {
     /// A key of a table.

@@ -42,7 +42,7 @@ pub struct OutputSpec {
     pub precision: Precision,
 }
 
-/// When a frame is written.
+/// The distance from one frame to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Interval {
     /// Every so many steps.

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::text::{NotText, visible};
 
-/// Why particles could not be generated or read.
+/// A reason why particles could not be generated or read.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ParticleProblem {
     /// More than one of the list, the generated ones and the file.

@@ -58,7 +58,7 @@ pub(super) fn read(path: &Path, dimension: usize) -> Result<ParticleList, Vec<Pa
     }
 }
 
-/// What is wrong in a text.
+/// An error in a text.
 #[derive(Debug, PartialEq)]
 struct Fault {
     line: usize,

@@ -4,7 +4,7 @@ use gluey_fem::MeshError;
 use gluey_stokes::{NotDriven, StokesError, WarmStartError};
 use thiserror::Error;
 
-/// Why the finite-element flow failed.
+/// A failure of the finite-element flow.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FlowError {
     /// In mesh, assembly or solution.

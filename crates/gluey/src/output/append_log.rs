@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use super::{FileError, create_draft, draft_path, rename};
 
-/// How far a file had come.
+/// The place that a file had come to.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {
     /// Number of the draft.

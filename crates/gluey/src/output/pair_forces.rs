@@ -3,7 +3,7 @@
 use gluey_contact::{Contact, Partner};
 use gluey_suspension::Repulsion;
 
-/// What acts between pairs at an instant.
+/// Forces between pairs at an instant.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PairForces<'a> {
     /// Pairs in contact; none without a contact model.

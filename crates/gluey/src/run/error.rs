@@ -15,7 +15,7 @@ use crate::output::{ClaimError, FileError, RowsError};
 use crate::rheology::RheologyError;
 use crate::simulation::StepError;
 
-/// Why a run failed.
+/// A reason why a run failed.
 #[derive(Debug, Error)]
 pub enum RunError {
     /// The case makes no sense.

@@ -18,7 +18,7 @@ use crate::progress::Notice;
 #[derive(Clone, Default)]
 pub struct LastSteps(Arc<Mutex<Vec<Weak<dyn OfRun>>>>);
 
-/// Where a run ended that was asked to.
+/// The end of a run that was asked to stop.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("interrupted after step {step} of {steps} (t = {})", shown(*time))]
 pub struct Ended {

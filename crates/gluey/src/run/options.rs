@@ -36,7 +36,7 @@ pub struct RunOptions {
     pub memory_limit: Option<u64>,
 }
 
-/// How a run is recorded: see [`super::RunRecord`].
+/// Options of the record of a run, see [`super::RunRecord`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecordOptions {
     /// Whether the results of another run may be replaced.

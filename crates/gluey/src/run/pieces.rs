@@ -17,7 +17,7 @@ use super::frames::{Others, StreamOptions};
 use crate::checkpoint::FlowPieces;
 use crate::output::{FileError, vtk};
 
-/// All ranks but zero, as rank zero sees them.
+/// The ranks but zero, as rank zero sees them.
 pub(super) struct OtherRanks<'a, const D: usize> {
     pub ranks: &'a Ranks,
     /// Of rank zero.

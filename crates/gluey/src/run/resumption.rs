@@ -9,7 +9,7 @@ use super::record::{RecordError, RunRecord, RunState};
 use super::runs_of_folder::{FolderError, recorded_runs};
 use crate::output::ResultPaths;
 
-/// How to go on with a run: its case file and its options, at the places where its results are now.
+/// A run to go on with: its case file and its options, at the places where its results are now.
 #[derive(Clone, Debug)]
 pub struct Resumption {
     /// The case as it was run.

@@ -36,7 +36,7 @@ pub struct PointProgress {
     pub report: Option<RunReport>,
 }
 
-/// How a point is.
+/// The stage that a point is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PointStage {

@@ -15,7 +15,7 @@ const LAYOUT: u32 = 1;
 
 const MANIFEST: &str = "sweep.json";
 
-/// What a study says of itself, `sweep.json`.
+/// The file `sweep.json`, in which a study says what it is about.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Manifest {
     /// Layout of this file.

@@ -8,7 +8,7 @@ use super::Axis;
 use crate::number_text::shown_to;
 use crate::report::RunReport;
 
-/// What came out of a point.
+/// The outcome of a point.
 #[derive(Clone, Debug, Serialize)]
 pub struct PointResult {
     /// Name of the point and of its folder.

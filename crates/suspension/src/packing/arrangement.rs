@@ -5,7 +5,7 @@ use std::fmt;
 /// Sweeps of an [`Arrangement::Equilibrium`] that is asked for without their number.
 pub const DEFAULT_SWEEPS: usize = 4000;
 
-/// How particles are arranged.
+/// The arrangement of particles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Arrangement {
     /// Points at random, grown to particles that are pushed apart. Many pairs are left at the smallest gap,

@@ -4,7 +4,7 @@ use gluey_contact::ContactError;
 
 use super::Arrangement;
 
-/// Why particles could not be placed.
+/// A reason why particles could not be placed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PackingError {
     /// A parameter outside its range.

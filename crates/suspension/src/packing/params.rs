@@ -38,7 +38,7 @@ pub enum Amount {
     },
 }
 
-/// What to make.
+/// The particles to make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PackingParams {
     /// How many particles of which size.

@@ -45,7 +45,7 @@ struct Crowd<'a, const D: usize> {
     positions: &'a mut [Vector<D>],
 }
 
-/// How a round of pushes ended.
+/// The end of a round of pushes.
 enum Settled {
     /// No pair overlaps.
     Yes,

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::PackingError;
 
-/// How radii are distributed; their mean is set by the fraction.
+/// The distribution of radii, whose mean is set by the fraction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sizes {
     /// All radii are equal.

@@ -17,7 +17,7 @@ const WIDTH: f64 = 600.0;
 /// Frames that are drawn before they are written.
 const BATCH: usize = 32;
 
-/// What an animation is like.
+/// Options of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnimationOptions {
     /// Pixels across.

@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::figure::Figure;
 use crate::frames::FramesError;
 
-/// Why results could not be drawn.
+/// A reason why results could not be drawn.
 #[derive(Debug, Error)]
 pub enum PlotError {
     /// No trajectory.

@@ -115,7 +115,7 @@ where
     circles
 }
 
-/// All that is drawn.
+/// The parts of a picture of the flow.
 struct Picture<const D: usize> {
     plane: Plane<D>,
     view: View,

@@ -15,7 +15,7 @@ use super::told::told;
 /// Smallest gap that has a colour of its own, in mean radii.
 const SMALLEST_GAP: f64 = 1e-4;
 
-/// From where spheres are seen, in degrees.
+/// The direction from which spheres are seen, in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// About the vertical `y`: from 0, in front (at the positive end of `z`), to 90, on the right (of `x`).
@@ -78,7 +78,7 @@ named! {
     }
 }
 
-/// How particles are shown.
+/// The look of particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
     /// From where, in 3D.

@@ -33,7 +33,7 @@ const LEGEND: f64 = 74.0;
 const NARROW: f64 = 460.0;
 const ROW: f64 = 20.0;
 
-/// Which frame.
+/// The choice of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameChoice {
     /// The last one.
@@ -122,8 +122,7 @@ struct Seen {
     is_image: bool,
 }
 
-/// What has room in a drawing: the sides of a rectangle, and the largest number behind a
-/// colour.
+/// The sides of the rectangle that has room in a drawing, and the largest number behind a colour.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     left: f64,
@@ -146,7 +145,7 @@ impl View {
     }
 }
 
-/// What is seen of a frame.
+/// The visible part of a frame.
 pub(super) struct Scene {
     is_flat: bool,
     look: Look,

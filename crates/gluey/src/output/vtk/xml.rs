@@ -25,7 +25,7 @@ const BLOCK: usize = 1 << 18;
 /// Bytes of the number that stands before uncompressed data.
 const SIZE_LENGTH: usize = 8;
 
-/// How numbers are stored in the files for ParaView.
+/// The form of numbers in the files for ParaView.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct VtkEncoding {
     /// From 0 (none) over 1 (fast) to 9 (small).

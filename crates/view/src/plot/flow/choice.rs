@@ -56,7 +56,7 @@ impl FromStr for SliceChoice {
     }
 }
 
-/// What to draw of the flow.
+/// Options of a picture of the flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowOptions {
     /// In colours.

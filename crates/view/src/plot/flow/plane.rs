@@ -109,7 +109,7 @@ impl<const D: usize> Plane<D> {
     }
 }
 
-/// Where the plane lies on paper.
+/// The place of the plane on paper.
 pub struct View {
     left: f64,
     high: f64,

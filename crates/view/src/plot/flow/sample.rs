@@ -39,7 +39,7 @@ impl<const D: usize> Samples<D> {
     }
 }
 
-/// What is to be known of the flow.
+/// A flow, and the quantity that is sampled of it.
 pub struct Sampling<'a, const D: usize> {
     pub fields: &'a Fields<D>,
     /// Displacement of the cells along x per unit of y.
