@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
-use gluey::table::Table;
+use gluey::table::NumberTable;
 use gluey::{
     Case, Checkpoint, CheckpointSummary, Progress, ProgressState, RunError, RunOptions, Silent, run,
 };
@@ -163,7 +163,7 @@ fn no_list_of_particles_and_no_table_panics() {
                 0
             }
         });
-        let table = catch_unwind(|| Table::parse(&shown).is_ok());
+        let table = catch_unwind(|| NumberTable::parse(&shown).is_ok());
         match (outcome, table) {
             (Ok(is_read), Ok(_)) => read[is_read] += 1,
             _ => panic!("file {number}:\n{shown}"),

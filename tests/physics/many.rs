@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use gluey::output::PairForces;
 use gluey::output::csv::CsvWriter;
-use gluey::{Case, Ended, Progress, ProgressState, Row, RunError, RunOptions, Silent, run};
+use gluey::{Case, Ended, Progress, ProgressState, RunError, RunOptions, Silent, TrajectoryRow, run};
 use gluey_contact::Domain;
 use gluey_geom::{Particle, Spin, Twist, Vector};
 use gluey_testkit::cpu_seconds;
@@ -26,7 +26,12 @@ fn output_of(count: usize) -> (u64, u64, f64) {
     let mut writer = CsvWriter::create::<3>(&folder.path().join("t.csv"), count).expect("files");
     let mut fastest = f64::INFINITY;
     for step in 0..=STEP_COUNT {
-        let row = Row { time: 0.01 * step as f64, particles: &particles, twists: &twists, domain: &domain };
+        let row = TrajectoryRow {
+            time: 0.01 * step as f64,
+            particles: &particles,
+            twists: &twists,
+            domain: &domain,
+        };
         let start = cpu_seconds();
         let smallest = writer.write(&row, &PairForces::default()).expect("a row").expect("a pair");
         fastest = fastest.min(cpu_seconds() - start);

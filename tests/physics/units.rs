@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::told;
-use gluey::table::Table;
+use gluey::table::NumberTable;
 use tempfile::TempDir;
 
 /// Three discs in a channel of this height, at round places: surfaces are just as far from cells as finer
@@ -22,8 +22,8 @@ fn case(unit: f64) -> String {
     )
 }
 
-fn table(folder: &Path, name: &str) -> Table {
-    Table::parse(&fs::read_to_string(folder.join("out").join(name)).expect(name)).expect(name)
+fn table(folder: &Path, name: &str) -> NumberTable {
+    NumberTable::parse(&fs::read_to_string(folder.join("out").join(name)).expect(name)).expect(name)
 }
 
 /// The run of a case in a unit, with its pictures.

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use gluey::case::Place;
+use gluey::case::IssuePlace;
 use gluey::{Case, CaseError};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/invalid");
@@ -82,7 +82,8 @@ fn messages_name_a_place_and_a_cure() {
                 assert!(!invalid.issues.is_empty());
                 for (issue, line) in invalid.issues.iter().zip(invalid.to_string().lines()) {
                     let place = format!("{}:", file.display());
-                    let is_placed = line.starts_with(&place) || matches!(issue.place, Place::List { .. });
+                    let is_placed =
+                        line.starts_with(&place) || matches!(issue.place, IssuePlace::List { .. });
                     assert!(is_placed || line.starts_with("--set "), "{line}");
                     let has_key = !issue.key.is_root()
                         || issue.value.is_some()

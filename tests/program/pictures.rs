@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::program::{fails, gluey, told};
 use assert_cmd::Command;
 use flate2::read::ZlibDecoder;
-use gluey::output::vtk::{Frame, VtkWriter};
+use gluey::output::vtk::{VtkFrame, VtkWriter};
 use gluey_contact::Domain;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::Fields;
@@ -236,7 +236,7 @@ where
     let particles = vec![Particle::new(Vector::<D>::repeat(0.5), radius)];
     let (twists, contacts, domain) = (vec![Twist::default()], vec![], Domain::default());
     let (in_box, fields) = (None, Some(known::<D>(flow)));
-    let frame = Frame { step: 20, time: 0.5, particles, twists, contacts, domain, in_box, fields };
+    let frame = VtkFrame { step: 20, time: 0.5, particles, twists, contacts, domain, in_box, fields };
     writer.write(&frame).expect("files");
     let center = vec!["0.5"; D].join(", ");
     let case = format!(

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::{fails, told};
-use gluey::table::Table;
+use gluey::table::NumberTable;
 use tempfile::TempDir;
 
 fn read(folder: &Path, name: &str) -> String {
@@ -17,8 +17,8 @@ fn write(folder: &Path, name: &str, text: &str) {
     fs::write(folder.join(name), text).expect("a file");
 }
 
-fn table(folder: &Path, name: &str) -> Table {
-    Table::parse(&read(folder, name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+fn table(folder: &Path, name: &str) -> NumberTable {
+    NumberTable::parse(&read(folder, name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// Two discs near the walls of a channel, nothing between.
@@ -88,7 +88,7 @@ fn sheared(end: f64, more: &str) -> String {
 }
 
 /// The mean of a column behind the rows that are left out.
-fn mean(table: &Table, name: &str, skipped: usize) -> f64 {
+fn mean(table: &NumberTable, name: &str, skipped: usize) -> f64 {
     let kept = &table.column(name).expect("a column")[skipped..];
     kept.iter().sum::<f64>() / kept.len() as f64
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use gluey::output::vtk::{
-    Frame, Precision, ShownBox, VtkEncoding, VtkWriter, read_fields, read_particles, write_piece,
+    Precision, ShownBox, VtkEncoding, VtkFrame, VtkWriter, read_fields, read_particles, write_piece,
 };
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
@@ -69,11 +69,11 @@ fn one_cell<const D: usize>() -> Fields<D> {
 }
 
 /// A frame of fields without particles.
-fn frame_of<const D: usize>(fields: &Fields<D>) -> Frame<D>
+fn frame_of<const D: usize>(fields: &Fields<D>) -> VtkFrame<D>
 where
     Dim<D>: Space<D>,
 {
-    Frame {
+    VtkFrame {
         step: 40,
         time: 1.0,
         particles: vec![],
@@ -169,7 +169,7 @@ fn fields_in_pieces() {
     assert!(error.to_string().contains(pieces[1]), "{error}");
 
     // A run that goes on finds the steps before, whoever wrote them.
-    create(&[(40, 1.0)]).write(&Frame { step: 41, time: 1.5, ..frame.clone() }).expect("files");
+    create(&[(40, 1.0)]).write(&VtkFrame { step: 41, time: 1.5, ..frame.clone() }).expect("files");
     assert!(
         listed().contains("fields-000040.pvtu") && listed().contains("fields-000041.vtu"),
         "{}",
@@ -196,7 +196,7 @@ fn every_encoding_reads_back() {
     {
         let encoding = VtkEncoding { compression, precision };
         let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder").encoded(encoding);
-        let frame = Frame {
+        let frame = VtkFrame {
             step: 0,
             time: 0.0,
             particles: particles.clone(),
@@ -241,7 +241,7 @@ fn particles_and_contacts() {
     twists[2].spin[0] = -0.5;
     let contacts = [Contact { pair: PairKey::new(0, 2), lambda: 0.3, gamma: -0.01, gap: 1e-9 }];
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let frame = Frame {
+    let frame = VtkFrame {
         step: 0,
         time: 0.0,
         particles: particles.clone(),
@@ -284,7 +284,7 @@ fn contacts_with_walls_and_images() {
         gap: 0.1 * lambda,
     });
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
-    let frame = Frame {
+    let frame = VtkFrame {
         step: 0,
         time: 0.0,
         particles: particles.to_vec(),
@@ -320,7 +320,7 @@ fn a_sheared_box_is_shown_whole() {
     let contacts = [Contact { pair: PairKey::across(0, 1, [-5, 2, 0]), lambda: 1.0, gamma: 0.0, gap: 0.0 }];
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
     let (particles, twists, contacts) = (particles.to_vec(), twists.to_vec(), contacts.to_vec());
-    let frame = Frame { step: 0, time: 0.0, particles, twists, contacts, domain, in_box, fields: None };
+    let frame = VtkFrame { step: 0, time: 0.0, particles, twists, contacts, domain, in_box, fields: None };
     writer.write(&frame).expect("files");
 
     let near = |found: &[f64], exact: &[f64]| {

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use gluey::case::{CaseIssue, InvalidCase, Place};
+use gluey::case::{CaseIssue, InvalidCase, IssuePlace};
 use gluey::output::folder_of;
 use gluey::{
     CaseError, CheckpointError, CheckpointSummary, Ended, FileError, NotText, OccupiedError, ResultPaths,
@@ -68,7 +68,7 @@ impl Diagnosed {
         let one =
             InvalidCase { text: String::new(), issues: vec![issue.clone()], more: 0, ..invalid.clone() };
         let diagnosed = Self::with_hint(one, Some(issue.problem.hint()));
-        let Place::Text { span, .. } = &issue.place else { return diagnosed };
+        let IssuePlace::Text { span, .. } = &issue.place else { return diagnosed };
         Self {
             source: Some(NamedSource::new(invalid.file.display().to_string(), invalid.text.clone())),
             label: Some(span.clone().into()),

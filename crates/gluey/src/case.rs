@@ -49,7 +49,7 @@ mod suspension;
 mod validate;
 
 pub use contact::ContactSpec;
-pub use error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem};
+pub use error::{CaseError, CaseIssue, CaseProblem, InvalidCase, IssuePlace, Key, KeyPart};
 pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec};
 pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;

@@ -15,16 +15,16 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::case::Case;
-use crate::checksum::{Kind, Unopened};
+use crate::checksum::{FileKind, Unopened};
 use crate::hydrodynamics::HydrodynamicsError;
-use crate::output::{FileError, Mark, write_atomically};
+use crate::output::{DraftMark, FileError, write_atomically};
 use crate::phases::PhaseTable;
 use crate::simulation::{RestoreError, SimulationState};
 use crate::tally::Tally;
 
 /// Counts changes of the layout of [`Checkpoint`].
 const VERSION: u32 = 15;
-const KIND: Kind = Kind { magic: b"gluey-ck", layout: VERSION };
+const KIND: FileKind = FileKind { magic: b"gluey-ck", layout: VERSION };
 
 /// A run between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,15 +53,15 @@ where
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TableMarks {
     /// The trajectory.
-    pub trajectory: Mark,
+    pub trajectory: DraftMark,
     /// The near pairs, where they have a file.
-    pub gaps: Option<Mark>,
+    pub gaps: Option<DraftMark>,
     /// The rheology, where there is one.
-    pub rheology: Option<Mark>,
+    pub rheology: Option<DraftMark>,
     /// What holds particles, where there are such.
-    pub forces: Option<Mark>,
+    pub forces: Option<DraftMark>,
     /// What steps cost.
-    pub solver: Mark,
+    pub solver: DraftMark,
 }
 
 /// Files beside a checkpoint with what the next flow starts from, one for the cells of each rank that wrote

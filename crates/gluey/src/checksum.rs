@@ -13,7 +13,7 @@ const DIGEST_LENGTH: usize = 32;
 const COMPRESSION_LEVEL: u32 = 1;
 
 /// A kind of file, by its beginning.
-pub(crate) struct Kind {
+pub(crate) struct FileKind {
     pub magic: &'static [u8; 8],
     /// Counts changes of the layout of what is inside.
     pub layout: u32,
@@ -30,7 +30,7 @@ pub(crate) enum Unopened {
     Damaged,
 }
 
-impl Kind {
+impl FileKind {
     fn header_length(&self) -> usize {
         self.magic.len() + 4 + DIGEST_LENGTH
     }

@@ -29,7 +29,7 @@ pub use prepared::prepared_flow;
 
 /// Flows that the next prediction starts from, for checkpoints.
 #[derive(Serialize, Deserialize)]
-struct WarmStart<const D: usize> {
+struct StoredFlows<const D: usize> {
     centers: Vec<Vector<D>>,
     strain: f64,
     last: SavedFields,
@@ -133,8 +133,12 @@ where
     fn checkpoint(&self) -> Result<Vec<u8>, FlowError> {
         let Some((last, before)) = self.solver.warm_start() else { return Ok(Vec::new()) };
         let (centers, strain) = (self.places.clone(), self.strain);
-        let state =
-            WarmStart { centers, strain, last: last.clone().into(), before: before.cloned().map(Into::into) };
+        let state = StoredFlows {
+            centers,
+            strain,
+            last: last.clone().into(),
+            before: before.cloned().map(Into::into),
+        };
         Ok(postcard::to_allocvec(&state)?)
     }
 
@@ -142,7 +146,7 @@ where
         if state.is_empty() {
             return Ok(());
         }
-        let WarmStart { centers, strain, last, before } =
+        let StoredFlows { centers, strain, last, before } =
             postcard::from_bytes(state).map_err(FlowError::from)?;
         let (saved, present) = (centers.len(), self.suspension.radii.len());
         if saved != present {

@@ -65,9 +65,9 @@ pub use run::{
 };
 pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
 pub use summary::CaseSummary;
-pub use tally::{Motion, Tally};
+pub use tally::{StepMotion, Tally};
 pub use text::NotText;
-pub use trajectory::Row;
+pub use trajectory::TrajectoryRow;
 
 /// The example of the README.
 #[cfg(doctest)]

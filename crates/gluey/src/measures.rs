@@ -3,7 +3,7 @@
 use gluey_geom::{Lattice, Vector};
 
 use crate::case::Case;
-use crate::reference::{Comparison, Deviation, Reference};
+use crate::reference::{Comparison, Deviation, ReferenceSolution};
 use crate::trajectory::PairHistory;
 
 /// Part of a row that enters the measures; a resumed run reads it from its file.
@@ -19,7 +19,7 @@ pub(crate) struct Instant<const D: usize> {
 
 /// The measures of all rows so far.
 #[derive(Clone, Debug)]
-pub(crate) struct Measures<const D: usize> {
+pub(crate) struct RunMeasures<const D: usize> {
     radii: Vec<f64>,
     /// Periods of the box; `None` where images slide, and the first two particles are no pair.
     lattice: Option<Lattice<D>>,
@@ -29,10 +29,10 @@ pub(crate) struct Measures<const D: usize> {
     comparison: Option<Comparison>,
 }
 
-impl<const D: usize> Measures<D> {
+impl<const D: usize> RunMeasures<D> {
     /// No rows yet of a run of `case`.
     pub fn new(case: &Case) -> Self {
-        let reference = case.reference.as_deref().and_then(Reference::named);
+        let reference = case.reference.as_deref().and_then(ReferenceSolution::named);
         Self {
             radii: case.particles.iter().map(|particle| particle.radius).collect(),
             lattice: (!case.is_sheared()).then(|| case.surroundings().lattice),

@@ -54,7 +54,8 @@ pub fn size(bytes: f64) -> String {
 }
 
 /// Refuses a case whose mesh cannot be numbered, or needs more memory than there is, or than `limit` bytes
-/// however much there is. Where nobody tells how much there is, and without a limit, only the first is checked.
+/// however much there is. Where nobody tells how much there is, and without a limit, only the first is
+/// checked.
 ///
 /// # Errors
 /// [`TooLarge`] with the size expected.

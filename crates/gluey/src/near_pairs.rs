@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Vector};
 use gluey_suspension::{Container, for_each_pair};
 
-use crate::trajectory::Row;
+use crate::trajectory::TrajectoryRow;
 
 /// Room for rounding in the search, relative to lengths.
 const SLACK: f64 = 1e-9;
@@ -20,7 +20,7 @@ pub(crate) struct PairGap {
 }
 
 /// All pairs with a gap of at most `reach >= 0`, sorted by particles.
-pub(crate) fn within<const D: usize>(row: &Row<'_, D>, reach: f64) -> Vec<PairGap>
+pub(crate) fn within<const D: usize>(row: &TrajectoryRow<'_, D>, reach: f64) -> Vec<PairGap>
 where
     Dim<D>: Space<D>,
 {
@@ -46,7 +46,11 @@ where
 
 /// The smallest gap of all pairs, exactly; `None` for fewer than two particles. `near` holds the pairs up to
 /// `reach`.
-pub(crate) fn smallest<const D: usize>(row: &Row<'_, D>, near: &[PairGap], mut reach: f64) -> Option<f64>
+pub(crate) fn smallest<const D: usize>(
+    row: &TrajectoryRow<'_, D>,
+    near: &[PairGap],
+    mut reach: f64,
+) -> Option<f64>
 where
     Dim<D>: Space<D>,
 {
@@ -91,7 +95,7 @@ mod tests {
                 })
                 .collect();
             let twists = vec![Twist::default(); count];
-            let row = Row { time: 0.0, particles: &particles, twists: &twists, domain };
+            let row = TrajectoryRow { time: 0.0, particles: &particles, twists: &twists, domain };
             let all: Vec<PairGap> = row
                 .pairs()
                 .map(|(first, second)| PairGap { first, second, gap: row.gap(first, second) })

@@ -22,9 +22,9 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub(crate) use append_log::Draft;
-pub use append_log::{Mark, RowsError};
+pub use append_log::{DraftMark, RowsError};
 pub use claim::ClaimError;
-pub(crate) use claim::{Claim, is_claimed};
+pub(crate) use claim::{ResultClaim, is_claimed};
 pub use pair_forces::PairForces;
 pub use paths::ResultPaths;
 
@@ -53,8 +53,8 @@ impl FileError {
     }
 }
 
-/// A line of a table: numbers with so many decimals behind the first digit, 16 to read back exactly, and empty
-/// cells where there is none.
+/// A line of a table: numbers with so many decimals behind the first digit, 16 to read back exactly, and
+/// empty cells where there is none.
 pub fn line_of(numbers: impl IntoIterator<Item: Into<Option<f64>>>, decimals: usize) -> String {
     let cell = |number: Option<f64>| number.map_or(String::new(), |number| format!("{number:.decimals$e}"));
     let cells: Vec<String> = numbers.into_iter().map(|number| cell(number.into())).collect();

@@ -216,19 +216,19 @@ impl fmt::Display for Notice {
 /// long and reports nothing.
 #[derive(Debug)]
 pub struct Ticker {
-    shared: Arc<Shared>,
+    shared: Arc<TickerState>,
     thread: Option<JoinHandle<()>>,
 }
 
 #[derive(Debug, Default)]
-struct Shared {
-    place: Mutex<Place>,
+struct TickerState {
+    place: Mutex<LastReport>,
     ended: Condvar,
 }
 
 /// The last report, if there was any.
 #[derive(Debug, Default)]
-struct Place {
+struct LastReport {
     has_ended: bool,
     state: Option<ProgressState>,
 }
@@ -237,7 +237,7 @@ impl Ticker {
     /// Calls `say` every `interval` with what was reported last. Where there is no thread to be had, it is
     /// silent.
     pub fn new(interval: Duration, say: impl Fn(&ProgressState) + Send + 'static) -> Self {
-        let shared = Arc::<Shared>::default();
+        let shared = Arc::<TickerState>::default();
         let of_thread = shared.clone();
         let thread = std::thread::Builder::new().name("ticker".to_owned());
         let thread = thread.spawn(move || of_thread.tick(interval, say)).ok();
@@ -250,8 +250,8 @@ impl Ticker {
     }
 }
 
-impl Shared {
-    fn place(&self) -> MutexGuard<'_, Place> {
+impl TickerState {
+    fn place(&self) -> MutexGuard<'_, LastReport> {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

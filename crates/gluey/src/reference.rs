@@ -7,7 +7,7 @@
 use gluey_geom::Vector;
 
 use crate::interpolate::cubic;
-use crate::table::Table;
+use crate::table::NumberTable;
 use crate::trajectory::PairHistory;
 
 /// Names a case may give as its `reference`.
@@ -20,7 +20,7 @@ pub(crate) const RADIUS: f64 = 0.05;
 pub(crate) const MIDDLE: f64 = 0.5;
 /// Trajectories of particles, to compare a run with.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub struct ReferenceSolution {
     dimension: usize,
     /// Whether the flow is in the unit box with Couette velocity on its boundary, or without a box.
     is_in_box: bool,
@@ -31,7 +31,7 @@ pub struct Reference {
     gap: Vec<f64>,
 }
 
-/// Distance of a run from a [`Reference`], over the time they have in common.
+/// Distance of a run from a [`ReferenceSolution`], over the time they have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// Relative error of the gap of particles 1 and 2 at the end.
@@ -40,7 +40,7 @@ pub struct Deviation {
     pub max_abs_error_over_a: f64,
 }
 
-impl Reference {
+impl ReferenceSolution {
     /// The reference of that name.
     pub fn named(name: &str) -> Option<Self> {
         let (dimension, is_in_box, text) = match name {
@@ -52,10 +52,10 @@ impl Reference {
             }
             _ => return None,
         };
-        Self::new(dimension, is_in_box, &Table::parse(text).ok()?)
+        Self::new(dimension, is_in_box, &NumberTable::parse(text).ok()?)
     }
 
-    fn new(dimension: usize, is_in_box: bool, table: &Table) -> Option<Self> {
+    fn new(dimension: usize, is_in_box: bool, table: &NumberTable) -> Option<Self> {
         let column = |name: &str| table.find(name).map(<[f64]>::to_vec);
         let centers =
             (1..).map_while(|n| Some([column(&format!("x{n}"))?, column(&format!("y{n}"))?])).collect();
@@ -94,16 +94,16 @@ impl Reference {
     }
 }
 
-/// A run beside a [`Reference`], row by row.
+/// A run beside a [`ReferenceSolution`], row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct Comparison {
-    reference: Reference,
+    reference: ReferenceSolution,
     max_abs_error_over_a: Option<f64>,
 }
 
 impl Comparison {
     /// No rows yet.
-    pub fn new(reference: Reference) -> Self {
+    pub fn new(reference: ReferenceSolution) -> Self {
         Self { reference, max_abs_error_over_a: None }
     }
 
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn every_name_has_a_table_with_ascending_times() {
         for name in NAMES {
-            let reference = Reference::named(name).expect(name);
+            let reference = ReferenceSolution::named(name).expect(name);
             assert!(reference.times.len() > 20 && reference.centers.len() >= 2, "{name}");
             assert!(reference.times.is_sorted_by(|a, b| a < b), "{name}");
         }
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_reference_does_not_deviate_from_itself() {
-        let reference = Reference::named("pair2d_trajectory").expect("known");
+        let reference = ReferenceSolution::named("pair2d_trajectory").expect("known");
         let shifted = |shift: f64| {
             let mut comparison = Comparison::new(reference.clone());
             let mut pair = PairHistory::default();

@@ -6,7 +6,7 @@ use gluey_motion::FlowStatistics;
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, Strategy};
-use crate::measures::Measures;
+use crate::measures::RunMeasures;
 use crate::number_text::shown_to;
 use crate::phases::PhaseTable;
 use crate::rheology::RheologyMeans;
@@ -66,7 +66,7 @@ impl RunReport {
     /// The report of a run of `case`, without means of the rheology.
     pub(crate) fn of<const D: usize>(
         case: &Case,
-        measures: &Measures<D>,
+        measures: &RunMeasures<D>,
         flow: &FlowStatistics,
         tally: &Tally,
         wall_s: f64,

@@ -12,7 +12,7 @@ use thiserror::Error;
 pub use mean::Mean;
 
 use crate::output::{FileError, rows_of, whole_lines};
-use crate::table::{Table, TableError};
+use crate::table::{NumberTable, TableError};
 
 /// Means of the columns of `<name>-rheology.csv`, over viscosity and shear rate as they are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,11 +60,11 @@ impl RheologyMeans {
     pub fn read(path: &Path, begin: Option<f64>) -> Result<Option<Self>, RheologyError> {
         let Some(rows) = rows_of(path) else { return Ok(None) };
         let text = whole_lines(&rows)?;
-        let means = Table::parse(&text).and_then(|table| Self::of(&table, begin));
+        let means = NumberTable::parse(&text).and_then(|table| Self::of(&table, begin));
         means.map_err(|source| RheologyError::Table { path: rows, source })
     }
 
-    fn of(table: &Table, begin: Option<f64>) -> Result<Option<Self>, TableError> {
+    fn of(table: &NumberTable, begin: Option<f64>) -> Result<Option<Self>, TableError> {
         let (t, strain, viscosity) =
             (table.column("t")?, table.column("strain")?, table.column("viscosity")?);
         let skipped = match begin {
@@ -115,7 +115,7 @@ mod tests {
 
     /// A viscosity of 2 and 3 in turn behind ten rows of a start at 9, a normal stress difference that
     /// changes every five rows; in 2D.
-    fn table() -> Table {
+    fn table() -> NumberTable {
         let line = |row: i32| {
             let viscosity = if row < 10 { 9 } else { 2 + row % 2 };
             let by_dissipation = if row % 2 == 0 { String::new() } else { "2.5".to_owned() };
@@ -123,7 +123,7 @@ mod tests {
             format!("{row},{},{viscosity},{by_dissipation},{n1},{}\n", 0.5 * f64::from(row), 1 + row % 2)
         };
         let head = "t,strain,viscosity,viscosity_by_dissipation,N1,particle_pressure\n";
-        Table::parse(&(head.to_owned() + &(0..60).map(line).collect::<String>())).expect("a table")
+        NumberTable::parse(&(head.to_owned() + &(0..60).map(line).collect::<String>())).expect("a table")
     }
 
     #[test]

@@ -49,9 +49,9 @@ pub use runs_of_folder::{FolderError, recorded_runs};
 use crate::case::{Case, Hydrodynamics};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
-use crate::measures::{self, Measures};
+use crate::measures::{self, RunMeasures};
 use crate::output::solver_log::SolverRow;
-use crate::output::{Claim, FileError, ResultPaths};
+use crate::output::{FileError, ResultClaim, ResultPaths};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
@@ -64,7 +64,7 @@ use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
 use start::simulation;
-use tables::{Tables, earlier_drafts};
+use tables::{RunTables, earlier_drafts};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -124,23 +124,27 @@ where
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    Run::start(case, options, progress, hydrodynamics, contacts::of_case(case), None)?.finish()
+    RunInProgress::start(case, options, progress, hydrodynamics, contacts::of_case(case), None)?.finish()
 }
 
 /// Makes sure before the first step that files can be written, and that no other run writes them.
-fn claim_outputs(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<Vec<Claim>, RunError> {
+fn claim_outputs(
+    case: &Case,
+    options: &RunOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<ResultClaim>, RunError> {
     let streams = StreamOptions::of_run(case, options);
     let results = [Some(options.csv.as_path()), options.checkpoint.as_deref()];
     let results = results.into_iter().flatten().chain(streams.iter().map(|stream| stream.folder.as_path()));
-    let claims = results.map(Claim::new).collect::<Result<Vec<_>, _>>()?;
-    for lock in claims.iter().filter_map(Claim::unguarded) {
+    let claims = results.map(ResultClaim::new).collect::<Result<Vec<_>, _>>()?;
+    for lock in claims.iter().filter_map(ResultClaim::unguarded) {
         progress.notice(&Notice::NotLocked { lock: lock.to_owned() });
     }
     Ok(claims)
 }
 
 /// A run in progress.
-struct Run<'a, const D: usize, H, C>
+struct RunInProgress<'a, const D: usize, H, C>
 where
     Dim<D>: Space<D>,
 {
@@ -148,9 +152,9 @@ where
     options: &'a RunOptions,
     progress: &'a dyn Progress,
     simulation: Simulation<D, H, C>,
-    measures: Measures<D>,
+    measures: RunMeasures<D>,
     tally: Tally,
-    tables: Tables,
+    tables: RunTables,
     frames: Frames<'a, D>,
     last: Arc<Mutex<LastStep<D>>>,
     /// The ranks that share the flow.
@@ -161,7 +165,7 @@ where
     wall_before_s: f64,
 }
 
-impl<'a, const D: usize, H, C> Run<'a, D, H, C>
+impl<'a, const D: usize, H, C> RunInProgress<'a, D, H, C>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
@@ -178,7 +182,7 @@ where
         others: Option<&'a dyn Others>,
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics, contact);
-        let (mut measures, mut tally, mut wall_before_s) = (Measures::new(case), Tally::default(), 0.0);
+        let (mut measures, mut tally, mut wall_before_s) = (RunMeasures::new(case), Tally::default(), 0.0);
         let drafts = earlier_drafts(case, &options.csv)?;
         let file = CheckpointFile::new(options, !drafts.is_empty());
         let tables = match &options.resume {
@@ -189,7 +193,7 @@ where
                         has_checkpoint.then(|| ResultPaths::of_csv(&options.csv).folder().to_owned());
                     progress.notice(&Notice::EarlierDrafts { drafts, folder });
                 }
-                Tables::create::<D>(case, &options.csv)?
+                RunTables::create::<D>(case, &options.csv)?
             }
             Some(path) => {
                 let checkpoint = Checkpoint::read(case, path)?.on(others.map_or(0, Others::rank_count));
@@ -198,7 +202,7 @@ where
                 let restored = simulation.restore(checkpoint.state.clone()).map_err(RestoreError::widen);
                 restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
                 let visit = |row: &measures::Instant<D>| measures.add(row);
-                Tables::resume(&options.csv, &checkpoint, case.particles.len(), visit)?
+                RunTables::resume(&options.csv, &checkpoint, case.particles.len(), visit)?
             }
         };
         let first_step = simulation.step_index();

@@ -14,7 +14,7 @@ use gluey_motion::{
 use gluey_suspension::Repulsion;
 
 use crate::phases::PhaseTable;
-use crate::tally::Motion;
+use crate::tally::StepMotion;
 use part::Part;
 use repelling::Repelling;
 
@@ -71,7 +71,7 @@ where
     /// The last one, its velocities corrected; of the statistics, those of all flows of the step so far.
     prediction: Prediction<D>,
     contact_report: ContactReport,
-    motion: Motion,
+    motion: StepMotion,
     phases: PhaseTable,
 }
 
@@ -140,7 +140,7 @@ where
             drift: vec![Twist::default(); count],
             prediction: Prediction::of(vec![Twist::default(); count]),
             contact_report: ContactReport::default(),
-            motion: Motion::default(),
+            motion: StepMotion::default(),
             phases: PhaseTable::default(),
         }
     }
@@ -215,7 +215,7 @@ where
     pub fn predict(&mut self) -> Result<(), StepError<H::Error>> {
         let is_first = self.part.is_first();
         if is_first {
-            (self.part, self.motion) = (Part::WHOLE, Motion::default());
+            (self.part, self.motion) = (Part::WHOLE, StepMotion::default());
         }
         let (step, time) = (self.step, self.time());
         let start = std::time::Instant::now();
@@ -334,7 +334,7 @@ where
         let (integrator, particles) = (&mut self.integrator, &mut self.particles);
         self.phases.time("motion", || integrator.advance(dt, particles, &self.prediction.twists));
         self.strain += self.sliding_rate() * dt;
-        let Motion { parts, shortest, .. } = self.motion;
+        let StepMotion { parts, shortest, .. } = self.motion;
         let share = self.part.share();
         self.motion.shortest = if parts == 0 { share } else { shortest.min(share) };
         self.motion.parts += 1;
@@ -420,7 +420,7 @@ where
     }
 
     /// How the particles were moved in the last step, or are in the one that is being done.
-    pub fn motion(&self) -> &Motion {
+    pub fn motion(&self) -> &StepMotion {
         &self.motion
     }
 

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-pub use axis::Axis;
+pub use axis::SweptKey;
 pub use progress::{PointProgress, PointStage, StudyProgress};
 pub use study::Study;
 pub use table::{PointResult, table};
@@ -82,7 +82,7 @@ pub enum SweepError {
 
 /// A run of a study.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct StudyPoint {
     /// Its name, which its folder has too: `time.step=0.1+contact.strategy=none`.
     pub name: String,
     /// Values of the swept keys, in their order.
@@ -106,7 +106,7 @@ pub enum PointState {
     OtherCase,
 }
 
-impl Point {
+impl StudyPoint {
     /// How the point is, by what lies in its folder.
     ///
     /// # Errors
@@ -133,7 +133,7 @@ impl Point {
 ///
 /// # Errors
 /// [`SweepError`] if any of them makes no case, or two have the same name.
-pub fn points(file: &Path, axes: &[Axis], folder: &Path) -> Result<Vec<Point>, SweepError> {
+pub fn points(file: &Path, axes: &[SweptKey], folder: &Path) -> Result<Vec<StudyPoint>, SweepError> {
     for (index, axis) in axes.iter().enumerate() {
         if axes[..index].iter().any(|other| other.key == axis.key) {
             return Err(SweepError::KeyTwice { key: axis.key.clone() });
@@ -147,7 +147,7 @@ pub fn points(file: &Path, axes: &[Axis], folder: &Path) -> Result<Vec<Point>, S
             .flat_map(|set| axis.values.iter().map(move |value| with(set, value)))
             .collect();
     }
-    let mut points: Vec<Point> = Vec::new();
+    let mut points: Vec<StudyPoint> = Vec::new();
     for set in combinations {
         let point = point(file, axes, &set, folder)?;
         if points.iter().any(|other| other.name == point.name) {
@@ -158,7 +158,7 @@ pub fn points(file: &Path, axes: &[Axis], folder: &Path) -> Result<Vec<Point>, S
     Ok(points)
 }
 
-fn point(file: &Path, axes: &[Axis], set: &[&Override], folder: &Path) -> Result<Point, SweepError> {
+fn point(file: &Path, axes: &[SweptKey], set: &[&Override], folder: &Path) -> Result<StudyPoint, SweepError> {
     let values: Vec<String> = set.iter().map(|value| axis::written(value)).collect();
     let named = axes.iter().zip(&values).map(|(axis, value)| format!("{}={}", axis.key, plain(value)));
     let name = named.collect::<Vec<_>>().join("+");
@@ -168,7 +168,7 @@ fn point(file: &Path, axes: &[Axis], set: &[&Override], folder: &Path) -> Result
     let overrides: Vec<Override> = set.iter().map(|&value| value.clone()).collect();
     let case = Case::load_with(file, &overrides)?;
     let paths = ResultPaths::new(folder.join(&name), case.file_stem());
-    Ok(Point { name, values, case, paths })
+    Ok(StudyPoint { name, values, case, paths })
 }
 
 /// A value with what does not belong in a file name left out.

@@ -15,7 +15,7 @@ pub use crate::interpolate::linear;
 /// # Ok::<(), gluey::table::TableError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct NumberTable {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
 }
@@ -39,7 +39,7 @@ pub enum TableError {
     },
 }
 
-impl Table {
+impl NumberTable {
     /// Reads comma-separated numbers under a header of names; empty lines and those that start with `#` do
     /// not count, and an empty cell is no number (NaN). A text without a header is a table without columns.
     pub fn parse(text: &str) -> Result<Self, TableError> {
@@ -88,14 +88,14 @@ mod tests {
 
     #[test]
     fn empty_cells_are_no_numbers() {
-        let table = Table::parse("t,x,y\n0,,2\n1,3,\n").expect("a table");
+        let table = NumberTable::parse("t,x,y\n0,,2\n1,3,\n").expect("a table");
         let [x, y] = ["x", "y"].map(|name| table.column(name).expect("a column"));
         assert!(x[0].is_nan() && x[1] == 3.0 && y[0] == 2.0 && y[1].is_nan());
     }
 
     #[test]
     fn columns_are_found_by_name_and_comments_skipped() {
-        let table = Table::parse("# remark\nt, x\n\n0, 1.5\n# another\n1,2\n").expect("a table");
+        let table = NumberTable::parse("# remark\nt, x\n\n0, 1.5\n# another\n1,2\n").expect("a table");
         assert_eq!(table.column("x"), Ok(&[1.5, 2.0][..]));
         assert_eq!(table.find("y"), None);
         assert_eq!(table.column("y"), Err(TableError::Column { column: "y".into() }));
@@ -104,8 +104,8 @@ mod tests {
     #[test]
     fn rows_of_another_length_or_without_numbers_are_refused() {
         for bad in ["t,x\n0,1\n2\n", "t,x\n0,1\n2,3,4\n", "t,x\n0,1\n2,three\n"] {
-            assert_eq!(Table::parse(bad), Err(TableError::Row { line: 3, expected: 2 }), "{bad}");
+            assert_eq!(NumberTable::parse(bad), Err(TableError::Row { line: 3, expected: 2 }), "{bad}");
         }
-        assert_eq!(Table::parse("").map(|table| table.find("t").is_none()), Ok(true));
+        assert_eq!(NumberTable::parse("").map(|table| table.find("t").is_none()), Ok(true));
     }
 }

@@ -11,7 +11,7 @@ const SMALL_PUSH: f64 = 0.01;
 
 /// The motion of the particles in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
+pub struct StepMotion {
     /// Parts in which the step was done; 0 before it was.
     pub parts: usize,
     /// The shortest of them, as a share of the step.
@@ -50,7 +50,7 @@ pub struct Tally {
 
 impl Tally {
     /// Adds a step.
-    pub(crate) fn add(&mut self, motion: &Motion, flow: &FlowStatistics) {
+    pub(crate) fn add(&mut self, motion: &StepMotion, flow: &FlowStatistics) {
         self.halved_steps += usize::from(motion.parts > 1);
         if motion.parts > 0 {
             let before = if self.shortest_part > 0.0 { self.shortest_part } else { 1.0 };
@@ -109,10 +109,10 @@ mod tests {
     #[test]
     fn what_happened_is_told_and_no_more() {
         let mut tally = Tally::default();
-        let whole = Motion { parts: 1, shortest: 1.0, ..Motion::default() };
+        let whole = StepMotion { parts: 1, shortest: 1.0, ..StepMotion::default() };
         tally.add(&whole, &FlowStatistics::default());
         assert_eq!((tally.shortest_part, tally.to_string().as_str()), (1.0, ""));
-        let halved = Motion { parts: 3, shortest: 0.25, closed_films: 2, film_push: 0.5, refused: None };
+        let halved = StepMotion { parts: 3, shortest: 0.25, closed_films: 2, film_push: 0.5, refused: None };
         tally.add(&halved, &FlowStatistics { cells_raised: 4, solved_again: 1, ..FlowStatistics::default() });
         let told = tally.to_string();
         assert!(told.contains("in parts: 1, the shortest part 1/4") && told.contains("2 at most, in 1 rows"));

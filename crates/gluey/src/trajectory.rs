@@ -7,7 +7,7 @@ use crate::interpolate::cubic;
 
 /// Particles at an instant, and how they move.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<'a, const D: usize>
+pub struct TrajectoryRow<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -21,7 +21,7 @@ where
     pub domain: &'a Domain<D>,
 }
 
-impl<const D: usize> Row<'_, D>
+impl<const D: usize> TrajectoryRow<'_, D>
 where
     Dim<D>: Space<D>,
 {

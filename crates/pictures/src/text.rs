@@ -18,9 +18,9 @@ pub fn width(label: &str, size: f64) -> f64 {
     while !rest.is_empty() {
         let (piece, length) = next_piece(rest);
         letters += match piece {
-            Piece::Star => 0.0,
-            Piece::Script(_) => SCRIPT_SIZE * (rest[..length].chars().count() - 3) as f64,
-            Piece::Plain => rest[..length].chars().count() as f64,
+            LabelPiece::Star => 0.0,
+            LabelPiece::Script(_) => SCRIPT_SIZE * (rest[..length].chars().count() - 3) as f64,
+            LabelPiece::Plain => rest[..length].chars().count() as f64,
         };
         rest = &rest[length..];
     }
@@ -52,13 +52,13 @@ pub fn tspans(label: &str) -> String {
         let (piece, tail) = rest.split_at(length);
         rest = tail;
         match script {
-            Piece::Star => italic = !italic,
-            Piece::Script(wanted) => {
+            LabelPiece::Star => italic = !italic,
+            LabelPiece::Script(wanted) => {
                 let inner = &piece[2..piece.len() - 1];
                 out.push_str(&tspan(inner, italic, wanted - shift, true));
                 shift = wanted;
             }
-            Piece::Plain => {
+            LabelPiece::Plain => {
                 out.push_str(&tspan(piece, italic, -shift, false));
                 shift = 0.0;
             }
@@ -67,25 +67,25 @@ pub fn tspans(label: &str) -> String {
     out
 }
 
-enum Piece {
+enum LabelPiece {
     Star,
     Script(f64),
     Plain,
 }
 
 /// First item of `rest`, and how many bytes it takes.
-fn next_piece(rest: &str) -> (Piece, usize) {
+fn next_piece(rest: &str) -> (LabelPiece, usize) {
     if rest.starts_with('*') {
-        return (Piece::Star, 1);
+        return (LabelPiece::Star, 1);
     }
     for (mark, shift) in [("_{", SUBSCRIPT_DROP), ("^{", SUPERSCRIPT_RISE)] {
         if let (true, Some(end)) = (rest.starts_with(mark), rest.find('}')) {
-            return (Piece::Script(shift), end + 1);
+            return (LabelPiece::Script(shift), end + 1);
         }
     }
     let first = rest.chars().next().map_or(0, char::len_utf8);
     let next = ["*", "_{", "^{"].iter().filter_map(|mark| rest[first..].find(mark)).min();
-    (Piece::Plain, next.map_or(rest.len(), |at| first + at))
+    (LabelPiece::Plain, next.map_or(rest.len(), |at| first + at))
 }
 
 fn tspan(text: &str, italic: bool, shift: f64, script: bool) -> String {

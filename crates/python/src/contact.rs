@@ -53,7 +53,7 @@ struct Parameters<'py> {
 /// A step; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Step<'py> {
+struct StepArguments<'py> {
     positions: Numbers<'py>,
     radii: FloatArray<'py>,
     velocities: Numbers<'py>,
@@ -66,7 +66,7 @@ struct Step<'py> {
 /// Contacts or memory; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Memory<'py> {
+struct MemoryArrays<'py> {
     first: PyReadonlyArray1<'py, i64>,
     second: PyReadonlyArray1<'py, i64>,
     wall: PyReadonlyArray1<'py, i64>,
@@ -87,7 +87,7 @@ impl PairContact {
     }
 
     /// Corrects the velocities of a step.
-    fn correct<'py>(&self, py: Python<'py>, step: Step<'py>) -> PyResult<Corrected<'py>> {
+    fn correct<'py>(&self, py: Python<'py>, step: StepArguments<'py>) -> PyResult<Corrected<'py>> {
         let mut model = self.lock(py);
         match &mut *model {
             Model::Plane(model) => correct(py, model, &step),
@@ -106,7 +106,7 @@ impl PairContact {
     }
 
     /// Goes on from what [`Self::memory`] gave.
-    fn set_memory(&self, py: Python<'_>, memory: Memory<'_>) -> PyResult<()> {
+    fn set_memory(&self, py: Python<'_>, memory: MemoryArrays<'_>) -> PyResult<()> {
         let state = memory.state()?;
         let set = match &mut *self.lock(py) {
             Model::Plane(model) => model.resume(state),
@@ -175,7 +175,7 @@ where
 fn correct<'py, const D: usize>(
     py: Python<'py>,
     model: &mut gluey_contact::PairContact<D, WithFixed>,
-    step: &Step<'py>,
+    step: &StepArguments<'py>,
 ) -> PyResult<Corrected<'py>>
 where
     Dim<D>: Space<D>,
@@ -239,7 +239,7 @@ fn arrays<'py>(py: Python<'py>, pairs: Vec<(PairKey, f64, f64)>) -> PyResult<Bou
     Ok(dict)
 }
 
-impl Memory<'_> {
+impl MemoryArrays<'_> {
     fn state(&self) -> PyResult<ContactState> {
         let (first, second) = (self.first.as_slice()?, self.second.as_slice()?);
         let (wall, image) = (self.wall.as_slice()?, self.image.as_slice()?);

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use gluey::case::{CaseIssue, InvalidCase, Place};
+use gluey::case::{CaseIssue, InvalidCase, IssuePlace};
 use gluey::{
     CaseError, CheckpointError, Ended, FileError, NotText, ResultPaths, ResumeError, RowsError, RunError,
 };
@@ -73,12 +73,12 @@ pub fn of_case(py: Python<'_>, error: &CaseError) -> PyErr {
 fn told(invalid: &InvalidCase, issue: &CaseIssue) -> (String, String, String) {
     let file = invalid.file.display();
     let text = match &issue.place {
-        Place::Text { line, column, .. } if invalid.file.as_os_str() != DICTIONARY => {
+        IssuePlace::Text { line, column, .. } if invalid.file.as_os_str() != DICTIONARY => {
             format!("{file}:{line}:{column}: {issue}")
         }
-        Place::Text { .. } | Place::Value => issue.to_string(),
-        Place::List { file, line } => format!("{}:{line}: {issue}", file.display()),
-        Place::Argument(argument) => {
+        IssuePlace::Text { .. } | IssuePlace::Value => issue.to_string(),
+        IssuePlace::List { file, line } => format!("{}:{line}: {issue}", file.display()),
+        IssuePlace::Argument(argument) => {
             format!("overrides, {}: {issue}", argument.strip_prefix("--set ").unwrap_or(argument))
         }
     };

@@ -28,7 +28,7 @@ const STOPPING: &str = "stopping after this step; once more to stop waiting for 
 /// Output of a run; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Output {
+pub struct RunOutput {
     out: PathBuf,
     force: bool,
     vtk: Option<usize>,
@@ -37,7 +37,7 @@ pub struct Output {
     checkpoint_minutes: Option<f64>,
 }
 
-impl Output {
+impl RunOutput {
     fn options(self, case: &gluey::Case) -> RunOptions {
         let paths = ResultPaths::new(&self.out, case.file_stem());
         let encoding = VtkEncoding::default();
@@ -60,7 +60,7 @@ impl Output {
 pub fn run(
     py: Python<'_>,
     case: &Case,
-    output: Output,
+    output: RunOutput,
     threads: Option<usize>,
     progress: Option<Bound<'_, PyAny>>,
     notice: Bound<'_, PyAny>,
@@ -166,12 +166,12 @@ struct Listener<'py> {
 /// The last words of a run.
 #[derive(Default)]
 struct Watch {
-    told: Mutex<RunState>,
+    told: Mutex<LastWords>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct RunState {
+struct LastWords {
     state: Option<ProgressState>,
     notices: Vec<String>,
 }
@@ -187,7 +187,7 @@ impl Watch {
 
     /// Hands on what was told since the last time.
     fn tell(&self, py: Python<'_>, listener: &Listener<'_>, name: &str) -> PyResult<()> {
-        let RunState { state, notices } =
+        let LastWords { state, notices } =
             std::mem::take(&mut *self.told.lock().unwrap_or_else(PoisonError::into_inner));
         for notice in notices {
             listener.notice.call1((notice, true))?;

@@ -17,7 +17,7 @@ use crate::pool::compute;
 /// Options of pictures; a dictionary with these keys.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Plot {
+pub struct PlotRequest {
     folder: PathBuf,
     only: Vec<String>,
     frame: Option<String>,
@@ -35,7 +35,7 @@ pub struct Plot {
 
 /// Draws the results in a folder and gives the paths of the pictures.
 #[pyfunction]
-pub fn plot(py: Python<'_>, plot: Plot) -> PyResult<Vec<PathBuf>> {
+pub fn plot(py: Python<'_>, plot: PlotRequest) -> PyResult<Vec<PathBuf>> {
     let slice = plot.slice.map(|slice| named::<SliceChoice>("slice", &slice)).transpose()?;
     let quantity = plot.flow.map(|flow| named::<Quantity>("flow", &flow)).transpose()?;
     let (azimuth, elevation) = plot.view;

@@ -41,7 +41,7 @@ where
 /// The drive of a flow; a dictionary with these keys, without `hold` for free particles.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Drive<'py> {
+struct FlowDrive<'py> {
     /// Whether velocities and spins are given, and not forces and torques.
     hold: bool,
     vectors: Numbers<'py>,
@@ -67,7 +67,7 @@ impl Stokes {
     }
 
     /// The flow under some conditions.
-    fn solve<'py>(&self, py: Python<'py>, drive: Drive<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn solve<'py>(&self, py: Python<'py>, drive: FlowDrive<'py>) -> PyResult<Bound<'py, PyDict>> {
         let mut flows = self.flows.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         match &mut *flows {
             Flows::Plane(around) => around.solve(py, self.threads, &drive),
@@ -93,7 +93,7 @@ where
         &mut self,
         py: Python<'py>,
         threads: Option<usize>,
-        drive: &Drive<'py>,
+        drive: &FlowDrive<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let (vectors, spins) = (vectors::<D>(&drive.vectors)?, spins::<D>(&drive.spins)?);
         if vectors.len() != spins.len() {
@@ -141,9 +141,9 @@ where
 
 /// The stresslets of the bodies with what films add, and the share of films; nothing in a formulation that
 /// has none.
-type Moments<const D: usize> = Option<[Vec<Matrix<D>>; 2]>;
+type BodyMoments<const D: usize> = Option<[Vec<Matrix<D>>; 2]>;
 
-fn moments<const D: usize>(prepared: &Prepared<'_, D>, flow: &Flow<D>) -> Result<Moments<D>, StokesError>
+fn moments<const D: usize>(prepared: &Prepared<'_, D>, flow: &Flow<D>) -> Result<BodyMoments<D>, StokesError>
 where
     Dim<D>: Space<D>,
 {
@@ -160,7 +160,7 @@ where
 fn of_flow<'py, const D: usize>(
     py: Python<'py>,
     flow: &Flow<D>,
-    moments: Moments<D>,
+    moments: BodyMoments<D>,
 ) -> PyResult<Bound<'py, PyDict>>
 where
     Dim<D>: Space<D>,

@@ -29,14 +29,14 @@ pub fn for_each_pair<const D: usize>(
     if positions.is_empty() {
         return;
     }
-    let grid = Grid::new(container, positions, range);
+    let grid = ParticleCells::new(container, positions, range);
     for first in 0..positions.len() {
         grid.visit_partners(first, range, &mut visit);
     }
 }
 
 /// Particles binned by cells of the box without tilt.
-struct Grid<'a, const D: usize> {
+struct ParticleCells<'a, const D: usize> {
     container: &'a Container<D>,
     axes: [CellAxis; D],
     /// Positions wrapped into the box.
@@ -67,7 +67,7 @@ impl CellAxis {
     }
 }
 
-impl<'a, const D: usize> Grid<'a, D> {
+impl<'a, const D: usize> ParticleCells<'a, D> {
     fn new(container: &'a Container<D>, positions: &[Vector<D>], range: f64) -> Self {
         let wrapped: Vec<_> = positions.iter().map(|x| container.wrapped(x)).collect();
         let lattice = container.lattice();

@@ -28,10 +28,10 @@ use gluey_geom::{Dim, Space};
 use gluey_suspension::statistics::mser;
 use thiserror::Error;
 
-pub use summary::Summary;
+pub use summary::StructureSummary;
 
 use crate::frames::{FramesError, dimension, frame_files, read_frames};
-use observe::{Distributions, Instant};
+use observe::{Distributions, FrameNumbers};
 
 /// Options of an analysis.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,7 +87,7 @@ pub enum AnalyseError {
 }
 
 /// Reads the frames of a run, writes the tables and gives the summary.
-pub fn analyse(options: &AnalyseOptions) -> Result<Summary, AnalyseError> {
+pub fn analyse(options: &AnalyseOptions) -> Result<StructureSummary, AnalyseError> {
     if !(0.0..=10.0).contains(&options.reach_over_a) {
         return Err(AnalyseError::Reach { found: options.reach_over_a });
     }
@@ -98,14 +98,17 @@ pub fn analyse(options: &AnalyseOptions) -> Result<Summary, AnalyseError> {
     }
 }
 
-fn analyse_in<const D: usize>(options: &AnalyseOptions, files: &[PathBuf]) -> Result<Summary, AnalyseError>
+fn analyse_in<const D: usize>(
+    options: &AnalyseOptions,
+    files: &[PathBuf],
+) -> Result<StructureSummary, AnalyseError>
 where
     Dim<D>: Space<D>,
 {
     let frames = read_frames::<D>(files)?;
-    let series: Vec<Instant<D>> = frames
+    let series: Vec<FrameNumbers<D>> = frames
         .iter()
-        .map(|frame| Instant::of(frame, options.reach_over_a))
+        .map(|frame| FrameNumbers::of(frame, options.reach_over_a))
         .collect::<Result<_, ContactError>>()?;
     let medians: Vec<f64> =
         series.iter().filter_map(|instant| instant.gaps.map(|gaps| gaps.median)).collect();
@@ -117,7 +120,7 @@ where
     let distributions = Distributions::of(kept);
     let begin = options.skip.map(|_| kept[0].time);
     let rheology = rheology_beside(&files[0]).map(|table| RheologyMeans::read(&table, begin)).transpose()?;
-    let summary = Summary::of(&series, skip, &distributions, rheology.flatten());
+    let summary = StructureSummary::of(&series, skip, &distributions, rheology.flatten());
     let out = options.out.as_deref().unwrap_or(&options.folder);
     write(out, &tables::all(&series, &distributions))?;
     write(out, &[("summary.txt", summary.to_string())])?;

@@ -20,11 +20,11 @@ mod frames;
 mod plot;
 mod view;
 
-pub use analyse::{AnalyseError, AnalyseOptions, Summary, analyse};
+pub use analyse::{AnalyseError, AnalyseOptions, StructureSummary, analyse};
 pub use frames::FramesError;
 pub use plot::{
-    AnimationOptions, Coloring, Figure, FlowOptions, Format, FrameChoice, Look, PlotError, PlotOptions,
-    Quantity, SliceChoice, Viewpoint, plot,
+    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Look, PictureFormat, PlotError,
+    PlotOptions, Quantity, SliceChoice, Viewpoint, plot,
 };
 pub use view::{ViewError, ViewOptions, Viewed, view};
 

@@ -46,18 +46,18 @@ pub use flow::{FlowOptions, Quantity, SliceChoice};
 pub use look::{Coloring, Look, Viewpoint};
 pub use snapshot::FrameChoice;
 
-use read::{Results, Tables};
+use read::{Results, StructureTables};
 
 /// The format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum PictureFormat {
     /// Scalable, with its font.
     Svg,
     /// Pixels, 381 to the inch.
     Png,
 }
 
-impl Format {
+impl PictureFormat {
     fn extension(self) -> &'static str {
         match self {
             Self::Svg => "svg",
@@ -66,7 +66,7 @@ impl Format {
     }
 }
 
-impl FromStr for Format {
+impl FromStr for PictureFormat {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -94,7 +94,7 @@ pub struct PlotOptions {
     /// What to draw; what there are results for when empty and no frame is named.
     pub only: Vec<Figure>,
     /// How to write it.
-    pub formats: Vec<Format>,
+    pub formats: Vec<PictureFormat>,
     /// Width on paper in millimetres.
     pub width_mm: f64,
 }
@@ -129,7 +129,7 @@ pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
     if options.only.is_empty() && is_of_frames {
         return Ok(written);
     }
-    let tables = Tables::new(&options.folder);
+    let tables = StructureTables::new(&options.folder);
     for results in runs(options, &tables)? {
         for figure in wanted(options).filter(|figure| !figure.is_of_structure()) {
             if let Some(canvas) = draw(figure, &results, options)? {
@@ -150,7 +150,7 @@ pub fn plot(options: &PlotOptions) -> Result<Vec<PathBuf>, PlotError> {
 }
 
 /// The runs to draw; a folder that has the tables of `gluey analyse` needs none, nor do pictures of them.
-fn runs(options: &PlotOptions, tables: &Tables<'_>) -> Result<Vec<Results>, PlotError> {
+fn runs(options: &PlotOptions, tables: &StructureTables<'_>) -> Result<Vec<Results>, PlotError> {
     let only = &options.only;
     if !only.is_empty() && only.iter().all(|figure| figure.is_of_structure()) {
         return Ok(Vec::new());
@@ -179,7 +179,7 @@ fn draw(figure: Figure, results: &Results, options: &PlotOptions) -> Result<Opti
 }
 
 /// Writes a picture beside `stem` in every format.
-fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf>, PlotError> {
+fn write(canvas: &Canvas, stem: &Path, formats: &[PictureFormat]) -> Result<Vec<PathBuf>, PlotError> {
     let mut paths = Vec::new();
     for format in formats {
         // Names may have a dot in a number: nothing is an extension of theirs.
@@ -187,8 +187,10 @@ fn write(canvas: &Canvas, stem: &Path, formats: &[Format]) -> Result<Vec<PathBuf
         path.push(format!(".{}", format.extension()));
         let path = PathBuf::from(path);
         let bytes = match format {
-            Format::Svg => canvas.svg_for_print().into_bytes(),
-            Format::Png => canvas.png().map_err(|source| PlotError::Png { path: path.clone(), source })?,
+            PictureFormat::Svg => canvas.svg_for_print().into_bytes(),
+            PictureFormat::Png => {
+                canvas.png().map_err(|source| PlotError::Png { path: path.clone(), source })?
+            }
         };
         prepare_folder_of(&path)?;
         write_atomically(&path, &bytes)?;
@@ -206,7 +208,7 @@ mod tests {
     #[test]
     fn pictures_are_known_by_their_names() {
         for &figure in Figure::ALL {
-            for format in [Format::Svg, Format::Png] {
+            for format in [PictureFormat::Svg, PictureFormat::Png] {
                 assert!(is_picture(&format!("{}.{}", figure.as_str(), format.extension())), "{figure:?}");
             }
         }

@@ -60,8 +60,8 @@ pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
     let title = title(&files[0]);
     let files: Vec<PathBuf> = files.into_iter().step_by(options.every.max(1)).collect();
     let run = match dimension(&files)? {
-        2 => Run::of(title, &read_frames::<2>(&files)?),
-        _ => Run::of(title, &read_frames::<3>(&files)?),
+        2 => PageRun::of(title, &read_frames::<2>(&files)?),
+        _ => PageRun::of(title, &read_frames::<3>(&files)?),
     };
     let page = options.out.clone().unwrap_or_else(|| options.folder.join(PAGE_NAME));
     let text = run.page();
@@ -80,7 +80,7 @@ fn title(frame: &Path) -> String {
 
 /// A run as the script reads it; vectors have three coordinates each, one after the other.
 #[derive(Serialize)]
-struct Run {
+struct PageRun {
     title: String,
     dimension: usize,
     /// Lower corner of the box.
@@ -89,11 +89,11 @@ struct Run {
     edges: [f32; 3],
     periodic: [bool; 3],
     radii: Vec<f32>,
-    frames: Vec<Frame>,
+    frames: Vec<PageFrame>,
 }
 
 #[derive(Serialize)]
-struct Frame {
+struct PageFrame {
     time: f64,
     strain: f64,
     /// Displacement in x of the upper border against the lower one.
@@ -105,7 +105,7 @@ struct Frame {
     forces: Vec<f32>,
 }
 
-impl Run {
+impl PageRun {
     /// All frames have the radii and the box of the first.
     fn of<const D: usize>(title: String, frames: &[XyzFrame<D>]) -> Self
     where
@@ -120,7 +120,7 @@ impl Run {
             edges: triple(bounds.extent().as_slice()),
             periodic: std::array::from_fn(|d| d < D && !container.is_walled(d)),
             radii: radii.iter().map(|radius| *radius as f32).collect(),
-            frames: frames.iter().map(Frame::of).collect(),
+            frames: frames.iter().map(PageFrame::of).collect(),
         }
     }
 
@@ -133,7 +133,7 @@ impl Run {
     }
 }
 
-impl Frame {
+impl PageFrame {
     fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
     where
         Dim<D>: Space<D>,

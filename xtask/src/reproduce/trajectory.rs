@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use gluey::table::{Table, TableError, linear};
+use gluey::table::{NumberTable, TableError, linear};
 
 /// Centres and gaps over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,7 +36,7 @@ impl Trajectory {
     /// Takes the columns of a table; a last line without its newline (a run cut short) is dropped.
     fn parse(text: &str) -> Result<Self, TableError> {
         let whole = &text[..text.rfind('\n').map_or(0, |at| at + 1)];
-        let table = Table::parse(whole)?;
+        let table = NumberTable::parse(whole)?;
         let times = table.column("t")?.to_vec();
         let mut centers = Vec::new();
         while centers.is_empty() || table.find(&format!("x{}", centers.len() + 1)).is_some() {
@@ -100,7 +100,7 @@ impl Trajectory {
 }
 
 /// The gaps that a table has, `gap12_over_a, ...` or, for a pair, `D_over_a`.
-fn gaps(table: &Table, particle_count: usize) -> Vec<PairGap> {
+fn gaps(table: &NumberTable, particle_count: usize) -> Vec<PairGap> {
     let pairs = (1..=particle_count).flat_map(|i| (i + 1..=particle_count).map(move |j| (i, j)));
     let column = |(i, j)| table.find(&format!("gap{i}{j}_over_a")).or_else(|| table.find("D_over_a"));
     pairs.filter_map(|pair| Some(PairGap { pair, over_radius: column(pair)?.to_vec() })).collect()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use gluey::case::Override;
-use gluey::table::Table;
+use gluey::table::NumberTable;
 use gluey::{Case, OccupiedError, RecordOptions, ResultPaths, RunError, RunOptions, RunRecord, RunReport};
 
 use crate::book::progress::Board;
@@ -34,9 +34,9 @@ pub struct Done {
     /// What came out.
     pub report: RunReport,
     /// The trajectory.
-    pub trajectory: Table,
+    pub trajectory: NumberTable,
     /// The rheology, where there is one.
-    pub rheology: Option<Table>,
+    pub rheology: Option<NumberTable>,
 }
 
 impl Point {
@@ -97,7 +97,7 @@ fn report(case: &Case, paths: &ResultPaths, line: &dyn gluey::Progress) -> anyho
     }
 }
 
-fn table(path: &Path) -> anyhow::Result<Table> {
+fn table(path: &Path) -> anyhow::Result<NumberTable> {
     let text = std::fs::read_to_string(path);
-    Ok(Table::parse(&text.with_context(|| format!("{} cannot be read", path.display()))?)?)
+    Ok(NumberTable::parse(&text.with_context(|| format!("{} cannot be read", path.display()))?)?)
 }

@@ -64,7 +64,7 @@ struct Check {
     memory_is_measured: bool,
     /// Memory there is; unit: bytes.
     memory_available_bytes: Option<u64>,
-    trial: Option<Trial>,
+    trial: Option<TrialTimes>,
 }
 
 /// The first mesh.
@@ -76,7 +76,7 @@ struct Mesh {
 
 /// Times that trial steps took.
 #[derive(Debug, Serialize)]
-struct Trial {
+struct TrialTimes {
     /// Steps that were made.
     steps: usize,
     /// The first flow, which starts from nothing; unit: seconds.
@@ -114,7 +114,7 @@ impl CheckArguments {
     }
 
     /// Makes the first steps of the run, whose results go away again.
-    fn trial(&self, case: &Case) -> Result<Trial, Failure> {
+    fn trial(&self, case: &Case) -> Result<TrialTimes, Failure> {
         let folder =
             tempfile::TempDir::new().map_err(|error| Failure::new(TrialError::Folder(error), None))?;
         let steps = case.step_count().min(TRIAL_STEPS);
@@ -135,26 +135,26 @@ impl CheckArguments {
 /// Takes the time at the beginning of every flow, and whenever the run reports.
 struct Clock {
     reporter: Reporter,
-    times: Mutex<Times>,
+    times: Mutex<FlowTimes>,
 }
 
 /// The times at which the flows of a run began, and that of its last report.
 #[derive(Debug, Default)]
-struct Times {
+struct FlowTimes {
     flows: Vec<Instant>,
     last: Option<Instant>,
 }
 
-impl Times {
+impl FlowTimes {
     /// A trial of so many steps of a run of `all` steps. Flows are computed at the beginning of every step
     /// and at the end of the last.
-    fn trial(&self, steps: usize, all: usize) -> Trial {
+    fn trial(&self, steps: usize, all: usize) -> TrialTimes {
         let ends = self.flows.iter().skip(1).chain(&self.last);
         let seconds: Vec<f64> =
             self.flows.iter().zip(ends).map(|(start, end)| (*end - *start).as_secs_f64()).collect();
         let (first_s, later) = seconds.split_first().map_or((0.0, &[][..]), |(first, later)| (*first, later));
         let step_s = later.iter().sum::<f64>() / later.len().max(1) as f64;
-        Trial { steps, first_s, step_s, run_s: first_s + step_s * all as f64 }
+        TrialTimes { steps, first_s, step_s, run_s: first_s + step_s * all as f64 }
     }
 }
 
@@ -195,7 +195,7 @@ impl Check {
                 .map_or(String::new(), |there| format!(", {} there", size(there as f64)));
             lines.push(("memory", format!("{} ({how}{there})", size(bytes))));
         }
-        if let Some(Trial { first_s, step_s, run_s, .. }) = self.trial {
+        if let Some(TrialTimes { first_s, step_s, run_s, .. }) = self.trial {
             lines.push((
                 "time",
                 format!("about {} ({first_s:.3} s to begin, {step_s:.3} s a step)", duration(run_s)),
@@ -215,7 +215,7 @@ mod tests {
     fn a_run_goes_on_at_the_pace_of_its_trial() {
         let start = Instant::now();
         let after = |seconds| start + Duration::from_secs(seconds);
-        let times = Times { flows: vec![start, after(5), after(7)], last: Some(after(11)) };
+        let times = FlowTimes { flows: vec![start, after(5), after(7)], last: Some(after(11)) };
         let trial = times.trial(2, 100);
         assert_eq!((trial.first_s, trial.step_s, trial.run_s), (5.0, 3.0, 305.0));
     }

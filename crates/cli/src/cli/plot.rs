@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use gluey_view::{
-    AnimationOptions, Coloring, Figure, FlowOptions, Format, FrameChoice, Look, PlotOptions, Quantity,
+    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Look, PictureFormat, PlotOptions, Quantity,
     SliceChoice, Viewpoint,
 };
 
@@ -63,7 +63,7 @@ pub struct PlotArguments {
     rate: f64,
     /// How to write it: svg, png.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',', default_value = "svg,png")]
-    format: Vec<Format>,
+    format: Vec<PictureFormat>,
     /// Width on paper in millimetres.
     #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = number(60.0..=400.0, "millimetres"))]
     width: f64,

@@ -7,7 +7,7 @@ use std::thread;
 
 use clap::Args;
 use gluey::progress::duration;
-use gluey::sweep::{Axis, Point, PointResult, PointState, Study, SweepError, points, table};
+use gluey::sweep::{PointResult, PointState, Study, StudyPoint, SweepError, SweptKey, points, table};
 use gluey::{RunError, RunOptions, RunReport, in_full};
 use thiserror::Error;
 
@@ -31,7 +31,7 @@ pub struct SweepArguments {
     case: PathBuf,
     /// A key of the case and the values it takes: time.step=0.1,0.05; repeatable, for all combinations.
     #[arg(long, value_name = "KEY=A,B,...", required = true)]
-    set: Vec<Axis>,
+    set: Vec<SweptKey>,
     /// Folder for the points and the table.
     #[arg(long, default_value = "sweep", value_name = "DIR")]
     out: PathBuf,
@@ -72,7 +72,7 @@ impl SweepArguments {
     }
 
     /// Runs points, the next whenever a job is free, and gives their results in their own order.
-    fn run_all(&self, points: &[Point], states: &[PointState], requests: &Requests) -> Vec<PointResult> {
+    fn run_all(&self, points: &[StudyPoint], states: &[PointState], requests: &Requests) -> Vec<PointResult> {
         let next = AtomicUsize::new(0);
         let results: Vec<Mutex<Option<PointResult>>> = points.iter().map(|_| Mutex::new(None)).collect();
         let work = || {
@@ -99,7 +99,7 @@ impl SweepArguments {
         taken.collect()
     }
 
-    fn run_one(&self, point: &Point, state: &PointState, requests: &Requests) -> PointResult {
+    fn run_one(&self, point: &StudyPoint, state: &PointState, requests: &Requests) -> PointResult {
         let resume = match state {
             PointState::Complete(report) => {
                 return PointResult {
@@ -127,7 +127,7 @@ impl SweepArguments {
         self.of_run(point, ran)
     }
 
-    fn of_run(&self, point: &Point, ran: Result<RunReport, RunError>) -> PointResult {
+    fn of_run(&self, point: &StudyPoint, ran: Result<RunReport, RunError>) -> PointResult {
         match ran {
             Ok(report) => PointResult { report: Some(report), ..self.result(point, "complete", None) },
             Err(RunError::Interrupted(_)) => self.result(point, "interrupted", None),
@@ -140,7 +140,7 @@ impl SweepArguments {
         }
     }
 
-    fn result(&self, point: &Point, state: &'static str, error: Option<String>) -> PointResult {
+    fn result(&self, point: &StudyPoint, state: &'static str, error: Option<String>) -> PointResult {
         let keys = self.set.iter().map(|axis| axis.key.clone());
         let values = keys.zip(point.values.iter().cloned()).collect();
         PointResult { name: point.name.clone(), values, state, report: None, error }

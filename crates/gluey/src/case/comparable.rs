@@ -1,14 +1,14 @@
 //! Whether a case can be compared with a reference solution.
 
 use super::{Boundary, Case, Hydrodynamics};
-use crate::reference::{MIDDLE, RADIUS, Reference};
+use crate::reference::{MIDDLE, RADIUS, ReferenceSolution};
 
 /// How far from the reference's a particle may start, in radii.
 const START_TOLERANCE: f64 = 1e-6;
 
 /// First mismatch that keeps `case` from being compared with `reference`: what is required, and the case's
 /// value in its place.
-pub(super) fn mismatch(case: &Case, reference: &Reference) -> Option<(String, String)> {
+pub(super) fn mismatch(case: &Case, reference: &ReferenceSolution) -> Option<(String, String)> {
     let mut all = flow(case, reference).into_iter().chain(surroundings(case, reference));
     let first = all.find(|(is_so, ..)| !is_so);
     let first = first.map(|(_, needs, found)| (needs, found));
@@ -18,7 +18,7 @@ pub(super) fn mismatch(case: &Case, reference: &Reference) -> Option<(String, St
 /// A requirement of a comparison: whether it is met, what it is, and what the case has.
 type Requirement = (bool, String, String);
 
-fn flow(case: &Case, reference: &Reference) -> Vec<Requirement> {
+fn flow(case: &Case, reference: &ReferenceSolution) -> Vec<Requirement> {
     let (dimension, count) = (reference.dimension(), reference.particle_count());
     let hydrodynamics =
         if reference.is_in_box() { Hydrodynamics::Stokes } else { Hydrodynamics::PairMobility };
@@ -46,7 +46,7 @@ fn flow(case: &Case, reference: &Reference) -> Vec<Requirement> {
 
 /// Flow in a box needs that box and its boundary; without walls the height at which the shear is at rest
 /// counts.
-fn surroundings(case: &Case, reference: &Reference) -> Vec<Requirement> {
+fn surroundings(case: &Case, reference: &ReferenceSolution) -> Vec<Requirement> {
     let (lower, upper, boundary) = (case.lower(), case.upper(), case.domain.boundary);
     if !reference.is_in_box() {
         let middle = 0.5 * (lower[1] + upper[1]);
@@ -62,7 +62,7 @@ fn surroundings(case: &Case, reference: &Reference) -> Vec<Requirement> {
 }
 
 /// The first particle that is not one of the reference's at its start.
-fn first_stranger(case: &Case, reference: &Reference) -> Option<(String, String)> {
+fn first_stranger(case: &Case, reference: &ReferenceSolution) -> Option<(String, String)> {
     let mut particles = case.particles.iter().zip(reference.starts()).enumerate();
     particles.find_map(|(index, (particle, start))| {
         let start = &start[..reference.dimension()];

@@ -49,18 +49,18 @@ pub struct InvalidCase {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseIssue {
     /// Where it was written.
-    pub place: Place,
+    pub place: IssuePlace,
     /// The key, e.g. `particles[1].radius`.
     pub key: Key,
     /// The value as written, when there is one.
     pub value: Option<String>,
     /// The error.
-    pub problem: Problem,
+    pub problem: CaseProblem,
 }
 
 /// The place where something of a case was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum IssuePlace {
     /// In the text of its file.
     Text {
         /// Line, from 1.
@@ -91,10 +91,10 @@ impl fmt::Display for InvalidCase {
                 writeln!(f)?;
             }
             match &issue.place {
-                Place::Text { line, column, .. } => write!(f, "{file}:{line}:{column}: {issue}")?,
-                Place::List { file, line } => write!(f, "{}:{line}: {issue}", file.display())?,
-                Place::Argument(argument) => write!(f, "{argument}: {issue}")?,
-                Place::Value => write!(f, "{file}: {issue}")?,
+                IssuePlace::Text { line, column, .. } => write!(f, "{file}:{line}:{column}: {issue}")?,
+                IssuePlace::List { file, line } => write!(f, "{}:{line}: {issue}", file.display())?,
+                IssuePlace::Argument(argument) => write!(f, "{argument}: {issue}")?,
+                IssuePlace::Value => write!(f, "{file}: {issue}")?,
             }
         }
         match self.more {
@@ -121,13 +121,13 @@ impl fmt::Display for CaseIssue {
 impl CaseIssue {
     /// Whether the value is a row of a list, which says more than a key of the case.
     fn is_of_list(&self) -> bool {
-        matches!(self.place, Place::List { .. })
+        matches!(self.place, IssuePlace::List { .. })
     }
 }
 
 /// An error in a value of a case.
 #[derive(Clone, Debug, Error, PartialEq)]
-pub enum Problem {
+pub enum CaseProblem {
     /// Not TOML.
     #[error("not valid TOML: {message}")]
     Syntax {
@@ -379,7 +379,7 @@ pub enum Problem {
     BadName,
 }
 
-impl Problem {
+impl CaseProblem {
     /// Hint at values that would be right.
     pub fn hint(&self) -> String {
         match self {

@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Space};
 use gluey_suspension::ball_volume;
 use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
-use super::error::{Key, Problem};
-use super::findings::{Findings, Violation};
+use super::error::{CaseProblem, Key};
+use super::findings::{CaseFindings, Violation};
 use super::idle::idle_in_suspension;
 use super::particle_problem::ParticleProblem;
 use super::particles_file::ParticleList;
@@ -27,7 +27,7 @@ pub(super) fn fill(
     case: &mut Case,
     has_list: bool,
     folder: &Path,
-    findings: &mut Findings,
+    findings: &mut CaseFindings,
 ) -> Option<ParticleList> {
     let root = Key::default();
     let sources = [
@@ -38,20 +38,20 @@ pub(super) fn fill(
     let given: Vec<&'static str> = sources.iter().filter(|(is, _)| *is).map(|(_, name)| *name).collect();
     match given[..] {
         [] => {
-            let problem = Problem::MissingKey { name: "particles".into(), example: "[[particles]]" };
+            let problem = CaseProblem::MissingKey { name: "particles".into(), example: "[[particles]]" };
             findings.add(root.name("particles"), problem);
             None
         }
         [first, second, ..] => {
             let key = root.name(if case.suspension.is_some() { "suspension" } else { "particles_file" });
-            findings.add(key, Problem::Particles(ParticleProblem::TwoSources { first, second }));
+            findings.add(key, CaseProblem::Particles(ParticleProblem::TwoSources { first, second }));
             None
         }
         [_] => fill_from_one(case, folder, findings),
     }
 }
 
-fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) -> Option<ParticleList> {
+fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut CaseFindings) -> Option<ParticleList> {
     let mut read = None;
     if let Some(file) = &case.particles_file {
         match particles_file::read(&folder.join(file), case.dimension) {
@@ -60,7 +60,7 @@ fn fill_from_one(case: &mut Case, folder: &Path, findings: &mut Findings) -> Opt
                 read = Some(list);
             }
             Err(problems) => problems.into_iter().for_each(|problem| {
-                findings.add(Key::default().name("particles_file"), Problem::Particles(problem));
+                findings.add(Key::default().name("particles_file"), CaseProblem::Particles(problem));
             }),
         }
     }
@@ -108,7 +108,10 @@ fn check_count(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<()
         true => Ok(()),
         false => {
             let range = format!("of {} or more, for at most {MOST_PARTICLES} particles", shown(least));
-            Err(Violation { key: key.name("radius"), problem: Problem::OutOfRange { found: radius, range } })
+            Err(Violation {
+                key: key.name("radius"),
+                problem: CaseProblem::OutOfRange { found: radius, range },
+            })
         }
     }
 }
@@ -140,5 +143,5 @@ fn packing_key(error: &PackingError) -> Option<&'static str> {
 }
 
 fn fail<T>(key: Key, problem: ParticleProblem) -> Result<T, Violation> {
-    Err(Violation { key, problem: Problem::Particles(problem) })
+    Err(Violation { key, problem: CaseProblem::Particles(problem) })
 }

@@ -1,6 +1,6 @@
 //! What is wrong with a case, gathered while it is checked.
 
-use super::error::{Key, KeyPart, Problem};
+use super::error::{CaseProblem, Key, KeyPart};
 
 /// So many findings are kept; beyond, they are counted.
 const KEPT: usize = 100;
@@ -9,20 +9,20 @@ const KEPT: usize = 100;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Violation {
     pub key: Key,
-    pub problem: Problem,
+    pub problem: CaseProblem,
 }
 
 /// Errors found in a case.
 #[derive(Debug, Default)]
-pub(super) struct Findings {
+pub(super) struct CaseFindings {
     list: Vec<Violation>,
     /// Findings beyond those that are kept.
     more: usize,
 }
 
-impl Findings {
+impl CaseFindings {
     /// Notes that the value of `key` is wrong.
-    pub fn add(&mut self, key: Key, problem: Problem) {
+    pub fn add(&mut self, key: Key, problem: CaseProblem) {
         match self.list.len() < KEPT {
             true => self.list.push(Violation { key, problem }),
             false => self.more += 1,
@@ -31,7 +31,7 @@ impl Findings {
 
     /// Notes that `found`, the value of `key`, is not in a range.
     pub fn out_of_range(&mut self, key: Key, found: f64, range: &str) {
-        self.add(key, Problem::OutOfRange { found, range: range.to_owned() });
+        self.add(key, CaseProblem::OutOfRange { found, range: range.to_owned() });
     }
 
     /// Notes that `choice` needs something else than what the case has.
@@ -43,7 +43,7 @@ impl Findings {
         found: impl Into<String>,
     ) {
         let (choice, needs, found) = (choice.into(), needs.into(), found.into());
-        self.add(key, Problem::Unfit { choice, needs, found });
+        self.add(key, CaseProblem::Unfit { choice, needs, found });
     }
 
     /// Whether nothing was found.
@@ -69,7 +69,7 @@ impl Findings {
     /// them.
     pub fn have_unknown_part(&self) -> bool {
         let is_one = |violation: &Violation| {
-            violation.key.0.len() == 1 && matches!(violation.problem, Problem::UnknownKey { .. })
+            violation.key.0.len() == 1 && matches!(violation.problem, CaseProblem::UnknownKey { .. })
         };
         self.list.iter().any(is_one)
     }

@@ -5,14 +5,14 @@ use serde_json::Value as Schema;
 use toml::Value;
 
 use super::Case;
-use super::error::{Key, Problem};
-use super::findings::Findings;
+use super::error::{CaseProblem, Key};
+use super::findings::CaseFindings;
 use super::names::UnknownName;
 use super::suggest::{closest, synonym};
 use crate::number_text::shown;
 
 /// Notes everything in `value`, which stands at `key`, that `schema` does not allow.
-pub(super) fn check(value: &Value, schema: &Schema, key: &Key, findings: &mut Findings) {
+pub(super) fn check(value: &Value, schema: &Schema, key: &Key, findings: &mut CaseFindings) {
     let kind = schema["type"].as_str().unwrap_or_default();
     match (kind, value) {
         ("object", Value::Table(table)) => check_table(table, schema, key, findings),
@@ -27,12 +27,12 @@ pub(super) fn check(value: &Value, schema: &Schema, key: &Key, findings: &mut Fi
         ("number", Value::Float(number)) => check_range(*number, schema, key, findings),
         _ => findings.add(
             key.clone(),
-            Problem::WrongType { found: type_name(value).to_owned(), expected: expected(schema) },
+            CaseProblem::WrongType { found: type_name(value).to_owned(), expected: expected(schema) },
         ),
     }
 }
 
-fn check_table(table: &toml::Table, schema: &Schema, key: &Key, findings: &mut Findings) {
+fn check_table(table: &toml::Table, schema: &Schema, key: &Key, findings: &mut CaseFindings) {
     let known = || schema["properties"].as_object().into_iter().flat_map(|known| known.keys());
     let mut meant: Vec<String> = Vec::new();
     for (name, value) in table {
@@ -45,7 +45,7 @@ fn check_table(table: &toml::Table, schema: &Schema, key: &Key, findings: &mut F
                 let suggestion = near.filter(|_| elsewhere.is_empty());
                 let known = known().cloned().collect();
                 meant.extend(suggestion.clone());
-                let problem = Problem::UnknownKey { name: name.clone(), suggestion, elsewhere, known };
+                let problem = CaseProblem::UnknownKey { name: name.clone(), suggestion, elsewhere, known };
                 findings.add(key.name(name), problem);
             }
         }
@@ -53,7 +53,8 @@ fn check_table(table: &toml::Table, schema: &Schema, key: &Key, findings: &mut F
     for name in schema["required"].as_array().into_iter().flatten().filter_map(Schema::as_str) {
         // A key that is misspelt is not missing too.
         if !table.contains_key(name) && !meant.iter().any(|key| key == name) {
-            findings.add(key.name(name), Problem::MissingKey { name: name.into(), example: example(name) });
+            findings
+                .add(key.name(name), CaseProblem::MissingKey { name: name.into(), example: example(name) });
         }
     }
 }
@@ -75,20 +76,21 @@ fn search(schema: &Schema, key: &Key, name: &str, found: &mut Vec<String>) {
     properties.iter().for_each(|(part, schema)| search(schema, &key.name(part), name, found));
 }
 
-fn check_name(found: &str, schema: &Schema, key: &Key, findings: &mut Findings) {
+fn check_name(found: &str, schema: &Schema, key: &Key, findings: &mut CaseFindings) {
     let Some(names) = schema["enum"].as_array() else { return };
     let known: Vec<String> = names.iter().filter_map(Schema::as_str).map(str::to_owned).collect();
     if !known.iter().any(|name| name == found) {
         let what = key.last_name().unwrap_or("name").to_owned();
-        findings.add(key.clone(), Problem::UnknownName(UnknownName { what, found: found.to_owned(), known }));
+        findings
+            .add(key.clone(), CaseProblem::UnknownName(UnknownName { what, found: found.to_owned(), known }));
     }
 }
 
-fn check_range(number: f64, schema: &Schema, key: &Key, findings: &mut Findings) {
+fn check_range(number: f64, schema: &Schema, key: &Key, findings: &mut CaseFindings) {
     if !number.is_finite() {
-        return findings.add(key.clone(), Problem::NotFinite { found: number });
+        return findings.add(key.clone(), CaseProblem::NotFinite { found: number });
     }
-    let range = Range::of(schema);
+    let range = NumberRange::of(schema);
     if !range.contains(number) {
         findings.out_of_range(key.clone(), number, &range.in_words());
     }
@@ -96,7 +98,7 @@ fn check_range(number: f64, schema: &Schema, key: &Key, findings: &mut Findings)
 
 /// Numbers that a key may have.
 #[derive(Clone, Copy, Debug, Default)]
-struct Range {
+struct NumberRange {
     /// Whether only whole numbers are meant.
     is_whole: bool,
     least: Option<f64>,
@@ -105,7 +107,7 @@ struct Range {
     below: Option<f64>,
 }
 
-impl Range {
+impl NumberRange {
     fn of(schema: &Schema) -> Self {
         let number = |name: &str| schema.get(name).and_then(Schema::as_f64);
         Self {
@@ -149,7 +151,7 @@ impl Range {
 
 /// What a number of this schema may be, in words.
 pub(crate) fn range_in_words(schema: &Schema) -> String {
-    Range::of(schema).in_words()
+    NumberRange::of(schema).in_words()
 }
 
 /// A value's type in words of the case file.
@@ -204,7 +206,7 @@ mod tests {
 
     /// Lines of what is found in the form of a case.
     fn found(text: &str) -> Vec<String> {
-        let mut findings = Findings::default();
+        let mut findings = CaseFindings::default();
         let table: toml::Table = toml::from_str(text).expect("TOML");
         check(&Value::Table(table), Case::schema(), &Key::default(), &mut findings);
         let (list, more) = findings.into_parts();

@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Space, Twist, Vector};
 
 use super::error::Key;
-use super::findings::Findings;
+use super::findings::CaseFindings;
 use super::forces::{is_given, vector};
 use super::{Boundary, Case, Formulation, Hydrodynamics, ParticleSpec};
 
@@ -44,7 +44,7 @@ impl Case {
 }
 
 /// Notes what does not go with a motion that is given to a particle.
-pub(super) fn check_motion(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut Findings) {
+pub(super) fn check_motion(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut CaseFindings) {
     if !particle.is_given_motion() {
         return;
     }
@@ -84,7 +84,7 @@ fn other_model(case: &Case) -> Option<(String, String)> {
 }
 
 /// Notes a force on fluid and particles that nothing carries, or that does nothing.
-pub(super) fn check_force_density(case: &Case, key: &Key, findings: &mut Findings) {
+pub(super) fn check_force_density(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let Some(force) = case.body_force.as_ref().filter(|force| force.len() == case.dimension) else { return };
     let mut unfit = |needs: &str, found: &str| findings.unfit(key.clone(), "`body_force`", needs, found);
     if let Some((needs, found)) = other_model(case) {

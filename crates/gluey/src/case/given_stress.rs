@@ -1,7 +1,7 @@
 //! What goes with a shear stress: one that is given instead of a shear rate, and the one that is written.
 
 use super::error::Key;
-use super::findings::Findings;
+use super::findings::CaseFindings;
 use super::{Boundary, Case, ParticleSpec};
 
 /// The choice of a stress.
@@ -12,7 +12,7 @@ const TABLE: &str = "`[rheology]`";
 const GIVEN: &str = "a particle that is held or driven";
 
 /// Notes a stress beside a rate, or in a box that is not sheared for ever.
-pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut Findings) {
+pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut CaseFindings) {
     if case.shear_stress.is_none() {
         return;
     }
@@ -28,7 +28,7 @@ pub(super) fn check_shear_stress(case: &Case, root: &Key, findings: &mut Finding
 }
 
 /// Notes a table of the rheology in a box that has none.
-pub(super) fn check_rheology(case: &Case, key: Key, findings: &mut Findings) {
+pub(super) fn check_rheology(case: &Case, key: Key, findings: &mut CaseFindings) {
     if case.rheology.is_none() {
         return;
     }
@@ -41,7 +41,7 @@ pub(super) fn check_rheology(case: &Case, key: Key, findings: &mut Findings) {
 }
 
 /// Notes the same where what holds or drives particles makes the stress none of the suspension.
-pub(super) fn check_stress_of_free(case: &Case, key: Key, findings: &mut Findings) {
+pub(super) fn check_stress_of_free(case: &Case, key: Key, findings: &mut CaseFindings) {
     if case.rheology.is_some() && case.gives_motions() {
         findings.unfit(key, TABLE, "free particles", GIVEN);
     }
@@ -49,7 +49,7 @@ pub(super) fn check_stress_of_free(case: &Case, key: Key, findings: &mut Finding
 
 /// Notes what acts from outside on a suspension that is driven by a stress: then it is not the stress alone
 /// that tells the rate.
-pub(super) fn check_stress_alone(case: &Case, root: &Key, findings: &mut Findings) {
+pub(super) fn check_stress_alone(case: &Case, root: &Key, findings: &mut CaseFindings) {
     if case.shear_stress.is_none() {
         return;
     }

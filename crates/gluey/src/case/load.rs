@@ -5,9 +5,9 @@ use std::path::Path;
 use toml::Value;
 use toml::de::DeTable;
 
-use super::error::{CaseError, CaseIssue, InvalidCase, Key, Place, Problem};
-use super::findings::Findings;
-use super::locate::Source;
+use super::error::{CaseError, CaseIssue, CaseProblem, InvalidCase, IssuePlace, Key};
+use super::findings::CaseFindings;
+use super::locate::CaseSource;
 use super::overrides::Override;
 use super::particles_file::ParticleList;
 use super::validate::{check_mutual, check_surroundings};
@@ -38,10 +38,10 @@ impl Case {
     /// [`CaseError::Invalid`] with all that is wrong: first syntax, then the version, then all keys and
     /// values, with what does not fit together in the parts of the case whose keys and values are right.
     pub fn parse_with(text: &str, file: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, CaseError> {
-        let source = Source { text, file: file.as_ref() };
+        let source = CaseSource { text, file: file.as_ref() };
         let tree = DeTable::parse(text).map_err(|error| source.syntax_error(&error))?;
         let mut table: toml::Table = toml::from_str(text).map_err(|error| source.value_error(&error))?;
-        let mut findings = Findings::default();
+        let mut findings = CaseFindings::default();
         for set in overrides {
             set.apply(&mut table).unwrap_or_else(|problem| findings.add(set.key.clone(), problem));
         }
@@ -92,17 +92,17 @@ impl Case {
     }
 
     /// What is wrong with single values of a case that is no text.
-    fn findings_in_form(&self) -> Findings {
-        let mut findings = Findings::default();
+    fn findings_in_form(&self) -> CaseFindings {
+        let mut findings = CaseFindings::default();
         match toml::Table::try_from(self) {
             Ok(table) => form::check(&Value::Table(table), Case::schema(), &Key::default(), &mut findings),
-            Err(error) => findings.add(Key::default(), Problem::Malformed { message: error.to_string() }),
+            Err(error) => findings.add(Key::default(), CaseProblem::Malformed { message: error.to_string() }),
         }
         findings
     }
 
     /// An error if anything was found in a case that is no text.
-    fn refuse(&self, findings: Findings) -> Result<(), CaseError> {
+    fn refuse(&self, findings: CaseFindings) -> Result<(), CaseError> {
         if findings.is_empty() {
             return Ok(());
         }
@@ -110,7 +110,7 @@ impl Case {
         let issues = list
             .into_iter()
             .map(|found| CaseIssue {
-                place: Place::Value,
+                place: IssuePlace::Value,
                 key: found.key,
                 value: None,
                 problem: found.problem,
@@ -122,13 +122,13 @@ impl Case {
 }
 
 /// Why nothing can be said of a case: it is written in a layout that is not known.
-fn version_problem(table: &toml::Table) -> Option<Problem> {
+fn version_problem(table: &toml::Table) -> Option<CaseProblem> {
     let found = table.get("version")?.as_integer()?;
-    (found != i64::from(VERSION)).then_some(Problem::Version { found })
+    (found != i64::from(VERSION)).then_some(CaseProblem::Version { found })
 }
 
 /// Notes keys of a formulation in a case that names none: it would be solved with another.
-fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
+fn check_choice_is_named(table: &toml::Table, findings: &mut CaseFindings) {
     let Some(flow) = table.get("flow").and_then(Value::as_table) else { return };
     if flow.contains_key("formulation") {
         return;
@@ -144,7 +144,11 @@ fn check_choice_is_named(table: &toml::Table, findings: &mut Findings) {
 
 /// The case that `table` is, as far as its parts are right, and the file that lists its particles; what is
 /// wrong is noted.
-fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<(Case, Option<ParticleList>)> {
+fn read(
+    table: toml::Table,
+    folder: &Path,
+    findings: &mut CaseFindings,
+) -> Option<(Case, Option<ParticleList>)> {
     let has_list = table.contains_key("particles");
     check_choice_is_named(&table, findings);
     let whole = Value::Table(table);
@@ -162,7 +166,7 @@ fn read(table: toml::Table, folder: &Path, findings: &mut Findings) -> Option<(C
         Ok(case) => case,
         Err(error) => {
             let message = error.to_string();
-            findings.add(Key::default(), Problem::Malformed { message });
+            findings.add(Key::default(), CaseProblem::Malformed { message });
             return None;
         }
     };

@@ -6,19 +6,19 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{CaseError, CaseIssue, InvalidCase, Key, KeyPart, Place, Problem};
-use super::findings::{Findings, Violation};
+use super::error::{CaseError, CaseIssue, CaseProblem, InvalidCase, IssuePlace, Key, KeyPart};
+use super::findings::{CaseFindings, Violation};
 use super::overrides::Override;
 use super::particles_file::ParticleList;
 use crate::text::{is_unseen, visible};
 
 /// The text that errors point into.
-pub(super) struct Source<'a> {
+pub(super) struct CaseSource<'a> {
     pub text: &'a str,
     pub file: &'a Path,
 }
 
-impl Source<'_> {
+impl CaseSource<'_> {
     /// Where the files lie that the case names.
     pub fn folder(&self) -> &Path {
         self.file.parent().unwrap_or(Path::new(""))
@@ -29,26 +29,26 @@ impl Source<'_> {
         let span = error.span().unwrap_or(0..0);
         let (problem, span) = match self.unseen(&span) {
             Some(found) => found,
-            None => (Problem::Syntax { message: error.message().to_owned() }, span),
+            None => (CaseProblem::Syntax { message: error.message().to_owned() }, span),
         };
         let place = self.place(span);
         self.invalid(vec![CaseIssue { place, key: Key::default(), value: None, problem }], 0)
     }
 
     /// A character that is not seen in the first line of `span`, where it begins or behind that.
-    fn unseen(&self, span: &Range<usize>) -> Option<(Problem, Range<usize>)> {
+    fn unseen(&self, span: &Range<usize>) -> Option<(CaseProblem, Range<usize>)> {
         let start = self.floor_boundary(span.start);
         let line_start = self.text[..start].rfind('\n').map_or(0, |end| end + 1);
         let line = self.text[start..].split('\n').next().unwrap_or_default().trim_end_matches('\r');
         let (at, character) = line.char_indices().find(|&(_, c)| is_unseen(c) && c != '\t')?;
         let at = start + at;
         let (line, is_first) = (self.text[..at].matches('\n').count() + 1, at == line_start);
-        Some((Problem::Unseen { line, is_first, character }, at..at + character.len_utf8()))
+        Some((CaseProblem::Unseen { line, is_first, character }, at..at + character.len_utf8()))
     }
 
     /// That a number has more digits than can be read; there is no other such error in what is TOML.
     pub fn value_error(&self, error: &toml::de::Error) -> CaseError {
-        let problem = Problem::TooManyDigits;
+        let problem = CaseProblem::TooManyDigits;
         let span = error.span().unwrap_or(0..0);
         let value = self.excerpt(&span);
         let place = self.place(span);
@@ -59,7 +59,7 @@ impl Source<'_> {
     pub fn errors(
         &self,
         tree: &DeTable<'_>,
-        findings: Findings,
+        findings: CaseFindings,
         particles: Option<&ParticleList>,
         overrides: &[Override],
     ) -> CaseError {
@@ -96,7 +96,7 @@ impl Source<'_> {
                 let (is_key, value_span) = (holder == key, value.span());
                 let start = name.as_ref().map_or(value_span.start, |name| name.start.min(value_span.start));
                 let span = match (name, &problem) {
-                    (Some(name), Problem::UnknownKey { .. }) if is_key => name,
+                    (Some(name), CaseProblem::UnknownKey { .. }) if is_key => name,
                     _ => self.first_line(&(start..value_span.end)),
                 };
                 let is_table = matches!(value.get_ref(), DeValue::Table(_));
@@ -114,12 +114,12 @@ impl Source<'_> {
         (span.start, CaseIssue { place: self.place(span), key, value: None, problem })
     }
 
-    fn place(&self, span: Range<usize>) -> Place {
+    fn place(&self, span: Range<usize>) -> IssuePlace {
         let before = &self.text[..self.floor_boundary(span.start)];
         let line_start = before.rfind('\n').map_or(0, |end| end + 1);
         let line = before.matches('\n').count() + 1;
         let column = before[line_start..].chars().count() + 1;
-        Place::Text { line, column, span }
+        IssuePlace::Text { line, column, span }
     }
 
     /// The value as written, on one line and not too long.

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Two particles and the distance of their surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Neighbours {
+pub(crate) struct NearParticles {
     /// Index of the first particle.
     pub first: usize,
     /// Index of the second particle, larger.
@@ -24,7 +24,7 @@ pub(crate) struct Neighbours {
 
 /// The pairs whose surfaces are nearer than `reach`, in the order of the second, then of the first particle.
 /// Centres have `dimension` coordinates and lie in the box.
-pub(crate) fn nearer_than(case: &Case, reach: f64) -> Vec<Neighbours> {
+pub(crate) fn nearer_than(case: &Case, reach: f64) -> Vec<NearParticles> {
     let mut pairs = match case.dimension {
         2 => candidates::<2>(case, reach),
         _ => candidates::<3>(case, reach),
@@ -35,11 +35,11 @@ pub(crate) fn nearer_than(case: &Case, reach: f64) -> Vec<Neighbours> {
     near.filter(|pair| pair.distance - pair.contact_distance < reach).collect()
 }
 
-fn neighbours(case: &Case, first: usize, second: usize) -> Neighbours {
+fn neighbours(case: &Case, first: usize, second: usize) -> NearParticles {
     let (a, b) = (&case.particles[first], &case.particles[second]);
     let along = |axis: usize| nearest_image(a.position[axis] - b.position[axis], case.period(axis));
     let distance = (0..case.dimension).map(along).fold(0.0, f64::hypot);
-    Neighbours { first, second, distance, contact_distance: a.radius + b.radius }
+    NearParticles { first, second, distance, contact_distance: a.radius + b.radius }
 }
 
 /// The second and the first of pairs that are about as near as that, in any image.
@@ -93,7 +93,7 @@ mod tests {
             for (dimension, reach) in [(2, 0.0), (2, 0.05), (3, 0.0), (3, 0.1)] {
                 let case = random_case(dimension, boundary, seed);
                 let all = (0..60).flat_map(|second| (0..second).map(move |first| (first, second)));
-                let expected: Vec<Neighbours> = all
+                let expected: Vec<NearParticles> = all
                     .map(|(first, second)| neighbours(&case, first, second))
                     .filter(|pair| pair.distance - pair.contact_distance < reach)
                     .collect();

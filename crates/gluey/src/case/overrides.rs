@@ -5,7 +5,7 @@ use std::str::FromStr;
 use thiserror::Error;
 use toml::{Table, Value};
 
-use super::error::{CaseIssue, Key, KeyPart, Place, Problem};
+use super::error::{CaseIssue, CaseProblem, IssuePlace, Key, KeyPart};
 use super::form::type_name;
 
 /// A key of a case and the value it is to have instead of that of the file.
@@ -59,7 +59,7 @@ impl Override {
     }
 
     /// Sets the key in the table of a case, which stays as it is where that cannot be done.
-    pub(super) fn apply(&self, table: &mut Table) -> Result<(), Problem> {
+    pub(super) fn apply(&self, table: &mut Table) -> Result<(), CaseProblem> {
         let (last, path) = self.key.0.split_last().expect("a key has a part");
         let mut place = Value::Table(table.clone());
         let holder = path.iter().try_fold(&mut place, enter)?;
@@ -71,9 +71,9 @@ impl Override {
     }
 
     /// What is wrong with `key` because of this.
-    pub(super) fn issue(&self, key: Key, problem: Problem) -> CaseIssue {
+    pub(super) fn issue(&self, key: Key, problem: CaseProblem) -> CaseIssue {
         let key = if key == self.key { Key::default() } else { key };
-        CaseIssue { place: Place::Argument(self.text.clone()), key, value: None, problem }
+        CaseIssue { place: IssuePlace::Argument(self.text.clone()), key, value: None, problem }
     }
 
     /// Whether this key is `other`, above it or below it.
@@ -83,17 +83,17 @@ impl Override {
 }
 
 /// What stands at `part` of a table or list; an empty table where nothing does.
-fn enter<'a>(holder: &'a mut Value, part: &KeyPart) -> Result<&'a mut Value, Problem> {
+fn enter<'a>(holder: &'a mut Value, part: &KeyPart) -> Result<&'a mut Value, CaseProblem> {
     match (part, holder) {
         (KeyPart::Name(name), Value::Table(table)) => {
             Ok(table.entry(name.clone()).or_insert_with(|| Value::Table(Table::new())))
         }
         (KeyPart::Index(index), Value::Array(list)) => {
             let count = list.len();
-            list.get_mut(*index).ok_or(Problem::NoEntry { index: *index, count })
+            list.get_mut(*index).ok_or(CaseProblem::NoEntry { index: *index, count })
         }
-        (KeyPart::Index(index), _) => Err(Problem::NoEntry { index: *index, count: 0 }),
-        (KeyPart::Name(name), other) => Err(Problem::WrongType {
+        (KeyPart::Index(index), _) => Err(CaseProblem::NoEntry { index: *index, count: 0 }),
+        (KeyPart::Name(name), other) => Err(CaseProblem::WrongType {
             found: format!("{}, which has no key `{name}`", type_name(other)),
             expected: "a key of the case, such as time.step or particles.0.radius".into(),
         }),
@@ -135,7 +135,7 @@ fn parse_value(text: &str) -> Result<Value, BadOverride> {
 mod tests {
     use super::*;
 
-    fn set(text: &str, case: &str) -> Result<Table, Problem> {
+    fn set(text: &str, case: &str) -> Result<Table, CaseProblem> {
         let mut table: Table = toml::from_str(case).expect("TOML");
         let change: Override = text.parse().expect("an override");
         change.apply(&mut table).map(|()| table)
@@ -152,8 +152,8 @@ mod tests {
             set("contact.solver=active-set", case).expect("set")["contact"]["solver"].as_str(),
             Some("active-set")
         );
-        assert_eq!(set("particles.2.radius=3", case), Err(Problem::NoEntry { index: 2, count: 2 }));
-        assert!(matches!(set("time.step.size=3", case), Err(Problem::WrongType { .. })));
+        assert_eq!(set("particles.2.radius=3", case), Err(CaseProblem::NoEntry { index: 2, count: 2 }));
+        assert!(matches!(set("time.step.size=3", case), Err(CaseProblem::WrongType { .. })));
     }
 
     #[test]

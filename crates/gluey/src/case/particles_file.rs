@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::{CaseIssue, KeyPart, Place};
+use super::error::{CaseIssue, IssuePlace, KeyPart};
 use super::findings::Violation;
 use super::{ParticleProblem, ParticleSpec};
 use crate::number_text::shown;
@@ -38,7 +38,8 @@ impl ParticleList {
             _ => return None,
         };
         let (line, row) = self.rows.get(index)?;
-        let (place, value) = (Place::List { file: self.file.clone(), line: *line }, Some(text::visible(row)));
+        let (place, value) =
+            (IssuePlace::List { file: self.file.clone(), line: *line }, Some(text::visible(row)));
         Some((*line, CaseIssue { place, key: key.clone(), value, problem: problem.clone() }))
     }
 }
@@ -67,10 +68,10 @@ struct Fault {
 }
 
 /// Particles, their lines, and what is written there.
-type Rows = (Vec<ParticleSpec>, Vec<(usize, String)>);
+type ParticleRows = (Vec<ParticleSpec>, Vec<(usize, String)>);
 
 /// Empty lines and those that begin with `#` do not count.
-fn parse(text: &str, dimension: usize) -> Result<Rows, Vec<Fault>> {
+fn parse(text: &str, dimension: usize) -> Result<ParticleRows, Vec<Fault>> {
     let lines = (1..).zip(text.lines().map(str::trim));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let names = names(dimension);

@@ -1,15 +1,15 @@
 //! What does not fit together in a case whose keys and values are right one by one.
 
 use super::comparable::mismatch;
-use super::error::{Key, Problem};
-use super::findings::Findings;
+use super::error::{CaseProblem, Key};
+use super::findings::CaseFindings;
 use super::given::{check_force_density, check_motion};
 use super::given_stress::{check_rheology, check_shear_stress, check_stress_alone, check_stress_of_free};
 use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
-use super::neighbours::{Neighbours, nearer_than};
+use super::neighbours::{NearParticles, nearer_than};
 use super::particle_problem::ParticleProblem;
 use super::{Case, ParticleSpec, fill};
-use crate::reference::Reference;
+use crate::reference::ReferenceSolution;
 
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
@@ -18,10 +18,10 @@ const RATES: (f64, f64) = (1e-100, 1e100);
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Notes what does not fit together before there are particles.
-pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
+pub(super) fn check_surroundings(case: &Case, findings: &mut CaseFindings) {
     let root = Key::default();
     if !is_file_name(&case.name) {
-        findings.add(root.name("name"), Problem::BadName);
+        findings.add(root.name("name"), CaseProblem::BadName);
     }
     if findings.are_good(&["flow"]) {
         check_force(&case.gravity, case, &root.name("gravity"), findings);
@@ -49,7 +49,7 @@ pub(super) fn check_surroundings(case: &Case, findings: &mut Findings) {
 }
 
 /// The square of a shear rate, which powers are made of, is a number.
-fn check_size(rate: f64, key: Key, findings: &mut Findings) {
+fn check_size(rate: f64, key: Key, findings: &mut CaseFindings) {
     let (least, most) = RATES;
     if rate != 0.0 && !(least..=most).contains(&rate.abs()) && findings.are_good(&["shear_rate"]) {
         findings.out_of_range(key, rate, &format!("of a size from {least:e} to {most:e}, or 0"));
@@ -57,7 +57,7 @@ fn check_size(rate: f64, key: Key, findings: &mut Findings) {
 }
 
 /// Notes what does not fit together in a case whose particles are there.
-pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
+pub(super) fn check_mutual(case: &Case, findings: &mut CaseFindings) {
     let root = Key::default();
     if findings.are_good(&fill::NEEDED) && !findings.have_unknown_part() {
         check_particles(case, &root.name("particles"), findings);
@@ -78,7 +78,7 @@ pub(super) fn check_mutual(case: &Case, findings: &mut Findings) {
 }
 
 /// Notes streams without or with two intervals, and those that would write over each other.
-fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_output(case: &Case, key: &Key, findings: &mut CaseFindings) {
     for (index, output) in case.output.iter().enumerate() {
         let key = key.index(index);
         let choice = format!("output {}", index + 1);
@@ -106,14 +106,15 @@ fn check_output(case: &Case, key: &Key, findings: &mut Findings) {
             findings.unfit(key.name(name), format!("label = \"{label}\""), "a label of its own", found);
         }
         if !is_file_name(label) {
-            findings.add(key.name("label"), Problem::BadName);
+            findings.add(key.name("label"), CaseProblem::BadName);
         }
     }
 }
 
 /// A comparison with a reference of something else would look like an error of the run.
-fn check_reference(case: &Case, key: Key, findings: &mut Findings) {
-    let Some((name, table)) = case.reference.as_ref().and_then(|name| Some((name, Reference::named(name)?)))
+fn check_reference(case: &Case, key: Key, findings: &mut CaseFindings) {
+    let Some((name, table)) =
+        case.reference.as_ref().and_then(|name| Some((name, ReferenceSolution::named(name)?)))
     else {
         return;
     };
@@ -122,20 +123,20 @@ fn check_reference(case: &Case, key: Key, findings: &mut Findings) {
     }
 }
 
-fn check_box(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_box(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let (lower, upper) = (case.lower(), case.upper());
     let are_corners = [("lower", &lower), ("upper", &upper)]
         .map(|(name, corner)| check_coordinates(corner, case.dimension, key.name(name), findings));
     if are_corners == [true, true] {
         for axis in (0..case.dimension).filter(|&axis| upper[axis] <= lower[axis]) {
-            let problem = Problem::EmptyBox { axis: AXES[axis], lower: lower[axis], upper: upper[axis] };
+            let problem = CaseProblem::EmptyBox { axis: AXES[axis], lower: lower[axis], upper: upper[axis] };
             findings.add(key.name("upper"), problem);
         }
     }
 }
 
 /// Boxes that are sheared for ever are those of one formulation; a mesh is made of cubes.
-fn check_boundary(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_boundary(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let (flow, needed) = (&case.flow, Formulation::Unfitted);
     let mut unfit = |needs: String, found: &str| {
         let choice = format!("\"{}\"", Boundary::Sheared);
@@ -149,16 +150,16 @@ fn check_boundary(case: &Case, key: &Key, findings: &mut Findings) {
         unfit(format!("flow.formulation = \"{needed}\""), flow.formulation.name());
     }
     if is_flow && case.root_cells().is_none() {
-        findings.add(key.name("upper"), Problem::UnevenBox { edges: case.edges() });
+        findings.add(key.name("upper"), CaseProblem::UnevenBox { edges: case.edges() });
     }
 }
 
-fn check_particles(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_particles(case: &Case, key: &Key, findings: &mut CaseFindings) {
     if case.suspension.is_some() || case.particles_file.is_some() {
-        return findings.add(key.clone(), Problem::Particles(ParticleProblem::NotFilled));
+        return findings.add(key.clone(), CaseProblem::Particles(ParticleProblem::NotFilled));
     }
     if case.particles.is_empty() {
-        return findings.add(key.clone(), Problem::NoParticles);
+        return findings.add(key.clone(), CaseProblem::NoParticles);
     }
     let mut can_meet = true;
     for (index, particle) in case.particles.iter().enumerate() {
@@ -174,14 +175,14 @@ fn check_particles(case: &Case, key: &Key, findings: &mut Findings) {
     }
 }
 
-fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut Findings) {
+fn check_force(force: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut CaseFindings) {
     let Some(force) = force else { return };
     check_coordinates(force, case.dimension, key.clone(), findings);
     check_answered(case, key, findings);
 }
 
 /// The motion of a particle that is held or driven.
-fn check_given(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut Findings) {
+fn check_given(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut CaseFindings) {
     if let Some(velocity) = &particle.velocity {
         check_coordinates(velocity, case.dimension, key.name("velocity"), findings);
     }
@@ -191,22 +192,28 @@ fn check_given(case: &Case, particle: &ParticleSpec, key: &Key, findings: &mut F
     check_motion(case, particle, key, findings);
 }
 
-fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut Findings) {
+fn check_torque(torque: &Option<Vec<f64>>, case: &Case, key: &Key, findings: &mut CaseFindings) {
     let Some(torque) = torque else { return };
     check_rotation("a torque", torque, case.dimension, key, findings);
     check_answered(case, key, findings);
 }
 
 /// Notes a torque or spin that has not as many numbers as there are axes to turn about.
-fn check_rotation(what: &'static str, numbers: &[f64], dimension: usize, key: &Key, findings: &mut Findings) {
+fn check_rotation(
+    what: &'static str,
+    numbers: &[f64],
+    dimension: usize,
+    key: &Key,
+    findings: &mut CaseFindings,
+) {
     let (found, needed) = (numbers.len(), if dimension == 2 { 1 } else { 3 });
     if found != needed {
-        findings.add(key.clone(), Problem::RotationCount { what, found, needed, dimension });
+        findings.add(key.clone(), CaseProblem::RotationCount { what, found, needed, dimension });
     }
 }
 
 /// Only the finite-element flow answers to forces.
-fn check_answered(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_answered(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let found = case.flow.hydrodynamics;
     if found != Hydrodynamics::Stokes {
         let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
@@ -216,7 +223,7 @@ fn check_answered(case: &Case, key: &Key, findings: &mut Findings) {
 
 /// Notes where the particle has no room in the box, or is not inside. Whether it is in the box or near it:
 /// what lies at the end of the world cannot be looked for neighbours.
-fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -> bool {
+fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut CaseFindings) -> bool {
     let particle = &case.particles[index];
     let (lower, upper) = (case.lower(), case.upper());
     let mut is_near = true;
@@ -225,13 +232,14 @@ fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -
         let range = (lower[d] + particle.radius, upper[d] - particle.radius);
         if range.0 >= range.1 {
             let (diameter, edge) = (2.0 * particle.radius, upper[d] - lower[d]);
-            findings.add(key.name("radius"), Problem::TooBig { particle: index + 1, diameter, edge, axis });
+            findings
+                .add(key.name("radius"), CaseProblem::TooBig { particle: index + 1, diameter, edge, axis });
             return false;
         }
         let range = match case.period(d) {
             Some(period) if 4.0 * particle.radius > period => {
                 let (particle, diameter) = (index + 1, 2.0 * particle.radius);
-                let problem = Problem::PeriodTooShort { particle, diameter, period, axis };
+                let problem = CaseProblem::PeriodTooShort { particle, diameter, period, axis };
                 findings.add(key.name("radius"), problem);
                 return false;
             }
@@ -241,7 +249,7 @@ fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -
         };
         let excess = (range.0 - particle.position[d]).max(particle.position[d] - range.1);
         if excess > 0.0 {
-            let problem = Problem::OutsideBox { particle: index + 1, excess, axis, range };
+            let problem = CaseProblem::OutsideBox { particle: index + 1, excess, axis, range };
             findings.add(key.name("position"), problem);
             is_near &= excess < upper[d] - lower[d];
         }
@@ -249,22 +257,23 @@ fn check_inside(case: &Case, index: usize, key: &Key, findings: &mut Findings) -
     is_near
 }
 
-fn check_overlaps(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_overlaps(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let overlapping = nearer_than(case, 0.0);
-    let Some(Neighbours { first, second, distance, contact_distance }) = overlapping.first().copied() else {
+    let Some(NearParticles { first, second, distance, contact_distance }) = overlapping.first().copied()
+    else {
         return;
     };
     let others = overlapping[1..].iter().map(|pair| (pair.first + 1, pair.second + 1)).collect();
     let (gap, key) = (distance - contact_distance, key.index(second).name("position"));
     let (first, second) = (first + 1, second + 1);
-    findings.add(key, Problem::Overlap { first, second, gap, distance, contact_distance, others });
+    findings.add(key, CaseProblem::Overlap { first, second, gap, distance, contact_distance, others });
 }
 
-fn check_time(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_time(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let time = &case.time;
     let steps = time.end / time.step;
     if steps > MAX_STEPS {
-        let problem = Problem::TooManySteps { end: time.end, step: time.step, steps };
+        let problem = CaseProblem::TooManySteps { end: time.end, step: time.step, steps };
         findings.add(key.name("step"), problem);
     }
     if let Some(amplitude) = time.strain_amplitude
@@ -275,7 +284,7 @@ fn check_time(case: &Case, key: &Key, findings: &mut Findings) {
 }
 
 /// A shear that oscillates is there, nothing else turns it round, and it does so between steps.
-fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut Findings) {
+fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut CaseFindings) {
     let choice = format!("strain_amplitude = {amplitude}");
     let mut unfit = |needs: &str, found: String| findings.unfit(key.clone(), &choice, needs, found);
     if let Some(at) = case.time.reverse_at {
@@ -290,7 +299,7 @@ fn check_cycles(case: &Case, amplitude: f64, key: Key, findings: &mut Findings) 
     }
 }
 
-fn check_flow(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_flow(case: &Case, key: &Key, findings: &mut CaseFindings) {
     check_mesh(case, &key.name("mesh"), findings);
     check_lubrication(case, key.name("lubrication"), findings);
     if case.flow.hydrodynamics == Hydrodynamics::PairMobility {
@@ -299,7 +308,7 @@ fn check_flow(case: &Case, key: &Key, findings: &mut Findings) {
 }
 
 /// Deficits are those of one formulation.
-fn check_lubrication(case: &Case, key: Key, findings: &mut Findings) {
+fn check_lubrication(case: &Case, key: Key, findings: &mut CaseFindings) {
     let (flow, needed) = (&case.flow, Formulation::Unfitted);
     if case.lubrication() == Lubrication::None || flow.formulation == needed {
         return;
@@ -309,7 +318,7 @@ fn check_lubrication(case: &Case, key: Key, findings: &mut Findings) {
     findings.unfit(key, choice, format!("flow.formulation = \"{needed}\""), found);
 }
 
-fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
+fn check_mesh(case: &Case, key: &Key, findings: &mut CaseFindings) {
     // An analytic model has no mesh to be too fine.
     let (Some(root_size), Some(finest), Some(level)) =
         (case.root_size(), case.finest_level(), case.surface_level())
@@ -323,25 +332,25 @@ fn check_mesh(case: &Case, key: &Key, findings: &mut Findings) {
         let least = (1.0 + 1e-3) / cells;
         let key = Key::default().name("particles");
         return small.into_iter().for_each(|(index, radius)| {
-            let problem = Problem::TooSmall { particle: index + 1, radius, least };
+            let problem = CaseProblem::TooSmall { particle: index + 1, radius, least };
             findings.add(key.index(index).name("radius"), problem);
         });
     }
     if level > f64::from(finest) {
         let (radius, cells_per_radius) = (case.smallest_radius(), case.cells_per_radius());
         let largest = radius * cells;
-        let problem = Problem::MeshTooFine { cells_per_radius, radius, level, finest, largest };
+        let problem = CaseProblem::MeshTooFine { cells_per_radius, radius, level, finest, largest };
         return findings.add(key.name("cells_per_radius"), problem);
     }
     let level = level as u32;
     if let Some(found) = case.flow.mesh.coarsest_level.filter(|&found| found > level) {
-        let problem = Problem::CoarseTooFine { found, finest: level };
+        let problem = CaseProblem::CoarseTooFine { found, finest: level };
         findings.add(key.name("coarsest_level"), problem);
     }
 }
 
 /// The analytic model knows two equal spheres in unbounded shear.
-fn check_pair_mobility(case: &Case, key: Key, findings: &mut Findings) {
+fn check_pair_mobility(case: &Case, key: Key, findings: &mut CaseFindings) {
     let choice = format!("\"{}\"", Hydrodynamics::PairMobility);
     let radii: Vec<f64> = case.particles.iter().map(|particle| particle.radius).collect();
     let found = match (case.dimension, radii.as_slice()) {
@@ -354,10 +363,10 @@ fn check_pair_mobility(case: &Case, key: Key, findings: &mut Findings) {
 }
 
 /// Whether there is a coordinate for each axis; notes it where there is not.
-fn check_coordinates(values: &[f64], dimension: usize, key: Key, findings: &mut Findings) -> bool {
+fn check_coordinates(values: &[f64], dimension: usize, key: Key, findings: &mut CaseFindings) -> bool {
     let found = values.len();
     if found != dimension {
-        findings.add(key, Problem::CoordinateCount { found, dimension });
+        findings.add(key, CaseProblem::CoordinateCount { found, dimension });
     }
     found == dimension
 }

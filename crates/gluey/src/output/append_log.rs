@@ -1,8 +1,8 @@
 //! A text file that grows line by line, and goes on growing after its writer was killed.
 //!
-//! A [`Mark`] in a checkpoint says how far the file had come. A run that resumes keeps all whole lines behind
-//! the mark: what it writes there is compared with them, byte by byte, until there are no more. One that
-//! cannot have the same bits leaves them where they are and goes on in a draft of its own.
+//! A [`DraftMark`] in a checkpoint says how far the file had come. A run that resumes keeps all whole lines
+//! behind the mark: what it writes there is compared with them, byte by byte, until there are no more. One
+//! that cannot have the same bits leaves them where they are and goes on in a draft of its own.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -16,7 +16,7 @@ use super::{FileError, create_draft, draft_path, rename};
 
 /// The place that a file had come to.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Mark {
+pub struct DraftMark {
     /// Number of the draft.
     pub draft: u32,
     /// Bytes.
@@ -87,7 +87,7 @@ impl Draft {
     /// The first draft of `complete` that is not there yet.
     pub fn create(complete: &Path) -> Result<Self, FileError> {
         let created = create_draft(complete);
-        let draft = created.and_then(|(number, _)| Self::open(complete, number, &Mark::default()));
+        let draft = created.and_then(|(number, _)| Self::open(complete, number, &DraftMark::default()));
         draft.map_err(|error| FileError::new(complete, "create the file", error))
     }
 
@@ -101,7 +101,7 @@ impl Draft {
     /// Goes on at `mark` with the draft that was marked, of which only half a last line is taken away. Where
     /// its run was completed, the rows are copied to a new draft; the complete file stays until this run
     /// replaces it.
-    pub fn resume(complete: &Path, mark: &Mark) -> Result<Self, RowsError> {
+    pub fn resume(complete: &Path, mark: &DraftMark) -> Result<Self, RowsError> {
         let path = draft_path(complete, mark.draft);
         let failed = |error| FileError::new(complete, "go on with the file", error);
         if holds(&path, mark).map_err(failed)? {
@@ -119,7 +119,7 @@ impl Draft {
         Err(RowsError::Missing { draft: path, complete: complete.to_owned(), lines: mark.lines })
     }
 
-    fn open(complete: &Path, number: u32, mark: &Mark) -> io::Result<Self> {
+    fn open(complete: &Path, number: u32, mark: &DraftMark) -> io::Result<Self> {
         let path = draft_path(complete, number);
         let mut file = File::options().read(true).write(true).open(&path)?;
         let mut hasher = Hasher::new();
@@ -206,9 +206,9 @@ impl Draft {
     }
 
     /// How far the file has come.
-    pub fn mark(&self) -> Mark {
+    pub fn mark(&self) -> DraftMark {
         let digest = *self.hasher.finalize().as_bytes();
-        Mark { draft: self.number, bytes: self.bytes, lines: self.lines, digest, is_last: false }
+        DraftMark { draft: self.number, bytes: self.bytes, lines: self.lines, digest, is_last: false }
     }
 
     /// Gives the complete file its name. Where an earlier run had come further than this one goes, its rows
@@ -227,7 +227,7 @@ impl Draft {
 }
 
 /// Whether the file is there and begins as it was marked.
-fn holds(path: &Path, mark: &Mark) -> io::Result<bool> {
+fn holds(path: &Path, mark: &DraftMark) -> io::Result<bool> {
     let file = match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
         opened => opened?,
@@ -269,7 +269,7 @@ mod tests {
     use super::*;
 
     /// A folder with a draft of four lines and a half, and the mark behind the second.
-    fn killed() -> (TempDir, PathBuf, Mark) {
+    fn killed() -> (TempDir, PathBuf, DraftMark) {
         let folder = tempfile::tempdir().expect("a folder");
         let complete = folder.path().join("t.csv");
         let mut draft = Draft::create(&complete).expect("a file");
@@ -326,7 +326,7 @@ mod tests {
     #[test]
     fn lines_behind_the_last_mark_stay_in_their_draft() {
         let (_folder, complete, mark) = killed();
-        let mut draft = Draft::resume(&complete, &Mark { is_last: true, ..mark }).expect("marked");
+        let mut draft = Draft::resume(&complete, &DraftMark { is_last: true, ..mark }).expect("marked");
         draft.write("5\n").expect("another line");
         assert_eq!(draft.mark().draft, 2);
         draft.finish().expect("complete");

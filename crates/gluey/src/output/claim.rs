@@ -37,7 +37,7 @@ pub enum ClaimError {
 
 /// The right to write one result, until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Claim {
+pub(crate) struct ResultClaim {
     lock: PathBuf,
     /// Whether the file system knows locks.
     is_locked: bool,
@@ -45,7 +45,7 @@ pub(crate) struct Claim {
     _file: File,
 }
 
-impl Claim {
+impl ResultClaim {
     /// Claims the file or folder `result` and creates the folder it lies in.
     pub fn new(result: &Path) -> Result<Self, ClaimError> {
         let lock = with_suffix(result, ".lock");
@@ -79,7 +79,7 @@ impl Claim {
     }
 }
 
-impl Drop for Claim {
+impl Drop for ResultClaim {
     fn drop(&mut self) {
         // Where it cannot be told whether a lock file still has its name, it must keep it.
         if cfg!(unix) && self.is_locked {
@@ -128,9 +128,9 @@ mod tests {
     fn a_result_has_one_writer_at_a_time() {
         let folder = tempfile::tempdir().expect("a folder");
         let (one, other) = (folder.path().join("deep/one.csv"), folder.path().join("deep/other.csv"));
-        let claim = Claim::new(&one).expect("free");
-        let _beside = Claim::new(&other).expect("another result");
-        match Claim::new(&one) {
+        let claim = ResultClaim::new(&one).expect("free");
+        let _beside = ResultClaim::new(&other).expect("another result");
+        match ResultClaim::new(&one) {
             Err(ClaimError::InUse { result, holder, .. }) => {
                 assert_eq!((result, holder), (one.clone(), Some(process::id())));
             }
@@ -139,7 +139,7 @@ mod tests {
         assert!(is_claimed(&one));
         drop(claim);
         assert!(!is_claimed(&one));
-        Claim::new(&one).expect("free again");
+        ResultClaim::new(&one).expect("free again");
         assert_eq!(cfg!(unix), !with_suffix(&one, ".lock").exists());
     }
 
@@ -148,6 +148,6 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let result = folder.path().join("t.csv");
         fs::write(with_suffix(&result, ".lock"), "12345\n").expect("a file");
-        Claim::new(&result).expect("free");
+        ResultClaim::new(&result).expect("free");
     }
 }

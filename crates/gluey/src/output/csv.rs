@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 
 use gluey_geom::{Dim, Space, Vector};
 
-use super::append_log::{Draft, Mark, RowsError};
+use super::append_log::{Draft, DraftMark, RowsError};
 use super::pair_forces::{ContactForces, PairForces};
 use super::{FileError, ResultPaths, line_of};
 use crate::measures::Instant;
 use crate::near_pairs::{self, PairGap};
-use crate::trajectory::Row;
+use crate::trajectory::TrajectoryRow;
 
 /// Gaps up to this many mean radii are listed one by one where pairs have no columns.
 pub const GAP_CUTOFF_OVER_A: f64 = 1.0;
@@ -53,12 +53,12 @@ impl CsvWriter {
         Ok(Self { rows, gaps })
     }
 
-    /// Goes on with the files of a run of so many particles at these marks; `visit` sees the rows up to there.
-    /// Rows behind them stay, and are compared with those that are written.
+    /// Goes on with the files of a run of so many particles at these marks; `visit` sees the rows up to
+    /// there. Rows behind them stay, and are compared with those that are written.
     pub(crate) fn resume<const D: usize>(
         path: &Path,
-        rows: &Mark,
-        gaps: Option<&Mark>,
+        rows: &DraftMark,
+        gaps: Option<&DraftMark>,
         particle_count: usize,
         mut visit: impl FnMut(&Instant<D>),
     ) -> Result<Self, RowsError>
@@ -82,7 +82,7 @@ impl CsvWriter {
     /// pair in mean radii, if there is one.
     pub fn write<const D: usize>(
         &mut self,
-        row: &Row<'_, D>,
+        row: &TrajectoryRow<'_, D>,
         forces: &PairForces<'_>,
     ) -> Result<Option<f64>, RowsError>
     where
@@ -109,7 +109,7 @@ impl CsvWriter {
     }
 
     /// How far the rows and the near pairs have come.
-    pub(crate) fn marks(&self) -> (Mark, Option<Mark>) {
+    pub(crate) fn marks(&self) -> (DraftMark, Option<DraftMark>) {
         (self.rows.mark(), self.gaps.as_ref().map(Draft::mark))
     }
 
@@ -149,7 +149,7 @@ where
     names.join(",")
 }
 
-fn line<const D: usize>(row: &Row<'_, D>, smallest_gap_over_a: Option<f64>) -> String
+fn line<const D: usize>(row: &TrajectoryRow<'_, D>, smallest_gap_over_a: Option<f64>) -> String
 where
     Dim<D>: Space<D>,
 {
@@ -183,7 +183,7 @@ where
 
 /// The rows of near pairs and near walls.
 fn gap_lines<const D: usize>(
-    row: &Row<'_, D>,
+    row: &TrajectoryRow<'_, D>,
     near: &[PairGap],
     cutoff: f64,
     forces: &PairForces<'_>,
@@ -247,7 +247,7 @@ mod tests {
             let particles: Vec<_> =
                 (0..count).map(|n| Particle::new(Vector::<D>::repeat(n as f64 / 3.0), 0.1)).collect();
             let (twists, domain) = (vec![Twist::default(); count], Domain::default());
-            let row = Row { time: 0.1, particles: &particles, twists: &twists, domain: &domain };
+            let row = TrajectoryRow { time: 0.1, particles: &particles, twists: &twists, domain: &domain };
             let a = row.mean_radius();
             let smallest_gap_over_a = row.pairs().map(|(i, j)| row.gap(i, j) / a).reduce(f64::min);
             let line = line(&row, smallest_gap_over_a);
@@ -278,7 +278,7 @@ mod tests {
         let domain = Domain::default().with_period(0, 30.5).with_wall(floor);
         let twists = vec![Twist::default(); 10];
         let mut writer = CsvWriter::create::<2>(&path, 10).expect("files");
-        let row = Row { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
+        let row = TrajectoryRow { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
         let contact = |pair, lambda| Contact { pair, lambda, gamma: 0.0, gap: 0.5 };
         let contacts = [contact(PairKey::across(0, 9, [-1, 0, 0]), 3.0), contact(PairKey::wall(0, 0), 7.0)];
         let repulsion = Repulsion { force: 2.0, range: 0.5, radius: 1.0 };

@@ -13,16 +13,17 @@ pub struct PairForces<'a> {
 }
 
 /// The forces of contacts by pair, sorted.
-pub(super) struct ContactForces(Option<Vec<(Pair, f64)>>);
+pub(super) struct ContactForces(Option<Vec<(PairOrWall, f64)>>);
 
 /// A particle, its partner, and whether that is a wall.
-type Pair = (usize, usize, bool);
+type PairOrWall = (usize, usize, bool);
 
 impl ContactForces {
     /// Contacts with several images of a partner are added up.
     pub fn of(forces: &PairForces<'_>) -> Self {
         let sorted = |contacts: &[Contact]| {
-            let mut all: Vec<(Pair, f64)> = contacts.iter().map(|one| (pair(one), one.lambda)).collect();
+            let mut all: Vec<(PairOrWall, f64)> =
+                contacts.iter().map(|one| (pair(one), one.lambda)).collect();
             all.sort_by_key(|(pair, _)| *pair);
             all
         };
@@ -30,7 +31,7 @@ impl ContactForces {
     }
 
     /// The force on a pair over `6 pi eta`, positive apart; nothing without a contact model.
-    pub fn on(&self, wanted: Pair) -> Option<f64> {
+    pub fn on(&self, wanted: PairOrWall) -> Option<f64> {
         let all = self.0.as_ref()?;
         let first = all.partition_point(|(pair, _)| *pair < wanted);
         let of_pair = all[first..].iter().take_while(|(pair, _)| *pair == wanted);
@@ -39,7 +40,7 @@ impl ContactForces {
     }
 }
 
-fn pair(contact: &Contact) -> Pair {
+fn pair(contact: &Contact) -> PairOrWall {
     let first = contact.pair.first as usize;
     match contact.pair.second {
         Partner::Particle { index, .. } => (first, index as usize, false),

@@ -10,10 +10,10 @@ use std::path::Path;
 use gluey_contact::ContactReport;
 use gluey_motion::FlowStatistics;
 
-use super::append_log::{Draft, Mark, RowsError};
+use super::append_log::{Draft, DraftMark, RowsError};
 use super::{FileError, ResultPaths};
 use crate::phases::PhaseTable;
-use crate::tally::Motion;
+use crate::tally::StepMotion;
 
 /// What is the same on every run.
 const FACTS: &str = "step,t,strain,cells,unknowns,solves,iterations,residual,\
@@ -45,7 +45,7 @@ pub struct SolverRow<'a> {
     /// The correction for contact.
     pub contact: &'a ContactReport,
     /// How the particles were moved.
-    pub motion: &'a Motion,
+    pub motion: &'a StepMotion,
     /// Wall time since the run began, this step's included.
     pub phases: &'a PhaseTable,
 }
@@ -80,7 +80,7 @@ impl SolverLog {
     }
 
     /// Goes on with the file at `mark`, after so much wall time.
-    pub(crate) fn resume(csv: &Path, mark: &Mark, phases: &PhaseTable) -> Result<Self, RowsError> {
+    pub(crate) fn resume(csv: &Path, mark: &DraftMark, phases: &PhaseTable) -> Result<Self, RowsError> {
         Ok(Self { draft: Draft::resume(&ResultPaths::of_csv(csv).solver(), mark)?, before: seconds(phases) })
     }
 
@@ -94,7 +94,7 @@ impl SolverLog {
     }
 
     /// How far the file has come.
-    pub(crate) fn mark(&self) -> Mark {
+    pub(crate) fn mark(&self) -> DraftMark {
         self.draft.mark()
     }
 
@@ -110,7 +110,7 @@ fn facts(row: &SolverRow<'_>) -> String {
     let FlowStatistics { cell_count, dof_count, solve_count, iteration_count, residual, .. } = flow;
     let FlowStatistics { penalties_doubled, cells_raised, .. } = flow;
     let ContactReport { pair_count, active_count, iterations, .. } = contact;
-    let Motion { parts, closed_films, film_push, .. } = motion;
+    let StepMotion { parts, closed_films, film_push, .. } = motion;
     format!(
         "{step},{time:.16e},{strain:.16e},{cell_count},{dof_count},{solve_count},{iteration_count},\
          {residual:.3e},{pair_count},{active_count},{iterations},{parts},{closed_films},{film_push:.3e},\
@@ -141,13 +141,14 @@ mod tests {
         for step in 0..2 {
             phases.add("solve", 1.5 + step as f64);
             let (time, strain) = (step as f64, 0.0);
-            let (flow, contact, motion) = (&flow, &contact, &Motion { parts: 2, ..Motion::default() });
+            let (flow, contact, motion) =
+                (&flow, &contact, &StepMotion { parts: 2, ..StepMotion::default() });
             let row = SolverRow { step, time, strain, flow, contact, motion, phases: &phases };
             log.write(&row).expect("a row");
         }
         log.finish().expect("complete");
         let text = std::fs::read_to_string(ResultPaths::of_csv(&csv).solver()).expect("a file");
-        let table = crate::table::Table::parse(&text).expect("a table");
+        let table = crate::table::NumberTable::parse(&text).expect("a table");
         assert_eq!(table.column("solve_s"), Ok(&[1.5, 2.5][..]));
         assert_eq!(table.column("iterations"), Ok(&[9.0, 9.0][..]));
         assert_eq!(table.column("parts"), Ok(&[2.0, 2.0][..]));

@@ -38,14 +38,14 @@ pub use shown::ShownBox;
 use shown::{Shown, shown};
 use vtkio::model::CellType;
 pub use xml::VtkEncoding;
-use xml::{Array, Piece};
+use xml::{Array, GridPiece};
 
 /// What rounding may do to a place, relative to the distance of centres.
 const ROUNDING: f64 = 1e-6;
 
 /// Particles, contacts and fields at one instant.
 #[derive(Clone, Debug)]
-pub struct Frame<const D: usize>
+pub struct VtkFrame<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -72,12 +72,12 @@ where
 pub struct VtkWriter {
     folder: PathBuf,
     encoding: VtkEncoding,
-    series: [Series; 3],
+    series: [FrameSeries; 3],
 }
 
 /// Files of one kind and their times.
 #[derive(Debug)]
-struct Series {
+struct FrameSeries {
     name: &'static str,
     /// How many files a step has, of which this writer writes the first; none for one file.
     pieces: Option<usize>,
@@ -93,7 +93,7 @@ impl VtkWriter {
             let files = |step| [file_name(name, step), pieces::index_name(name, step)];
             let there = |step| files(step).into_iter().find(|file| folder.join(file).is_file());
             let entries = done.iter().filter_map(|&(step, time)| Some((time, there(step)?)));
-            Series { name, pieces: None, entries: entries.collect() }
+            FrameSeries { name, pieces: None, entries: entries.collect() }
         });
         Ok(Self { folder: folder.to_owned(), encoding: VtkEncoding::default(), series })
     }
@@ -113,7 +113,7 @@ impl VtkWriter {
     }
 
     /// Writes one instant.
-    pub fn write<const D: usize>(&mut self, frame: &Frame<D>) -> Result<(), FileError>
+    pub fn write<const D: usize>(&mut self, frame: &VtkFrame<D>) -> Result<(), FileError>
     where
         Dim<D>: Space<D>,
     {
@@ -132,13 +132,13 @@ impl VtkWriter {
     }
 }
 
-impl Series {
+impl FrameSeries {
     fn add(
         &mut self,
         folder: &Path,
         step: usize,
         time: f64,
-        piece: Piece,
+        piece: GridPiece,
         encoding: VtkEncoding,
     ) -> Result<(), FileError> {
         let (whole, index) = (file_name(self.name, step), pieces::index_name(self.name, step));
@@ -163,7 +163,7 @@ fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
 }
 
-fn particles_piece<const D: usize>(frame: &Frame<D>, balls: &[Shown<D>]) -> Piece
+fn particles_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece
 where
     Dim<D>: Space<D>,
 {
@@ -179,7 +179,7 @@ where
     let unwrapped: Vec<_> = balls.iter().map(|ball| particles[ball.particle].pose.position).collect();
     let spins: Vec<f64> =
         balls.iter().flat_map(|ball| spin_in_space::<D>(&twists[ball.particle].spin)).collect();
-    Piece {
+    GridPiece {
         points: in_space(&centers(balls)),
         connectivity: (0..count as u64).collect(),
         offsets: (1..=count as u64).collect(),
@@ -198,7 +198,7 @@ where
 
 /// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images
 /// follow the centres, without a vertex.
-fn contacts_piece<const D: usize>(frame: &Frame<D>, balls: &[Shown<D>]) -> Piece
+fn contacts_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece
 where
     Dim<D>: Space<D>,
 {
@@ -234,7 +234,7 @@ where
         scalars("lambda", of_lines(|contact| contact.lambda)),
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
-    Piece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
+    GridPiece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
 }
 
 /// A plane spin turns about z.

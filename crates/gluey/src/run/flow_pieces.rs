@@ -8,10 +8,10 @@ use gluey_parallel::{Communicator, Ranks};
 
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
-use crate::checksum::Kind;
+use crate::checksum::FileKind;
 use crate::output::{FileError, write_atomically};
 
-const KIND: Kind = Kind { magic: b"gluey-fp", layout: 1 };
+const KIND: FileKind = FileKind { magic: b"gluey-fp", layout: 1 };
 
 /// Writes the pieces of a rank, which belong to a checkpoint with such a name, and says what all of them are;
 /// nothing if there is none.

@@ -11,7 +11,7 @@ use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
 use crate::case::{Case, Interval, OutputKind};
 use crate::checkpoint::FlowPieces;
-use crate::output::vtk::{Frame, FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkWriter};
+use crate::output::vtk::{FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkFrame, VtkWriter};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::output::{FileError, ResultPaths};
 use crate::simulation::{Simulation, StepError};
@@ -35,11 +35,11 @@ pub(super) trait Others {
 pub(super) struct StreamOptions {
     pub folder: PathBuf,
     interval: Interval,
-    format: Format,
+    format: FrameFormat,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Format {
+enum FrameFormat {
     Vtk { encoding: VtkEncoding, with_fields: bool },
     Xyz { gzip: bool },
 }
@@ -54,11 +54,11 @@ impl StreamOptions {
             folder: paths.frames(output.label()),
             interval: output.interval(),
             format: match output.kind {
-                OutputKind::Vtk => Format::Vtk {
+                OutputKind::Vtk => FrameFormat::Vtk {
                     encoding: VtkEncoding { compression: output.compression, precision: output.precision },
                     with_fields: output.fields,
                 },
-                OutputKind::Xyz => Format::Xyz { gzip: output.compression > 0 },
+                OutputKind::Xyz => FrameFormat::Xyz { gzip: output.compression > 0 },
             },
         });
         let others = of_case.filter(|stream| asked.iter().all(|other| other.folder != stream.folder));
@@ -69,18 +69,18 @@ impl StreamOptions {
     #[cfg(feature = "ranks")]
     pub fn encoding(&self) -> Option<VtkEncoding> {
         match self.format {
-            Format::Vtk { encoding, .. } => Some(encoding),
-            Format::Xyz { .. } => None,
+            FrameFormat::Vtk { encoding, .. } => Some(encoding),
+            FrameFormat::Xyz { .. } => None,
         }
     }
 
     fn vtk(options: &VtkOptions) -> Self {
-        let format = Format::Vtk { encoding: options.encoding, with_fields: true };
+        let format = FrameFormat::Vtk { encoding: options.encoding, with_fields: true };
         Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
     }
 
     fn xyz(options: &XyzOptions) -> Self {
-        let format = Format::Xyz { gzip: options.gzip };
+        let format = FrameFormat::Xyz { gzip: options.gzip };
         Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
     }
 }
@@ -118,8 +118,8 @@ where
         let stream = |stream: StreamOptions| {
             let StreamOptions { folder, interval, format } = stream;
             let opened = match format {
-                Format::Xyz { gzip } => Stream::Xyz(XyzWriter::create(&folder, gzip)?),
-                Format::Vtk { encoding, with_fields } => {
+                FrameFormat::Xyz { gzip } => Stream::Xyz(XyzWriter::create(&folder, gzip)?),
+                FrameFormat::Vtk { encoding, with_fields } => {
                     let writer = vtk_writer(case, &folder, interval, step)?.encoded(encoding);
                     let writer = match others {
                         Some(others) => writer.in_pieces(others.rank_count()),
@@ -158,7 +158,7 @@ where
                     let domain = simulation.contact().domain().clone();
                     let shown =
                         || ShownBox { container: container(case, simulation), slide: simulation.slide() };
-                    writer.write(Frame {
+                    writer.write(VtkFrame {
                         step,
                         time,
                         particles: particles.to_vec(),

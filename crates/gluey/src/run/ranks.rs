@@ -9,7 +9,9 @@ use gluey_parallel::{Communicator, Ranks};
 use super::contacts;
 use super::frames::StreamOptions;
 use super::pieces::{Follows, OtherRanks};
-use super::{Run, RunError, RunOptions, claim_outputs, flow_pieces, logged, overwrite_guard, stale_files};
+use super::{
+    RunError, RunInProgress, RunOptions, claim_outputs, flow_pieces, logged, overwrite_guard, stale_files,
+};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 use crate::flow::suspension;
 use crate::hydrodynamics::HydrodynamicsError;
@@ -66,7 +68,7 @@ where
     overwrite_guard::check_free(case, options)?;
     stale_files::remove(case, options)?;
     let report = logged(case, options, progress, |log| {
-        Run::start(case, options, log, leader, contact, Some(&others))?.finish()
+        RunInProgress::start(case, options, log, leader, contact, Some(&others))?.finish()
     })?;
     Ok(Some(report))
 }

@@ -16,10 +16,10 @@ use crate::measures::Instant;
 use crate::output::csv::{CsvWriter, gaps_path};
 use crate::output::rheology::{self, Rheology};
 use crate::output::solver_log::{SolverLog, SolverRow};
-use crate::output::{Draft, FileError, Mark, ResultPaths, RowsError, drafts, forces};
+use crate::output::{Draft, DraftMark, FileError, ResultPaths, RowsError, drafts, forces};
 use crate::rheology::{RheologyError, RheologyMeans};
 use crate::simulation::{Simulation, StepError};
-use crate::trajectory::Row;
+use crate::trajectory::TrajectoryRow;
 
 /// Means of the rheology that a run has written, if it writes any.
 ///
@@ -34,7 +34,7 @@ pub(super) fn means_of_rheology(case: &Case, csv: &Path) -> Result<Option<Rheolo
 
 /// The tables of a run in progress.
 #[derive(Debug)]
-pub(super) struct Tables {
+pub(super) struct RunTables {
     trajectory: CsvWriter,
     rheology: Option<Draft>,
     forces: Option<Draft>,
@@ -55,7 +55,7 @@ fn paths(case: &Case, csv: &Path) -> [Option<PathBuf>; 2] {
     [case.has_rheology().then(|| paths.rheology()), case.gives_motions().then(|| paths.forces())]
 }
 
-impl Tables {
+impl RunTables {
     /// Starts those that a case has.
     pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError>
     where
@@ -86,7 +86,7 @@ impl Tables {
     {
         let TableMarks { trajectory, gaps, rheology, forces, solver } = &checkpoint.tables;
         let paths = ResultPaths::of_csv(csv);
-        let resume = |path: PathBuf, mark: &Option<Mark>| {
+        let resume = |path: PathBuf, mark: &Option<DraftMark>| {
             mark.as_ref().map(|mark| Draft::resume(&path, mark)).transpose()
         };
         Ok(Self {
@@ -97,8 +97,8 @@ impl Tables {
         })
     }
 
-    /// Adds the rows of the step that was predicted and corrected last, and gives the smallest gap of any pair
-    /// in mean radii, if there is one.
+    /// Adds the rows of the step that was predicted and corrected last, and gives the smallest gap of any
+    /// pair in mean radii, if there is one.
     pub fn write<const D: usize, H, C>(
         &mut self,
         case: &Case,
@@ -112,7 +112,7 @@ impl Tables {
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         let (particles, twists) = (simulation.particles(), simulation.twists());
-        let row = Row { time, particles, twists, domain: simulation.contact().domain() };
+        let row = TrajectoryRow { time, particles, twists, domain: simulation.contact().domain() };
         let smallest_gap_over_a = self.trajectory.write(&row, &simulation.contact().pair_forces(case))?;
         if let (Some(rheology), Some(stress)) = (&mut self.rheology, simulation.stress()) {
             let stress = with_contacts(*stress, simulation.contact(), particles)

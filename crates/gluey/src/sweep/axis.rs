@@ -6,14 +6,14 @@ use crate::case::{BadOverride, Override};
 
 /// A key of a case and the values that a study gives it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct SweptKey {
     /// The key, as it was written.
     pub key: String,
     /// The values, each as what sets the key to it.
     pub values: Vec<Override>,
 }
 
-impl FromStr for Axis {
+impl FromStr for SweptKey {
     type Err = BadOverride;
 
     /// Reads `key=value,value,...`. Values are those of `--set`; commas in lists and texts divide nothing.
@@ -56,12 +56,12 @@ mod tests {
 
     #[test]
     fn values_are_divided_by_commas_outside_of_lists_and_texts() {
-        let axis: Axis = "particles.1.position=[0.7,0.5], [0.7,0.49]".parse().expect("an axis");
+        let axis: SweptKey = "particles.1.position=[0.7,0.5], [0.7,0.49]".parse().expect("an axis");
         assert_eq!(axis.key, "particles.1.position");
         let values: Vec<String> = axis.values.iter().map(written).collect();
         assert_eq!(values, ["[0.7,0.5]", "[0.7,0.49]"]);
         assert_eq!(split("\"a,b\",c"), ["\"a,b\"", "c"]);
-        assert!("time.step=0.1,".parse::<Axis>().is_err());
-        assert!("time.step".parse::<Axis>().is_err());
+        assert!("time.step=0.1,".parse::<SweptKey>().is_err());
+        assert!("time.step".parse::<SweptKey>().is_err());
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Point, PointState, SweepError};
+use super::{PointState, StudyPoint, SweepError};
 use crate::output::{FileError, write_atomically};
 use crate::run::TABLE_OF_STUDY;
 
@@ -71,7 +71,7 @@ impl Study {
     ///
     /// # Errors
     /// [`SweepError`] with what is in the way; everything is then as it was.
-    pub fn open(&self, points: &[Point], force: bool) -> Result<Vec<PointState>, SweepError> {
+    pub fn open(&self, points: &[StudyPoint], force: bool) -> Result<Vec<PointState>, SweepError> {
         let earlier = if force { Vec::new() } else { self.check_free()? };
         let mut states = Vec::new();
         for point in points {
@@ -111,8 +111,8 @@ impl Study {
     }
 
     /// Writes down the study with its earlier points and these.
-    fn write(&self, mut all: Vec<NamedPoint>, points: &[Point]) -> Result<(), FileError> {
-        for Point { name, values, .. } in points {
+    fn write(&self, mut all: Vec<NamedPoint>, points: &[StudyPoint]) -> Result<(), FileError> {
+        for StudyPoint { name, values, .. } in points {
             let point = NamedPoint { name: name.clone(), values: values.clone() };
             if !all.contains(&point) {
                 all.push(point);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::Axis;
+use super::SweptKey;
 use crate::number_text::shown_to;
 use crate::report::RunReport;
 
@@ -27,7 +27,7 @@ pub struct PointResult {
 /// named `_over_a` are in mean radii, `wall_s` in seconds; means of the rheology behind `strain_skipped` have
 /// half the width of their 95 % interval beside them, which `blocks_independent` says to hold. No count where
 /// there was nothing to be counted.
-pub fn table(axes: &[Axis], results: &[PointResult]) -> Vec<Vec<String>> {
+pub fn table(axes: &[SweptKey], results: &[PointResult]) -> Vec<Vec<String>> {
     let keys = axes.iter().map(|axis| axis.key.clone());
     let numbers = numbers_of(None).into_iter().map(|(name, _)| name.to_owned());
     let head = keys.chain(["state".to_owned()]).chain(numbers).collect();

@@ -15,12 +15,12 @@ const MOST_CELLS: usize = 2000;
 
 /// Cell of a lattice: edges in relation to each other, and sites as parts of the edges. No site lies on a
 /// face, so that walls are no nearer than neighbours.
-struct Crystal<const D: usize> {
+struct LatticeCell<const D: usize> {
     edges: Vector<D>,
     sites: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Crystal<D> {
+impl<const D: usize> LatticeCell<D> {
     fn of(arrangement: Arrangement) -> Option<Self> {
         let (low, middle, high) = (0.25, 0.5, 0.75);
         let (dimension, edges, sites): (usize, [f64; 3], &[[f64; 3]]) = match arrangement {
@@ -106,8 +106,8 @@ pub(super) fn sites<const D: usize>(
     Ok((0..cell_count).flat_map(in_cell).collect())
 }
 
-fn crystal<const D: usize>(arrangement: Arrangement) -> Result<Crystal<D>, PackingError> {
-    Crystal::of(arrangement).ok_or(PackingError::OtherDimension { arrangement, dimension: D })
+fn crystal<const D: usize>(arrangement: Arrangement) -> Result<LatticeCell<D>, PackingError> {
+    LatticeCell::of(arrangement).ok_or(PackingError::OtherDimension { arrangement, dimension: D })
 }
 
 /// Moves each point to a random one of the ball of this radius around it.

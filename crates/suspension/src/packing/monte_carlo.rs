@@ -13,7 +13,7 @@ const ACCEPTANCE: f64 = 0.4;
 const ADAPTING: f64 = 0.5;
 
 /// Balls in cells at least as wide as the largest of them.
-struct Fluid<'a, const D: usize> {
+struct HardFluid<'a, const D: usize> {
     container: &'a Container<D>,
     positions: Vec<Vector<D>>,
     radii: &'a [f64],
@@ -32,7 +32,7 @@ pub(super) fn equilibrate<const D: usize>(
 ) {
     let largest = radii.iter().copied().fold(0.0, f64::max);
     let longest = 0.5 * container.bounds().extent().min();
-    let mut fluid = Fluid::new(container, std::mem::take(positions), radii);
+    let mut fluid = HardFluid::new(container, std::mem::take(positions), radii);
     let mut step = 0.2 * largest;
     for sweep in 0..sweep_count {
         let accepted = fluid.sweep(step, random) as f64 / radii.len() as f64;
@@ -43,7 +43,7 @@ pub(super) fn equilibrate<const D: usize>(
     *positions = fluid.positions;
 }
 
-impl<'a, const D: usize> Fluid<'a, D> {
+impl<'a, const D: usize> HardFluid<'a, D> {
     fn new(container: &'a Container<D>, positions: Vec<Vector<D>>, radii: &'a [f64]) -> Self {
         let widest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
         let spacing = (container.volume() / radii.len() as f64).powf(1.0 / D as f64);

@@ -58,7 +58,7 @@ impl<const D: usize> Crowd<'_, D> {
     /// Pushes with the neighbours that balls have now.
     fn settle(&mut self, looks_left: &mut usize) -> Settled {
         let skin = SKIN * self.radii.iter().sum::<f64>() / self.radii.len() as f64;
-        let neighbours = Neighbours::of(self.container, self.positions, self.radii, skin);
+        let neighbours = NearBalls::of(self.container, self.positions, self.radii, skin);
         let before = self.positions.to_vec();
         let mut to_look_at: Vec<u32> = (0..self.radii.len() as u32).collect();
         let (mut next, mut is_next) = (Vec::new(), vec![false; self.radii.len()]);
@@ -91,7 +91,7 @@ impl<const D: usize> Crowd<'_, D> {
 
     /// Parts a ball from its walls and from its neighbours, tells of all that move for it and of what they
     /// have to look at again; its largest overlap.
-    fn push(&mut self, ball: usize, neighbours: &Neighbours<D>, mut tell: impl FnMut(usize)) -> f64 {
+    fn push(&mut self, ball: usize, neighbours: &NearBalls<D>, mut tell: impl FnMut(usize)) -> f64 {
         let mut worst = 0.0;
         self.keep_inside(ball);
         for &(other, shift) in neighbours.around(ball) {
@@ -125,12 +125,12 @@ impl<const D: usize> Crowd<'_, D> {
 }
 
 /// Balls that are near each other, and the shift of the image that is.
-struct Neighbours<const D: usize> {
+struct NearBalls<const D: usize> {
     starts: Vec<usize>,
     list: Vec<(u32, Vector<D>)>,
 }
 
-impl<const D: usize> Neighbours<D> {
+impl<const D: usize> NearBalls<D> {
     fn of(container: &Container<D>, positions: &[Vector<D>], radii: &[f64], skin: f64) -> Self {
         let largest = radii.iter().copied().fold(0.0, f64::max);
         let mut pairs = Vec::new();

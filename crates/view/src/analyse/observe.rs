@@ -27,7 +27,7 @@ const SLABS_PER_RADIUS: f64 = 2.0;
 
 /// Numbers of one frame; lengths in mean radii.
 #[derive(Clone, Debug)]
-pub(super) struct Instant<const D: usize> {
+pub(super) struct FrameNumbers<const D: usize> {
     pub time: f64,
     pub strain: f64,
     /// Nearest gaps; nothing where a particle has no neighbour.
@@ -42,7 +42,7 @@ pub(super) struct Instant<const D: usize> {
     pub fabric: Option<Matrix<D>>,
 }
 
-impl<const D: usize> Instant<D>
+impl<const D: usize> FrameNumbers<D>
 where
     Dim<D>: Space<D>,
 {

@@ -7,11 +7,11 @@ use gluey::shown_to;
 use gluey_geom::{Dim, Space};
 use serde::{Serialize, Serializer};
 
-use super::observe::{Distributions, Instant};
+use super::observe::{Distributions, FrameNumbers};
 
 /// Means over the frames behind the transient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub struct StructureSummary {
     /// Number of particles.
     pub particle_count: usize,
     /// Volume of the particles over that of the box.
@@ -32,9 +32,9 @@ pub struct Summary {
     pub rheology: Option<RheologyMeans>,
 }
 
-impl Summary {
+impl StructureSummary {
     pub(super) fn of<const D: usize>(
-        series: &[Instant<D>],
+        series: &[FrameNumbers<D>],
         skipped: usize,
         distributions: &Distributions<D>,
         rheology: Option<RheologyMeans>,
@@ -43,7 +43,7 @@ impl Summary {
         Dim<D>: Space<D>,
     {
         let kept = &series[skipped..];
-        let mean = |value: &dyn Fn(&Instant<D>) -> Option<f64>| {
+        let mean = |value: &dyn Fn(&FrameNumbers<D>) -> Option<f64>| {
             let values: Vec<f64> = kept.iter().filter_map(value).collect();
             Mean::of(&values)
         };
@@ -87,7 +87,7 @@ fn told(mean: Option<Mean>) -> String {
     }
 }
 
-impl fmt::Display for Summary {
+impl fmt::Display for StructureSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { particle_count, fraction, frame_count, skipped, .. } = self;
         writeln!(f, "{particle_count} particles at the fraction {fraction:.4}")?;

@@ -4,13 +4,13 @@ use gluey::output::line_of;
 use gluey_geom::{Dim, Space};
 use gluey_suspension::structure::GapStatistics;
 
-use super::observe::{Distributions, Instant};
+use super::observe::{Distributions, FrameNumbers};
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 /// Names and contents of all tables.
 pub(super) fn all<const D: usize>(
-    series: &[Instant<D>],
+    series: &[FrameNumbers<D>],
     distributions: &Distributions<D>,
 ) -> Vec<(&'static str, String)>
 where
@@ -28,9 +28,9 @@ where
 }
 
 /// Lines of numbers under a header.
-struct Table(String);
+struct TableText(String);
 
-impl Table {
+impl TableText {
     fn new(header: &str) -> Self {
         Self(format!("{header}\n"))
     }
@@ -45,10 +45,10 @@ fn vector<const D: usize>(name: &str) -> String {
     AXES[..D].iter().map(|axis| format!(",{name}_{axis}")).collect()
 }
 
-fn of_series<const D: usize>(series: &[Instant<D>]) -> String {
+fn of_series<const D: usize>(series: &[FrameNumbers<D>]) -> String {
     let tensor: String =
         (0..D).flat_map(|i| (i..D).map(move |j| format!(",fabric_{}{}", AXES[i], AXES[j]))).collect();
-    let mut table = Table::new(&format!(
+    let mut table = TableText::new(&format!(
         "t,strain,smallest_gap_over_a,gap_1_percent_over_a,median_gap_over_a,contacts,largest_cluster{}{tensor}",
         vector::<D>("percolates")
     ));
@@ -72,7 +72,7 @@ fn of_series<const D: usize>(series: &[Instant<D>]) -> String {
 fn radial<const D: usize>(distributions: &Distributions<D>) -> String {
     let name = |[one, other]: [usize; 2]| format!(",g_{}{}", one + 1, other + 1);
     let names: String = distributions.partial.iter().map(|(pair, _)| name(*pair)).collect();
-    let mut table = Table::new(&format!("r_over_a,g,pairs{names}"));
+    let mut table = TableText::new(&format!("r_over_a,g,pairs{names}"));
     let partial: Vec<_> = distributions.partial.iter().map(|(_, radial)| radial.bins()).collect();
     for (row, bin) in distributions.radial.bins().into_iter().enumerate() {
         let whole = [Some(bin.distance / distributions.a), bin.g, Some(bin.pair_count as f64)];
@@ -82,13 +82,13 @@ fn radial<const D: usize>(distributions: &Distributions<D>) -> String {
 }
 
 fn angular<const D: usize>(distributions: &Distributions<D>) -> String {
-    let mut table = Table::new("theta_rad,g");
+    let mut table = TableText::new("theta_rad,g");
     distributions.angular.bins().into_iter().for_each(|(theta, g)| table.row([Some(theta), g]));
     table.0
 }
 
 fn waves<const D: usize>(distributions: &Distributions<D>) -> Option<String> {
-    let mut table = Table::new("k_a,s,vectors");
+    let mut table = TableText::new("k_a,s,vectors");
     for bin in distributions.waves.as_ref()?.bins() {
         table.row([bin.wave_number * distributions.a, bin.s, bin.vector_count as f64].map(Some));
     }
@@ -96,7 +96,7 @@ fn waves<const D: usize>(distributions: &Distributions<D>) -> Option<String> {
 }
 
 fn profile<const D: usize>(distributions: &Distributions<D>) -> String {
-    let mut table = Table::new(&format!("y,fraction{}", vector::<D>("velocity")));
+    let mut table = TableText::new(&format!("y,fraction{}", vector::<D>("velocity")));
     for slab in distributions.profile.slabs() {
         let velocity = (0..D).map(|d| slab.velocity.map(|velocity| velocity[d]));
         table.row([Some(slab.middle), Some(slab.fraction)].into_iter().chain(velocity));
@@ -105,7 +105,7 @@ fn profile<const D: usize>(distributions: &Distributions<D>) -> String {
 }
 
 fn diffusion<const D: usize>(distributions: &Distributions<D>) -> String {
-    let mut table = Table::new(&format!("lag_t,lag_strain{}", vector::<D>("mean_square_over_a2")));
+    let mut table = TableText::new(&format!("lag_t,lag_strain{}", vector::<D>("mean_square_over_a2")));
     for lag in 1..=distributions.longest_lag() {
         let Some(squares) = distributions.displacements.mean_square(lag) else { continue };
         let time = distributions.interval.map(|interval| lag as f64 * interval);

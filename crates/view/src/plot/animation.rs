@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::error::PlotError;
 use super::look::Look;
-use super::snapshot::{Scene, View, beside_pictures};
+use super::snapshot::{Scene, SceneView, beside_pictures};
 use crate::frames::{dimension, frame_files, read_frames};
 
 /// Width of the drawings in SVG pixels: the size of their text, whatever their pixels.
@@ -54,7 +54,7 @@ where
     let is_sheared = frames.iter().any(|frame| frame.strain != 0.0);
     let scene = |frame: &XyzFrame<D>| Scene::of(frame, look, is_sheared);
     let views = frames.par_iter().map(|frame| scene(frame).view());
-    let Some(view) = views.reduce_with(View::around) else { return Ok(Vec::new()) };
+    let Some(view) = views.reduce_with(SceneView::around) else { return Ok(Vec::new()) };
     let still = |canvas: &Canvas| {
         let still = Still::new(canvas, options.pixels);
         still.map_err(|source| PlotError::Png { path: path.to_owned(), source })

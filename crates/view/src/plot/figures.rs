@@ -8,7 +8,7 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, PALETTE, PIXELS_PER_MM, S
 
 use super::error::PlotError;
 use super::figure::Figure;
-use super::read::{Borders, Results, Source};
+use super::read::{Borders, Results, TableSource};
 
 /// Many curves that are not told apart.
 pub(super) const FAINT: Stroke = Stroke { color: "#9aa5b1", width: 0.8, dashes: None };
@@ -55,7 +55,7 @@ pub fn gaps(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<
 }
 
 /// The gap of every pair, up to as many as there are strokes: those that come nearest.
-fn all_pairs(source: &Source, t: &[f64]) -> Vec<Curve> {
+fn all_pairs(source: &TableSource, t: &[f64]) -> Vec<Curve> {
     let names = (1..10).flat_map(|i| (i + 1..10).map(move |j| (i, j)));
     let mut pairs: Vec<_> =
         names.filter_map(|(i, j)| Some((i, j, source.table.find(&format!("gap{i}{j}_over_a"))?))).collect();
@@ -107,7 +107,12 @@ pub fn trajectories(results: &Results, width_mm: f64) -> Result<Canvas, PlotErro
 
 /// Paths over the box, whose walls are solid and whose periodic borders are dashed. Both axes have one scale;
 /// a long way or a high one has room beside it, so that the frame is neither flat nor narrow.
-fn paths(source: &Source, across: &str, count: usize, borders: Option<&Borders>) -> Result<Chart, PlotError> {
+fn paths(
+    source: &TableSource,
+    across: &str,
+    count: usize,
+    borders: Option<&Borders>,
+) -> Result<Chart, PlotError> {
     let axis = if across == "y" { 1 } else { 2 };
     let mut curves = borders.map_or(Vec::new(), |borders| borders.curves(axis));
     for n in 1..=count {
@@ -155,7 +160,7 @@ pub fn rheology(results: &Results, width_mm: f64, is_needed: bool) -> Result<Opt
 
 /// Columns against strain, with strokes from `first` on; `N2` is there in 3D only.
 fn against_strain(
-    source: &Source,
+    source: &TableSource,
     label: &str,
     columns: &[(&str, &str)],
     first: usize,
@@ -195,7 +200,7 @@ pub fn solver(results: &Results, width_mm: f64, is_needed: bool) -> Result<Optio
 
 /// Columns against time, with their names and strokes, but those that are zero throughout.
 fn of_steps<'a>(
-    source: &Source,
+    source: &TableSource,
     label: &str,
     columns: impl Iterator<Item = (&'a str, Option<&'a str>, Stroke)>,
 ) -> Result<Chart, PlotError> {

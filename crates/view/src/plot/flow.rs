@@ -20,7 +20,7 @@ use super::snapshot::{EDGE, FrameChoice, PERIODIC};
 use super::told::{told, told_to};
 pub use choice::{FlowOptions, Quantity, SliceChoice};
 use files::FlowFrame;
-use plane::{Plane, View};
+use plane::{PicturePlane, PlaneView};
 use sample::{Samples, Sampling};
 
 /// Most pixels of a picture's field along either side.
@@ -69,8 +69,8 @@ where
     let container = frame.case.container::<D>();
     let height = container.bounds().extent()[1];
     let container = container.tilted(shear * height);
-    let plane = Plane::of(&container, options.slice)?;
-    let view = View::new(&plane, width, MARGIN);
+    let plane = PicturePlane::of(&container, options.slice)?;
+    let view = PlaneView::new(&plane, width, MARGIN);
     let (columns, rows) = view.pixels(MOST_PIXELS);
     let sampling = Sampling { fields: &fields, shear, quantity: options.quantity };
     let samples = sampling.samples(&plane, columns, rows);
@@ -80,7 +80,7 @@ where
 }
 
 /// Time, strain of what is sheared and, in 3D, where the slice is.
-fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
+fn caption<const D: usize>(frame: &FlowFrame, plane: &PicturePlane<D>) -> String {
     let Case { time, shear_rate, shear_stress, .. } = &frame.case;
     let slice = match D {
         2 => String::new(),
@@ -97,7 +97,7 @@ fn caption<const D: usize>(frame: &FlowFrame, plane: &Plane<D>) -> String {
 fn circles<const D: usize>(
     container: &Container<D>,
     particles: &[Particle<D>],
-    plane: &Plane<D>,
+    plane: &PicturePlane<D>,
 ) -> Vec<((f64, f64), f64)>
 where
     Dim<D>: Space<D>,
@@ -117,8 +117,8 @@ where
 
 /// The parts of a picture of the flow.
 struct Picture<const D: usize> {
-    plane: Plane<D>,
-    view: View,
+    plane: PicturePlane<D>,
+    view: PlaneView,
     samples: Samples<D>,
     circles: Vec<((f64, f64), f64)>,
     quantity: Quantity,
@@ -126,7 +126,7 @@ struct Picture<const D: usize> {
 
 impl<const D: usize> Picture<D> {
     fn draw(&self, caption: &str, path: &Path) -> Result<Canvas, PlotError> {
-        let range = Range::of(self.values_of_fluid(), self.quantity);
+        let range = ColorRange::of(self.values_of_fluid(), self.quantity);
         let (width, height) = self.view.canvas();
         let mut canvas = Canvas::new(width, height);
         let colors = self.samples.values().map(|value| value.map(|value| color_scale(range.fraction(value))));
@@ -198,7 +198,7 @@ impl<const D: usize> Picture<D> {
 
     /// Borders, dashed where they are periodic, with the names of the axes and where they end.
     fn draw_outline(&self, canvas: &mut Canvas, outline: [(f64, f64); 4]) {
-        let Plane { across, up, is_walled, ends, .. } = &self.plane;
+        let PicturePlane { across, up, is_walled, ends, .. } = &self.plane;
         for (n, walled) in [is_walled[1], is_walled[0], is_walled[1], is_walled[0]].into_iter().enumerate() {
             canvas.line(outline[n], outline[(n + 1) % 4], if walled { EDGE } else { PERIODIC });
         }
@@ -216,7 +216,7 @@ impl<const D: usize> Picture<D> {
         canvas.text(x, middle(lower_left.1, upper_left.1) + 5.0, 15.0, "end", &name(*up));
     }
 
-    fn draw_legend(&self, canvas: &mut Canvas, range: &Range, caption: &str) {
+    fn draw_legend(&self, canvas: &mut Canvas, range: &ColorRange, caption: &str) {
         let (width, height) = self.view.canvas();
         let (left, right) = (MARGIN[0], width - MARGIN[1]);
         let (y, length) = (height - 70.0, 0.5 * (right - left));
@@ -231,13 +231,13 @@ impl<const D: usize> Picture<D> {
 }
 
 /// The values at the ends of the colours, and whether there are some beyond.
-struct Range {
+struct ColorRange {
     low: f64,
     high: f64,
     is_cut: [bool; 2],
 }
 
-impl Range {
+impl ColorRange {
     /// Speeds from 0 to the largest; of other quantities almost all.
     fn of(mut values: Vec<f64>, quantity: Quantity) -> Self {
         values.sort_by(f64::total_cmp);
@@ -274,12 +274,12 @@ mod tests {
     #[test]
     fn colours_take_almost_all_of_the_values() {
         let values: Vec<f64> = (0..1000).map(f64::from).rev().collect();
-        let range = Range::of(values.clone(), Quantity::Pressure);
+        let range = ColorRange::of(values.clone(), Quantity::Pressure);
         assert_eq!((range.low, range.high, range.is_cut), (2.0, 997.0, [true; 2]));
         assert_eq!(range.labels(), ["≤ 2", "≥ 997"]);
-        let range = Range::of(values, Quantity::Speed);
+        let range = ColorRange::of(values, Quantity::Speed);
         assert_eq!((range.low, range.high, range.is_cut), (0.0, 999.0, [false; 2]));
-        let constant = Range::of(vec![-1.0, -1.0 + 1e-9], Quantity::Vorticity);
+        let constant = ColorRange::of(vec![-1.0, -1.0 + 1e-9], Quantity::Vorticity);
         assert_eq!((constant.fraction(-1.0), constant.is_cut), (0.5, [false; 2]));
     }
 }

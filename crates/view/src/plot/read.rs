@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use gluey::ResultPaths;
 use gluey::case::{Case, Hydrodynamics};
 use gluey::output::{FileError, entries, rows_of, undrafted, whole_lines};
-use gluey::table::Table;
+use gluey::table::NumberTable;
 use gluey_pictures::Curve;
 
 use super::error::PlotError;
@@ -18,14 +18,14 @@ use super::snapshot::{EDGE, PERIODIC};
 const HEADER: &[u8] = b"t,x1,";
 
 /// A table and where it came from.
-pub struct Source {
+pub struct TableSource {
     /// The file.
     pub path: PathBuf,
     /// Its numbers.
-    pub table: Table,
+    pub table: NumberTable,
 }
 
-impl Source {
+impl TableSource {
     /// A column that must be there.
     pub fn column(&self, name: &str) -> Result<&[f64], PlotError> {
         self.table.column(name).map_err(|source| PlotError::Table { path: self.path.clone(), source })
@@ -53,24 +53,24 @@ impl Results {
     }
 
     /// Where particles were.
-    pub fn trajectory(&self, figure: Figure) -> Result<Source, PlotError> {
+    pub fn trajectory(&self, figure: Figure) -> Result<TableSource, PlotError> {
         let csv = self.paths.csv();
         read(rows_of(&csv).unwrap_or(csv))?.with_rows(figure)
     }
 
     /// Near pairs, which runs of ten and more particles list.
-    pub fn near_pairs(&self) -> Result<Option<Source>, PlotError> {
+    pub fn near_pairs(&self) -> Result<Option<TableSource>, PlotError> {
         rows_of(&self.paths.gaps()).map(read).transpose()
     }
 
     /// Stresses; an error where they are needed and not there.
-    pub fn rheology(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
+    pub fn rheology(&self, is_needed: bool) -> Result<Option<TableSource>, PlotError> {
         let hint = "runs in boxes with domain.boundary = \"sheared\" write it";
         self.table(self.paths.rheology(), Figure::Rheology, is_needed, hint)
     }
 
     /// What the steps cost; an error where it is needed and not there.
-    pub fn solver(&self, is_needed: bool) -> Result<Option<Source>, PlotError> {
+    pub fn solver(&self, is_needed: bool) -> Result<Option<TableSource>, PlotError> {
         self.table(self.paths.solver(), Figure::Solver, is_needed, "a run writes it beside its trajectory")
     }
 
@@ -81,7 +81,7 @@ impl Results {
         figure: Figure,
         is_needed: bool,
         hint: &'static str,
-    ) -> Result<Option<Source>, PlotError> {
+    ) -> Result<Option<TableSource>, PlotError> {
         match (rows_of(&path), is_needed) {
             (Some(rows), _) => Ok(Some(read(rows)?.with_rows(figure)?)),
             (None, false) => Ok(None),
@@ -128,11 +128,11 @@ impl Borders {
 }
 
 /// The tables of `gluey analyse` in a folder.
-pub struct Tables<'a> {
+pub struct StructureTables<'a> {
     folder: &'a Path,
 }
 
-impl<'a> Tables<'a> {
+impl<'a> StructureTables<'a> {
     /// Those in this folder.
     pub fn new(folder: &'a Path) -> Self {
         Self { folder }
@@ -149,7 +149,12 @@ impl<'a> Tables<'a> {
     }
 
     /// A table with two rows at least; an error where it is needed and not so.
-    pub fn table(&self, name: &str, figure: Figure, is_needed: bool) -> Result<Option<Source>, PlotError> {
+    pub fn table(
+        &self,
+        name: &str,
+        figure: Figure,
+        is_needed: bool,
+    ) -> Result<Option<TableSource>, PlotError> {
         let path = self.folder.join(name);
         match (path.exists(), is_needed) {
             (true, true) => Ok(Some(read(path)?.with_rows(figure)?)),
@@ -196,10 +201,10 @@ fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
     Ok(begins().map_err(|error| FileError::unread(path, error))?)
 }
 
-fn read(path: PathBuf) -> Result<Source, PlotError> {
+fn read(path: PathBuf) -> Result<TableSource, PlotError> {
     let text = whole_lines(&path)?;
-    match Table::parse(&numbers(&text)) {
-        Ok(table) => Ok(Source { path, table }),
+    match NumberTable::parse(&numbers(&text)) {
+        Ok(table) => Ok(TableSource { path, table }),
         Err(source) => Err(PlotError::Table { path, source }),
     }
 }
@@ -220,8 +225,8 @@ mod tests {
 
     #[test]
     fn partners_have_numbers() {
-        let table = Table::parse(&numbers("t,i,partner\n0,1,wall\n0,2,image\n")).expect("numbers");
+        let table = NumberTable::parse(&numbers("t,i,partner\n0,1,wall\n0,2,image\n")).expect("numbers");
         assert_eq!(table.column("partner"), Ok(&[1.0, 0.0][..]));
-        assert!(Table::parse(&numbers("t,i,partner\n0,1,ghost\n")).is_err(), "an unknown partner");
+        assert!(NumberTable::parse(&numbers("t,i,partner\n0,1,ghost\n")).is_err(), "an unknown partner");
     }
 }

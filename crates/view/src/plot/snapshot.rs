@@ -124,7 +124,7 @@ struct Seen {
 
 /// The sides of the rectangle that has room in a drawing, and the largest number behind a colour.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct SceneView {
     left: f64,
     right: f64,
     low: f64,
@@ -132,7 +132,7 @@ pub(super) struct View {
     most: f64,
 }
 
-impl View {
+impl SceneView {
     /// What has room for two of them.
     pub fn around(self, other: Self) -> Self {
         Self {
@@ -187,7 +187,7 @@ impl Scene {
     }
 
     /// What has room for all of it.
-    pub fn view(&self) -> View {
+    pub fn view(&self) -> SceneView {
         let room = |axis: usize, sign: f64| {
             let balls = self.balls.iter().map(|ball| sign * ball.at[axis] + ball.radius);
             let ends = self.edges.iter().flat_map(|(ends, _)| ends.map(|end| sign * end[axis]));
@@ -195,7 +195,7 @@ impl Scene {
         };
         let measures = self.balls.iter().map(|ball| ball.measure);
         let most = self.look.end().unwrap_or_else(|| measures.fold(0.0, f64::max));
-        View { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), most }
+        SceneView { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), most }
     }
 
     fn draw_alone(&self, width: f64) -> Canvas {
@@ -203,8 +203,8 @@ impl Scene {
     }
 
     /// A drawing that has room for this view.
-    pub fn draw(&self, view: &View, width: f64) -> Canvas {
-        let View { left, right, low, high, most } = *view;
+    pub fn draw(&self, view: &SceneView, width: f64) -> Canvas {
+        let SceneView { left, right, low, high, most } = *view;
         // Not higher than wide.
         let scale = (width - 2.0 * MARGIN) / (right - left).max(high - low);
         let shift = MARGIN.max(0.5 * (width - scale * (right - left)));

@@ -5,7 +5,7 @@ use gluey_pictures::{Axis, Canvas, Chart, Curve, PALETTE, Stroke};
 use super::error::PlotError;
 use super::figure::Figure;
 use super::figures::{FAINT, chart, curve, points, stacked, under_frame};
-use super::read::{Source, Tables};
+use super::read::{StructureTables, TableSource};
 
 /// A column, its name in the legend, its stroke.
 type Column = (&'static str, &'static str, Stroke);
@@ -20,7 +20,7 @@ const FIT: Stroke = Stroke { color: "#1c1c1c", width: 1.0, dashes: Some("6 3") }
 /// A picture; none where there is no table of it and it was not asked for by name.
 pub fn draw(
     figure: Figure,
-    tables: &Tables<'_>,
+    tables: &StructureTables<'_>,
     width_mm: f64,
     is_needed: bool,
 ) -> Result<Option<Canvas>, PlotError> {
@@ -38,7 +38,7 @@ pub fn draw(
 }
 
 /// Contacts of a particle, the largest cluster and fabric, against strain or, without shear, time.
-fn contacts(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
+fn contacts(tables: &StructureTables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
     let Some(source) = tables.table("series.csv", Figure::Contacts, is_needed)? else {
         return Ok(Vec::new());
     };
@@ -64,7 +64,7 @@ fn contacts(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
 }
 
 /// g(r), g(theta) in degrees and, in periodic boxes, S(k), each beside 1, what there is without order.
-fn correlations(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
+fn correlations(tables: &StructureTables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
     let named = [
         ("g_of_r.csv", "r_over_a", "distance *r* / *a*", "g", "*g*(*r*)"),
         ("g_of_theta.csv", "theta_rad", "angle to the flow *θ* (degrees)", "g", "*g*(*θ*) near contact"),
@@ -95,7 +95,7 @@ fn correlations(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, Plot
 }
 
 /// Correlations between particles of two radii, where the table has them.
-fn partial(source: &Source, x: &[f64]) -> Vec<Curve> {
+fn partial(source: &TableSource, x: &[f64]) -> Vec<Curve> {
     let pairs = (1..=3).flat_map(|one| (one..=3).map(move |other| (one, other)));
     let found = pairs.filter_map(|(one, other)| {
         Some((format!("radii {one} and {other}"), source.table.find(&format!("g_{one}{other}"))?))
@@ -105,7 +105,7 @@ fn partial(source: &Source, x: &[f64]) -> Vec<Curve> {
 }
 
 /// Fraction and velocities against the height.
-fn profiles(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
+fn profiles(tables: &StructureTables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
     let Some(source) = tables.table("profile_y.csv", Figure::Profiles, is_needed)? else {
         return Ok(Vec::new());
     };
@@ -123,7 +123,7 @@ fn profiles(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotErro
 
 /// Mean squares of displacements against the lag, and the lines that fit the second half of them, whose
 /// slopes are twice the diffusivities of the summary.
-fn diffusion(tables: &Tables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
+fn diffusion(tables: &StructureTables<'_>, is_needed: bool) -> Result<Vec<Chart>, PlotError> {
     let Some(source) = tables.table("diffusion.csv", Figure::Diffusion, is_needed)? else {
         return Ok(Vec::new());
     };
@@ -171,7 +171,7 @@ fn fitted(x: &[f64], y: &[f64]) -> Option<[f64; 2]> {
 
 /// The column of strains and its label or, where they do not grow, that of times.
 fn clock(
-    source: &Source,
+    source: &TableSource,
     names: [&'static str; 2],
     labels: [&'static str; 2],
 ) -> Result<(&'static str, &'static str), PlotError> {
@@ -182,7 +182,7 @@ fn clock(
 
 /// Columns against another one; those of the third axis are there in 3D only.
 fn of_columns(
-    source: &Source,
+    source: &TableSource,
     across: &str,
     label: &str,
     name: &str,
@@ -199,7 +199,7 @@ fn of_columns(
 }
 
 /// A column, which may only be missing if it is one of the third axis.
-fn found<'a>(source: &'a Source, name: &str) -> Result<Option<&'a [f64]>, PlotError> {
+fn found<'a>(source: &'a TableSource, name: &str) -> Result<Option<&'a [f64]>, PlotError> {
     match source.table.find(name) {
         None if name.ends_with('z') => Ok(None),
         _ => source.column(name).map(Some),

@@ -16,13 +16,13 @@ pub fn draw(study: &StudyProgress, width_mm: f64) -> Result<Canvas, PlotError> {
     let axis = (0..study.keys.len()).find(|&key| has_numbers(&study.points, key));
     let no_numbers = || PlotError::NoNumbers { folder: study.folder.clone(), keys: study.keys.clone() };
     let axis = axis.ok_or_else(no_numbers)?;
-    let mut series: Vec<Series> = Vec::new();
+    let mut series: Vec<Viscosities> = Vec::new();
     for point in &study.points {
         let Some((x, mean)) = number(point, axis).zip(viscosity(point)) else { continue };
         let label = label(study, point, axis);
         match series.iter_mut().find(|one| one.label == label) {
             Some(one) => one.points.push((x, mean)),
-            None => series.push(Series { label, points: vec![(x, mean)] }),
+            None => series.push(Viscosities { label, points: vec![(x, mean)] }),
         }
     }
     if series.is_empty() {
@@ -44,12 +44,12 @@ pub fn draw(study: &StudyProgress, width_mm: f64) -> Result<Canvas, PlotError> {
     Ok(stacked(&[chart], width_mm))
 }
 
-struct Series {
+struct Viscosities {
     label: String,
     points: Vec<(f64, Mean)>,
 }
 
-impl Series {
+impl Viscosities {
     /// A line through the means, a dot at each, and their intervals as bars.
     fn curves(&mut self, number: usize) -> [Curve; 2] {
         self.points.sort_by(|one, other| one.0.total_cmp(&other.0));

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use gluey_geom::{Dim, Space};
 
-use super::{Frame, VtkWriter};
+use super::{VtkFrame, VtkWriter};
 use crate::output::FileError;
 
 /// Frames that may wait.
@@ -45,12 +45,12 @@ impl Drop for Passage {
     }
 }
 
-enum Message<const D: usize>
+enum FrameMessage<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     /// A frame, and what ends when it is on disk, or given up.
-    Frame(Box<Frame<D>>, Passage),
+    VtkFrame(Box<VtkFrame<D>>, Passage),
     /// An answer is due when all frames before are on disk.
     Flush(SyncSender<()>),
 }
@@ -63,7 +63,7 @@ where
 {
     folder: PathBuf,
     on_their_way: OnTheirWay,
-    queue: Option<SyncSender<Message<D>>>,
+    queue: Option<SyncSender<FrameMessage<D>>>,
     /// Nothing once it ended, which it does before it is told to only where a frame could not be written.
     thread: Option<JoinHandle<Result<(), FileError>>>,
 }
@@ -83,14 +83,14 @@ where
     }
 
     /// Has a frame written; waits while two others are on their way.
-    pub fn write(&mut self, frame: Frame<D>) -> Result<(), FileError> {
-        self.send(Message::Frame(Box::new(frame), self.on_their_way.begin()))
+    pub fn write(&mut self, frame: VtkFrame<D>) -> Result<(), FileError> {
+        self.send(FrameMessage::VtkFrame(Box::new(frame), self.on_their_way.begin()))
     }
 
     /// Returns when all frames are on disk.
     pub fn flush(&mut self) -> Result<(), FileError> {
         let (answer, answered) = sync_channel(1);
-        self.send(Message::Flush(answer))?;
+        self.send(FrameMessage::Flush(answer))?;
         answered.recv().or_else(|_| self.failure())
     }
 
@@ -99,7 +99,7 @@ where
         if self.thread.is_some() { self.end() } else { self.failure() }
     }
 
-    fn send(&mut self, message: Message<D>) -> Result<(), FileError> {
+    fn send(&mut self, message: FrameMessage<D>) -> Result<(), FileError> {
         let sent = self.queue.as_ref().map(|queue| queue.send(message));
         if matches!(sent, Some(Ok(()))) { Ok(()) } else { self.failure() }
     }
@@ -135,15 +135,15 @@ where
     }
 }
 
-fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<Message<D>>) -> Result<(), FileError>
+fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<FrameMessage<D>>) -> Result<(), FileError>
 where
     Dim<D>: Space<D>,
 {
     for message in messages {
         match message {
-            Message::Frame(frame, _passage) => writer.write(&frame)?,
+            FrameMessage::VtkFrame(frame, _passage) => writer.write(&frame)?,
             // Whoever asked has gone if this fails.
-            Message::Flush(answer) => drop(answer.send(())),
+            FrameMessage::Flush(answer) => drop(answer.send(())),
         }
     }
     Ok(())
@@ -155,9 +155,9 @@ mod tests {
 
     use super::*;
 
-    fn frame(step: usize) -> Frame<2> {
+    fn frame(step: usize) -> VtkFrame<2> {
         let (particles, twists, contacts, domain) = (vec![], vec![], vec![], Domain::default());
-        Frame { step, time: step as f64, particles, twists, contacts, domain, in_box: None, fields: None }
+        VtkFrame { step, time: step as f64, particles, twists, contacts, domain, in_box: None, fields: None }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use gluey_geom::Vector;
 use gluey_motion::Fields;
 use vtkio::model::CellType;
 
-use super::xml::{Array, Piece};
+use super::xml::{Array, GridPiece};
 
 /// The series of the fields.
 pub(super) const FIELDS: &str = "fields";
@@ -16,14 +16,14 @@ pub(super) const QUAD_ORDER: [usize; 9] = [0, 2, 8, 6, 1, 5, 7, 3, 4];
 pub(super) const HEXAHEDRON_ORDER: [usize; 27] =
     [0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13];
 
-pub(super) fn fields_piece<const D: usize>(fields: &Fields<D>) -> Piece {
+pub(super) fn fields_piece<const D: usize>(fields: &Fields<D>) -> GridPiece {
     let (order, cell_type): (&[usize], _) = match D {
         2 => (&QUAD_ORDER, CellType::BiquadraticQuad),
         _ => (&HEXAHEDRON_ORDER, CellType::TriquadraticHexahedron),
     };
     let cells = fields.cells.chunks_exact(order.len());
     let count = cells.len();
-    Piece {
+    GridPiece {
         points: in_space(&fields.points),
         connectivity: cells.flat_map(|cell| order.iter().map(|&node| u64::from(cell[node]))).collect(),
         offsets: (1..=count).map(|cell| (cell * order.len()) as u64).collect(),

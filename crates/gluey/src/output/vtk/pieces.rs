@@ -7,7 +7,7 @@ use std::path::Path;
 use gluey_motion::Fields;
 
 use super::grid::{FIELDS, fields_piece};
-use super::xml::{self, Piece, VtkEncoding};
+use super::xml::{self, GridPiece, VtkEncoding};
 use crate::case::Precision;
 use crate::output::{FileError, write_atomically};
 
@@ -28,7 +28,7 @@ pub(super) fn write_first(
     series: &str,
     step: usize,
     count: usize,
-    piece: Piece,
+    piece: GridPiece,
     encoding: VtkEncoding,
 ) -> Result<(), FileError> {
     let names: Vec<String> = (0..count).map(|rank| piece_name(series, step, rank)).collect();
@@ -47,7 +47,7 @@ pub(super) fn index_name(series: &str, step: usize) -> String {
 }
 
 /// The text that names files with such arrays as `piece` has.
-fn index(piece: &Piece, precision: Precision, names: &[String]) -> String {
+fn index(piece: &GridPiece, precision: Precision, names: &[String]) -> String {
     let kind = match precision {
         Precision::Double => "Float64",
         Precision::Single => "Float32",

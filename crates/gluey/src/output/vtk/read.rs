@@ -38,7 +38,7 @@ pub enum VtkReadError {
 /// If the file cannot be read, or is not of this dimension.
 pub fn read_fields<const D: usize>(path: &Path) -> Result<Fields<D>, VtkReadError> {
     let mut all = Fields::default();
-    for grid in Grid::all(path)? {
+    for grid in FileGrid::all(path)? {
         append(&mut all, fields_of(&grid)?);
     }
     Ok(all)
@@ -55,7 +55,7 @@ fn append<const D: usize>(all: &mut Fields<D>, more: Fields<D>) {
     all.multiplier.extend(more.multiplier);
 }
 
-fn fields_of<const D: usize>(grid: &Grid) -> Result<Fields<D>, VtkReadError> {
+fn fields_of<const D: usize>(grid: &FileGrid) -> Result<Fields<D>, VtkReadError> {
     let order: &[usize] = if D == 2 { &QUAD_ORDER } else { &HEXAHEDRON_ORDER };
     let (nodes, ends) = grid.piece.cells.cell_verts.clone().into_xml();
     if ends.iter().enumerate().any(|(cell, &end)| end != ((cell + 1) * order.len()) as u64) {
@@ -94,7 +94,7 @@ pub fn read_particles<const D: usize>(path: &Path) -> Result<Vec<Particle<D>>, V
 where
     Dim<D>: Space<D>,
 {
-    let grid = Grid::read(path)?;
+    let grid = FileGrid::read(path)?;
     let centers = grid.vectors::<D>(grid.piece.points.cast_into(), "points")?;
     let (radii, image) = (grid.scalars("radius")?, grid.scalars("image")?);
     if radii.len() != centers.len() || image.len() != centers.len() {
@@ -106,12 +106,12 @@ where
 }
 
 /// A file and the grid in it.
-struct Grid {
+struct FileGrid {
     path: PathBuf,
     piece: UnstructuredGridPiece,
 }
 
-impl Grid {
+impl FileGrid {
     /// The grid of a file, or those of the files that it names.
     fn all(path: &Path) -> Result<Vec<Self>, VtkReadError> {
         let names = |piece: &Piece<UnstructuredGridPiece>| match piece {

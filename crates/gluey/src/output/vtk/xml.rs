@@ -50,7 +50,7 @@ pub(super) struct Array {
 }
 
 /// A grid and what is known at its points and cells.
-pub(super) struct Piece {
+pub(super) struct GridPiece {
     /// Three coordinates per point.
     pub points: Vec<f64>,
     /// Points of all cells.
@@ -63,7 +63,7 @@ pub(super) struct Piece {
 }
 
 /// Writes the file that holds `piece`, whole or not at all.
-pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<(), FileError> {
+pub(super) fn write(path: &Path, piece: GridPiece, encoding: VtkEncoding) -> Result<(), FileError> {
     let text = document(piece, encoding);
     let text = text.map_err(|error| FileError::new(path, "encode the file", error))?;
     write_atomically(path, text.as_bytes())
@@ -72,7 +72,7 @@ pub(super) fn write(path: &Path, piece: Piece, encoding: VtkEncoding) -> Result<
 /// The text of that file. vtkio writes it, without compression; the arrays are compressed afterwards in
 /// blocks, since vtkio (0.7.0-rc2) hands its compressor one number at a time, for each of which flate2 clears
 /// 32 kB. What is empty stays as it is: vtkio does not read arrays of no block.
-fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
+fn document(piece: GridPiece, encoding: VtkEncoding) -> io::Result<String> {
     let compression = if piece.points.is_empty() { 0 } else { encoding.compression };
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
@@ -98,7 +98,7 @@ fn document(piece: Piece, encoding: VtkEncoding) -> io::Result<String> {
     }
 }
 
-fn grid(piece: Piece, precision: Precision) -> UnstructuredGridPiece {
+fn grid(piece: GridPiece, precision: Precision) -> UnstructuredGridPiece {
     let attributes = |arrays: Vec<Array>| -> Vec<Attribute> {
         let attribute = |array: Array| {
             let components = array.components;

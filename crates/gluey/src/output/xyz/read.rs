@@ -60,7 +60,7 @@ pub fn read_text(path: &Path) -> Result<String, XyzError> {
 
 /// The dimension of space of a frame.
 pub fn dimension(path: &Path, text: &str) -> Result<usize, XyzError> {
-    let lines = Lines { path, lines: text.lines().collect() };
+    let lines = FrameLines { path, lines: text.lines().collect() };
     match lines.value("Dimension")?.parse() {
         Ok(dimension @ 2..=3) => Ok(dimension),
         _ => Err(lines.fault(1, lines.value("Dimension")?, "2 or 3")),
@@ -73,7 +73,7 @@ where
 {
     /// Reads a frame; `path` is what errors call it.
     pub fn parse(path: &Path, text: &str) -> Result<Self, XyzError> {
-        let lines = Lines { path, lines: text.lines().collect() };
+        let lines = FrameLines { path, lines: text.lines().collect() };
         let count: usize = lines
             .line(0)
             .trim()
@@ -103,7 +103,7 @@ where
         Ok(frame)
     }
 
-    fn push(&mut self, numbers: &[f64], lines: &Lines<'_>, line: usize) -> Result<(), XyzError> {
+    fn push(&mut self, numbers: &[f64], lines: &FrameLines<'_>, line: usize) -> Result<(), XyzError> {
         if numbers[3] <= 0.0 {
             return Err(lines.fault(line, &numbers[3].to_string(), "a positive radius"));
         }
@@ -119,12 +119,12 @@ where
 }
 
 /// The lines of a file.
-struct Lines<'a> {
+struct FrameLines<'a> {
     path: &'a Path,
     lines: Vec<&'a str>,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> FrameLines<'a> {
     fn line(&self, index: usize) -> &'a str {
         self.lines.get(index).copied().unwrap_or("")
     }

@@ -7,7 +7,7 @@ use super::super::error::PlotError;
 use super::choice::{AXES, SliceChoice};
 
 /// A plane across an axis; the plane itself in 2D.
-pub struct Plane<const D: usize> {
+pub struct PicturePlane<const D: usize> {
     /// Axis across it; 2 in 2D.
     pub normal: usize,
     /// Where on this axis.
@@ -27,7 +27,7 @@ pub struct Plane<const D: usize> {
     pub bounds: [f64; 4],
 }
 
-impl<const D: usize> Plane<D> {
+impl<const D: usize> PicturePlane<D> {
     /// The plane that is chosen, else that across z through the middle.
     pub fn of(container: &Container<D>, slice: Option<SliceChoice>) -> Result<Self, PlotError> {
         let (lattice, bounds) = (container.lattice(), container.bounds());
@@ -110,7 +110,7 @@ impl<const D: usize> Plane<D> {
 }
 
 /// The place of the plane on paper.
-pub struct View {
+pub struct PlaneView {
     left: f64,
     high: f64,
     extent: (f64, f64),
@@ -121,9 +121,9 @@ pub struct View {
     pub scale: f64,
 }
 
-impl View {
+impl PlaneView {
     /// As wide as there is room, but not higher than wide; room beside, over and below the field.
-    pub fn new<const D: usize>(plane: &Plane<D>, width: f64, [beside, over, below]: [f64; 3]) -> Self {
+    pub fn new<const D: usize>(plane: &PicturePlane<D>, width: f64, [beside, over, below]: [f64; 3]) -> Self {
         let [left, low, right, high] = plane.bounds;
         let extent = (right - left, high - low);
         let room = width - beside - over;

@@ -5,7 +5,7 @@ use gluey_geom::{Matrix, Vector};
 use gluey_motion::Fields;
 
 use super::choice::Quantity;
-use super::plane::Plane;
+use super::plane::PicturePlane;
 
 /// Degree of the elements.
 const DEGREE: usize = 2;
@@ -14,7 +14,7 @@ const SLACK: f64 = 1e-9;
 
 /// The flow at a point.
 #[derive(Clone, Debug)]
-pub struct Sample<const D: usize> {
+pub struct FlowSample<const D: usize> {
     pub velocity: Vector<D>,
     pub value: f64,
 }
@@ -23,7 +23,7 @@ pub struct Sample<const D: usize> {
 pub struct Samples<const D: usize> {
     pub columns: usize,
     pub rows: usize,
-    pub all: Vec<Option<Sample<D>>>,
+    pub all: Vec<Option<FlowSample<D>>>,
 }
 
 impl<const D: usize> Samples<D> {
@@ -57,7 +57,7 @@ pub fn shear<const D: usize>(fields: &Fields<D>) -> Option<f64> {
 }
 
 /// A cell: a box that leans along x.
-struct Cell<'a, const D: usize> {
+struct SampledCell<'a, const D: usize> {
     nodes: &'a [u32],
     lower: Vector<D>,
     size: Vector<D>,
@@ -66,7 +66,7 @@ struct Cell<'a, const D: usize> {
 
 impl<'a, const D: usize> Sampling<'a, D> {
     /// The flow at the middles of the pixels. Of a pixel between cells the last of them decides.
-    pub fn samples(&self, plane: &Plane<D>, columns: usize, rows: usize) -> Samples<D> {
+    pub fn samples(&self, plane: &PicturePlane<D>, columns: usize, rows: usize) -> Samples<D> {
         let mut all = vec![None; columns * rows];
         for nodes in self.fields.cells.chunks_exact(3usize.pow(D as u32)) {
             let cell = self.cell(nodes);
@@ -74,7 +74,7 @@ impl<'a, const D: usize> Sampling<'a, D> {
             for shift in shifts {
                 let mut lower = cell.lower;
                 lower[0] += shift;
-                let cell = Cell { lower, ..cell };
+                let cell = SampledCell { lower, ..cell };
                 let Some(rectangle) = cell.rectangle(plane) else { continue };
                 let [across, down] = plane.pixels_in(rectangle, columns, rows);
                 for row in down {
@@ -90,15 +90,15 @@ impl<'a, const D: usize> Sampling<'a, D> {
         Samples { columns, rows, all }
     }
 
-    fn cell(&self, nodes: &'a [u32]) -> Cell<'a, D> {
+    fn cell(&self, nodes: &'a [u32]) -> SampledCell<'a, D> {
         let point = |node: usize| self.fields.points[nodes[node] as usize];
         let lower = point(0);
         // The last node of each edge from the lower corner.
         let size = Vector::from_fn(|d, _| point(2 * 3usize.pow(d as u32))[d] - lower[d]);
-        Cell { nodes, lower, size, shear: self.shear }
+        SampledCell { nodes, lower, size, shear: self.shear }
     }
 
-    fn sample(&self, cell: &Cell<'_, D>, local: &[f64; D], normal: usize) -> Sample<D> {
+    fn sample(&self, cell: &SampledCell<'_, D>, local: &[f64; D], normal: usize) -> FlowSample<D> {
         let (mut velocity, mut slopes) = (Vector::<D>::zeros(), Matrix::<D>::zeros());
         let mut pressure = 0.0;
         for (i, &node) in cell.nodes.iter().enumerate() {
@@ -117,13 +117,13 @@ impl<'a, const D: usize> Sampling<'a, D> {
                 slopes[(second, first)] - slopes[(first, second)]
             }
         };
-        Sample { velocity, value }
+        FlowSample { velocity, value }
     }
 }
 
-impl<const D: usize> Cell<'_, D> {
+impl<const D: usize> SampledCell<'_, D> {
     /// Left, low, right, high in the plane; nothing if the plane does not cut the cell.
-    fn rectangle(&self, plane: &Plane<D>) -> Option<[f64; 4]> {
+    fn rectangle(&self, plane: &PicturePlane<D>) -> Option<[f64; 4]> {
         let lean = self.shear * self.size[1];
         let ends = |axis: usize| {
             let (low, high) = (self.lower[axis], self.lower[axis] + self.size[axis]);
