@@ -8,21 +8,22 @@ mod rooms;
 mod shape;
 mod sources;
 mod style;
+mod types;
 mod unused;
 
 use std::path::Path;
 
-/// Prints all offences and how many tuples signatures take apart; whether the workspace is tidy.
+/// Prints all offences and what may only become less; whether the workspace is tidy.
 pub fn run(root: &Path) -> anyhow::Result<bool> {
-    let (offences, tuple_count) = offences(root)?;
-    println!("{tuple_count} parameters are tuples");
+    let (offences, remarks) = offences(root)?;
+    remarks.iter().for_each(|remark| println!("{remark}"));
     offences.iter().for_each(|offence| eprintln!("{offence}"));
     Ok(offences.is_empty())
 }
 
-/// All offences, each with its place, and the number of parameters that are tuples; an empty list is a tidy
-/// workspace.
-fn offences(root: &Path) -> anyhow::Result<(Vec<String>, usize)> {
+/// All offences, each with its place, and how many there are of what may only become less; an empty list is a
+/// tidy workspace.
+fn offences(root: &Path) -> anyhow::Result<(Vec<String>, [String; 2])> {
     let law = law::Law::read(&root.join("ARCHITECTURE.md"))?;
     let sources = sources::all(root)?;
     let metadata = arrows::metadata(root)?;
@@ -32,8 +33,10 @@ fn offences(root: &Path) -> anyhow::Result<(Vec<String>, usize)> {
     offences.extend(rooms::offences(&law, &metadata.folders(root), &sources)?);
     offences.extend(style::offences(&sources));
     let (shapes, tuple_count) = shape::offences(&sources)?;
-    offences.extend(shapes);
-    Ok((offences, tuple_count))
+    let (types, comment_count) = types::offences(&sources)?;
+    offences.extend(shapes.into_iter().chain(types));
+    let tuples = format!("{tuple_count} parameters are tuples");
+    Ok((offences, [tuples, format!("{comment_count} types have comments without a noun")]))
 }
 
 #[cfg(test)]
