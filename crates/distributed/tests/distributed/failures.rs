@@ -9,11 +9,11 @@ use gluey_distributed::{
 };
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_motion::Configuration;
-use gluey_parallel::{Communicator, Ranks, Threads};
+use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 
-use crate::support;
+use crate::support::{self, on_ranks};
 
 const RANKS: usize = 3;
 /// Agreements of one computation; nothing here takes as many.
@@ -29,7 +29,7 @@ fn fail_in_turn(
     let on_ranks = |fault: (usize, usize)| {
         let work = work.clone();
         let run = move || {
-            Threads::run(RANKS, |ranks| {
+            on_ranks(RANKS, |ranks| {
                 let ranks = Failing::new(ranks, fault);
                 let agreements = ranks.agreements();
                 (work(&Ranks::new(ranks)), agreements.load(Ordering::Relaxed))
@@ -133,7 +133,7 @@ fn a_rank_that_fails_anywhere_in_contact_ends_all() {
 #[test]
 fn bodies_that_are_too_small_are_so_on_all_ranks() {
     let small = Suspension { radii: vec![0.001; 2], ..suspension::<2>(Lubrication::Deficit, false) };
-    let run = move || Threads::run(RANKS, |ranks| failure(&small, ranks, [0.5; 2]).unwrap()).unwrap();
+    let run = move || on_ranks(RANKS, |ranks| failure(&small, ranks, [0.5; 2]).unwrap()).unwrap();
     let errors = within_a_minute("small bodies", run);
     assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
     assert!(matches!(errors[0], SuspensionError::Flow(FlowError::Part(_))), "{errors:?}");

@@ -3,9 +3,9 @@
 use gluey_distributed::{BoxFlow, FlowError, LocalFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
-use gluey_parallel::{Ranks, Threads};
+use gluey_parallel::Ranks;
 
-use crate::support::largest_difference;
+use crate::support::{largest_difference, on_ranks};
 
 /// Of velocities and pressures, over the largest.
 const LIMITS: [f64; 2] = [1.6e-11, 1.7e-10];
@@ -72,7 +72,7 @@ where
     let alone = example.solve::<D>(&Ranks::alone());
     assert!(alone.relative_residual < 1e-11);
     for size in [2, 3, 4, 8] {
-        let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
+        let run = || on_ranks(size, |ranks| example.solve::<D>(ranks)).unwrap();
         let parts = run();
         let (velocity, pressure) = joined(&parts);
         let difference = largest_difference(&alone.velocity, &velocity);
@@ -116,7 +116,7 @@ fn cuts_are_those_of_one_rank_that_counts_everything() {
                 ImplicitTree::new(Aabb::unit(), [1; 2], example.periodic(), example.level, &wants).unwrap()
             };
             let want = Cuts::equal(&mut tree(), size);
-            let found = Threads::run(size, |ranks| equal_cuts(&tree(), ranks)).unwrap();
+            let found = on_ranks(size, |ranks| equal_cuts(&tree(), ranks)).unwrap();
             assert!(found.iter().all(|cuts| *cuts == want));
         }
     }
@@ -130,7 +130,7 @@ fn cuts_share_work() {
     let weight = |cell: &Cell<2>| if cell.coords[0].is_multiple_of(3) { 9 } else { 2 };
     let all = tree().weigh_leaves(&(0..tree().end()), &weight);
     for size in [1, 2, 3, 8, 40] {
-        let found = Threads::run(size, |ranks| weighted_cuts(&tree(), ranks, &weight)).unwrap();
+        let found = on_ranks(size, |ranks| weighted_cuts(&tree(), ranks, &weight)).unwrap();
         assert!(found.iter().all(|cuts| *cuts == found[0]));
         let work = |rank: usize| tree().weigh_leaves(&found[0].of(rank), &weight);
         assert_eq!((0..size).map(work).sum::<u64>(), all);
@@ -146,7 +146,7 @@ fn cuts_share_work() {
 fn ranks_without_cells_take_part() {
     let example = Example { level: 3, ..UNIFORM };
     let alone = example.solve::<2>(&Ranks::alone());
-    let parts = Threads::run(40, |ranks| example.solve::<2>(ranks)).unwrap();
+    let parts = on_ranks(40, |ranks| example.solve::<2>(ranks)).unwrap();
     assert!(parts.iter().any(|part| part.levels[0].cells == 0));
     let difference = largest_difference(&alone.velocity, &joined(&parts).0);
     assert!(difference < 1e-9, "{difference:e}");
@@ -156,7 +156,7 @@ fn ranks_without_cells_take_part() {
 #[test]
 fn no_rank_holds_arrays_of_the_size_of_the_mesh() {
     let example = Example { level: 7, ..UNIFORM };
-    let parts = Threads::run(16, |ranks| {
+    let parts = on_ranks(16, |ranks| {
         let wants = example.wants::<2>();
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], example.level, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
@@ -177,7 +177,7 @@ fn no_rank_holds_arrays_of_the_size_of_the_mesh() {
 
 #[test]
 fn a_box_without_walls_is_an_error_on_all_ranks() {
-    let errors = Threads::run(3, |ranks| {
+    let errors = on_ranks(3, |ranks| {
         let wants = |_: &Vector<2>, _: f64, _: u8| true;
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [true; 2], 3, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);

@@ -9,12 +9,12 @@ use gluey_fem::element::{multi_index, value};
 use gluey_geom::{Dim, Particle, Space, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Configuration, Fields, Hydrodynamics};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::Communicator;
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
 };
 
-use crate::support;
+use crate::support::{self, on_ranks};
 
 /// Places and radii; the third lies across the border of the box in the first direction.
 const BODIES: [([f64; 3], f64); 3] =
@@ -67,7 +67,7 @@ fn shown<const D: usize>(suspension: &SharedSuspension<D>, size: usize) -> Vec<F
 where
     Dim<D>: Space<D>,
 {
-    let found = Threads::run(size, |ranks| {
+    let found = on_ranks(size, |ranks| {
         if ranks.rank() > 0 {
             let mut seen = None;
             suspension.follow_and_show(ranks, &mut |frame, fields| {
@@ -180,7 +180,7 @@ fn a_rank_without_cells_has_an_empty_piece() {
 fn a_flow_that_failed_has_no_fields() {
     let mut suspension = suspension::<2>(Lubrication::Deficit);
     suspension.suspension.radii = vec![0.001; 3];
-    let found = Threads::run(2, |ranks| {
+    let found = on_ranks(2, |ranks| {
         if ranks.rank() > 0 {
             let mut seen = Vec::new();
             suspension.follow_and_show(ranks, &mut |_, fields| seen.push(fields.is_some()));

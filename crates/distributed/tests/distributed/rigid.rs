@@ -5,12 +5,12 @@ use gluey_distributed::{BoxFlow, FlowError, LocalFlow, PartError, SurfaceBodies,
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_parallel::{Ranks, Threads};
+use gluey_parallel::Ranks;
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
 };
 
-use crate::support::{is_in_fluid, largest_difference, velocities};
+use crate::support::{is_in_fluid, largest_difference, on_ranks, velocities};
 
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 5e-12, max_iterations: 200 };
 const FORMULATION: Formulation = Formulation::Unfitted { lubrication: Lubrication::Deficit };
@@ -131,7 +131,7 @@ where
     let (balls, (velocity, twists)) = (example.balls::<D>(), example.serial::<D>(solver));
     let alone = example.solve::<D>(&Ranks::alone());
     for size in [1, 2, 3, 4, 8] {
-        let run = || Threads::run(size, |ranks| example.solve::<D>(ranks)).unwrap();
+        let run = || on_ranks(size, |ranks| example.solve::<D>(ranks)).unwrap();
         let parts = run();
         let found = velocities(&parts);
         let points: Vec<&Vector<D>> = parts.iter().flat_map(|part| &part.points).collect();
@@ -147,7 +147,7 @@ where
         let is_close = |part: &LocalFlow<D>| part.iterations.abs_diff(alone.iterations) <= 1;
         assert!(parts.iter().all(is_close), "{} {}", parts[0].iterations, alone.iterations);
         assert!(parts.iter().all(|part| part.twists == parts[0].twists), "ranks agree on all bodies");
-        let again = run();
+        let again = if size == 1 { vec![alone.clone()] } else { run() };
         assert_eq!((velocities(&again), &again[0].twists), (found, &parts[0].twists), "the same bits");
     }
 }
@@ -170,7 +170,7 @@ fn ranks_move_bodies_as_the_serial_solver_does_in_3d() {
 
 /// Copies of twists on ranks that do not own the body.
 fn ghost_bodies(example: Example<'_>, size: usize) -> usize {
-    let parts = Threads::run(size, |ranks| example.solve::<2>(ranks)).unwrap();
+    let parts = on_ranks(size, |ranks| example.solve::<2>(ranks)).unwrap();
     let finest = parts.iter().map(|part| part.levels[part.levels.len() - 1]);
     assert_eq!(finest.clone().map(|level| level.bodies).sum::<usize>(), example.bodies.len());
     finest.map(|level| level.ghost_bodies).sum()
@@ -185,7 +185,7 @@ fn a_body_is_known_to_the_ranks_whose_cells_it_touches() {
 /// What all ranks say.
 fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
     let (balls, wants) = (example.balls::<2>(), |_: &Vector<2>, _: f64, _: u8| true);
-    let found = Threads::run(3, |ranks| {
+    let found = on_ranks(3, |ranks| {
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], 3, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
         let bodies = SurfaceBodies { balls: &balls, lubrication: Lubrication::Deficit };

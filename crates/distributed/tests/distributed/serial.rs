@@ -4,8 +4,9 @@
 use gluey_distributed::{BoxFlow, equal_cuts};
 use gluey_fem::{ImplicitTree, TreeMesh};
 use gluey_geom::{Aabb, Dim, Space, Vector};
-use gluey_parallel::Threads;
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, Lubrication, SolverKind};
+
+use crate::support::on_ranks;
 
 const FLOW: BoxFlow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 120 };
 
@@ -30,7 +31,7 @@ where
     let serial = FlowSolver::<D>::new(params).unwrap().solve(mesh, &[], &walls).unwrap();
     let scale = serial.velocity.iter().fold(0.0f64, |m, u| m.max(u.abs()));
     for size in [1, 3, 8] {
-        let parts = Threads::run(size, |ranks| {
+        let parts = on_ranks(size, |ranks| {
             let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], level, &wants).unwrap();
             let cuts = equal_cuts(&tree, ranks);
             FLOW.solve(&mut tree, &cuts, ranks, &walls).unwrap().velocity

@@ -3,6 +3,7 @@
 use gluey_distributed::LocalFlow;
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, LevelSet};
+use gluey_parallel::{RankFailure, Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
 
 /// Free particles that nothing but the shear drives, in the unit box, which is periodic in the first
@@ -28,6 +29,16 @@ where
         shear_rate: 1.0,
         shear_stress: None,
     }
+}
+
+/// What ranks that are threads return, in their order. Each computes by itself: where all share the threads
+/// of the process, each waits for work of the others, which takes longer and changes no bit.
+pub fn on_ranks<R: Send>(size: usize, work: impl Fn(&Ranks) -> R + Sync) -> Result<Vec<R>, RankFailure> {
+    Threads::run(size, |ranks| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+        let _pool = pool.build().expect("the thread of a rank has no pool yet");
+        work(ranks)
+    })
 }
 
 /// Velocities of all ranks, one after the other.

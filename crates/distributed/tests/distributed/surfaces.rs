@@ -5,12 +5,12 @@ use gluey_distributed::{BoxFlow, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
-use gluey_parallel::{Ranks, Threads};
+use gluey_parallel::Ranks;
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, GivenOf, Lubrication, Refinement, SolverKind,
 };
 
-use crate::support::{is_in_fluid, velocities};
+use crate::support::{is_in_fluid, on_ranks, velocities};
 
 const TOLERANCE: f64 = 1e-11;
 /// What one rank may differ from one process by: only sums over bodies and cells for means are in another
@@ -118,7 +118,7 @@ where
         let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x) };
         let scale = serial.velocity.iter().copied().map(f64::abs).fold(0.0, largest);
         for &size in sizes {
-            let run = || Threads::run(size, |ranks| self.solve(ranks)).unwrap();
+            let run = || on_ranks(size, |ranks| self.solve(ranks)).unwrap();
             let parts = run();
             let velocity = velocities(&parts);
             assert_eq!(velocity.len() * D, serial.velocity.len());

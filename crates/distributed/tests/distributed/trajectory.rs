@@ -6,13 +6,13 @@ use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::Communicator;
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
     Suspension,
 };
 
-use crate::support;
+use crate::support::{self, on_ranks};
 
 const STEP: f64 = 0.05;
 const STEPS: usize = 12;
@@ -169,7 +169,7 @@ where
     for &size in sizes {
         let run = || {
             // Every second number of ranks is led by rank zero, which alone knows particles and contacts.
-            Threads::run(size, |ranks| match (size % 2, ranks.rank()) {
+            on_ranks(size, |ranks| match (size % 2, ranks.rank()) {
                 (0, 0) => Some(trajectory(meeting, SharedHydrodynamics::leading(&suspension, ranks))),
                 (0, _) => {
                     suspension.follow(ranks);
@@ -224,7 +224,7 @@ fn ranks_take_particles_where_the_serial_solver_does_in_3d() {
 fn followers_end_when_the_leader_fails() {
     let mut suspension = suspension::<2>(PAIR, Lubrication::Deficit);
     suspension.suspension.radii = vec![0.001; 2];
-    let errors = Threads::run(3, |ranks| {
+    let errors = on_ranks(3, |ranks| {
         if ranks.rank() > 0 {
             suspension.follow(ranks);
             return None;

@@ -6,8 +6,10 @@ use gluey_contact::{
 };
 use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_parallel::{Communicator, Threads};
+use gluey_parallel::Communicator;
 use gluey_testkit::packing::Packing;
+
+use crate::support::on_ranks;
 
 pub const RADIUS: f64 = 0.5;
 pub const SIZES: [usize; 4] = [2, 3, 4, 8];
@@ -198,7 +200,7 @@ where
 
     /// On so many ranks: the course of rank zero, and how contact failed on the others.
     pub fn on(&self, size: usize) -> (Course<D>, Vec<Option<String>>) {
-        let ends = Threads::run(size, |ranks| {
+        let ends = on_ranks(size, |ranks| {
             if ranks.rank() == 0 {
                 return (Some(self.run(&mut SharedContact::new(self.alone(), ranks))), None);
             }
