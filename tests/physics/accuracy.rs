@@ -2,8 +2,10 @@
 //! against exact mobilities. What is measured here is what README says.
 
 use gluey::case::Hydrodynamics;
-use gluey::{Case, RunOptions, Silent, Strategy, run};
+use gluey::{Case, RunOptions, Silent, Strategy};
 use tempfile::TempDir;
+
+use crate::runs::run;
 
 /// Spheres so small that the box changes their velocities by less than 2e-4.
 const RADIUS: f64 = 0.0125;

@@ -4,8 +4,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use gluey::case::{Formulation, Hydrodynamics};
-use gluey::{Case, RunOptions, Silent, run};
+use gluey::{Case, RunOptions, Silent};
 use tempfile::TempDir;
+
+use crate::runs::run;
 
 /// Largest distance from the reference, in radii, after two steps on a coarse mesh: three times what is
 /// measured. A case whose particles do not move at all, or move backwards, is ten times as far away.

@@ -4,10 +4,12 @@
 use std::fs;
 
 use gluey::case::ParticleSpec;
-use gluey::{Case, RunError, RunOptions, RunReport, Silent, StepError, run};
+use gluey::{Case, RunError, RunOptions, RunReport, Silent, StepError};
 use gluey_contact::{ContactError, SolverKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::runs::run;
 
 const RADIUS: f64 = 0.5;
 

@@ -4,9 +4,11 @@ use std::fs;
 
 use gluey::case::ParticleSpec;
 use gluey::flow::{MeshEstimate, MeshSize};
-use gluey::{Case, Formulation, RunError, RunOptions, Silent, run};
+use gluey::{Case, Formulation, RunError, RunOptions, Silent};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::runs::run;
 
 fn shipped() -> Vec<Case> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases");

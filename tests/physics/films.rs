@@ -2,13 +2,13 @@
 //! which the flow comes in: every step is solved, nothing touches, nothing moves faster than the flow.
 
 use gluey::case::ParticleSpec;
-use gluey::{Case, RunOptions, Silent, run};
+use gluey::{Case, RunOptions, Silent};
 use gluey_geom::Vector;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::runs::centers;
+use crate::runs::{centers, run};
 
 /// Time step, and how many.
 const STEP: f64 = 0.01;

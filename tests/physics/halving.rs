@@ -3,10 +3,10 @@
 
 use std::fs;
 
-use gluey::{Case, RunError, RunOptions, Silent, StepError, Tally, run};
+use gluey::{Case, RunError, RunOptions, Silent, StepError, Tally};
 
 use crate::program;
-use crate::runs::{beside, case, column, failure, resumes_bit_by_bit};
+use crate::runs::{beside, case, column, failure, resumes_bit_by_bit, run};
 
 /// Discs so crowded in a small box that films of one pair over several borders are in each other's way.
 fn crowd(halvings: u32) -> Case {

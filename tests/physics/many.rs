@@ -7,12 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use gluey::output::PairForces;
 use gluey::output::csv::CsvWriter;
-use gluey::{Case, Ended, Progress, ProgressState, RunError, RunOptions, Silent, TrajectoryRow, run};
+use gluey::{Case, Ended, Progress, ProgressState, RunError, RunOptions, Silent, TrajectoryRow};
 use gluey_contact::Domain;
 use gluey_geom::{Particle, Spin, Twist, Vector};
 use gluey_testkit::cpu_seconds;
 use gluey_testkit::packing::Packing;
 use tempfile::TempDir;
+
+use crate::runs::run;
 
 const STEP_COUNT: usize = 10;
 

@@ -2,8 +2,10 @@
 //! with the mobility of the pair evaluated at a gap 0.05 radii too large: it imitates a solver that does not
 //! resolve the film.
 
-use gluey::{Case, RunOptions, RunReport, Silent, Strategy, run};
+use gluey::{Case, RunOptions, RunReport, Silent, Strategy};
 use tempfile::TempDir;
+
+use crate::runs::run;
 
 fn case(strategy: Strategy) -> Case {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/cases/pair-3d-mobility.toml");
@@ -116,7 +118,10 @@ fn so_it_is_in_the_finite_element_flow() {
         case.flow.paper.viscosity_ratio = 100.0;
         ends(&case)
     };
-    let [gluey, inelastic] = [Strategy::Gluey, Strategy::Inelastic].map(there_and_back);
+    let [gluey, inelastic] = std::thread::scope(|scope| {
+        let run = |strategy| scope.spawn(move || there_and_back(strategy));
+        [Strategy::Gluey, Strategy::Inelastic].map(run).map(|run| run.join().expect("a run"))
+    });
     assert!(distance(2, &gluey) < 0.001, "gluey: {gluey:?}");
     assert!(distance(2, &inelastic) > 0.05, "inelastic: {inelastic:?}");
 }

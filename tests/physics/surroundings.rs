@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use gluey::{Case, RunError, RunOptions, RunReport, Silent, run};
+use gluey::{Case, RunError, RunOptions, RunReport, Silent};
 use tempfile::TempDir;
+
+use crate::runs::run;
 
 fn case(text: &str) -> Case {
     Case::parse(text, "case.toml").unwrap_or_else(|error| panic!("{error}"))

@@ -7,13 +7,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use gluey::{Case, Progress, ProgressState, RunError, RunOptions, Silent, run};
+use gluey::{Case, Progress, ProgressState, RunError, RunOptions, RunReport, Silent};
 use gluey_geom::Vector;
+use gluey_testkit::compute_alone;
 use tempfile::TempDir;
 
 /// The case of a text.
 pub fn case(text: &str) -> Case {
     Case::parse(text, "case.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Runs on the thread of the test.
+pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
+    compute_alone();
+    gluey::run(case, options, progress)
 }
 
 /// Runs to the end with a trajectory of this name.

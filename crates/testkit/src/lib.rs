@@ -1,5 +1,6 @@
 //! What tests measure against: exact Stokes flows, orders of convergence, reference data, random packings,
-//! counters of allocations and CPU time, ranks that are told to fail, and programs outside this workspace.
+//! counters of allocations and CPU time, ranks that are told to fail, threads that compute by themselves, and
+//! programs outside this workspace.
 //!
 //! ```
 //! use gluey_testkit::{convergence_order, exact::{PolynomialFlow, StokesSolution}};
@@ -13,6 +14,7 @@
 //! A dev-dependency only: nothing here belongs in a program that users run.
 
 pub mod allocation;
+mod alone;
 mod clock;
 mod convergence;
 pub mod exact;
@@ -21,6 +23,7 @@ pub mod packing;
 pub mod reference;
 mod stranger;
 
+pub use alone::compute_alone;
 pub use clock::cpu_seconds;
 pub use convergence::{convergence_order, convergence_orders};
 pub use stranger::Stranger;

@@ -5,6 +5,7 @@ use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_levelset::{Ball, LevelSet};
 use gluey_parallel::{RankFailure, Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
+use gluey_testkit::compute_alone;
 
 /// Free particles that nothing but the shear drives, in the unit box, which is periodic in the first
 /// direction.
@@ -31,12 +32,10 @@ where
     }
 }
 
-/// What ranks that are threads return, in their order. Each computes by itself: where all share the threads
-/// of the process, each waits for work of the others, which takes longer and changes no bit.
+/// What ranks that are threads return, in their order.
 pub fn on_ranks<R: Send>(size: usize, work: impl Fn(&Ranks) -> R + Sync) -> Result<Vec<R>, RankFailure> {
     Threads::run(size, |ranks| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
-        let _pool = pool.build().expect("the thread of a rank has no pool yet");
+        compute_alone();
         work(ranks)
     })
 }

@@ -3,7 +3,9 @@
 
 use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{Conditions, Flow, FlowParams, FlowSolver, Refinement};
+use gluey_stokes::{Conditions, Flow, FlowParams, Refinement};
+
+use crate::support::flow_solver;
 
 const RADIUS: f64 = 0.1;
 
@@ -17,7 +19,7 @@ where
 {
     let mesh = Refinement::to_level(level).mesh(Aabb::unit(), [1; D], [true; D], balls).unwrap();
     let params = FlowParams { tolerance, ..FlowParams::for_dimension(D) };
-    let mut solver = FlowSolver::<D>::new(params).unwrap();
+    let mut solver = flow_solver::<D>(params);
     solver.solve_under(mesh, balls, &Conditions::in_linear_flow(gradient)).unwrap()
 }
 

@@ -12,9 +12,9 @@ use std::f64::consts::PI;
 
 use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
-use gluey_stokes::{Conditions, FlowSolver, Formulation, Prepared, SolverKind};
+use gluey_stokes::{Conditions, Formulation, Prepared, SolverKind};
 
-use crate::support::{UNFITTED, bands, mesh, params};
+use crate::support::{UNFITTED, bands, flow_solver, mesh, params};
 
 const RADIUS: f64 = 0.15;
 
@@ -83,7 +83,7 @@ where
 {
     let ball = Ball::new(Vector::<D>::from_fn(|d, _| 0.51 - 0.02 * d as f64), RADIUS);
     let kind = if D == 2 { SolverKind::Direct } else { SolverKind::Multigrid };
-    let mut solver = FlowSolver::new(params(formulation, kind, 1e-9)).unwrap();
+    let mut solver = flow_solver(params(formulation, kind, 1e-9));
     let mut prepared = solver.prepared(mesh(&bands(level), &[ball]), &[ball]).unwrap();
     let (twist, wrench) = motion::<D>();
     let flow = |x: &Vector<D>| {

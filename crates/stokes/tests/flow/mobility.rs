@@ -8,7 +8,7 @@ use gluey_stokes::{
 use nalgebra::DMatrix;
 
 use crate::support::{
-    RADIUS, SOLVERS, UNFITTED, bands, couette, doublet, mesh, paper, params, twist_distance,
+    RADIUS, SOLVERS, UNFITTED, bands, couette, doublet, flow_solver, mesh, paper, params, twist_distance,
 };
 
 /// Two unequal balls, off the middle of the box and off the lines of the mesh.
@@ -54,7 +54,7 @@ fn solver<const D: usize>(formulation: Formulation, kind: SolverKind, tolerance:
 where
     Dim<D>: Space<D>,
 {
-    FlowSolver::new(params(formulation, kind, tolerance)).unwrap()
+    flow_solver(params(formulation, kind, tolerance))
 }
 
 /// The two unequal balls, prepared.
@@ -281,7 +281,7 @@ fn iterations_of_held<const D: usize>(balls: &[Ball<D>], kind: SolverKind) -> us
 where
     Dim<D>: Space<D>,
 {
-    let mut solver = FlowSolver::new(params(UNFITTED, kind, 1e-8)).unwrap();
+    let mut solver = flow_solver(params(UNFITTED, kind, 1e-8));
     let level = if D == 2 { 7 } else { 5 };
     let mut prepared = solver.prepared(mesh(&bands(level), balls), balls).unwrap();
     let rest = vec![Twist::default(); balls.len()];

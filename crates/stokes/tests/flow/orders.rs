@@ -3,13 +3,13 @@
 use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
 use gluey_levelset::Ball;
-use gluey_stokes::{FlowSolver, Refinement, SolverKind};
+use gluey_stokes::{Refinement, SolverKind};
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{
     InclusionViscosity, PolynomialFlow, RigidSphere, StokesSolution, ViscousInclusion, WavyPressure,
 };
 
-use crate::support::{SOLVERS, UNFITTED, bands, graded, l2_errors, mesh, params, solve};
+use crate::support::{SOLVERS, UNFITTED, bands, flow_solver, graded, l2_errors, mesh, params, solve};
 
 fn disc(center: Vector<2>, radius: f64) -> ViscousInclusion {
     ViscousInclusion {
@@ -40,7 +40,7 @@ where
 {
     let sizes: Vec<f64> = levels.iter().map(|&level| 0.5f64.powi(level.into())).collect();
     let errors = levels.iter().map(|&level| {
-        let mut solver = FlowSolver::new(params(UNFITTED, solver, 1e-9)).unwrap();
+        let mut solver = flow_solver(params(UNFITTED, solver, 1e-9));
         let force = |x: &Vector<D>| exact.body_force(x);
         let boundary = |x: &Vector<D>| exact.velocity(x);
         let flow = solver.solve_forced(mesh(level), &[], &boundary, Some(&force)).unwrap();

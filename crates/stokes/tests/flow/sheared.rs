@@ -10,6 +10,8 @@ use gluey_stokes::{
 };
 use gluey_testkit::reference::{Table, cells_of_discs, sheared_simple_cubic_lattice, sheared_square_lattice};
 
+use crate::support::flow_solver;
+
 /// A box of unit height.
 #[derive(Clone, Copy)]
 struct Box<const D: usize> {
@@ -44,7 +46,7 @@ impl<const D: usize> Box<D> {
         Dim<D>: Space<D>,
     {
         let params = FlowParams { solver: self.solver, tolerance: 1e-9, ..FlowParams::for_dimension(D) };
-        FlowSolver::new(params).unwrap()
+        flow_solver(params)
     }
 
     /// The same by a solver that may remember another flow.
@@ -295,7 +297,7 @@ fn forces_on_held_bodies_sum_to_zero() {
     let balls = in_box.balls(&[first, above], radius);
     let mesh = Refinement::to_level(5).mesh(Aabb::unit(), [1, 1], [true; 2], &balls).unwrap();
     let params = FlowParams { tolerance: 1e-10, ..FlowParams::for_dimension(2) };
-    let mut solver = FlowSolver::<2>::new(params).unwrap();
+    let mut solver = flow_solver::<2>(params);
     let mut prepared = solver.prepared(mesh, &balls).unwrap();
     let conditions = Conditions::in_linear_flow(&shear());
     let free = prepared.solve(&conditions).unwrap();
@@ -316,10 +318,6 @@ fn other_formulations_say_that_they_cannot() {
     let balls = Box::<2>::unit(0.0, 4).balls(&[somewhere(0.0)], 0.2);
     let mesh = Refinement::to_level(4).mesh(Aabb::unit(), [1, 1], [true; 2], &balls).unwrap();
     let params = FlowParams { formulation: paper, ..FlowParams::for_dimension(2) };
-    let refused = FlowSolver::<2>::new(params).unwrap().solve_under(
-        mesh,
-        &balls,
-        &Conditions::in_linear_flow(&shear()),
-    );
+    let refused = flow_solver::<2>(params).solve_under(mesh, &balls, &Conditions::in_linear_flow(&shear()));
     assert!(matches!(refused, Err(StokesError::Unsupported { .. })), "{refused:?}");
 }

@@ -6,8 +6,8 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Flow, FlowSolver, Formulation, Lubrication, SolverKind};
 
 use crate::support::{
-    RADIUS, SOLVERS, UNFITTED, balls, bands, bump, couette, doublet, graded, mesh, pair_at, paper, params,
-    solve, twist_distance,
+    RADIUS, SOLVERS, UNFITTED, balls, bands, bump, couette, doublet, flow_solver, graded, mesh, pair_at,
+    paper, params, solve, twist_distance,
 };
 
 #[test]
@@ -191,7 +191,7 @@ fn the_last_flows_are_a_good_start_for_the_next() {
         let run = |solver: &mut FlowSolver<2>, step: i32| {
             solver.solve(mesh(&bands(7), &at(step)), &at(step), &couette).unwrap()
         };
-        let mut solver = FlowSolver::<2>::new(parameters).unwrap();
+        let mut solver = flow_solver::<2>(parameters);
         let [first, second] = [0, 1].map(|step| run(&mut solver, step).iteration_count);
         let (last, before) = solver.warm_start().map(|(l, b)| (l.clone(), b.cloned())).unwrap();
         let warm = run(&mut solver, 2);
@@ -199,7 +199,7 @@ fn the_last_flows_are_a_good_start_for_the_next() {
         assert!(second.max(warm.iteration_count) < first, "{second}, {} and {first}", warm.iteration_count);
         assert!(twist_distance(&warm.twists, &cold.twists) < 1e-8);
 
-        let mut resumed = FlowSolver::<2>::new(parameters).unwrap();
+        let mut resumed = flow_solver::<2>(parameters);
         let refused = resumed.set_warm_start(mesh(&bands(6), &at(1)), last.clone(), before.clone());
         assert_eq!(refused.unwrap_err().velocities, last.velocity.len());
         resumed.set_warm_start(mesh(&bands(7), &at(1)), last, before).unwrap();

@@ -8,6 +8,7 @@ use gluey_stokes::{
     Flow, FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, ParticleVelocity, Refinement,
     SolverKind, StokesError,
 };
+use gluey_testkit::compute_alone;
 use gluey_testkit::exact::StokesSolution;
 
 /// Radius of the particles in the reference data.
@@ -52,6 +53,15 @@ pub fn graded<const D: usize>(level: u8) -> TreeMesh<D> {
     .unwrap()
 }
 
+/// A solver of flows that computes on the thread of its test.
+pub fn flow_solver<const D: usize>(params: FlowParams) -> FlowSolver<D>
+where
+    Dim<D>: Space<D>,
+{
+    compute_alone();
+    FlowSolver::new(params).unwrap()
+}
+
 /// One flow, computed from nothing.
 pub fn try_solve<const D: usize>(
     params: FlowParams,
@@ -62,6 +72,7 @@ pub fn try_solve<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
+    compute_alone();
     FlowSolver::new(params)?.solve(mesh, balls, boundary)
 }
 

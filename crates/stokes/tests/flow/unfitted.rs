@@ -4,14 +4,12 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, LevelSet};
 use gluey_linalg::{LinOp, vector};
-use gluey_stokes::{
-    Conditions, Flow, FlowSolver, Problem, Refinement, SolverKind, StokesError, SystemOperator,
-};
+use gluey_stokes::{Conditions, Flow, Problem, Refinement, SolverKind, StokesError, SystemOperator};
 use gluey_testkit::reference::{pair_2d_velocities, single_2d_velocities};
 
 use crate::support::{
-    RADIUS, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve, strain_inside,
-    try_solve, twist_distance,
+    RADIUS, UNFITTED, balls, bands, couette, flow_solver, mesh, pair_at, pair_motion, params, solve,
+    strain_inside, try_solve, twist_distance,
 };
 
 fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>
@@ -231,7 +229,7 @@ where
     let conditions = Conditions::at_rest().with_force(force).with_wrenches(wrenches);
     let bodies = crowd::<D>();
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
-    let mut solver = FlowSolver::new(params(UNFITTED, kind, 1e-10)).unwrap();
+    let mut solver = flow_solver(params(UNFITTED, kind, 1e-10));
     solver.solve_under(mesh, &bodies, &conditions).unwrap().twists
 }
 
@@ -280,7 +278,7 @@ where
     let force = |_: &Vector<D>| Vector::<D>::from_fn(|d, _| 1.0 - 0.4 * d as f64);
     let still = [Twist::default()];
     let conditions = Conditions::at_rest().with_force(Some(&force)).with_twists(&still);
-    let mut solver = FlowSolver::new(params(UNFITTED, kind, 1e-10)).unwrap();
+    let mut solver = flow_solver(params(UNFITTED, kind, 1e-10));
     let held = solver.solve_under(mesh, &[ball], &conditions).unwrap().wrenches[0];
     assert!((held.force + force(&Vector::zeros())).norm() < 1e-8, "{held:?}");
 }
