@@ -27,6 +27,7 @@ use figures::Data;
 use page::Section;
 use plan::{CaseName, FigureName, RunKey};
 use rows::Evidence;
+use runner::Runner;
 use settings::Settings;
 use summary::{Run, Summary};
 use trajectory::Trajectory;
@@ -110,7 +111,8 @@ fn make_runs(
     failures: &mut Vec<Failure>,
 ) -> BTreeMap<RunKey, RunReport> {
     let board = Board::new();
-    let results = schedule::in_parallel(keys, jobs, |&key| runner::run(folder, key, quick, &board));
+    let runner = Runner::new(folder, quick, &board);
+    let results = schedule::in_parallel(keys, jobs, |&key| runner.run(key));
     let report = |(&key, result)| Some((key, keep(format!("run {key}"), result, failures)?));
     keys.iter().zip(results).filter_map(report).collect()
 }

@@ -41,7 +41,8 @@ fn head(summary: &Summary) -> String {
         "<h1>Contact problems for particles in a shear flow</h1>\n<p>The figures of Verdon, Lefebvre-Lepot, Lobry and \
          Laure (2010), computed by gluey {} in {}. Thin grey lines are exact solutions; the dotted line is the \
          formulation <code>unfitted</code>, in which lubrication keeps particles apart and no contact acts, as in the exact \
-         solutions; all others are in the formulation <code>paper</code>. Lengths are in units of the box, times in units of \
+         solutions, and in their box, in figure 9 that of the paper's runs too; all others are in the formulation \
+         <code>paper</code>. Lengths are in units of the box, times in units of \
          1/shear rate.</p>\n{}<p>{SETTING_OF_PAPER}</p>\n{}",
         summary.version,
         duration(summary.wall_s),

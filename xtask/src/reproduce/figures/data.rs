@@ -39,7 +39,8 @@ impl Data {
         }
         if figure.case() == CaseName::Trio2d && !figure.approaches().is_empty() {
             notes.push(
-                "Box periodic in *x*; unfitted and exact: Couette flow on all sides, to *t* = 12.".to_owned(),
+                "Box periodic in *x*; exact and unfitted beside it: Couette flow on all sides, to *t* = 12."
+                    .to_owned(),
             );
         }
         let missing: Vec<&str> = figure
@@ -65,6 +66,7 @@ pub fn stroke(approach: Approach) -> Stroke {
             Stroke { color: "#c79a00", width: 1.8, dashes: Some("1.5 1.5 6 1.5") }
         }
         Approach::Unfitted => Stroke { color: "#8a3ea0", width: 1.8, dashes: Some("2 2.5") },
+        Approach::UnfittedPeriodic => Stroke { color: "#cc79a7", width: 1.8, dashes: Some("5 2.5") },
     }
 }
 
@@ -80,6 +82,7 @@ pub fn legend(approach: Approach) -> &'static str {
         Approach::GlueyAsPrinted => "gluey contact as printed",
         Approach::GlueyAsPrintedLargeStep => "gluey contact as printed, twice the time step",
         Approach::Unfitted => "unfitted, no contact",
+        Approach::UnfittedPeriodic => "unfitted, no contact, in the box of the paper's runs",
     }
 }
 
