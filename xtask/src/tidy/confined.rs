@@ -1,7 +1,7 @@
 //! Libraries whose names may be used in a few places only.
 
 use super::law::Law;
-use super::sources::Source;
+use super::sources::{Source, words};
 
 /// Uses of confined names outside their places.
 pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
@@ -23,20 +23,9 @@ pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
 
 /// Whether a line of code names the library in a path: `name::...` or `use name`.
 fn uses(line: &str, name: &str) -> bool {
-    let mut rest = line;
-    while let Some(at) = rest.find(name) {
-        let (before, after) = (&rest[..at], &rest[at + name.len()..]);
-        let inside_word = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
-        let starts = !inside_word(before.chars().next_back()) && !before.ends_with("::");
-        if starts
-            && (after.starts_with("::") || before.ends_with("use "))
-            && !inside_word(after.chars().next())
-        {
-            return true;
-        }
-        rest = after;
-    }
-    false
+    words(line, name).any(|(before, after)| {
+        !before.ends_with("::") && (after.starts_with("::") || before.ends_with("use "))
+    })
 }
 
 #[cfg(test)]

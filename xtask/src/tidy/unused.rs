@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::arrows::{Dependency, Metadata, Package};
-use super::sources::Source;
+use super::sources::{Source, words};
 
 /// Folders whose files belong to several packages; the program tests the examples of the library, too.
 const SHARED: [&str; 3] = ["tests", "benches", "crates/gluey/examples"];
@@ -27,16 +27,10 @@ fn is_used(dependency: &Dependency, folder: &str, sources: &[Source]) -> bool {
         true => source.lies_in(folder) || SHARED.iter().any(|shared| source.lies_in(shared)),
         false => source.lies_in(&format!("{folder}/src")),
     };
-    sources.iter().filter(could).any(|source| source.lines.iter().any(|line| names(line, &name)))
-}
-
-/// Whether `name` stands in a line as a word of its own.
-fn names(line: &str, name: &str) -> bool {
-    let is_part = |c: char| c.is_alphanumeric() || c == '_';
-    line.match_indices(name).any(|(at, _)| {
-        let (before, after) = (&line[..at], &line[at + name.len()..]);
-        !before.chars().next_back().is_some_and(is_part) && !after.chars().next().is_some_and(is_part)
-    })
+    sources
+        .iter()
+        .filter(could)
+        .any(|source| source.lines.iter().any(|line| words(line, &name).next().is_some()))
 }
 
 #[cfg(test)]

@@ -15,45 +15,44 @@ const OVERLAP_COLOR: &str = "#7fc49f";
 /// Figure 5 or 7a: |D/a| of a pair.
 pub fn pair(figure: FigureName, data: &Data) -> Canvas {
     let floor = if figure == FigureName::Fig5 { 1e-6 } else { 1e-5 };
-    let mut curves: Vec<Curve> = Vec::new();
-    for (approach, run) in data.runs_of(figure) {
-        curves.extend(gap_curves(approach, run, (1, 2), floor, true));
-    }
-    curves.extend(exact(data, figure.case(), (1, 2), floor));
-    let mut notes = data.notes(figure);
-    notes.extend(floor_note(&curves, floor));
-    let (x, y) = (time_axis(&curves), gap_axis("|*D*/*a*|", &curves, floor));
-    stack(&[Chart { notes, ..book::chart(x, y, curves) }], |_| FRAME_HEIGHT)
+    let mut chart = panel(figure, data, (1, 2), floor);
+    chart.notes = notes(figure, data, std::slice::from_ref(&chart), floor);
+    stack(&[chart], |_| FRAME_HEIGHT)
 }
 
 /// Figure 9: D/a of the three pairs, positive values only, one panel each.
 pub fn trio(data: &Data) -> Canvas {
-    let floor = 1e-6;
-    let panel = |(i, j): (usize, usize)| {
-        let mut curves: Vec<Curve> = Vec::new();
-        for (approach, run) in data.runs_of(FigureName::Fig9) {
-            curves.extend(gap_curves(approach, run, (i, j), floor, false));
-        }
-        curves.extend(exact(data, CaseName::Trio2d, (i, j), floor));
-        let y = gap_axis(&format!("*D*_{{{i}{j}}}/*a*"), &curves, floor);
-        book::chart(time_axis(&curves), y, curves)
-    };
-    let mut charts = [(1, 2), (1, 3), (2, 3)].map(panel);
+    let (figure, floor) = (FigureName::Fig9, 1e-6);
+    let mut charts = [(1, 2), (1, 3), (2, 3)].map(|pair| panel(figure, data, pair, floor));
     for upper in &mut charts[..2] {
         upper.x.label.clear();
     }
-    charts[0].notes = data.notes(FigureName::Fig9);
-    if let Some(note) = charts.iter().find_map(|chart| floor_note(&chart.curves, floor)) {
-        charts[0].notes.push(note);
-    }
+    charts[0].notes = notes(figure, data, &charts, floor);
     stack(&charts, |_| PANEL_HEIGHT)
 }
 
-fn exact(data: &Data, case: CaseName, pair: (usize, usize), floor: f64) -> Vec<Curve> {
-    let gap = data.exact.get(&case).and_then(|exact| Some((exact, exact.gap(pair)?)));
-    gap.map(|(exact, gap)| exact_curve("exact", vec![clipped(&exact.times, gap, floor)]))
-        .into_iter()
-        .collect()
+/// The gap of a pair in all runs of a figure.
+fn panel(figure: FigureName, data: &Data, pair: (usize, usize), floor: f64) -> Chart {
+    let is_pair = figure.case() != CaseName::Trio2d;
+    let runs = data.runs_of(figure).into_iter();
+    let mut curves: Vec<Curve> =
+        runs.flat_map(|(approach, run)| gap_curves(approach, run, pair, floor, is_pair)).collect();
+    let exact = data.exact.get(&figure.case()).and_then(|exact| Some((exact, exact.gap(pair)?)));
+    curves.extend(exact.map(|(exact, gap)| exact_curve("exact", vec![clipped(&exact.times, gap, floor)])));
+    let (i, j) = pair;
+    let label = if is_pair { "|*D*/*a*|".to_owned() } else { format!("*D*_{{{i}{j}}}/*a*") };
+    let y = gap_axis(&label, &curves, floor);
+    book::chart(time_axis(&curves), y, curves)
+}
+
+/// Notes of the figure; the last says that values were clipped, if they were.
+fn notes(figure: FigureName, data: &Data, charts: &[Chart], floor: f64) -> Vec<String> {
+    let mut notes = data.notes(figure);
+    if charts.iter().any(|chart| values(&chart.curves).any(|(_, value)| *value <= floor)) {
+        let exponent = format!("{:.0}", floor.log10()).replace('-', "\u{2212}");
+        notes.push(format!("Contact: gaps below 10^{{{exponent}}} *a* are drawn at 10^{{{exponent}}}."));
+    }
+    notes
 }
 
 /// The curve of a run; where the gap is negative, a second curve shows |D| if `with_overlap`.
@@ -86,13 +85,6 @@ fn gap_curves(
 
 fn clipped(times: &[f64], gap: &[f64], floor: f64) -> Vec<(f64, f64)> {
     times.iter().zip(gap).map(|(&t, &value)| (t, value.max(floor))).collect()
-}
-
-/// Says that values were clipped, if they were.
-fn floor_note(curves: &[Curve], floor: f64) -> Option<String> {
-    let clipped = values(curves).any(|(_, value)| *value <= floor);
-    let exponent = format!("{:.0}", floor.log10()).replace('-', "\u{2212}");
-    clipped.then(|| format!("Contact: gaps below 10^{{{exponent}}} *a* are drawn at 10^{{{exponent}}}."))
 }
 
 fn values(curves: &[Curve]) -> impl Iterator<Item = &(f64, f64)> {

@@ -14,17 +14,9 @@ const BOX_TOP: f64 = 40.0;
 /// Radius of the particles, in units of the box.
 const RADIUS: f64 = 0.05;
 
-/// Figure 4: two particles in a shear flow.
-pub fn two_particles() -> Canvas {
-    setup(&[[0.451, 0.51], [0.549, 0.49]])
-}
-
-/// Figure 8: three particles in a shear flow.
-pub fn three_particles() -> Canvas {
-    setup(&[[0.451, 0.51], [0.549, 0.49], [0.7, 0.49]])
-}
-
-fn setup(centers: &[[f64; 2]]) -> Canvas {
+/// Figure 4 or 8: two or three particles in a shear flow.
+pub fn particles(count: usize) -> Canvas {
+    let centers = &[[0.451, 0.51], [0.549, 0.49], [0.7, 0.49]][..count];
     let mut canvas = Canvas::new(WIDTH, BOX_TOP + BOX_SIDE + 50.0);
     canvas.rectangle((BOX_LEFT, BOX_TOP), (BOX_SIDE, BOX_SIDE), BLACK);
     canvas.line(at(0.0, 0.5), at(1.0, 0.5), THIN);

@@ -6,19 +6,10 @@ use crate::reproduce::plan::FigureName;
 use crate::reproduce::trajectory::Trajectory;
 use gluey_pictures::{Axis, Canvas, Chart, Curve, Mark, equal_aspect_height, stack};
 
-/// Figure 6 or 7b: both particles of a pair.
-pub fn pair(figure: FigureName, data: &Data) -> Canvas {
-    paths(figure, data, 2)
-}
-
-/// Figure 10 or 11: the three discs.
-pub fn trio(figure: FigureName, data: &Data) -> Canvas {
-    paths(figure, data, 3)
-}
-
-fn paths(figure: FigureName, data: &Data, particle_count: usize) -> Canvas {
+/// Figure 6, 7b, 10 or 11: the paths of all particles.
+pub fn paths(figure: FigureName, data: &Data) -> Canvas {
     let all =
-        |run: &Trajectory| (1..=particle_count).map(|particle| run.path_xy(particle)).collect::<Vec<_>>();
+        |run: &Trajectory| (1..=run.centers.len()).map(|particle| run.path_xy(particle)).collect::<Vec<_>>();
     let mut curves: Vec<Curve> = Vec::new();
     for (approach, run) in data.runs_of(figure) {
         let label = Some(legend(approach).to_owned());
