@@ -9,9 +9,9 @@ use serde_json::{Map, json};
 /// Strain of a step.
 const STEP: f64 = 0.025;
 
-/// What is measured.
+/// The suspension and the steps that are measured.
 #[derive(Clone, Debug, clap::Args)]
-pub struct Options {
+pub struct SuspensionBenchOptions {
     /// Number of particles.
     #[arg(long, default_value_t = 20, value_name = "N")]
     count: usize,
@@ -39,7 +39,7 @@ pub struct Options {
 }
 
 /// Measures, and prints the line. Seconds are wall time unless their name says CPU.
-pub fn run(options: &Options) -> anyhow::Result<()> {
+pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
     let pool = pool.context("no pool of threads")?;
     let (first, one) = pool.install(|| timed_run(options, 1))?;
@@ -72,7 +72,7 @@ pub fn run(options: &Options) -> anyhow::Result<()> {
 }
 
 /// A run of so many steps, and its CPU seconds.
-fn timed_run(options: &Options, steps: usize) -> anyhow::Result<(RunReport, f64)> {
+fn timed_run(options: &SuspensionBenchOptions, steps: usize) -> anyhow::Result<(RunReport, f64)> {
     let case = case(options, steps).context("these options make no case")?;
     let folder = tempfile::tempdir().context("no folder for the results")?;
     let start = cpu_seconds();
@@ -80,8 +80,9 @@ fn timed_run(options: &Options, steps: usize) -> anyhow::Result<(RunReport, f64)
     Ok((report, cpu_seconds() - start))
 }
 
-fn case(options: &Options, steps: usize) -> Result<Case, CaseError> {
-    let Options { count, fraction, dimension, cells_per_radius, root_cells, seed, .. } = options;
+fn case(options: &SuspensionBenchOptions, steps: usize) -> Result<Case, CaseError> {
+    let SuspensionBenchOptions { count, fraction, dimension, cells_per_radius, root_cells, seed, .. } =
+        options;
     let end = STEP * steps as f64;
     let text = format!(
         "name = \"bench\"\ndimension = {dimension}\n[domain]\nboundary = \"sheared\"\n\
@@ -112,8 +113,8 @@ fn cpu_seconds() -> f64 {
 mod tests {
     use super::*;
 
-    fn options(count: usize, dimension: usize) -> Options {
-        Options {
+    fn options(count: usize, dimension: usize) -> SuspensionBenchOptions {
+        SuspensionBenchOptions {
             count,
             fraction: 0.2,
             dimension,

@@ -2,9 +2,9 @@
 
 use crate::{program, workspace_root};
 
-/// How much is tried.
+/// Numbers of files that are tried.
 #[derive(clap::Args)]
-pub struct Options {
+pub struct FuzzOptions {
     /// Mutated case files.
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     cases: u64,
@@ -20,8 +20,8 @@ pub struct Options {
 }
 
 /// Runs the tests; their summaries go to standard output.
-pub fn run(options: &Options) -> anyhow::Result<()> {
-    let Options { cases, checkpoints, tables, seed } = options;
+pub fn run(options: &FuzzOptions) -> anyhow::Result<()> {
+    let FuzzOptions { cases, checkpoints, tables, seed } = options;
     let mut cargo = program::cargo("test --release --workspace --test fuzz -- --nocapture");
     cargo.current_dir(workspace_root());
     for (name, value) in [("CASES", cases), ("CHECKPOINTS", checkpoints), ("TABLES", tables), ("SEED", seed)]

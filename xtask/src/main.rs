@@ -32,11 +32,11 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Task {
     /// Compute and draw the figures of Verdon et al. (2010).
-    ReproduceFigures(reproduce::Options),
+    ReproduceFigures(reproduce::ReproductionOptions),
     /// Compute what has an exact solution, with all formulations, and hold it against limits.
-    Verify(verify::Options),
+    Verify(verify::VerificationOptions),
     /// Compute a study of suspensions: a table, pictures and a page beside the literature.
-    Study(study::Options),
+    Study(study::StudyOptions),
     /// Time one solve of the Stokes core and print one line of JSON.
     #[command(disable_help_flag = true)]
     BenchStokes {
@@ -45,11 +45,11 @@ enum Task {
         options: Vec<OsString>,
     },
     /// Time a step of a sheared suspension and print one line of JSON.
-    BenchSuspension(bench_suspension::Options),
+    BenchSuspension(bench_suspension::SuspensionBenchOptions),
     /// Write the reference of case files (docs/case-keys.md) and their JSON schema (data/case.schema.json).
     Keys,
     /// Try mutated case files, checkpoints and tables: none may panic, hang or fill the memory.
-    Fuzz(fuzz::Options),
+    Fuzz(fuzz::FuzzOptions),
     /// Install the Python package in a fresh environment and run its tests.
     Python {
         /// The interpreter, instead of the first python3 or python.

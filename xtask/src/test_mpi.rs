@@ -79,7 +79,7 @@ pub fn run(root: &Path) -> anyhow::Result<()> {
     let mut failing = launcher.command("3", &program, "--level 3 --fail-rank 1");
     notices(&mut failing, |said| said.contains("this rank was told to fail"))?;
     println!("a rank that fails ends all of 3 ranks, and says why");
-    let case = Case { launcher, root: root.to_owned() };
+    let case = CaseOnRanks { launcher, root: root.to_owned() };
     case.compare()?;
     case.write_frames()?;
     case.refuse()?;
@@ -101,12 +101,12 @@ fn unnoticed(command: &str, said: &str) -> String {
 }
 
 /// Runs of a case by `gluey`.
-struct Case {
+struct CaseOnRanks {
     launcher: Launcher,
     root: PathBuf,
 }
 
-impl Case {
+impl CaseOnRanks {
     /// The places of the particles are those of one process, and the same bits run after run; the stress too
     /// where there is one.
     fn compare(&self) -> anyhow::Result<()> {
@@ -274,7 +274,7 @@ fn largest_difference(one: &str, other: &str) -> Option<f64> {
     is_same_shape.then(|| one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }
 
-/// How processes are started.
+/// The program that starts processes.
 struct Launcher {
     is_open_mpi: bool,
 }

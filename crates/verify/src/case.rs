@@ -13,7 +13,7 @@ use gluey_testkit::reference::TableError;
 use crate::number::Number;
 use crate::plot::Plot;
 
-/// How much is computed.
+/// The extent of what is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Extent {
     /// What takes a minute.
@@ -29,7 +29,7 @@ impl Extent {
     }
 }
 
-/// Why a computation has no result.
+/// A reason for which a computation has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// In mesh, assembly or solution.
@@ -62,7 +62,7 @@ impl From<MeshError> for VerifyError {
 }
 
 /// A chapter of the book.
-pub struct Case {
+pub struct VerificationCase {
     /// Name of its files.
     pub name: &'static str,
     /// Title.
@@ -76,14 +76,14 @@ pub struct Case {
     /// The computations.
     pub tasks: fn(Extent) -> Vec<Task>,
     /// The numbers that are judged.
-    pub numbers: fn(&Tables) -> Vec<Number>,
+    pub numbers: fn(&CaseTables) -> Vec<Number>,
     /// The picture.
-    pub plot: fn(&Tables) -> Plot,
+    pub plot: fn(&CaseTables) -> Plot,
 }
 
 type Work = dyn Fn() -> Result<Vec<f64>, VerifyError> + Send + Sync;
 
-/// One computation.
+/// A computation.
 pub struct Task {
     /// Name of the formulation, or of what stands in its place.
     pub method: &'static str,
@@ -106,16 +106,16 @@ impl Task {
     ///
     /// # Errors
     /// The errors of the work.
-    pub fn run(&self) -> Result<Row, VerifyError> {
+    pub fn run(&self) -> Result<TaskResult, VerifyError> {
         let start = cpu_seconds();
         let values = (self.work)()?;
-        Ok(Row { method: self.method, at: self.at.clone(), values, cpu_s: cpu_seconds() - start })
+        Ok(TaskResult { method: self.method, at: self.at.clone(), values, cpu_s: cpu_seconds() - start })
     }
 }
 
 /// The result of a computation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct TaskResult {
     /// Name of the formulation.
     pub method: &'static str,
     /// Values of the keys.
@@ -128,19 +128,22 @@ pub struct Row {
 
 /// The results of a case.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct CaseTable {
     keys: &'static [&'static str],
     measures: &'static [&'static str],
-    rows: Vec<Row>,
+    rows: Vec<TaskResult>,
 }
 
 /// Name of the column of CPU times.
 pub const CPU_TIME: &str = "CPU seconds";
 
-impl Table {
+impl CaseTable {
     /// The table of a case; a computation without a result has NaN in place of its measures.
-    pub fn new<'a>(case: &Case, results: impl Iterator<Item = (&'a Task, Option<Row>)>) -> Self {
-        let missing = |task: &Task| Row {
+    pub fn new<'a>(
+        case: &VerificationCase,
+        results: impl Iterator<Item = (&'a Task, Option<TaskResult>)>,
+    ) -> Self {
+        let missing = |task: &Task| TaskResult {
             method: task.method,
             at: task.at.clone(),
             values: vec![f64::NAN; case.measures.len()],
@@ -153,7 +156,7 @@ impl Table {
     /// The values of a measure, or of [`CPU_TIME`], in the rows of a method where keys have these values.
     /// A name that the table does not have has no values.
     pub fn values(&self, measure: &str, method: &str, at: &[(&str, f64)]) -> Vec<f64> {
-        let is_there = |row: &&Row| row.method == method && self.is_at(row, at);
+        let is_there = |row: &&TaskResult| row.method == method && self.is_at(row, at);
         self.rows.iter().filter(is_there).filter_map(|row| self.value(row, measure)).collect()
     }
 
@@ -197,11 +200,11 @@ impl Table {
         text
     }
 
-    fn is_at(&self, row: &Row, at: &[(&str, f64)]) -> bool {
+    fn is_at(&self, row: &TaskResult, at: &[(&str, f64)]) -> bool {
         at.iter().all(|&(key, wanted)| self.value(row, key) == Some(wanted))
     }
 
-    fn value(&self, row: &Row, name: &str) -> Option<f64> {
+    fn value(&self, row: &TaskResult, name: &str) -> Option<f64> {
         let of = |names: &[&str], values: &[f64]| names.iter().position(|n| *n == name).map(|i| values[i]);
         let time = (name == CPU_TIME).then_some(row.cpu_s);
         of(self.keys, &row.at).or_else(|| of(self.measures, &row.values)).or(time)
@@ -210,16 +213,16 @@ impl Table {
 
 /// The tables of all cases, by their names.
 #[derive(Clone, Debug, Default)]
-pub struct Tables(BTreeMap<&'static str, Table>);
+pub struct CaseTables(BTreeMap<&'static str, CaseTable>);
 
-impl Tables {
+impl CaseTables {
     /// Adds the table of a case.
-    pub fn insert(&mut self, name: &'static str, table: Table) {
+    pub fn insert(&mut self, name: &'static str, table: CaseTable) {
         self.0.insert(name, table);
     }
 
     /// The table of a case; empty if there is none.
-    pub fn of(&self, name: &str) -> Table {
+    pub fn of(&self, name: &str) -> CaseTable {
         self.0.get(name).cloned().unwrap_or_default()
     }
 }
@@ -228,8 +231,8 @@ impl Tables {
 mod tests {
     use super::*;
 
-    fn table() -> Table {
-        let case = Case {
+    fn table() -> CaseTable {
+        let case = VerificationCase {
             name: "test",
             title: "",
             text: "",
@@ -245,7 +248,7 @@ mod tests {
             })
         };
         let tasks = [task(1.0, 0.0, Some(0.1)), task(1.0, 1.0, Some(0.3)), task(0.5, 0.0, None)];
-        Table::new(&case, tasks.iter().map(|task| (task, task.run().ok())))
+        CaseTable::new(&case, tasks.iter().map(|task| (task, task.run().ok())))
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! The verification book of the Stokes solver: what it computes beside exact solutions, in every formulation.
 //!
-//! A [`Case`] is a chapter: its [`Task`]s are computed one by one, their results make a [`Table`], numbers
-//! taken from it are held against `limits.csv`. `cargo xtask verify` computes the tasks side by side and
-//! writes the book; `docs/verification.md` says what each case is.
+//! A [`VerificationCase`] is a chapter: its [`Task`]s are computed one by one, their results make a
+//! [`CaseTable`], numbers taken from it are held against `limits.csv`. `cargo xtask verify` computes the
+//! tasks side by side and writes the book; `docs/verification.md` says what each case is.
 //!
 //! ```
-//! use gluey_verify::{CASES, Extent, Table, Tables, judge, limits};
+//! use gluey_verify::{CASES, CaseTable, CaseTables, Extent, judge, limits};
 //!
 //! let case = CASES.iter().find(|case| case.name == "integrator").expect("a case of this name");
 //! let tasks = (case.tasks)(Extent::Quick);
-//! let mut tables = Tables::default();
-//! tables.insert(case.name, Table::new(case, tasks.iter().map(|task| (task, task.run().ok()))));
+//! let mut tables = CaseTables::default();
+//! tables.insert(case.name, CaseTable::new(case, tasks.iter().map(|task| (task, task.run().ok()))));
 //! let judged = judge(case.name, &(case.numbers)(&tables), &limits()?, Extent::Quick);
 //! assert!(!judged.is_empty() && judged.iter().all(|judged| !judged.is_failure()));
 //! # Ok::<(), gluey_verify::LimitError>(())
@@ -30,10 +30,10 @@ mod set_up;
 pub mod statistics;
 mod verdict;
 
-pub use case::{CPU_TIME, Case, Extent, Row, Table, Tables, Task, VerifyError};
+pub use case::{CPU_TIME, CaseTable, CaseTables, Extent, Task, TaskResult, VerificationCase, VerifyError};
 pub use cases::CASES;
 pub use limits::{Judged, Limit, LimitError, judge, limits, proposal};
 pub use method::{FILM_METHODS, METHODS, Method};
-pub use number::{Kind, Number};
+pub use number::{Number, NumberKind};
 pub use plot::{Curve, Plot};
-pub use verdict::{Outcome, Wanted};
+pub use verdict::{Judgement, Wanted};

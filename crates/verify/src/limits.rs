@@ -6,8 +6,8 @@
 //! nothing.
 
 use crate::case::Extent;
-use crate::number::{Kind, Number};
-use crate::verdict::{Outcome, Wanted};
+use crate::number::{Number, NumberKind};
+use crate::verdict::{Judgement, Wanted};
 
 /// The limit of a number.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub struct Judged {
     /// The number; `None` if it is missing or not finite.
     pub value: Option<f64>,
     /// Its wanted interval and whether it lies there; `None` where there is no limit yet.
-    pub verdict: Option<(Wanted, Outcome)>,
+    pub verdict: Option<(Wanted, Judgement)>,
     /// Why the limit is no better.
     pub reason: String,
 }
@@ -55,7 +55,7 @@ impl Judged {
     /// Whether the book fails because of it: it does not hold, or could not be measured.
     pub fn is_failure(&self) -> bool {
         match self.verdict {
-            Some((_, outcome)) => outcome != Outcome::Yes,
+            Some((_, outcome)) => outcome != Judgement::Yes,
             None => self.value.is_none(),
         }
     }
@@ -103,10 +103,10 @@ fn limit(line: &str) -> Result<Limit, &'static str> {
 pub fn proposal(case: &str, number: &Number, from: Extent) -> Option<String> {
     let twice = round_up(2.0 * number.value.abs().max(0.5 * ROUNDING));
     let (wanted, limit) = match number.kind {
-        Kind::Order => ("at least", (9.0 * number.value).floor() / 10.0),
-        Kind::Error => ("within", twice),
-        Kind::Size => ("at most", twice),
-        Kind::Remark => return None,
+        NumberKind::Order => ("at least", (9.0 * number.value).floor() / 10.0),
+        NumberKind::Error => ("within", twice),
+        NumberKind::Size => ("at most", twice),
+        NumberKind::Remark => return None,
     };
     let from = if from == Extent::Quick { "quick" } else { "full" };
     let Number { what, method, .. } = number;
@@ -144,7 +144,7 @@ pub fn judge(case: &str, numbers: &[Number], limits: &[Limit], extent: Extent) -
             what: limit.what.clone(),
             method: limit.method.clone(),
             value: None,
-            verdict: Some((limit.wanted, Outcome::NotMeasured)),
+            verdict: Some((limit.wanted, Judgement::NotMeasured)),
             reason: limit.reason.clone(),
         });
     measured.chain(missing).collect()
@@ -158,7 +158,7 @@ mod tests {
                          disc; speed; soft; at most; 2; full;\n";
 
     fn number(what: &str, value: f64) -> Number {
-        Number::new(Kind::Error, what.to_owned(), "soft", value)
+        Number::new(NumberKind::Error, what.to_owned(), "soft", value)
     }
 
     #[test]
@@ -204,9 +204,9 @@ mod tests {
     #[test]
     fn a_proposal_is_a_line_that_lets_its_number_pass() {
         let kinds = [
-            (Kind::Error, -0.0123, "within; 0.025"),
-            (Kind::Size, 0.5, "at most; 1.0"),
-            (Kind::Order, 2.97, "at least; 2.6"),
+            (NumberKind::Error, -0.0123, "within; 0.025"),
+            (NumberKind::Size, 0.5, "at most; 1.0"),
+            (NumberKind::Order, 2.97, "at least; 2.6"),
         ];
         for (kind, value, expected) in kinds {
             let number = Number::new(kind, "spin".to_owned(), "soft", value);
@@ -215,9 +215,9 @@ mod tests {
             let limits = parse(&line).unwrap();
             assert!(!judge("disc", &[number], &limits, Extent::Quick)[0].is_failure());
         }
-        let seconds = Number::new(Kind::Remark, "seconds".to_owned(), "soft", 1.0);
+        let seconds = Number::new(NumberKind::Remark, "seconds".to_owned(), "soft", 1.0);
         assert_eq!(proposal("cost", &seconds, Extent::Full), None);
-        let nothing = Number::new(Kind::Size, "turn".to_owned(), "soft", 0.0);
+        let nothing = Number::new(NumberKind::Size, "turn".to_owned(), "soft", 0.0);
         assert_eq!(
             proposal("symmetry", &nothing, Extent::Full).unwrap(),
             "symmetry; turn; soft; at most; 1e-11; full;"

@@ -1,8 +1,8 @@
 //! The numbers that are taken from tables.
 
-/// What a number is, and so what can be wanted of it.
+/// The kind of a number, and so what can be wanted of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum NumberKind {
     /// An order of convergence: the larger the better.
     Order,
     /// An error with a sign: near zero.
@@ -21,22 +21,22 @@ pub struct Number {
     /// Name of the formulation.
     pub method: &'static str,
     /// What kind of number it is.
-    pub kind: Kind,
+    pub kind: NumberKind,
     /// The number.
     pub value: f64,
 }
 
 impl Number {
     /// A number of a formulation.
-    pub fn new(kind: Kind, what: String, method: &'static str, value: f64) -> Self {
+    pub fn new(kind: NumberKind, what: String, method: &'static str, value: f64) -> Self {
         Self { what, method, kind, value }
     }
 
     /// Mean and scatter of an error over positions.
     pub fn mean_and_scatter(name: &str, method: &'static str, mean: f64, scatter: f64) -> [Self; 2] {
         [
-            Self::new(Kind::Error, format!("{name}, mean error"), method, mean),
-            Self::new(Kind::Size, format!("{name}, scatter"), method, scatter),
+            Self::new(NumberKind::Error, format!("{name}, mean error"), method, mean),
+            Self::new(NumberKind::Size, format!("{name}, scatter"), method, scatter),
         ]
     }
 }

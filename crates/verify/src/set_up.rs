@@ -10,7 +10,7 @@ use gluey_testkit::exact::{InclusionViscosity, RigidSphere, ViscousInclusion};
 use gluey_testkit::reference::{self, TableError};
 use itertools::iproduct;
 
-use crate::case::{Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerifyError};
 use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::norms::Lattice;
 use crate::number::Number;
@@ -144,7 +144,7 @@ pub fn pair<const D: usize>(center: Vector<D>, radius: f64, gap: f64, degrees: f
     [Ball::new(center - arm, radius), Ball::new(center + arm, radius)]
 }
 
-/// How two balls move relative to each other in the plane of shear.
+/// The motion of two balls relative to each other in the plane of shear.
 #[derive(Clone, Copy, Debug)]
 pub struct PairMotion {
     /// Speed along the line of centres, negative when they approach.
@@ -174,7 +174,7 @@ impl PairMotion {
 
 /// Mean and scatter of a measure over the rows at `at`, as numbers of what `name` says.
 pub fn mean_and_scatter(
-    table: &Table,
+    table: &CaseTable,
     method: &'static str,
     measure: &str,
     at: &[(&str, f64)],
@@ -227,7 +227,7 @@ impl SpherePairs {
     }
 
     /// Mean and scatter of each measure over the positions; names begin with `what`.
-    pub fn numbers(&self, table: &Table, measures: &[&str], what: &str) -> Vec<Number> {
+    pub fn numbers(&self, table: &CaseTable, measures: &[&str], what: &str) -> Vec<Number> {
         let places = iproduct!(IN_SHEARED_BOXES, self.meshes, self.gaps, measures);
         let of_place = |(method, cells, gap, measure): (&Method, &f64, &f64, &&str)| {
             let name = format!("{what}{measure}, a/h = {cells}, gap {gap} a");

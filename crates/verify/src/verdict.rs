@@ -4,10 +4,10 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Whether a number is what it should be.
+/// A judgement of a number: whether it is what it should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum Judgement {
     /// It is.
     Yes,
     /// It is not.
@@ -30,11 +30,11 @@ pub enum Wanted {
 
 impl Wanted {
     /// What is to be said of a number; limits are inclusive.
-    pub fn outcome(self, value: Option<f64>) -> Outcome {
+    pub fn outcome(self, value: Option<f64>) -> Judgement {
         match value.filter(|value| value.is_finite()) {
-            None => Outcome::NotMeasured,
-            Some(value) if self.holds(value) => Outcome::Yes,
-            Some(_) => Outcome::No,
+            None => Judgement::NotMeasured,
+            Some(value) if self.holds(value) => Judgement::Yes,
+            Some(_) => Judgement::No,
         }
     }
 
@@ -68,12 +68,12 @@ mod tests {
 
     #[test]
     fn limits_are_inclusive_and_what_is_not_a_number_is_not_measured() {
-        assert_eq!(Wanted::AtMost(1.0).outcome(Some(1.0)), Outcome::Yes);
-        assert_eq!(Wanted::AtMost(1.0).outcome(Some(1.1)), Outcome::No);
-        assert_eq!(Wanted::AtLeast(1.0).outcome(Some(0.9)), Outcome::No);
-        assert_eq!(Wanted::Between(0.0, 0.4).outcome(Some(0.5)), Outcome::No);
+        assert_eq!(Wanted::AtMost(1.0).outcome(Some(1.0)), Judgement::Yes);
+        assert_eq!(Wanted::AtMost(1.0).outcome(Some(1.1)), Judgement::No);
+        assert_eq!(Wanted::AtLeast(1.0).outcome(Some(0.9)), Judgement::No);
+        assert_eq!(Wanted::Between(0.0, 0.4).outcome(Some(0.5)), Judgement::No);
         for value in [None, Some(f64::NAN), Some(f64::INFINITY)] {
-            assert_eq!(Wanted::AtMost(1.0).outcome(value), Outcome::NotMeasured);
+            assert_eq!(Wanted::AtMost(1.0).outcome(value), Judgement::NotMeasured);
         }
     }
 

@@ -15,14 +15,14 @@ use serde::Serialize;
 
 /// Something that did not work.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Failure {
+pub struct BookFailure {
     /// The run, figure or file.
     pub what: String,
     /// Why.
     pub error: String,
 }
 
-impl Failure {
+impl BookFailure {
     /// Names what failed, with the error and its causes.
     pub fn new(what: String, error: &(dyn Error + 'static)) -> Self {
         Self { what, error: chain(error) }
@@ -33,9 +33,9 @@ impl Failure {
 pub fn keep<T>(
     what: String,
     result: Result<T, impl Into<anyhow::Error>>,
-    failures: &mut Vec<Failure>,
+    failures: &mut Vec<BookFailure>,
 ) -> Option<T> {
-    result.map_err(|error| failures.push(Failure::new(what, &*error.into()))).ok()
+    result.map_err(|error| failures.push(BookFailure::new(what, &*error.into()))).ok()
 }
 
 /// Writes a drawing as `<name>.svg` and `<name>.png`; the second may fail.
@@ -43,7 +43,7 @@ pub fn write_drawing(
     out: &Path,
     name: &str,
     drawing: &Canvas,
-    failures: &mut Vec<Failure>,
+    failures: &mut Vec<BookFailure>,
 ) -> anyhow::Result<()> {
     files::write(&out.join(format!("{name}.svg")), drawing.svg().as_bytes())?;
     match keep(format!("{name}.png"), drawing.png(), failures) {

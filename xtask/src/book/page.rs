@@ -2,7 +2,7 @@
 
 use gluey_pictures::font_faces;
 
-use super::Failure;
+use super::BookFailure;
 
 const STYLE: &str = "body{font-family:'Libertinus Serif',Georgia,serif;max-width:66rem;margin:2rem auto;padding:0 1rem;\
 line-height:1.45;color:#111;background:#fff}h1,h2{font-weight:normal}section{margin-top:3rem}svg{max-width:100%;height:auto}\
@@ -22,10 +22,10 @@ pub fn document(title: &str, body: &str) -> String {
 }
 
 /// What stands under the title: a note on `--quick`, and what failed.
-pub fn notes(quick: Option<&str>, failures: &[Failure]) -> String {
+pub fn notes(quick: Option<&str>, failures: &[BookFailure]) -> String {
     let quick =
         quick.map(|text| format!("<p class=\"note\">Computed with <code>--quick</code>: {text}</p>\n"));
-    let failures = failures.iter().map(|Failure { what, error }| {
+    let failures = failures.iter().map(|BookFailure { what, error }| {
         format!("<p class=\"note bad\">{}: {}</p>\n", escape(what), escape(error))
     });
     quick.into_iter().chain(failures).collect()

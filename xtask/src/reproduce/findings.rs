@@ -2,12 +2,12 @@
 
 use super::figures;
 use super::plan::{Approach, FigureName};
-use super::rows::{Evidence, View, measure, text};
+use super::rows::{Evidence, RunView, measure, text};
 use super::trajectory::Trajectory;
 
 /// A table of numbers: one row a curve.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct FigureTable {
     /// Names of the columns after the first.
     pub columns: &'static [String],
     /// Name of the curve and its numbers.
@@ -15,11 +15,11 @@ pub struct Table {
 }
 
 /// The numbers of a figure, the exact solution in the first row; `None` for set-ups.
-pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<Table> {
+pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<FigureTable> {
     let columns = &text(figure).columns;
     let (case, exact) = (figure.case(), evidence.exact(figure.case()));
     let row = |name: &str, run: &Trajectory, approach: Option<Approach>| {
-        let view = View { run, exact, case, approach, evidence };
+        let view = RunView { run, exact, case, approach, evidence };
         (name.to_owned(), columns.iter().map(|column| measure(column)?(&view)).collect())
     };
     let mut rows: Vec<_> = exact.map(|exact| row("exact", exact, None)).into_iter().collect();
@@ -27,7 +27,7 @@ pub fn table(figure: FigureName, evidence: &Evidence<'_>) -> Option<Table> {
         let run = evidence.data.runs.get(&key);
         rows.extend(run.map(|run| row(figures::legend(key.approach), run, Some(key.approach))));
     }
-    (!columns.is_empty()).then_some(Table { columns, rows })
+    (!columns.is_empty()).then_some(FigureTable { columns, rows })
 }
 
 #[cfg(test)]

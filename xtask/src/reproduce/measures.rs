@@ -164,7 +164,7 @@ pub fn offset_of_the_pair(run: &Trajectory) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::trajectory::PairGap;
+    use super::super::trajectory::GapSeries;
     use super::*;
     use std::f64::consts::PI;
 
@@ -181,7 +181,7 @@ mod tests {
         let over_radius = times.iter().map(|&t| gap(t)).collect();
         Trajectory {
             centers: vec![path(-1.0), path(1.0)],
-            gaps: vec![PairGap { pair: (1, 2), over_radius }],
+            gaps: vec![GapSeries { pair: (1, 2), over_radius }],
             times,
         }
     }

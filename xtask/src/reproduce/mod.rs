@@ -22,14 +22,14 @@ use anyhow::Context;
 use gluey::RunReport;
 
 use crate::book::progress::Board;
-use crate::book::{Failure, files, jobs, keep, schedule, write_drawing};
+use crate::book::{BookFailure, files, jobs, keep, schedule, write_drawing};
 use figures::Data;
 use page::Section;
 use plan::{CaseName, FigureName, RunKey};
 use rows::Evidence;
 use runner::Runner;
 use settings::Settings;
-use summary::{Run, Summary};
+use summary::{CompletedRun, Summary};
 use trajectory::Trajectory;
 
 /// Times shown by figures of the 2D pair end here; its exact orbit is continued to this time.
@@ -37,7 +37,7 @@ const LATEST_END: f64 = 30.0;
 
 /// Figures to reproduce, and where to put them.
 #[derive(clap::Args)]
-pub struct Options {
+pub struct ReproductionOptions {
     /// A coarse mesh, large time steps and shorter runs: half the time.
     #[arg(long)]
     quick: bool,
@@ -54,9 +54,9 @@ pub struct Options {
 
 /// Makes the runs and figures; whether all is well. Failures of single runs or figures are part of the
 /// summary; an error means that nothing could be written.
-pub fn run(options: Options) -> anyhow::Result<bool> {
+pub fn run(options: ReproductionOptions) -> anyhow::Result<bool> {
     let start = Instant::now();
-    let Options { quick, only, out, jobs: wanted } = options;
+    let ReproductionOptions { quick, only, out, jobs: wanted } = options;
     // Each once, in the paper's order.
     let figures: Vec<FigureName> =
         FigureName::all().filter(|figure| only.is_empty() || only.contains(figure)).collect();
@@ -89,15 +89,15 @@ pub fn run(options: Options) -> anyhow::Result<bool> {
 }
 
 /// The settings of all runs whose case can be read.
-fn settings(keys: &[RunKey], quick: bool, failures: &mut Vec<Failure>) -> BTreeMap<RunKey, Settings> {
+fn settings(keys: &[RunKey], quick: bool, failures: &mut Vec<BookFailure>) -> BTreeMap<RunKey, Settings> {
     let case =
         |&key| Some((key, Settings::of(&keep(format!("run {key}"), runner::case(key, quick), failures)?)));
     keys.iter().filter_map(case).collect()
 }
 
-fn runs(reports: BTreeMap<RunKey, RunReport>, settings: &BTreeMap<RunKey, Settings>) -> Vec<Run> {
+fn runs(reports: BTreeMap<RunKey, RunReport>, settings: &BTreeMap<RunKey, Settings>) -> Vec<CompletedRun> {
     let run = |(key, report): (RunKey, RunReport)| {
-        Some(Run { name: key.name(), settings: settings.get(&key)?.clone(), report })
+        Some(CompletedRun { name: key.name(), settings: settings.get(&key)?.clone(), report })
     };
     reports.into_iter().filter_map(run).collect()
 }
@@ -108,7 +108,7 @@ fn make_runs(
     quick: bool,
     folder: &Path,
     jobs: usize,
-    failures: &mut Vec<Failure>,
+    failures: &mut Vec<BookFailure>,
 ) -> BTreeMap<RunKey, RunReport> {
     let board = Board::new();
     let runner = Runner::new(folder, quick, &board);
@@ -122,7 +122,7 @@ fn load(
     figures: &[FigureName],
     folder: &Path,
     reports: &BTreeMap<RunKey, RunReport>,
-    failures: &mut Vec<Failure>,
+    failures: &mut Vec<BookFailure>,
 ) -> Data {
     let run = |&key| {
         let run = Trajectory::read(&folder.join(format!("{key}.csv")));

@@ -1,13 +1,13 @@
 //! `index.html`: one self-contained page with the figures, the runs and how they compare.
 
 use gluey::progress::duration;
-use gluey_verify::Outcome;
+use gluey_verify::Judgement;
 
-use super::findings::Table;
+use super::findings::FigureTable;
 use super::plan::FigureName;
 use super::rows;
 use super::summary::{self, Summary};
-use super::verdict::{self, Claim, Kind, Row};
+use super::verdict::{self, Claim, ClaimKind, JudgedClaim};
 use crate::book::page::{self, BAD, TEXT, TITLE, escape, number};
 use gluey_pictures::Canvas;
 
@@ -18,7 +18,7 @@ pub struct Section {
     /// The drawing.
     pub drawing: Canvas,
     /// Exact solution and runs in numbers.
-    pub table: Option<Table>,
+    pub table: Option<FigureTable>,
 }
 
 /// What a reader of the paper asks first: why not its viscosity ratio.
@@ -52,10 +52,10 @@ fn head(summary: &Summary) -> String {
 }
 
 /// How much was reproduced, with what was not by name.
-fn counts(rows: &[Row]) -> String {
+fn counts(rows: &[JudgedClaim]) -> String {
     let groups = [
-        (Kind::Paper, "statements of the paper", "are reproduced", "not reproduced"),
-        (Kind::Exact, "comparisons with exact solutions", "hold", "not within its limit"),
+        (ClaimKind::Paper, "statements of the paper", "are reproduced", "not reproduced"),
+        (ClaimKind::Exact, "comparisons with exact solutions", "hold", "not within its limit"),
     ];
     let mut text = String::new();
     for (kind, what, hold, not) in groups {
@@ -63,8 +63,8 @@ fn counts(rows: &[Row]) -> String {
         if count > 0 {
             text += &format!("<p>Of {count} {what} {held} {hold}, {} do not.</p>\n", count - held);
         }
-        let missed = rows.iter().filter(|row| row.claim.kind == kind && row.outcome != Outcome::Yes);
-        let line = |row: &Row| {
+        let missed = rows.iter().filter(|row| row.claim.kind == kind && row.outcome != Judgement::Yes);
+        let line = |row: &JudgedClaim| {
             let Claim { figure, statement, run, measure, .. } = row.claim;
             let [statement, run, measure] = [statement, run, measure].map(|text| escape(text));
             let measured = format!("{run}: {measure} = {}", number(row.value));
@@ -78,7 +78,7 @@ fn counts(rows: &[Row]) -> String {
     text
 }
 
-fn runs(runs: &[summary::Run]) -> String {
+fn runs(runs: &[summary::CompletedRun]) -> String {
     if runs.is_empty() {
         return String::new();
     }
@@ -86,7 +86,7 @@ fn runs(runs: &[summary::Run]) -> String {
                    largest error / a";
     let columns = columns.split('|').map(|name| ("th", name));
     let head = page::row(columns.chain([(TITLE, "settings")]));
-    let line = |summary::Run { name, settings, report }: &summary::Run| {
+    let line = |summary::CompletedRun { name, settings, report }: &summary::CompletedRun| {
         let counts = [report.cells, report.dofs].map(|count| count.to_string());
         let numbers = [
             report.min_gap_over_a,
@@ -102,7 +102,7 @@ fn runs(runs: &[summary::Run]) -> String {
     format!("<h2>Runs</h2>\n<table>{head}{}</table>\n", runs.iter().map(line).collect::<String>())
 }
 
-fn html_of(section: &Section, rows: &[Row]) -> String {
+fn html_of(section: &Section, rows: &[JudgedClaim]) -> String {
     let figure = section.figure;
     let (title, svg) = (&rows::text(figure).title, section.drawing.inline_svg());
     let of = |kind| rows.iter().filter(move |row| row.claim.figure == figure && row.claim.kind == kind);
@@ -112,20 +112,21 @@ fn html_of(section: &Section, rows: &[Row]) -> String {
 }
 
 /// A kind of rows, its heading, and how what holds and what does not read.
-type Group = (Kind, &'static str, &'static str, &'static str);
+type Group = (ClaimKind, &'static str, &'static str, &'static str);
 
 const GROUPS: &[Group] = &[
-    (Kind::Paper, "the paper says", "reproduced", "not reproduced"),
-    (Kind::Exact, "against the exact solution", "within", "not within"),
-    (Kind::Guarantee, "guaranteed by construction", "as it must be", "broken"),
+    (ClaimKind::Paper, "the paper says", "reproduced", "not reproduced"),
+    (ClaimKind::Exact, "against the exact solution", "within", "not within"),
+    (ClaimKind::Guarantee, "guaranteed by construction", "as it must be", "broken"),
 ];
 
-fn group<'a>((_, heading, yes, no): &Group, rows: impl Iterator<Item = &'a Row>) -> String {
-    let line = |row: &Row| {
+fn group<'a>(group: &Group, rows: impl Iterator<Item = &'a JudgedClaim>) -> String {
+    let (_, heading, yes, no) = group;
+    let line = |row: &JudgedClaim| {
         let (class, mark) = match row.outcome {
-            Outcome::Yes => (TEXT, *yes),
-            Outcome::No => (BAD, *no),
-            Outcome::NotMeasured => (BAD, "not measured"),
+            Judgement::Yes => (TEXT, *yes),
+            Judgement::No => (BAD, *no),
+            Judgement::NotMeasured => (BAD, "not measured"),
         };
         let Claim { statement, run, measure, .. } = row.claim;
         let [statement, run, measure, wanted] =
@@ -143,7 +144,7 @@ fn group<'a>((_, heading, yes, no): &Group, rows: impl Iterator<Item = &'a Row>)
 }
 
 /// Why a row does not hold, or fails.
-fn remark(row: &Row) -> String {
+fn remark(row: &JudgedClaim) -> String {
     let (class, text) = match (row.reason(), row.failure()) {
         (Some(reason), _) => ("td class=\"t reason\" colspan=\"6\"", format!("Why not: {}", escape(reason))),
         (_, Some(failure)) => ("td class=\"t bad\" colspan=\"6\"", format!("This row {}.", escape(&failure))),
@@ -152,7 +153,7 @@ fn remark(row: &Row) -> String {
     page::row([(class, text)])
 }
 
-fn table(table: &Table) -> String {
+fn table(table: &FigureTable) -> String {
     let head = page::row(
         [("th", String::new())].into_iter().chain(table.columns.iter().map(|name| ("th", escape(name)))),
     );
@@ -169,7 +170,7 @@ mod tests {
 
     #[test]
     fn a_page_without_runs_names_the_failure() {
-        let failures = vec![crate::book::Failure { what: "pair-2d".into(), error: "a < b".into() }];
+        let failures = vec![crate::book::BookFailure { what: "pair-2d".into(), error: "a < b".into() }];
         let summary = Summary {
             version: "0",
             quick: true,

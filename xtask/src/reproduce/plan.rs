@@ -52,7 +52,7 @@ pub enum Approach {
     UnfittedPeriodic,
 }
 
-/// One run: a case and the way it is computed.
+/// A run: a case and the way it is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunKey {
     /// The case.

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use gluey::RunReport;
-use gluey_verify::Outcome;
+use gluey_verify::Judgement;
 use serde::Serialize;
 
 use super::plan::FigureName;
 use super::settings::Settings;
-use super::verdict::{Claim, Kind, Row, count};
-use crate::book::Failure;
+use super::verdict::{Claim, ClaimKind, JudgedClaim, count};
+use crate::book::BookFailure;
 
 /// The content of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -23,16 +23,16 @@ pub struct Summary {
     /// The figures drawn.
     pub figures: Vec<FigureName>,
     /// The runs that succeeded.
-    pub runs: Vec<Run>,
+    pub runs: Vec<CompletedRun>,
     /// Runs, figures and files that failed.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<BookFailure>,
     /// Rows under the figures.
-    pub rows: Vec<Row>,
+    pub rows: Vec<JudgedClaim>,
 }
 
 /// A run that succeeded.
 #[derive(Clone, Debug, Serialize)]
-pub struct Run {
+pub struct CompletedRun {
     /// Its name, that of its CSV file.
     pub name: String,
     /// Its settings.
@@ -44,7 +44,7 @@ pub struct Run {
 impl Summary {
     /// Whether everything was computed and every row holds or is a known disagreement.
     pub fn succeeded(&self) -> bool {
-        self.failures.is_empty() && !self.rows.iter().any(Row::is_failure)
+        self.failures.is_empty() && !self.rows.iter().any(JudgedClaim::is_failure)
     }
 
     /// As indented JSON.
@@ -57,18 +57,18 @@ impl Summary {
         for row in &self.rows {
             let Claim { figure, statement, run, measure, kind, .. } = row.claim;
             let mark = match (row.outcome, row.reason().is_some(), kind) {
-                (Outcome::NotMeasured, _, _) => "MISSING",
-                (Outcome::No, true, _) => "no, known",
-                (Outcome::No, false, _) => "NO",
-                (Outcome::Yes, _, Kind::Guarantee) => "guaranteed",
-                (Outcome::Yes, _, _) => "yes",
+                (Judgement::NotMeasured, _, _) => "MISSING",
+                (Judgement::No, true, _) => "no, known",
+                (Judgement::No, false, _) => "NO",
+                (Judgement::Yes, _, ClaimKind::Guarantee) => "guaranteed",
+                (Judgement::Yes, _, _) => "yes",
             };
             let value = row.value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.4e}"));
             println!("{mark:10} {figure:5} {statement} {run}: {measure} = {value} ({})", row.wanted);
         }
         println!("\nfigures, runs, summary.json and index.html are in {}", out.display());
-        let (reproduced, statements) = count(&self.rows, Kind::Paper);
-        let (held, comparisons) = count(&self.rows, Kind::Exact);
+        let (reproduced, statements) = count(&self.rows, ClaimKind::Paper);
+        let (held, comparisons) = count(&self.rows, ClaimKind::Exact);
         println!(
             "\nof {statements} statements of the paper {reproduced} are reproduced, {} are not; of {comparisons} comparisons \
              with exact solutions {held} hold, {} do not",

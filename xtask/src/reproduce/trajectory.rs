@@ -13,12 +13,12 @@ pub struct Trajectory {
     /// For each particle its centre at every time, in units of the box; z = 0 in two dimensions.
     pub centers: Vec<Vec<[f64; 3]>>,
     /// Gaps between pairs of particles.
-    pub gaps: Vec<PairGap>,
+    pub gaps: Vec<GapSeries>,
 }
 
 /// The gap of one pair over time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PairGap {
+pub struct GapSeries {
     /// The particles, counted from 1 as in the paper.
     pub pair: (usize, usize),
     /// D/a at every time.
@@ -100,10 +100,10 @@ impl Trajectory {
 }
 
 /// The gaps that a table has, `gap12_over_a, ...` or, for a pair, `D_over_a`.
-fn gaps(table: &NumberTable, particle_count: usize) -> Vec<PairGap> {
+fn gaps(table: &NumberTable, particle_count: usize) -> Vec<GapSeries> {
     let pairs = (1..=particle_count).flat_map(|i| (i + 1..=particle_count).map(move |j| (i, j)));
     let column = |(i, j)| table.find(&format!("gap{i}{j}_over_a")).or_else(|| table.find("D_over_a"));
-    pairs.filter_map(|pair| Some(PairGap { pair, over_radius: column(pair)?.to_vec() })).collect()
+    pairs.filter_map(|pair| Some(GapSeries { pair, over_radius: column(pair)?.to_vec() })).collect()
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
 //! Rows under the figures: what is claimed, the number that decides it, and whether it is so.
 
-use gluey_verify::{Outcome, Wanted};
+use gluey_verify::{Judgement, Wanted};
 use serde::{Deserialize, Serialize};
 
 use super::plan::{FigureName, RunKey};
 
-/// Why a row is there.
+/// The kind of a row: why it is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum ClaimKind {
     /// A statement of the paper: reproduced or not.
     Paper,
     /// A comparison with an exact solution.
@@ -27,7 +27,7 @@ pub struct Claim {
     /// The figure under which it is shown.
     pub figure: FigureName,
     /// Why it is there.
-    pub kind: Kind,
+    pub kind: ClaimKind,
     /// The statement.
     pub statement: String,
     /// The run or runs it is about.
@@ -54,7 +54,7 @@ pub struct Claim {
     known_quick: Option<Missed>,
 }
 
-/// Why a row does not hold, and where its number lies.
+/// A reason for which a row does not hold, and where its number lies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Missed {
     /// The reason.
@@ -71,11 +71,11 @@ impl Claim {
     }
 
     /// The row that it becomes with its number.
-    pub fn judge(&'static self, value: Option<f64>, quick: bool) -> Row {
+    pub fn judge(&'static self, value: Option<f64>, quick: bool) -> JudgedClaim {
         let value = value.filter(|value| value.is_finite());
         let wanted = self.quick.filter(|_| quick).unwrap_or(self.wanted);
         let known = if quick { &self.known_quick } else { &self.known };
-        Row {
+        JudgedClaim {
             claim: self,
             value,
             wanted: wanted.to_string(),
@@ -85,9 +85,9 @@ impl Claim {
     }
 }
 
-/// One judged row.
+/// A judged row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct JudgedClaim {
     /// What is claimed.
     #[serde(flatten)]
     pub claim: &'static Claim,
@@ -96,23 +96,23 @@ pub struct Row {
     /// Its wanted interval.
     pub wanted: String,
     /// Whether it is.
-    pub outcome: Outcome,
+    pub outcome: Judgement,
     /// What is known of it, if it is a known disagreement.
     pub known: Option<&'static Missed>,
 }
 
-impl Row {
+impl JudgedClaim {
     /// Why the reproduction fails because of this row; `None` if it does not.
     pub fn failure(&self) -> Option<String> {
         match (self.outcome, self.known) {
-            (Outcome::NotMeasured, _) => Some("was not measured".to_owned()),
-            (Outcome::No, None) => Some("does not hold and is no known disagreement".to_owned()),
-            (Outcome::No, Some(Missed { between: (least, most), .. })) => {
+            (Judgement::NotMeasured, _) => Some("was not measured".to_owned()),
+            (Judgement::No, None) => Some("does not hold and is no known disagreement".to_owned()),
+            (Judgement::No, Some(Missed { between: (least, most), .. })) => {
                 let value = self.value.filter(|value| !(*least..=*most).contains(value))?;
                 Some(format!("is {value:.4e}, known to disagree by {least:e} to {most:e}"))
             }
-            (Outcome::Yes, Some(_)) => Some("holds, and is listed as a known disagreement".to_owned()),
-            (Outcome::Yes, None) => None,
+            (Judgement::Yes, Some(_)) => Some("holds, and is listed as a known disagreement".to_owned()),
+            (Judgement::Yes, None) => None,
         }
     }
 
@@ -123,15 +123,15 @@ impl Row {
 
     /// For a known disagreement, the reason.
     pub fn reason(&self) -> Option<&'static str> {
-        let known = self.known.filter(|_| self.outcome == Outcome::No && !self.is_failure());
+        let known = self.known.filter(|_| self.outcome == Judgement::No && !self.is_failure());
         known.map(|known| known.why.as_str())
     }
 }
 
 /// How many rows of a kind hold, and how many there are.
-pub fn count(rows: &[Row], kind: Kind) -> (usize, usize) {
+pub fn count(rows: &[JudgedClaim], kind: ClaimKind) -> (usize, usize) {
     let own = rows.iter().filter(|row| row.claim.kind == kind);
-    let held = own.clone().filter(|row| row.outcome == Outcome::Yes).count();
+    let held = own.clone().filter(|row| row.outcome == Judgement::Yes).count();
     (held, own.count())
 }
 
@@ -145,7 +145,7 @@ mod tests {
         Box::leak(Box::new(Claim {
             id: text("fig5-test"),
             figure: FigureName::Fig5,
-            kind: Kind::Paper,
+            kind: ClaimKind::Paper,
             statement: text("It is so."),
             run: text("pair-2d-none"),
             measure: text("a number"),
@@ -158,18 +158,18 @@ mod tests {
         }))
     }
 
-    fn outcome(value: Option<f64>, wanted: Wanted) -> Outcome {
+    fn outcome(value: Option<f64>, wanted: Wanted) -> Judgement {
         claim(wanted, None).judge(value, false).outcome
     }
 
     #[test]
     fn limits_are_inclusive_and_what_is_not_a_number_is_not_measured() {
-        assert_eq!(outcome(Some(1.0), Wanted::AtMost(1.0)), Outcome::Yes);
-        assert_eq!(outcome(Some(1.1), Wanted::AtMost(1.0)), Outcome::No);
-        assert_eq!(outcome(Some(0.9), Wanted::AtLeast(1.0)), Outcome::No);
-        assert_eq!(outcome(Some(0.5), Wanted::Between(0.0, 0.4)), Outcome::No);
+        assert_eq!(outcome(Some(1.0), Wanted::AtMost(1.0)), Judgement::Yes);
+        assert_eq!(outcome(Some(1.1), Wanted::AtMost(1.0)), Judgement::No);
+        assert_eq!(outcome(Some(0.9), Wanted::AtLeast(1.0)), Judgement::No);
+        assert_eq!(outcome(Some(0.5), Wanted::Between(0.0, 0.4)), Judgement::No);
         for value in [None, Some(f64::NAN), Some(f64::INFINITY)] {
-            assert_eq!(outcome(value, Wanted::AtMost(1.0)), Outcome::NotMeasured);
+            assert_eq!(outcome(value, Wanted::AtMost(1.0)), Judgement::NotMeasured);
         }
     }
 
@@ -189,7 +189,7 @@ mod tests {
         let judged = |value| claim.judge(value, false);
         let row = judged(Some(0.5 * (least + most)));
         assert!(row.reason().is_some() && !row.is_failure());
-        assert_eq!(count(&[row], Kind::Paper), (0, 1));
+        assert_eq!(count(&[row], ClaimKind::Paper), (0, 1));
         assert!(judged(None).is_failure());
         // Another number than the known one, and one that is as the paper says.
         for value in [1.01 * most, 0.99 * least, 0.0] {

@@ -22,14 +22,14 @@ const KNOWN: [Stroke; 3] = [
 
 /// A quantity with its error, at many places.
 #[derive(Clone, Debug)]
-pub struct Series {
+pub struct StudySeries {
     /// Its name in the legend.
     pub label: String,
     /// Place, mean, and half the length of its error bar.
     pub points: Vec<(f64, f64, f64)>,
 }
 
-impl Series {
+impl StudySeries {
     /// Without points so far.
     pub fn new(label: &str) -> Self {
         Self { label: label.to_owned(), points: Vec::new() }
@@ -47,7 +47,7 @@ pub fn draw(
     x: &str,
     y: &str,
     is_logarithmic: bool,
-    series: &[Series],
+    series: &[StudySeries],
     known: Vec<(String, Vec<(f64, f64)>)>,
 ) -> Canvas {
     let mut curves: Vec<Curve> = Vec::new();

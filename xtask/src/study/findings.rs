@@ -2,7 +2,7 @@
 
 use gluey_pictures::Canvas;
 
-use super::point::{Done, Point};
+use super::point::{Done, StudyPoint};
 
 /// A study.
 pub struct Study {
@@ -11,12 +11,12 @@ pub struct Study {
     /// What is computed and beside what, as HTML.
     pub text: &'static str,
     /// The runs.
-    pub points: fn(quick: bool) -> Vec<Point>,
+    pub points: fn(quick: bool) -> Vec<StudyPoint>,
     /// What comes out of the runs that succeeded.
     pub findings: fn(&[Done]) -> anyhow::Result<Findings>,
 }
 
-/// What comes out of a study.
+/// Results of a study.
 #[derive(Default)]
 pub struct Findings {
     /// Names of the columns with commas between them.

@@ -21,7 +21,7 @@ use crate::book::progress::Board;
 use crate::book::{files, jobs, keep, schedule, write_drawing};
 use crate::workspace_root;
 use findings::Study;
-use point::{Done, Point};
+use point::{Done, StudyPoint};
 
 /// The studies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -34,9 +34,9 @@ pub enum Name {
     Settling,
 }
 
-/// What to compute, and where to put it.
+/// The study to compute, and where to put it.
 #[derive(clap::Args)]
-pub struct Options {
+pub struct StudyOptions {
     /// The study.
     name: Name,
     /// Few points and short runs: minutes.
@@ -65,7 +65,7 @@ impl Name {
 ///
 /// # Errors
 /// If nothing can be written.
-pub fn run(options: &Options) -> anyhow::Result<bool> {
+pub fn run(options: &StudyOptions) -> anyhow::Result<bool> {
     let start = Instant::now();
     let (study, quick) = (options.name.study(), options.quick);
     let folder = Path::new(if quick { "target/studies/quick" } else { "target/studies" });
@@ -74,7 +74,7 @@ pub fn run(options: &Options) -> anyhow::Result<bool> {
     files::prepare_folder(out)?;
     let (points, board) = ((study.points)(quick), Board::new());
     let data = workspace_root().join("data/studies");
-    let run = |point: &Point| point.run(&data, &out.join("runs"), &board);
+    let run = |point: &StudyPoint| point.run(&data, &out.join("runs"), &board);
     let results = schedule::in_parallel(&points, jobs(options.jobs), run);
     let mut failures = Vec::new();
     let results = points.iter().zip(results);

@@ -4,7 +4,7 @@ use gluey::progress::duration;
 
 use super::findings::{Findings, Study};
 use super::point::Done;
-use crate::book::Failure;
+use crate::book::BookFailure;
 use crate::book::page::{self, escape};
 
 /// What a study took, as HTML; earlier runs count with the time that they took then.
@@ -33,7 +33,7 @@ pub fn csv(findings: &Findings) -> String {
 pub fn html(
     study: &Study,
     findings: &Findings,
-    failures: &[Failure],
+    failures: &[BookFailure],
     is_quick: bool,
     effort: &str,
 ) -> String {

@@ -14,7 +14,7 @@ const CHECKPOINT_MINUTES: f64 = 2.0;
 
 /// A case of `data/studies` with keys set otherwise.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct StudyPoint {
     /// Name of its folder.
     pub name: String,
     /// What is run, a line for each model.
@@ -28,7 +28,7 @@ pub struct Point {
 /// A point with its results.
 pub struct Done {
     /// The point.
-    pub point: Point,
+    pub point: StudyPoint,
     /// The case that was run.
     pub case: Case,
     /// What came out.
@@ -39,7 +39,7 @@ pub struct Done {
     pub rheology: Option<NumberTable>,
 }
 
-impl Point {
+impl StudyPoint {
     /// A point of the study whose case is in `file`.
     pub fn new(name: String, model: &'static str, at: f64, file: &'static str) -> Self {
         Self { name, model, at, file, set: Vec::new() }

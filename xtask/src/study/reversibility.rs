@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use gluey::Tally;
 
-use super::drawing::{Series, draw};
+use super::drawing::{StudySeries, draw};
 use super::findings::{Findings, Study};
-use super::point::{Done, Point};
+use super::point::{Done, StudyPoint};
 
 const FILES: [&str; 2] = ["reversibility-2d.toml", "reversibility-3d.toml"];
 /// Amplitudes of the strain in 2D and 3D.
@@ -39,7 +39,7 @@ pub const STUDY: Study = Study {
     findings,
 };
 
-fn points(quick: bool) -> Vec<Point> {
+fn points(quick: bool) -> Vec<StudyPoint> {
     let dimensions = if quick { 0..1 } else { 0..2 };
     let mut points = Vec::new();
     for place in dimensions {
@@ -52,9 +52,9 @@ fn points(quick: bool) -> Vec<Point> {
     points
 }
 
-fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> Point {
+fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> StudyPoint {
     let name = format!("{}d-{}-{amplitude}", place + 2, model.replace(", ", "-"));
-    let point = Point::new(name, model, amplitude, FILES[place])
+    let point = StudyPoint::new(name, model, amplitude, FILES[place])
         .with("time.strain_amplitude", amplitude)
         .with("time.end", 4.0 * amplitude * cycles as f64);
     match model {
@@ -108,7 +108,7 @@ fn away(done: &Done) -> anyhow::Result<(f64, f64)> {
 fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     let (mut rows, mut drawings) = (Vec::new(), Vec::new());
     for (dimension, names) in [(2, ["away-2d", "distance-2d"]), (3, ["away-3d", "distance-3d"])] {
-        let (mut shares, mut distances) = (MODELS.map(Series::new), MODELS.map(Series::new));
+        let (mut shares, mut distances) = (MODELS.map(StudySeries::new), MODELS.map(StudySeries::new));
         for run in done.iter().filter(|run| run.case.dimension == dimension) {
             let (share, distance) = away(run)?;
             let smallest = run.report.min_gap_over_a.map_or(String::new(), |gap| format!("{gap:.1e}"));

@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
 use gluey_verify::statistics::{mean, scatter};
 
-use super::drawing::{Series, curve, draw};
+use super::drawing::{StudySeries, curve, draw};
 use super::findings::{Findings, Study};
-use super::point::{Done, Point};
+use super::point::{Done, StudyPoint};
 
 const FILE: &str = "settling.toml";
 const MODEL: &str = "equilibrium";
@@ -24,13 +24,13 @@ pub const STUDY: Study = Study {
     findings,
 };
 
-fn points(quick: bool) -> Vec<Point> {
+fn points(quick: bool) -> Vec<StudyPoint> {
     let fractions = if quick { &[0.1, 0.3][..] } else { &[0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4][..] };
     let seeds = if quick { 2 } else { 20 };
     let mut points = Vec::new();
     for &fraction in fractions {
         for seed in 1..=seeds {
-            let point = Point::new(format!("{fraction}-{seed}"), MODEL, fraction, FILE);
+            let point = StudyPoint::new(format!("{fraction}-{seed}"), MODEL, fraction, FILE);
             points.push(point.with("suspension.volume_fraction", fraction).with("suspension.seed", seed));
         }
     }
@@ -66,8 +66,8 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
         corrected.push((phi, mean + lost, 2.0 * error));
     }
     let series = [
-        Series { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
-        Series { label: "20 spheres in their box".to_owned(), points: in_box },
+        StudySeries { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
+        StudySeries { label: "20 spheres in their box".to_owned(), points: in_box },
     ];
     let columns = "configurations,phi,in_box,corrected,standard_error,polynomial";
     let drawing = draw("volume fraction *φ*", "settling velocity", false, &series, known());

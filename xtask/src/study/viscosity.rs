@@ -6,9 +6,9 @@ use gluey::Tally;
 use gluey_suspension::statistics::{Estimate, mser};
 use gluey_verify::literature::viscosity_of_spheres;
 
-use super::drawing::{Series, curve, draw};
+use super::drawing::{StudySeries, curve, draw};
 use super::findings::{Findings, Study};
-use super::point::{Done, Point};
+use super::point::{Done, StudyPoint};
 
 const FILE: &str = "viscosity.toml";
 const LUBRICATION: &str = "lubrication";
@@ -47,15 +47,16 @@ pub const STUDY: Study = Study {
     findings,
 };
 
-fn points(quick: bool) -> Vec<Point> {
+fn points(quick: bool) -> Vec<StudyPoint> {
     let fractions = if quick { &[0.1, 0.3][..] } else { &[0.05, 0.1, 0.2, 0.3, 0.4, 0.45][..] };
     let count = if quick { COUNT_IF_QUICK } else { COUNT };
     let mut points = Vec::new();
     for &fraction in fractions {
         for model in MODELS {
-            let point = Point::new(format!("{}-{fraction}", model.replace(", ", "-")), model, fraction, FILE)
-                .with("suspension.volume_fraction", fraction)
-                .with("suspension.count", count);
+            let point =
+                StudyPoint::new(format!("{}-{fraction}", model.replace(", ", "-")), model, fraction, FILE)
+                    .with("suspension.volume_fraction", fraction)
+                    .with("suspension.count", count);
             let point = with_model(point, radius(fraction, count));
             points.push(if quick { point.with("time.end", 0.5) } else { point });
         }
@@ -68,9 +69,9 @@ fn radius(fraction: f64, count: u32) -> f64 {
     (3.0 * fraction / (4.0 * PI * f64::from(count))).cbrt()
 }
 
-fn with_model(point: Point, radius: f64) -> Point {
+fn with_model(point: StudyPoint, radius: f64) -> StudyPoint {
     let lubricated =
-        |point: Point| point.with("contact.strategy", "none").with("flow.lubrication", "deficit");
+        |point: StudyPoint| point.with("contact.strategy", "none").with("flow.lubrication", "deficit");
     match point.model {
         LUBRICATION => lubricated(point),
         REPULSION => lubricated(point)
@@ -105,7 +106,7 @@ const DRAWN: [(usize, &str, &str); 3] = [
 ];
 
 fn findings(done: &[Done]) -> anyhow::Result<Findings> {
-    let (mut rows, mut drawn) = (Vec::new(), DRAWN.map(|_| MODELS.map(Series::new)));
+    let (mut rows, mut drawn) = (Vec::new(), DRAWN.map(|_| MODELS.map(StudySeries::new)));
     for run in done {
         let Some((begin, estimates)) = steady(run)? else { continue };
         let [eta, contacts, n1, n2] = [0, 1, 2, 3].map(|k| &estimates[k]);
@@ -123,7 +124,7 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
             }
         }
     }
-    let drawing = |(series, (k, name, label)): (&[Series; 4], (usize, &'static str, &str))| {
+    let drawing = |(series, (k, name, label)): (&[StudySeries; 4], (usize, &'static str, &str))| {
         let known = if k == 0 { known() } else { Vec::new() };
         (name, draw("volume fraction *φ*", label, k == 0, series, known))
     };

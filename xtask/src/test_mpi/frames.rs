@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use gluey::output::vtk::read_fields;
 use gluey_motion::Fields;
 
-use super::{Case, RANKS, line, notices, within};
+use super::{CaseOnRanks, RANKS, line, notices, within};
 use crate::{program, python};
 
 /// Its folder of frames.
@@ -27,7 +27,7 @@ const LIMIT: f64 = 1e-9;
 const READER: &str = "tests/read_back.py";
 const PACKAGES: [&str; 2] = ["meshio", "vtk"];
 
-impl Case {
+impl CaseOnRanks {
     /// Pieces hold what one process writes, and others read them.
     pub(super) fn write_frames(&self) -> anyhow::Result<()> {
         let frames = self.folder().join(FRAMES);

@@ -38,7 +38,7 @@ impl Package {
     }
 }
 
-/// What a package depends on.
+/// A dependency of a package.
 #[derive(Debug, Deserialize)]
 pub struct Dependency {
     /// Its name.

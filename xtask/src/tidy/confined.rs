@@ -1,10 +1,10 @@
 //! Libraries whose names may be used in a few places only.
 
 use super::law::Law;
-use super::sources::{Source, words};
+use super::sources::{SourceFile, words};
 
 /// Uses of confined names outside their places.
-pub fn offences(law: &Law, sources: &[Source]) -> Vec<String> {
+pub fn offences(law: &Law, sources: &[SourceFile]) -> Vec<String> {
     let mut offences = Vec::new();
     for source in sources {
         for (name, places) in &law.confined {
@@ -46,7 +46,7 @@ mod tests {
     fn a_use_in_the_wrong_place_is_reported_with_its_line() {
         let mut law = Law::default();
         law.confined.insert("widget".into(), vec!["crates/gadget".into()]);
-        let source = |path: &str| Source::new(path.into(), "// widget::\nuse widget::Mat;\n");
+        let source = |path: &str| SourceFile::new(path.into(), "// widget::\nuse widget::Mat;\n");
         assert!(offences(&law, &[source("crates/gadget/src/a.rs")]).is_empty());
         let found = offences(&law, &[source("crates/gadget2/src/a.rs")]);
         assert_eq!(found, ["crates/gadget2/src/a.rs:2: `widget` belongs in crates/gadget"]);

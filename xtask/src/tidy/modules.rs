@@ -7,9 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use syn::visit::{self, Visit};
 
-use super::sources::Source;
+use super::sources::SourceFile;
 
-/// One module uses an item of another.
+/// A use of an item of another module.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Use {
     /// File of the module that uses.
@@ -21,7 +21,7 @@ pub struct Use {
 }
 
 /// All uses between the modules of a crate whose files lie under `folder`, such as `crates/geom/src`.
-pub fn uses(folder: &str, sources: &[Source]) -> anyhow::Result<Vec<Use>> {
+pub fn uses(folder: &str, sources: &[SourceFile]) -> anyhow::Result<Vec<Use>> {
     let mut modules = BTreeMap::new();
     for source in sources.iter().filter(|source| !source.is_test()) {
         let own = source.path.strip_prefix(folder).and_then(|path| path.strip_prefix('/'));
@@ -46,7 +46,7 @@ fn module_path(file: &str) -> Option<Vec<String>> {
 
 /// A path in the code: its names and its line.
 #[derive(Debug)]
-struct Reference {
+struct NamePath {
     names: Vec<String>,
     line: usize,
 }
@@ -57,15 +57,15 @@ struct Module {
     file: String,
     path: Vec<String>,
     /// Names brought in by `use`, and whether they are passed on.
-    imports: BTreeMap<String, (Reference, bool)>,
+    imports: BTreeMap<String, (NamePath, bool)>,
     /// Modules of which all names are brought in.
-    globs: Vec<Reference>,
+    globs: Vec<NamePath>,
     /// Paths outside of `use`.
-    paths: Vec<Reference>,
+    paths: Vec<NamePath>,
 }
 
 impl Module {
-    fn parse(source: &Source, path: Vec<String>) -> anyhow::Result<Self> {
+    fn parse(source: &SourceFile, path: Vec<String>) -> anyhow::Result<Self> {
         let mut module = Self { file: source.path.clone(), path, ..Self::default() };
         module.visit_file(&source.syntax()?);
         Ok(module)
@@ -78,7 +78,7 @@ impl Module {
             let names = if names.last().is_some_and(|last| last == "self") { before.to_vec() } else { names };
             let name = if name == "self" { before.last().cloned().unwrap_or_default() } else { name };
             let line = ident.span().start().line;
-            self.imports.insert(name, (Reference { names, line }, passed_on));
+            self.imports.insert(name, (NamePath { names, line }, passed_on));
         };
         match tree {
             syn::UseTree::Path(path) => self.add_imports(&path.tree, &with(&path.ident), passed_on),
@@ -86,7 +86,7 @@ impl Module {
             syn::UseTree::Rename(name) => add(name.rename.to_string(), with(&name.ident), &name.ident),
             syn::UseTree::Glob(glob) => {
                 let line = glob.star_token.spans[0].start().line;
-                self.globs.push(Reference { names: before.to_vec(), line });
+                self.globs.push(NamePath { names: before.to_vec(), line });
             }
             syn::UseTree::Group(group) => {
                 group.items.iter().for_each(|tree| self.add_imports(tree, before, passed_on));
@@ -117,7 +117,7 @@ impl<'a> Visit<'a> for Module {
     fn visit_path(&mut self, path: &'a syn::Path) {
         if let Some(first) = path.segments.first() {
             let names = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
-            self.paths.push(Reference { names, line: first.ident.span().start().line });
+            self.paths.push(NamePath { names, line: first.ident.span().start().line });
         }
         visit::visit_path(self, path);
     }
@@ -212,8 +212,8 @@ pub(super) mod tests {
     use super::*;
 
     /// Sources of a crate `a`, given by paths under its `src` and texts.
-    pub fn sources(files: &[(&str, &str)]) -> Vec<Source> {
-        files.iter().map(|(path, text)| Source::new(format!("crates/a/src/{path}"), text)).collect()
+    pub fn sources(files: &[(&str, &str)]) -> Vec<SourceFile> {
+        files.iter().map(|(path, text)| SourceFile::new(format!("crates/a/src/{path}"), text)).collect()
     }
 
     fn found(files: &[(&str, &str)]) -> Vec<(String, String)> {

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::law::Law;
 use super::modules::{self, Use};
-use super::sources::Source;
+use super::sources::SourceFile;
 
 /// Uses of higher rooms, rooms that the law does not list, listed ones that do not exist, and cycles, in the
 /// crates in these folders.
-pub fn offences(law: &Law, folders: &[String], sources: &[Source]) -> anyhow::Result<Vec<String>> {
+pub fn offences(law: &Law, folders: &[String], sources: &[SourceFile]) -> anyhow::Result<Vec<String>> {
     let name = |folder: &str| folder.strip_prefix("crates/").unwrap_or(folder).to_owned();
     let is_unknown = |listed: &&String| !folders.iter().any(|folder| name(folder) == **listed);
     let unknown = law.rooms.keys().filter(is_unknown);
@@ -33,7 +33,7 @@ fn room_of<'a>(folder: &str, file: &'a str) -> Option<&'a str> {
     (!["lib", "main", "bin"].contains(&room)).then_some(room)
 }
 
-fn unknown_rooms(folder: &str, rooms: &[String], sources: &[Source]) -> Vec<String> {
+fn unknown_rooms(folder: &str, rooms: &[String], sources: &[SourceFile]) -> Vec<String> {
     let found: BTreeSet<&str> = sources.iter().filter_map(|source| room_of(folder, &source.path)).collect();
     let unlisted = found.iter().filter(|room| !rooms.iter().any(|listed| listed == *room));
     let missing = rooms.iter().filter(|room| !found.contains(room.as_str()));

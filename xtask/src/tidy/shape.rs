@@ -5,7 +5,7 @@ use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
 use super::modules::is_test;
-use super::sources::Source;
+use super::sources::SourceFile;
 
 /// Most parameters of a function, the receiver and the parts of tuples included.
 const MOST_PARAMETERS: usize = 7;
@@ -17,7 +17,7 @@ const LONGEST_FUNCTION: usize = 60;
 const WIDEST_COMMENT: usize = 110;
 
 /// Offences against the limits, and how many parameters take a tuple apart: `(a, b): (A, B)`.
-pub fn offences(sources: &[Source]) -> anyhow::Result<(Vec<String>, usize)> {
+pub fn offences(sources: &[SourceFile]) -> anyhow::Result<(Vec<String>, usize)> {
     let (mut offences, mut tuple_count) = (Vec::new(), 0);
     for source in sources {
         let (own, tuples) = of_source(source)?;
@@ -31,7 +31,7 @@ pub fn offences(sources: &[Source]) -> anyhow::Result<(Vec<String>, usize)> {
 }
 
 /// Offences in a source, and the number of its tuples.
-fn of_source(source: &Source) -> anyhow::Result<(Vec<String>, usize)> {
+fn of_source(source: &SourceFile) -> anyhow::Result<(Vec<String>, usize)> {
     let path = &source.path;
     let comments = source.lines.iter().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"));
     let wide = comments.filter(|(_, line)| line.chars().count() > WIDEST_COMMENT);
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     fn found(text: &str) -> Vec<String> {
-        of_source(&Source::new("crates/a/src/a.rs".into(), text)).unwrap().0
+        of_source(&SourceFile::new("crates/a/src/a.rs".into(), text)).unwrap().0
     }
 
     #[test]
@@ -135,10 +135,10 @@ mod tests {
     #[test]
     fn tuples_without_a_name_are_counted() {
         let text = "fn f((a, b): (u8, u8), c: (u8, u8)) {}\nimpl S {\n fn g((d, (e, h)): T) {}\n}\n";
-        let source = Source::new("crates/a/src/a.rs".into(), text);
+        let source = SourceFile::new("crates/a/src/a.rs".into(), text);
         assert_eq!(offences(&[source]).unwrap(), (Vec::new(), 2));
         let many = "fn f((a, b): (u8, u8)) {}\n".repeat(MOST_TUPLES + 1);
-        let found = offences(&[Source::new("crates/a/src/a.rs".into(), &many)]).unwrap();
+        let found = offences(&[SourceFile::new("crates/a/src/a.rs".into(), &many)]).unwrap();
         assert_eq!(found.0.len(), 1, "{found:?}");
     }
 

@@ -11,9 +11,9 @@ const TEST_FOLDERS: [&str; 3] = ["/tests/", "/benches/", "/examples/"];
 /// Name of the unit tests of a module in a file of their own.
 const TEST_FILE: &str = "/tests.rs";
 
-/// One source file.
+/// A source file.
 #[derive(Debug)]
-pub struct Source {
+pub struct SourceFile {
     /// Path from the root of the workspace, with `/`.
     pub path: String,
     /// Its lines.
@@ -22,7 +22,7 @@ pub struct Source {
     pub tests_from: usize,
 }
 
-impl Source {
+impl SourceFile {
     /// A source under this path.
     pub fn new(path: String, text: &str) -> Self {
         let lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -64,7 +64,7 @@ impl Source {
 }
 
 /// Every `.rs` file, ordered by path.
-pub fn all(root: &Path) -> anyhow::Result<Vec<Source>> {
+pub fn all(root: &Path) -> anyhow::Result<Vec<SourceFile>> {
     let mut paths = Vec::new();
     for folder in FOLDERS.map(|folder| root.join(folder)).into_iter().filter(|folder| folder.is_dir()) {
         collect(&folder, &mut paths).with_context(|| format!("cannot read {}", folder.display()))?;
@@ -72,7 +72,7 @@ pub fn all(root: &Path) -> anyhow::Result<Vec<Source>> {
     paths.sort();
     let source = |path: &PathBuf| {
         let own = path.strip_prefix(root).unwrap_or(path);
-        Ok(Source::new(own.to_string_lossy().replace('\\', "/"), &text(path)?))
+        Ok(SourceFile::new(own.to_string_lossy().replace('\\', "/"), &text(path)?))
     };
     paths.iter().map(source).collect()
 }
@@ -108,11 +108,11 @@ mod tests {
     #[test]
     fn tests_and_comments_are_not_code() {
         let text = "//! doc\nfn a() {}\n#[cfg(test)]\nmod tests {}\n";
-        let source = Source::new("crates/a/src/lib.rs".into(), text);
+        let source = SourceFile::new("crates/a/src/lib.rs".into(), text);
         assert_eq!(source.code().collect::<Vec<_>>(), [(2, "fn a() {}")]);
         assert_eq!(source.all_code().count(), 3);
         for path in ["crates/a/tests/b.rs", "crates/a/src/b/tests.rs"] {
-            assert_eq!(Source::new(path.into(), text).code().count(), 0);
+            assert_eq!(SourceFile::new(path.into(), text).code().count(), 0);
         }
     }
 }

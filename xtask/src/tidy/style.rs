@@ -1,6 +1,6 @@
 //! House rules that a machine can check: no loose ends, no unwrap outside tests, no long files.
 
-use super::sources::Source;
+use super::sources::SourceFile;
 
 /// Longest file, in lines.
 const LONGEST_FILE: usize = 500;
@@ -16,11 +16,11 @@ const LOOSE_ENDS: [&str; 5] = [
 const PANICS: [&str; 2] = [concat!(".unw", "rap()"), concat!("pa", "nic!(")];
 
 /// All offences against the house rules.
-pub fn offences(sources: &[Source]) -> Vec<String> {
+pub fn offences(sources: &[SourceFile]) -> Vec<String> {
     sources.iter().flat_map(of_source).collect()
 }
 
-fn of_source(source: &Source) -> Vec<String> {
+fn of_source(source: &SourceFile) -> Vec<String> {
     let path = &source.path;
     let mut offences = Vec::new();
     if source.lines.len() > LONGEST_FILE {
@@ -45,16 +45,16 @@ mod tests {
     fn loose_ends_panics_and_long_files_are_found() {
         let marks = LOOSE_ENDS.iter().chain(&PANICS);
         for mark in marks {
-            let source = Source::new("crates/a/src/a.rs".into(), &format!("fn a() {{}}\nx{mark}\n"));
+            let source = SourceFile::new("crates/a/src/a.rs".into(), &format!("fn a() {{}}\nx{mark}\n"));
             assert_eq!(of_source(&source).len(), 1, "{mark}");
         }
-        let long = Source::new("crates/a/src/a.rs".into(), &"fn a() {}\n".repeat(LONGEST_FILE + 1));
+        let long = SourceFile::new("crates/a/src/a.rs".into(), &"fn a() {}\n".repeat(LONGEST_FILE + 1));
         assert_eq!(of_source(&long).len(), 1);
     }
 
     #[test]
     fn tests_may_panic() {
         let text = format!("#[cfg(test)]\nmod tests {{\n x{}\n}}\n", PANICS[0]);
-        assert!(of_source(&Source::new("crates/a/src/a.rs".into(), &text)).is_empty());
+        assert!(of_source(&SourceFile::new("crates/a/src/a.rs".into(), &text)).is_empty());
     }
 }

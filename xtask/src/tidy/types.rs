@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use syn::visit::{self, Visit};
 
 use super::modules::is_test;
-use super::sources::Source;
+use super::sources::SourceFile;
 
 /// Most types that a name stands for, over all crates.
 const MOST_OF_A_NAME: usize = 6;
@@ -22,7 +22,7 @@ const NO_NOUNS: &[&str] = &[
 ];
 
 /// Offences against the limits, and how many comments begin without a noun.
-pub fn offences(sources: &[Source]) -> anyhow::Result<(Vec<String>, usize)> {
+pub fn offences(sources: &[SourceFile]) -> anyhow::Result<(Vec<String>, usize)> {
     let (mut places, mut unnamed) = (BTreeMap::<String, Vec<String>>::new(), Vec::new());
     for source in sources.iter().filter(|source| !source.is_test()) {
         let mut types = Types { path: &source.path, places: &mut places, unnamed: &mut unnamed };
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     fn found(text: &str) -> (Vec<String>, usize) {
-        offences(&[Source::new("crates/a/src/a.rs".into(), text)]).unwrap()
+        offences(&[SourceFile::new("crates/a/src/a.rs".into(), text)]).unwrap()
     }
 
     #[test]
@@ -119,7 +119,8 @@ mod tests {
         };
         assert!(found(&modules("A", MOST_OF_A_NAME)).0.is_empty());
         let (offences, _) = found(&modules("A", MOST_OF_A_NAME + 1));
-        assert!(offences[0].starts_with("`A` stands for 7 types, more than 6: "), "{offences:?}");
+        let wanted = format!("`A` stands for {} types, more than {MOST_OF_A_NAME}: ", MOST_OF_A_NAME + 1);
+        assert!(offences[0].starts_with(&wanted), "{offences:?}");
         assert!(found(&modules(EXCEPTED, MOST_OF_A_NAME + 1)).0.is_empty());
     }
 }

@@ -1,14 +1,14 @@
 //! The verification book: chapters with their numbers, and what they come to.
 
 use gluey_pictures::Canvas;
-use gluey_verify::{Case, Judged, Outcome};
+use gluey_verify::{Judged, Judgement, VerificationCase};
 
-use crate::book::Failure;
+use crate::book::BookFailure;
 
 /// A case with its results.
 pub struct Chapter {
     /// The case.
-    pub case: &'static Case,
+    pub case: &'static VerificationCase,
     /// Its numbers with what is said of them.
     pub judged: Vec<Judged>,
     /// Lines for `limits.csv`, for the numbers that it does not have.
@@ -28,7 +28,7 @@ pub struct Book {
     /// The cases.
     pub chapters: Vec<Chapter>,
     /// Computations and pictures that failed.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<BookFailure>,
 }
 
 impl Book {
@@ -38,7 +38,7 @@ impl Book {
     }
 
     /// All numbers, each with its case.
-    pub fn judged(&self) -> impl Iterator<Item = (&'static Case, &Judged)> {
+    pub fn judged(&self) -> impl Iterator<Item = (&'static VerificationCase, &Judged)> {
         self.chapters.iter().flat_map(|chapter| chapter.judged.iter().map(|judged| (chapter.case, judged)))
     }
 
@@ -46,8 +46,9 @@ impl Book {
     pub fn counts(&self) -> (usize, usize, usize) {
         let outcomes: Vec<_> =
             self.judged().map(|(_, judged)| judged.verdict.map(|(_, outcome)| outcome)).collect();
-        let count = |wanted: &dyn Fn(&Option<Outcome>) -> bool| outcomes.iter().filter(|o| wanted(o)).count();
-        (count(&|o| o.is_some()), count(&|o| *o == Some(Outcome::Yes)), count(&|o| o.is_none()))
+        let count =
+            |wanted: &dyn Fn(&Option<Judgement>) -> bool| outcomes.iter().filter(|o| wanted(o)).count();
+        (count(&|o| o.is_some()), count(&|o| *o == Some(Judgement::Yes)), count(&|o| o.is_none()))
     }
 
     /// What the terminal is told: all that fails, then the counts.

@@ -11,16 +11,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::bail;
-use gluey_verify::{CASES, Case, Extent, Limit, Table, Tables, Task};
+use gluey_verify::{CASES, CaseTable, CaseTables, Extent, Limit, Task, VerificationCase};
 
 use crate::book::progress::NowAndThen;
-use crate::book::{Failure, files, keep, schedule, write_drawing};
+use crate::book::{BookFailure, files, keep, schedule, write_drawing};
 use crate::workspace_root;
 use book::{Book, Chapter};
 
-/// What to verify, and where to put the book.
+/// Cases to verify, and where to put the book.
 #[derive(clap::Args)]
-pub struct Options {
+pub struct VerificationOptions {
     /// Fewer positions and coarser meshes: a minute.
     #[arg(long)]
     quick: bool,
@@ -33,9 +33,9 @@ pub struct Options {
 }
 
 /// Computes and writes the book; whether all is well. Failures of single computations are part of it.
-pub fn run(options: &Options) -> anyhow::Result<bool> {
+pub fn run(options: &VerificationOptions) -> anyhow::Result<bool> {
     let start = Instant::now();
-    let Options { quick, only, out } = options;
+    let VerificationOptions { quick, only, out } = options;
     files::prepare_folder(out)?;
     let limits = gluey_verify::limits()?;
     let cases = chosen(only)?;
@@ -63,7 +63,12 @@ pub fn run(options: &Options) -> anyhow::Result<bool> {
     Ok(book.holds())
 }
 
-fn chapter(case: &'static Case, tables: &Tables, limits: &[Limit], extent: Extent) -> Chapter {
+fn chapter(
+    case: &'static VerificationCase,
+    tables: &CaseTables,
+    limits: &[Limit],
+    extent: Extent,
+) -> Chapter {
     let numbers = (case.numbers)(tables);
     let judged = gluey_verify::judge(case.name, &numbers, limits, extent);
     let free = numbers.iter().zip(&judged).filter(|(_, judged)| judged.verdict.is_none());
@@ -72,7 +77,7 @@ fn chapter(case: &'static Case, tables: &Tables, limits: &[Limit], extent: Exten
     Chapter { case, judged, proposals, drawing: drawing::draw(&(case.plot)(tables)) }
 }
 
-fn chosen(only: &[String]) -> anyhow::Result<Vec<&'static Case>> {
+fn chosen(only: &[String]) -> anyhow::Result<Vec<&'static VerificationCase>> {
     let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
     if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
         bail!("there is no case {name}; the cases are {}", names.join(", "));
@@ -82,10 +87,15 @@ fn chosen(only: &[String]) -> anyhow::Result<Vec<&'static Case>> {
 
 /// All computations of the cases, as many at a time as there are cores; the last cases, which have the
 /// longest computations, go first.
-fn compute(cases: &[&'static Case], extent: Extent, failures: &mut Vec<Failure>) -> Tables {
-    let of_case =
-        |case: &&'static Case| (case.tasks)(extent).into_iter().map(|task| (*case, task)).collect::<Vec<_>>();
-    let jobs: Vec<(&'static Case, Task)> = cases.iter().rev().flat_map(of_case).collect();
+fn compute(
+    cases: &[&'static VerificationCase],
+    extent: Extent,
+    failures: &mut Vec<BookFailure>,
+) -> CaseTables {
+    let of_case = |case: &&'static VerificationCase| {
+        (case.tasks)(extent).into_iter().map(|task| (*case, task)).collect::<Vec<_>>()
+    };
+    let jobs: Vec<(&'static VerificationCase, Task)> = cases.iter().rev().flat_map(of_case).collect();
     let (done, line) = (AtomicUsize::new(0), NowAndThen::default());
     let results = schedule::in_parallel(&jobs, rayon::current_num_threads(), |(_, task)| {
         let row = task.run();
@@ -98,10 +108,10 @@ fn compute(cases: &[&'static Case], extent: Extent, failures: &mut Vec<Failure>)
         let what = format!("{}, {} at {:?}", case.name, task.method, task.at);
         rows.push((case.name, task, keep(what, result, failures)));
     }
-    let mut tables = Tables::default();
+    let mut tables = CaseTables::default();
     for case in cases {
         let own = rows.iter().filter(|(of, _, _)| *of == case.name);
-        tables.insert(case.name, Table::new(case, own.map(|(_, task, row)| (*task, row.clone()))));
+        tables.insert(case.name, CaseTable::new(case, own.map(|(_, task, row)| (*task, row.clone()))));
     }
     tables
 }
@@ -120,16 +130,16 @@ fn commit(root: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use gluey_pictures::Canvas;
-    use gluey_verify::{Judged, Number, Outcome};
+    use gluey_verify::{Judged, Judgement, Number};
 
     use super::*;
 
-    fn judged(value: Option<f64>, outcome: Outcome) -> Judged {
+    fn judged(value: Option<f64>, outcome: Judgement) -> Judged {
         let verdict = Some((gluey_verify::Wanted::AtMost(1.0), outcome));
         Judged { what: "speed".into(), method: "soft".into(), value, verdict, reason: String::new() }
     }
 
-    fn book(judged: Vec<Judged>, failures: Vec<Failure>) -> Book {
+    fn book(judged: Vec<Judged>, failures: Vec<BookFailure>) -> Book {
         let chapters =
             vec![Chapter { case: &CASES[0], judged, proposals: vec![], drawing: Canvas::new(1.0, 1.0) }];
         Book { quick: true, commit: Some("0123456789ab".into()), wall_s: 1.0, chapters, failures }
@@ -137,17 +147,17 @@ mod tests {
 
     #[test]
     fn a_miss_a_missing_number_and_a_failed_computation_each_fail_the_book() {
-        let good = || judged(Some(0.5), Outcome::Yes);
+        let good = || judged(Some(0.5), Judgement::Yes);
         assert!(book(vec![good()], vec![]).holds());
-        assert!(!book(vec![good(), judged(Some(2.0), Outcome::No)], vec![]).holds());
-        assert!(!book(vec![judged(None, Outcome::NotMeasured)], vec![]).holds());
-        let failure = crate::book::Failure { what: "disc".into(), error: "broke".into() };
+        assert!(!book(vec![good(), judged(Some(2.0), Judgement::No)], vec![]).holds());
+        assert!(!book(vec![judged(None, Judgement::NotMeasured)], vec![]).holds());
+        let failure = crate::book::BookFailure { what: "disc".into(), error: "broke".into() };
         assert!(!book(vec![good()], vec![failure]).holds());
     }
 
     #[test]
     fn page_and_table_show_number_limit_verdict_and_commit() {
-        let book = book(vec![judged(Some(2.0), Outcome::No)], vec![]);
+        let book = book(vec![judged(Some(2.0), Judgement::No)], vec![]);
         let page = page::html(&book);
         for part in ["0123456789ab", "speed", "2.000", "at most 1", "not within"] {
             assert!(page.contains(part), "{part}");

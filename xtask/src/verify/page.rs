@@ -1,7 +1,7 @@
 //! The book as a page, and its numbers as a table.
 
 use gluey::progress::duration;
-use gluey_verify::{Case, Judged, Outcome};
+use gluey_verify::{Judged, Judgement, VerificationCase};
 
 use super::book::{Book, Chapter, sentence};
 use crate::book::page::{self, BAD, TEXT, TITLE, escape, number};
@@ -20,9 +20,9 @@ pub fn csv(book: &Book) -> String {
         let wanted = judged.verdict.map_or_else(String::new, |(wanted, _)| wanted.to_string());
         let verdict = match judged.verdict {
             None => "",
-            Some((_, Outcome::Yes)) => "yes",
-            Some((_, Outcome::No)) => "no",
-            Some((_, Outcome::NotMeasured)) => "not measured",
+            Some((_, Judgement::Yes)) => "yes",
+            Some((_, Judgement::No)) => "no",
+            Some((_, Judgement::NotMeasured)) => "not measured",
         };
         let Judged { what, method, reason, .. } = judged;
         let fields = [case.name, what, method, &value, &wanted, verdict, reason];
@@ -37,11 +37,12 @@ fn head(book: &Book) -> String {
     let (version, commit, time) = (env!("CARGO_PKG_VERSION"), escape(&commit), duration(book.wall_s));
     let quick = book.quick.then_some("fewer positions and coarser meshes.");
     let (limits, held, free) = book.counts();
-    let missed =
-        book.judged().filter(|(_, judged)| judged.is_failure()).map(|(Case { name, .. }, judged)| {
+    let missed = book.judged().filter(|(_, judged)| judged.is_failure()).map(
+        |(VerificationCase { name, .. }, judged)| {
             let said = escape(&sentence(judged));
             format!("<p class=\"bad\"><a href=\"#{name}\">{name}</a>, {said}</p>\n")
-        });
+        },
+    );
     format!(
         "<h1>What gluey computes beside exact solutions</h1>\n<p>gluey {version}{commit}, computed in {time}. Every \
          formulation solves the same cases; a number without a limit is shown and decides nothing.</p>\n\
@@ -52,7 +53,7 @@ fn head(book: &Book) -> String {
 }
 
 fn chapter(Chapter { case, judged, drawing, .. }: &Chapter) -> String {
-    let Case { name, title, text, measures, .. } = case;
+    let VerificationCase { name, title, text, measures, .. } = case;
     let table = match measures.is_empty() {
         true => String::new(),
         false => format!("<p>All computations: <a href=\"{name}.csv\">{name}.csv</a>.</p>\n"),
@@ -86,9 +87,9 @@ fn cells(judged: &Judged) -> [(&'static str, String); 3] {
     let wanted = judged.verdict.map_or("none".to_owned(), |(wanted, _)| wanted.to_string());
     let (tag, mark) = match judged.verdict.map(|(_, outcome)| outcome) {
         None => (TEXT, ""),
-        Some(Outcome::Yes) => (TEXT, "within"),
-        Some(Outcome::No) => (BAD, "not within"),
-        Some(Outcome::NotMeasured) => (BAD, "not measured"),
+        Some(Judgement::Yes) => (TEXT, "within"),
+        Some(Judgement::No) => (BAD, "not within"),
+        Some(Judgement::NotMeasured) => (BAD, "not measured"),
     };
     [("td", number(judged.value)), (TEXT, wanted), (tag, mark.to_owned())]
 }

@@ -6,9 +6,9 @@ use gluey_stokes::{Conditions, FlowSolver};
 use gluey_testkit::reference::cells_of_discs;
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{IN_SHEARED_BOXES, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{periodic_mesh, simple_shear, stress_of};
 
@@ -16,7 +16,7 @@ use crate::set_up::{periodic_mesh, simple_shear, stress_of};
 const CELLS: [usize; 2] = [2, 8];
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "cells",
     title: "Cells of several discs",
     text: "Two cells with 2 and 8 free discs at random places (solid fractions 0.1 and 0.2, smallest gaps 2 and 0.11 radii) in simple \
@@ -67,12 +67,13 @@ fn measure(method: &Method, index: usize, level: u8) -> Result<Vec<f64>, VerifyE
     Ok(vec![velocity, turn, (1.0 + of_bodies[(0, 1)]) / eta - 1.0, normal / (eta - 1.0)])
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in IN_SHEARED_BOXES {
         for (at, &measure) in iproduct!(table.places(method.name, ["discs", "cells"]), CASE.measures) {
             let [(_, discs), (_, cells)] = at;
-            let kind = if matches!(measure, "velocity" | "spin") { Kind::Size } else { Kind::Error };
+            let kind =
+                if matches!(measure, "velocity" | "spin") { NumberKind::Size } else { NumberKind::Error };
             let name = format!("{measure}, {discs} discs, {cells} cells");
             numbers.push(Number::new(kind, name, method.name, table.values(measure, method.name, &at)[0]));
         }
@@ -80,7 +81,7 @@ fn numbers(table: &Table) -> Vec<Number> {
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["2 discs, velocity", "2 discs, spin", "8 discs, velocity", "8 discs, spin"];
     Plot::of_methods("cells per edge of the box", "largest error", &things, |method, thing| {
         let at = [("discs", CELLS[thing / 2] as f64)];

@@ -8,10 +8,10 @@ use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, Stress};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{IN_SHEARED_BOXES, Method};
 use crate::norms::superficial_velocity;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{exact_row, radius_of, shift, simple_shear, stress_of};
 
@@ -80,7 +80,7 @@ const SQUARES: &[[u32; 3]] = &[[4, 4, 4], [5, 5, 5], [6, 6, 6]];
 const RESOLUTION: f64 = 3.2;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "crystals",
     title: "Drag and viscosities of crystals",
     text: "Square and hexagonal lattices of discs and simple, body-centred and face-centred cubic lattices of spheres in boxes with \
@@ -199,7 +199,7 @@ impl Crystal {
     }
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in IN_SHEARED_BOXES {
         for at in table.places(method.name, ["crystal", "phi"]) {
@@ -216,14 +216,14 @@ fn numbers(table: &Table) -> Vec<Number> {
                 };
                 let name = format!("{said}, {}, phi = {phi}", crystal.name);
                 let value = table.values(measure, method.name, &at)[0];
-                numbers.push(Number::new(Kind::Error, name, method.name, value));
+                numbers.push(Number::new(NumberKind::Error, name, method.name, value));
             }
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things: Vec<&str> = CRYSTALS.iter().map(|crystal| crystal.name).collect();
     Plot::of_methods("solid fraction", "relative error of the drag", &things, |method, thing| {
         let at = [("crystal", thing as f64)];

@@ -6,7 +6,7 @@ use gluey_stokes::Refinement;
 use gluey_testkit::reference::single_2d_velocities;
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -17,7 +17,7 @@ const POSITIONS: usize = 16;
 const CELLS_PER_RADIUS: [f64; 3] = [3.2, 6.4, 12.8];
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "disc",
     title: "One disc",
     text: "A free disc of radius a = 0.05 at (0.5, 0.7) in the unit box with u = (y - 1/2, 0) on all sides: velocity and spin \
@@ -50,7 +50,7 @@ fn measure(method: &Method, cells: f64, shift: Vector<2>) -> Result<Vec<f64>, Ve
     Ok(vec![(twist.velocity[0] - shift[1] - exact("Ux")?) / RADIUS, twist.spin[0] - exact("omega")?])
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let number = |(cells, measure, method): (f64, &&str, &Method)| {
         let (mean, scatter) = mean_and_scatter(table, method.name, measure, cells);
         Number::mean_and_scatter(&format!("{measure}, a/h = {cells}"), method.name, mean, scatter)
@@ -59,7 +59,7 @@ fn numbers(table: &Table) -> Vec<Number> {
 }
 
 /// Of the errors less what the walls make of the shift.
-fn mean_and_scatter(table: &Table, method: &str, measure: &str, cells: f64) -> (f64, f64) {
+fn mean_and_scatter(table: &CaseTable, method: &str, measure: &str, cells: f64) -> (f64, f64) {
     let values = |name| table.values(name, method, &[("a/h", cells)]);
     let shifts = values("shift x").into_iter().zip(values("shift y"));
     let basis: Vec<[f64; 4]> = shifts.map(|(s, t)| [1.0, t, s * s, t * t]).collect();
@@ -67,7 +67,7 @@ fn mean_and_scatter(table: &Table, method: &str, measure: &str, cells: f64) -> (
     (coefficients[0], scatter)
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["velocity, mean", "velocity, scatter", "spin, mean", "spin, scatter"];
     Plot::of_methods("cells per radius *a*/*h*", "error", &things, |method, thing| {
         let point = |cells| {

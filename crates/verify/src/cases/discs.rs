@@ -7,7 +7,7 @@ use gluey_stokes::Refinement;
 use gluey_testkit::reference::{pair_2d_resistance, pair_2d_velocities};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{FILM_METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -28,7 +28,7 @@ const FILM_ALONG: [f64; 1] = [1e-2];
 const PRESSED: f64 = 135.0;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "discs",
     title: "Two discs",
     text: "Two free discs of radius 0.05 around the centre of the unit box with u = (y - 1/2, 0) on all sides, at 8 places in \
@@ -122,7 +122,7 @@ fn normal_resistance(gap: f64) -> Result<f64, VerifyError> {
         .ok_or_else(|| VerifyError::NoReference(format!("the resistance at a gap of {gap} radii")))
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     let measures = [("approach", PRESSED), ("line rotation", 0.0), ("spin", 0.0)];
     for method in FILM_METHODS {
@@ -137,7 +137,7 @@ fn numbers(table: &Table) -> Vec<Number> {
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let cells = [3.2, 6.4, 12.8, 25.6];
     let things = ["*a*/*h* = 3.2", "*a*/*h* = 6.4", "*a*/*h* = 12.8", "*a*/*h* = 25.6"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {

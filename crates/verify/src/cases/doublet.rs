@@ -5,9 +5,9 @@ use gluey_levelset::Ball;
 use gluey_motion::{Film, Integrator, Scheme};
 use gluey_stokes::{FlowSolver, Refinement};
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{DEFAULT_TOLERANCE, RADIUS, couette, level, mesh, pair};
 use crate::statistics::mean;
@@ -18,7 +18,7 @@ const MOST_TIME: f64 = 40.0;
 const HALF_TURN: f64 = 7.769130;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "doublet",
     title: "Reversibility of a doublet",
     text: "Two free discs of radius 0.05 around the centre of the unit box with u = (y - 1/2, 0) on all sides turn around each \
@@ -71,7 +71,7 @@ fn measure(method: &Method, number: f64, cells: f64, step: f64) -> Result<Vec<f6
         let discs = particles.map(|p| Ball::new(p.pose.position, p.radius));
         let mut twists = solver.solve(mesh(&refinement, &discs)?, &discs, &couette)?.twists;
         if method.lubricates {
-            open_films(&mut integrator, step, (&particles, &discs), &mut twists)?;
+            open_films(&mut integrator, step, &particles, &discs, &mut twists)?;
         }
         integrator.advance(step, &mut particles, &twists);
         let line = particles[1].pose.position - particles[0].pose.position;
@@ -92,7 +92,8 @@ fn measure(method: &Method, number: f64, cells: f64, step: f64) -> Result<Vec<f6
 fn open_films(
     integrator: &mut Integrator<2>,
     step: f64,
-    (particles, discs): (&[Particle<2>], &[Ball<2>]),
+    particles: &[Particle<2>],
+    discs: &[Ball<2>],
     twists: &mut [Twist<2>],
 ) -> Result<(), VerifyError> {
     let reach = integrator.film_reach(step, particles, twists);
@@ -116,7 +117,7 @@ fn sine(first: &Vector<2>, line: &Vector<2>) -> f64 {
     (first[0] * line[1] - first[1] * line[0]) / (first.norm() * line.norm())
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in METHODS.iter().map(|method| method.name) {
         for (start, name) in [(0.0, "half a radius apart"), (1.0, "figure 5")] {
@@ -126,11 +127,11 @@ fn numbers(table: &Table) -> Vec<Number> {
                     let run = format!("{name}, a/h = {cells}, step {step}");
                     let value = mean(&table.values("gap", method, &at));
                     let what = format!("{run}, change of the gap");
-                    numbers.push(Number::new(Kind::Error, what, method, value));
+                    numbers.push(Number::new(NumberKind::Error, what, method, value));
                     if start == 1.0 {
                         let value = mean(&table.values("half a turn", method, &at)) / HALF_TURN - 1.0;
                         let what = format!("{run}, time of half a turn");
-                        numbers.push(Number::new(Kind::Error, what, method, value));
+                        numbers.push(Number::new(NumberKind::Error, what, method, value));
                     }
                 }
             }
@@ -139,7 +140,7 @@ fn numbers(table: &Table) -> Vec<Number> {
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["half a radius apart", "figure 5"];
     Plot::of_methods("cells per radius *a*/*h*", "change of the gap in radii", &things, |method, start| {
         let at = [("start", start as f64), ("time step", 0.1)];

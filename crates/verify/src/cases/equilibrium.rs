@@ -8,10 +8,10 @@ use gluey_suspension::Container;
 use gluey_suspension::packing::{Amount, Arrangement, Packing, PackingParams};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::literature::{settling_lost_in_box, settling_of_spheres, viscosity_of_spheres};
 use crate::method::{IN_SHEARED_BOXES, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::statistics::{mean, scatter};
 
@@ -32,7 +32,7 @@ const SWEEPS: usize = 2000;
 /// standard errors 0.002, 0.006, 0.020, 0.03.
 const DISCS: [f64; 4] = [1.240, 1.601, 2.193, 3.19];
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "equilibrium",
     title: "Suspensions in equilibrium",
     text: "Hard discs and spheres in equilibrium, eighteen and twenty in a periodic box, 12 and 10 configurations of each fraction: mean \
@@ -155,7 +155,7 @@ fn expected(dimension: usize, phi: f64) -> f64 {
 }
 
 /// Errors of the means of viscosity and settling velocity.
-fn errors(table: &Table, method: &str, dimension: usize, phi: f64) -> [f64; 2] {
+fn errors(table: &CaseTable, method: &str, dimension: usize, phi: f64) -> [f64; 2] {
     let at = [("dimension", dimension as f64), ("phi", phi)];
     let mean_of = |measure: &str| mean(&table.values(measure, method, &at));
     let settling = mean_of("settling") + settling_lost_in_box(phi, COUNTS[1]);
@@ -167,7 +167,7 @@ fn standard_error(values: &[f64]) -> f64 {
     scatter(values) / (values.len() as f64).sqrt()
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (method, dimension) in iproduct!(IN_SHEARED_BOXES, [2, 3]) {
         for phi in table.steps("phi", method.name, &[("dimension", dimension as f64)]) {
@@ -177,15 +177,15 @@ fn numbers(table: &Table) -> Vec<Number> {
             for (k, measure) in CASE.measures.iter().enumerate().take(dimension - 1) {
                 let name = format!("{measure}, {dimension}D, phi = {phi}");
                 let scatter = standard_error(&table.values(measure, method.name, &at)) / scale[k];
-                numbers.push(Number::new(Kind::Error, name.clone(), method.name, errors[k]));
-                numbers.push(Number::new(Kind::Size, name + ", standard error", method.name, scatter));
+                numbers.push(Number::new(NumberKind::Error, name.clone(), method.name, errors[k]));
+                numbers.push(Number::new(NumberKind::Size, name + ", standard error", method.name, scatter));
             }
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["2D, viscosity", "3D, viscosity", "3D, settling"];
     Plot::of_methods("fraction", "error of the mean", &things, |method, thing| {
         let dimension = if thing == 0 { 2 } else { 3 };

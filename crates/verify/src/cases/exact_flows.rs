@@ -5,10 +5,10 @@ use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{couette, solve};
 use crate::statistics::largest;
@@ -19,7 +19,7 @@ const TOLERANCES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 const DETOUR: f64 = 10.0;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "exact-flows",
     title: "Couette and Poiseuille flow",
     text: "u = y - 1/2 and u = y (1 - y), p = -2 x are quadratic and linear: Q2-Q1 elements hold them exactly, on a mesh with \
@@ -61,17 +61,19 @@ impl<const D: usize> StokesSolution<D> for Channel {
 
 fn tasks(_: Extent) -> Vec<Task> {
     let channels = [Channel::Couette, Channel::Poiseuille];
-    let places = iproduct!(METHODS, channels, TOLERANCES, [measure::<2> as Measure, measure::<3>]);
+    let places = iproduct!(METHODS, channels, TOLERANCES, [measure::<2> as ChannelMeasure, measure::<3>]);
     let dimensions = [2.0, 3.0].into_iter().cycle();
-    let task =
-        |((method, channel, tolerance, measure), dimension): ((&'static Method, _, _, Measure), f64)| {
-            let at = [dimension, f64::from(channel as u8), tolerance];
-            Task::new(method.name, &at, move || measure(method, channel, tolerance))
-        };
+    let task = |((method, channel, tolerance, measure), dimension): (
+        (&'static Method, _, _, ChannelMeasure),
+        f64,
+    )| {
+        let at = [dimension, f64::from(channel as u8), tolerance];
+        Task::new(method.name, &at, move || measure(method, channel, tolerance))
+    };
     places.zip(dimensions).map(task).collect()
 }
 
-type Measure = fn(&Method, Channel, f64) -> Result<Vec<f64>, VerifyError>;
+type ChannelMeasure = fn(&Method, Channel, f64) -> Result<Vec<f64>, VerifyError>;
 
 fn measure<const D: usize>(method: &Method, channel: Channel, tolerance: f64) -> Result<Vec<f64>, VerifyError>
 where
@@ -87,20 +89,20 @@ where
     Ok(vec![errors.largest, errors.pressure])
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (dimension, (flow, name)) in iproduct!([2.0, 3.0], [(0.0, "Couette"), (1.0, "Poiseuille")]) {
         let at = [("dimension", dimension), ("flow", flow), ("tolerance", TOLERANCES[2])];
         for (measure, method) in iproduct!(&CASE.measures[..1 + flow as usize], METHODS) {
             let what = format!("{name} flow, {dimension}D, {measure}, tolerance 1e-12");
             let value = largest(&table.values(measure, method.name, &at));
-            numbers.push(Number::new(Kind::Size, what, method.name, value));
+            numbers.push(Number::new(NumberKind::Size, what, method.name, value));
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let (x, y) = ("tolerance of the solver", "largest relative error");
     Plot::of_methods(x, y, &["*u* 3D", "*p* 3D"], |method, thing| {
         let at = [("dimension", 3.0), ("flow", 1.0)];

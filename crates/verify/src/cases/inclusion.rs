@@ -7,9 +7,9 @@ use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, StokesSolution, ViscousSphere};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::norms::errors;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{around_one_body, disc_in_linear_flow, shift, sphere_in_linear_flow, uniform};
 use crate::statistics::over_positions;
@@ -19,7 +19,7 @@ const RATIOS: [f64; 3] = [2.0, 10.0, 100.0];
 const METHOD: &str = "paper";
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "inclusion",
     title: "A viscous inclusion",
     text: "A disc and a sphere of 2, 10 and 100 times the viscosity of the fluid around them in a linear flow, whose exact velocity is \
@@ -60,14 +60,14 @@ fn disc(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError
     let viscosity = InclusionViscosity::Finite(ratio);
     let (exact, strain) = disc_in_linear_flow(shift::<2>(position) / cells, viscosity);
     let stresslet = 4.0 * (ratio - 1.0) / (ratio + 1.0);
-    measure(cells, ratio, &exact, Ball::new(exact.center, 1.0), (strain, stresslet))
+    measure(cells, ratio, &exact, Ball::new(exact.center, 1.0), strain, stresslet)
 }
 
 fn sphere(cells: f64, ratio: f64, position: usize) -> Result<Vec<f64>, VerifyError> {
     let rigid = sphere_in_linear_flow(shift::<3>(position) / cells);
     let exact = ViscousSphere { rigid, ratio };
     let stresslet = 20.0 / 3.0 * exact.share();
-    measure(cells, ratio, &exact, Ball::new(rigid.center, 1.0), (rigid.strain, stresslet))
+    measure(cells, ratio, &exact, Ball::new(rigid.center, 1.0), rigid.strain, stresslet)
 }
 
 /// Errors of the velocity and of the stresslet, which is this many `pi mu a^D` times the strain.
@@ -76,7 +76,8 @@ fn measure<const D: usize>(
     ratio: f64,
     exact: &impl StokesSolution<D>,
     ball: Ball<D>,
-    (strain, stresslet): (Matrix<D>, f64),
+    strain: Matrix<D>,
+    stresslet: f64,
 ) -> Result<Vec<f64>, VerifyError>
 where
     Dim<D>: Space<D>,
@@ -96,17 +97,17 @@ where
 }
 
 /// The mean square of the errors of velocities, the mean of those of stresslets.
-fn statistic(table: &Table, measure: &str, at: &[(&str, f64)]) -> f64 {
+fn statistic(table: &CaseTable, measure: &str, at: &[(&str, f64)]) -> f64 {
     over_positions(measure, &table.values(measure, METHOD, at))
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (dimension, ratio) in iproduct!([2.0, 3.0], RATIOS) {
         let at = [("dimension", dimension), ("ratio", ratio)];
         let computed = table.steps("a/h", METHOD, &at);
         for &measure in CASE.measures {
-            let kind = if measure == "stresslet" { Kind::Error } else { Kind::Size };
+            let kind = if measure == "stresslet" { NumberKind::Error } else { NumberKind::Size };
             let of = |cells: f64| statistic(table, measure, &[&at[..], &[("a/h", cells)]].concat());
             let name = format!("{measure}, {dimension}D, {ratio} times");
             for &cells in &computed {
@@ -116,14 +117,14 @@ fn numbers(table: &Table) -> Vec<Number> {
                 let sizes: Vec<f64> = computed.iter().map(|cells| 1.0 / cells).collect();
                 let magnitudes: Vec<f64> = computed.iter().map(|&cells| of(cells)).collect();
                 let order = convergence_order(&sizes, &magnitudes);
-                numbers.push(Number::new(Kind::Order, format!("{name}, order"), METHOD, order));
+                numbers.push(Number::new(NumberKind::Order, format!("{name}, order"), METHOD, order));
             }
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["2D, 2 times", "2D, 100 times", "3D, 2 times", "3D, 100 times"];
     Plot::of_methods("cells per radius *a*/*h*", "error of the velocity", &things, |method, thing| {
         if method != METHOD {

@@ -6,8 +6,8 @@ use gluey_testkit::convergence_order;
 use gluey_testkit::reference::pair_3d_trajectory_unbounded;
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
-use crate::number::{Kind, Number};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
+use crate::number::{Number, NumberKind};
 use crate::plot::{Curve, Plot};
 use crate::set_up::exact_row;
 
@@ -19,7 +19,7 @@ const SCHEMES: [(&str, Scheme); 2] =
     [("euler", Scheme::Euler), ("adams-bashforth-2", Scheme::AdamsBashforth2)];
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "integrator",
     title: "Order in time",
     text: "Two spheres that meet in unbounded shear (paper, figure 7) with exact velocities (Batchelor and Green 1972) and films in balance, as in a run, to t = 7, \
@@ -73,24 +73,24 @@ fn advance(
     Ok(())
 }
 
-fn points(table: &Table, measure: &str, scheme: &str) -> Vec<(f64, f64)> {
+fn points(table: &CaseTable, measure: &str, scheme: &str) -> Vec<(f64, f64)> {
     table.values("time step", scheme, &[]).into_iter().zip(table.values(measure, scheme, &[])).collect()
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (measure, (method, _)) in iproduct!(CASE.measures, SCHEMES) {
         let (steps, errors): (Vec<f64>, Vec<f64>) = points(table, measure, method).into_iter().unzip();
         let what = format!("order of the error at the {measure}");
-        numbers.push(Number::new(Kind::Order, what, method, convergence_order(&steps, &errors)));
+        numbers.push(Number::new(NumberKind::Order, what, method, convergence_order(&steps, &errors)));
         let what = format!("error at the {measure}, smallest step");
         let smallest = errors.last().copied().unwrap_or(f64::NAN);
-        numbers.push(Number::new(Kind::Size, what, method, smallest));
+        numbers.push(Number::new(NumberKind::Size, what, method, smallest));
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let curve = |color: usize, dashes: usize| Curve {
         label: format!("{}, {}", SCHEMES[color].0, CASE.measures[dashes]),
         color,

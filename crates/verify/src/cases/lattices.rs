@@ -8,10 +8,10 @@ use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method, holding};
 use crate::norms::superficial_velocity;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{exact_row, radius_of, shift};
 use crate::statistics::{mean, rms};
@@ -20,7 +20,7 @@ use crate::statistics::{mean, rms};
 const FRACTIONS: [&[f64]; 2] = [&[0.1, 0.3, 0.5, 0.7], &[0.064, 0.2, 0.35, 0.5]];
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "lattices",
     title: "Drag of fixed lattices",
     text: "A body that is held in a box with periodic borders under a uniform force along x: the square lattice of discs and the \
@@ -93,7 +93,7 @@ fn exact(dimension: usize, phi: f64) -> Result<f64, VerifyError> {
     Ok(drag)
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (method, dimension) in iproduct!(holding(METHODS), [2.0, 3.0]) {
         for at in table.places(method.name, ["dimension", "cells", "phi"]) {
@@ -101,17 +101,17 @@ fn numbers(table: &Table) -> Vec<Number> {
             if own == dimension {
                 let name = format!("drag, {dimension}D, {cells} cells, phi = {phi}");
                 let drag = mean(&table.values("drag", method.name, &at));
-                numbers.push(Number::new(Kind::Error, name, method.name, drag));
+                numbers.push(Number::new(NumberKind::Error, name, method.name, drag));
             }
         }
         let forces = table.values("force", method.name, &[("dimension", dimension)]);
         let name = format!("force on the body and on the box, {dimension}D");
-        numbers.push(Number::new(Kind::Size, name, method.name, rms(&forces)));
+        numbers.push(Number::new(NumberKind::Size, name, method.name, rms(&forces)));
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["2D, *φ* = 0.1", "2D, *φ* = 0.7", "3D, *φ* = 0.064", "3D, *φ* = 0.5"];
     let (x, y) = ("cells per edge of the box", "rms relative error of the drag");
     Plot::of_methods(x, y, &things, |method, thing| {

@@ -6,10 +6,10 @@ use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, StokesSolution};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{around_one_body, disc_in_linear_flow, shift, solve, sphere_in_linear_flow, uniform};
 use crate::statistics::over_positions;
@@ -20,7 +20,7 @@ const MEASURES: &[&str] = &["velocity", "spin", "stresslet", "field", "field, la
 type Meshes = &'static [(f64, usize)];
 
 /// The chapter of the disc.
-pub const DISC: Case = Case {
+pub const DISC: VerificationCase = VerificationCase {
     name: "disc-in-linear-flow",
     title: "A disc in a linear flow, exact data on a box",
     text: "A free disc of radius one in the flow of Schmid and Podladchikov (2003) for a rigid inclusion, whose velocity is given \
@@ -35,7 +35,7 @@ pub const DISC: Case = Case {
 };
 
 /// The chapter of the sphere.
-pub const SPHERE: Case = Case {
+pub const SPHERE: VerificationCase = VerificationCase {
     name: "sphere-in-linear-flow",
     title: "A sphere in a linear flow, exact data on a box",
     text: "The same for a free sphere in a general linear flow (Batchelor 1967, section 4.11; Kim and Karrila 1991, section 3.3); \
@@ -55,9 +55,9 @@ fn sphere_meshes(extent: Extent) -> Meshes {
     extent.pick(&[(1.6, 8), (3.2, 2)], &[(1.6, 16), (3.2, 4), (4.8, 1)])
 }
 
-type Measure = fn(&'static Method, f64, usize) -> Result<Vec<f64>, VerifyError>;
+type FlowMeasure = fn(&'static Method, f64, usize) -> Result<Vec<f64>, VerifyError>;
 
-fn tasks(measure: Measure, meshes: Meshes) -> Vec<Task> {
+fn tasks(measure: FlowMeasure, meshes: Meshes) -> Vec<Task> {
     let of_mesh = |(method, &(cells, count)): (&'static Method, &(f64, usize))| {
         let task = move |k| Task::new(method.name, &[cells, k as f64], move || measure(method, cells, k));
         (0..count).map(task)
@@ -116,14 +116,14 @@ where
 }
 
 /// The statistic of a measure over positions.
-fn statistic(table: &Table, method: &str, measure: &str, cells: f64) -> f64 {
+fn statistic(table: &CaseTable, method: &str, measure: &str, cells: f64) -> f64 {
     over_positions(measure, &table.values(measure, method, &[("a/h", cells)]))
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (&measure, method) in iproduct!(MEASURES, METHODS) {
-        let kind = if measure == "stresslet" { Kind::Error } else { Kind::Size };
+        let kind = if measure == "stresslet" { NumberKind::Error } else { NumberKind::Size };
         let (mut sizes, mut magnitudes) = (Vec::new(), Vec::new());
         for cells in table.steps("a/h", method.name, &[]) {
             let value = statistic(table, method.name, measure, cells);
@@ -132,12 +132,12 @@ fn numbers(table: &Table) -> Vec<Number> {
             magnitudes.push(value.abs());
         }
         let value = convergence_order(&sizes, &magnitudes);
-        numbers.push(Number::new(Kind::Order, format!("{measure}, order"), method.name, value));
+        numbers.push(Number::new(NumberKind::Order, format!("{measure}, order"), method.name, value));
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["velocity", "spin", "stresslet", "field"];
     Plot::of_methods("cells per radius *a*/*h*", "error", &things, |method, thing| {
         let point = |cells: f64| (cells, statistic(table, method, things[thing], cells).abs());

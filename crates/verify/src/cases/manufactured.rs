@@ -7,16 +7,16 @@ use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution, WavyPressure};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
 use crate::norms::errors;
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 
 const FLOW: WavyPressure = WavyPressure(PolynomialFlow { viscosity: 1.0 });
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "manufactured",
     title: "Manufactured solutions without bodies",
     text: "The flow of the stream function g(x) g(y), g(t) = t^2 (1-t)^2 (in 3D the curl of g(x) g(y) g(z) (1, 1, 1)), with the \
@@ -72,7 +72,7 @@ where
     Ok(vec![errors.velocity, errors.pressure / errors.pressure_scale])
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let order = |(dimension, hanging, &measure, method): (f64, f64, &&str, &Method)| {
         let mesh = if hanging == 0.0 { "uniform" } else { "hanging nodes" };
         let at = [("dimension", dimension), ("hanging nodes", hanging)];
@@ -80,16 +80,16 @@ fn numbers(table: &Table) -> Vec<Number> {
         let finest = &points[points.len().saturating_sub(2)..];
         let (sizes, errors): (Vec<f64>, Vec<f64>) = finest.iter().copied().unzip();
         let what = format!("order of the {measure}, {dimension}D, {mesh}");
-        Number::new(Kind::Order, what, method.name, convergence_order(&sizes, &errors))
+        Number::new(NumberKind::Order, what, method.name, convergence_order(&sizes, &errors))
     };
     iproduct!([2.0, 3.0], [0.0, 1.0], CASE.measures, METHODS).map(order).collect()
 }
 
-fn points(table: &Table, measure: &str, method: &str, at: &[(&str, f64)]) -> Vec<(f64, f64)> {
+fn points(table: &CaseTable, measure: &str, method: &str, at: &[(&str, f64)]) -> Vec<(f64, f64)> {
     table.values("h", method, at).into_iter().zip(table.values(measure, method, at)).collect()
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["*u* 2D", "*u* 3D", "*p* 2D", "*p* 3D"];
     Plot::of_methods("cell size *h*", "relative error", &things, |method, thing| {
         let at = [("dimension", [2.0, 3.0][thing % 2]), ("hanging nodes", 1.0)];

@@ -21,10 +21,10 @@ mod symmetry;
 mod unequal_pairs;
 mod wall;
 
-use crate::case::Case;
+use crate::case::VerificationCase;
 
 /// All of them, in the order of the book.
-pub const CASES: &[Case] = &[
+pub const CASES: &[VerificationCase] = &[
     manufactured::CASE,
     exact_flows::CASE,
     disc::CASE,

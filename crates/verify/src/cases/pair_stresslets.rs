@@ -7,7 +7,7 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::exact::{PairStrain, pair_in_strain};
 
-use crate::case::{Case, Table, VerifyError};
+use crate::case::{CaseTable, VerificationCase, VerifyError};
 use crate::method::Method;
 use crate::plot::Plot;
 use crate::set_up::{SpherePairs, level, shift, stress_of};
@@ -23,7 +23,7 @@ const MESHES: [f64; 2] = [1.6, 3.2];
 const PAIRS: SpherePairs = SpherePairs { meshes: &MESHES, gaps: &GAPS };
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "pair-stresslets",
     title: "Stresslets of two spheres",
     text: "Two free spheres of radius 0.0125 in a periodic unit box in a strain: along the line of centres and across it on both sides \
@@ -75,7 +75,7 @@ pub(super) fn axes(position: usize) -> [Vector<3>; 3] {
     [side * turn_cos + other * turn_sin, other * turn_cos - side * turn_sin, line]
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things =
         ["along, *a*/*h* = 1.6", "along, *a*/*h* = 3.2", "tilting, *a*/*h* = 3.2", "across, *a*/*h* = 3.2"];
     Plot::of_methods("gap in radii", "rms relative error of the stresslet", &things, |method, thing| {

@@ -7,9 +7,9 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{IN_SHEARED_BOXES, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{level, shift, stress_of};
 use crate::statistics::mean;
@@ -25,7 +25,7 @@ const FAR: f64 = 7.5;
 const COEFFICIENT: f64 = 5.002;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "random-pairs",
     title: "The second coefficient of the viscosity",
     text: "The relative viscosity of spheres at random is 1 + 5/2 phi + c phi^2 with c = 5/2 + 15/2 int_2^inf J r^2 dr (Batchelor and \
@@ -118,18 +118,18 @@ fn coefficient(values: &[f64]) -> [f64; 2] {
     [2.5 + 7.5 * integral, 7.5 / 3.0 * (near - far) * error]
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in IN_SHEARED_BOXES {
         let [found, error] = coefficient(&table.values("J r^6", method.name, &[]));
         let miss = "second coefficient less 5.002".to_owned();
-        numbers.push(Number::new(Kind::Error, miss, method.name, found - COEFFICIENT));
-        numbers.push(Number::new(Kind::Size, "its standard error".to_owned(), method.name, error));
+        numbers.push(Number::new(NumberKind::Error, miss, method.name, found - COEFFICIENT));
+        numbers.push(Number::new(NumberKind::Size, "its standard error".to_owned(), method.name, error));
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     Plot::of_methods("r^-3 of the pair", "J r^6", &["pairs"], |method, _| {
         let of = |measure| table.values(measure, method, &[]);
         of("r^-3").into_iter().zip(of("J r^6")).collect()

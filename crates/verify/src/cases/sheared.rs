@@ -6,9 +6,9 @@ use gluey_stokes::{Conditions, Flow, FlowSolver};
 use gluey_testkit::reference::{sheared_simple_cubic_lattice, sheared_square_lattice};
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{IN_SHEARED_BOXES, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{exact_row, periodic_mesh, radius_of, shift, simple_shear, stress_of};
 use crate::statistics::rms;
@@ -19,7 +19,7 @@ const FRACTIONS: [&[f64]; 2] = [&[0.1, 0.3], &[0.1, 0.3]];
 const STRAINS: [f64; 4] = [0.0, 0.1, 0.3, 0.5];
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "sheared",
     title: "Sheared lattices",
     text: "A free body in simple shear in a box that is periodic in all directions, whose images slide along each other: the square \
@@ -92,7 +92,7 @@ fn exact(dimension: usize, phi: f64, strain: f64) -> Result<[f64; 4], VerifyErro
     Ok([eta, n1, 0.0, omega])
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in IN_SHEARED_BOXES {
         for (at, measure) in iproduct!(table.places(method.name, ["dimension", "cells"]), CASE.measures) {
@@ -100,13 +100,13 @@ fn numbers(table: &Table) -> Vec<Number> {
             let name = format!("{measure}, {dimension}D, {cells} cells");
             let values = table.values(measure, method.name, &at);
             let largest = values.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
-            numbers.push(Number::new(Kind::Error, name, method.name, largest));
+            numbers.push(Number::new(NumberKind::Error, name, method.name, largest));
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["2D, viscosity", "2D, normal stress", "3D, viscosity", "3D, normal stresses"];
     Plot::of_methods("cells per edge of the box", "rms error", &things, |method, thing| {
         let at = [("dimension", (2 + thing / 2) as f64)];

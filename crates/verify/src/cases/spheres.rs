@@ -6,7 +6,7 @@ use gluey_motion::{Configuration, Hydrodynamics, LinearFlow, PairMobility};
 use gluey_stokes::Refinement;
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{FILM_METHODS, METHODS, Method};
 use crate::number::Number;
 use crate::plot::Plot;
@@ -26,7 +26,7 @@ const DIRECTIONS: [[f64; 2]; 2] = [[135.0, 0.0], [160.0, 30.0]];
 const FEW: usize = 4;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "spheres",
     title: "Two spheres",
     text: "Two free spheres of radius 0.0125 in the middle of the unit box with u = y - 1/2 on all sides, the line of centres at \
@@ -97,7 +97,7 @@ fn tolerance(gap: f64, direction: [f64; 2]) -> f64 {
     if FILMS.contains(&gap) || direction != DIRECTIONS[0] { 1e-8 } else { 1e-6 }
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in FILM_METHODS {
         for at in table.places(method.name, ["a/h", "gap", "angle"]) {
@@ -110,7 +110,7 @@ fn numbers(table: &Table) -> Vec<Number> {
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let cells = [1.6, 3.2, 6.4];
     let things = ["*a*/*h* = 1.6", "*a*/*h* = 3.2", "*a*/*h* = 6.4"];
     Plot::of_methods("gap in radii", "rms relative error of the approach", &things, |method, thing| {

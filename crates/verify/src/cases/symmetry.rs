@@ -6,9 +6,9 @@ use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::TreeMesh;
 use itertools::iproduct;
 
-use crate::case::{Case, Extent, Table, Task, VerifyError};
+use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{couette, solve};
 use crate::statistics::largest;
@@ -21,7 +21,7 @@ const OPERATIONS: [&str; 3] = ["translation by cells", "quarter turn", "reciproc
 const RECIPROCITY: usize = 2;
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "symmetry",
     title: "Translation by whole cells, quarter turns, reciprocity",
     text: "Two free bodies of radius 0.1 in shear on a uniform mesh of the unit box (a/h = 3.2 in 2D, 1.6 in 3D). Moved by three cells along a period \
@@ -41,9 +41,9 @@ const RADIUS: f64 = 0.1;
 fn tasks(_: Extent) -> Vec<Task> {
     let mut tasks = Vec::new();
     for (method, tolerance) in iproduct!(METHODS, TOLERANCES) {
-        let plane: [Measure; 3] = [translation::<2>, quarter_turn::<2>, asymmetry::<2>];
-        let space: [Measure; 3] = [translation::<3>, quarter_turn::<3>, asymmetry::<3>];
-        let task = |dimension: f64, level: u8, operation: usize, measure: Measure| {
+        let plane: [SymmetryMeasure; 3] = [translation::<2>, quarter_turn::<2>, asymmetry::<2>];
+        let space: [SymmetryMeasure; 3] = [translation::<3>, quarter_turn::<3>, asymmetry::<3>];
+        let task = |dimension: f64, level: u8, operation: usize, measure: SymmetryMeasure| {
             let at = [dimension, operation as f64, tolerance];
             Task::new(method.name, &at, move || Ok(vec![measure(method, level, tolerance)?]))
         };
@@ -56,7 +56,7 @@ fn tasks(_: Extent) -> Vec<Task> {
     tasks
 }
 
-type Measure = fn(&Method, u8, f64) -> Result<f64, VerifyError>;
+type SymmetryMeasure = fn(&Method, u8, f64) -> Result<f64, VerifyError>;
 
 /// Largest difference of the resistance matrix of two unequal bodies from its transpose, over its largest
 /// entry.
@@ -148,7 +148,7 @@ where
     largest(&a.iter().zip(b).flat_map(of_body).collect::<Vec<_>>())
 }
 
-fn numbers(table: &Table) -> Vec<Number> {
+fn numbers(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (dimension, (operation, name), method) in
         iproduct!([2.0, 3.0], OPERATIONS.iter().enumerate(), METHODS)
@@ -157,13 +157,13 @@ fn numbers(table: &Table) -> Vec<Number> {
         if method.holds_bodies || operation != RECIPROCITY {
             let value = largest(&table.values("difference", method.name, &at));
             let what = format!("{name}, {dimension}D, tolerance 1e-10");
-            numbers.push(Number::new(Kind::Size, what, method.name, value));
+            numbers.push(Number::new(NumberKind::Size, what, method.name, value));
         }
     }
     numbers
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     Plot::of_methods("tolerance of the solver", "largest difference, 3D", &OPERATIONS, |method, operation| {
         let at = [("dimension", 3.0), ("operation", operation as f64)];
         let points = table.values("tolerance", method, &at).into_iter();

@@ -7,7 +7,7 @@ use gluey_testkit::exact::PairStrain;
 use gluey_testkit::reference::spheres_one_to_two;
 
 use super::pair_stresslets::axes;
-use crate::case::{Case, Table, VerifyError};
+use crate::case::{CaseTable, VerificationCase, VerifyError};
 use crate::method::Method;
 use crate::plot::Plot;
 use crate::set_up::{SpherePairs, exact_row, level, shift};
@@ -23,7 +23,7 @@ const MESHES: [f64; 2] = [1.6, 3.2];
 const PAIRS: SpherePairs = SpherePairs { meshes: &MESHES, gaps: &GAPS };
 
 /// The chapter.
-pub const CASE: Case = Case {
+pub const CASE: VerificationCase = VerificationCase {
     name: "unequal-pairs",
     title: "Two spheres, one twice as large",
     text: "Two free spheres of radii 0.0125 and 0.025 in a periodic unit box: the speed at which they approach in a strain along the line \
@@ -89,7 +89,7 @@ fn exact(gap: f64) -> Result<[f64; 6], VerifyError> {
     exact_row(&spheres_one_to_two()?, &[("gap", gap)], COLUMNS)
 }
 
-fn plot(table: &Table) -> Plot {
+fn plot(table: &CaseTable) -> Plot {
     let things = ["approach", "turning", "pushed", "dragged"];
     Plot::of_methods("gap in smaller radii", "rms relative error, *a*/*h* = 3.2", &things, |method, thing| {
         let error = |gap| rms(&table.values(things[thing], method, &[("a/h", MESHES[1]), ("gap", gap)]));

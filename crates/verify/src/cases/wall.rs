@@ -7,9 +7,9 @@ use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use itertools::iproduct;
 
-use crate::case::{Case, Table, Task, VerifyError};
+use crate::case::{CaseTable, Task, VerificationCase, VerifyError};
 use crate::method::{FILM_METHODS, Method, holding};
-use crate::number::{Kind, Number};
+use crate::number::{Number, NumberKind};
 use crate::plot::Plot;
 use crate::set_up::{level, mean_and_scatter, mesh, shift};
 use crate::statistics::{largest, rms};
@@ -26,7 +26,7 @@ const ALPHAS: [f64; 4] = [1.0, 0.5, 0.3, 0.1];
 const TABLE: [[f64; 2]; 4] = [[1.5675, 1.0998], [2.1514, 1.3877], [2.6475, 1.7012], [3.7863, 2.5056]];
 
 /// The chapter of the disc.
-pub const DISC: Case = Case {
+pub const DISC: VerificationCase = VerificationCase {
     name: "disc-wall",
     title: "A disc near a wall",
     text: "A disc of radius 0.003125 near a wall of the unit box at rest, held at a velocity across or along the wall or at a spin, at \
@@ -42,7 +42,7 @@ pub const DISC: Case = Case {
 };
 
 /// The chapter of the sphere.
-pub const SPHERE: Case = Case {
+pub const SPHERE: VerificationCase = VerificationCase {
     name: "wall",
     title: "A sphere near a wall",
     text: "A sphere of radius 0.0125 near a wall of the unit box at rest, held at a velocity across or along the wall or at a spin \
@@ -80,11 +80,11 @@ fn of_disc(alpha: f64) -> [f64; 3] {
 }
 
 /// The measures by a method, with these cells per radius, at the place of this number and this position.
-type Measure = fn(&Method, f64, usize, usize) -> Result<Vec<f64>, VerifyError>;
+type WallMeasure = fn(&Method, f64, usize, usize) -> Result<Vec<f64>, VerifyError>;
 
 /// By meshes, with cells per radius and the number of positions along the wall. The thinnest film, which no
 /// mesh here resolves, is asked only of what lubricates.
-fn tasks(measure: Measure, meshes: &[(f64, usize)]) -> Vec<Task> {
+fn tasks(measure: WallMeasure, meshes: &[(f64, usize)]) -> Vec<Task> {
     let mut tasks = Vec::new();
     for (method, &(cells, count)) in iproduct!(holding(FILM_METHODS), meshes) {
         let places = if method.lubricates { ALPHAS.len() } else { ALPHAS.len() - 1 };
@@ -152,7 +152,7 @@ where
 }
 
 /// Mean and scatter of forces and torque at a place.
-fn of_place(table: &Table, method: &Method, at: &[(&'static str, f64); 2]) -> Vec<Number> {
+fn of_place(table: &CaseTable, method: &Method, at: &[(&'static str, f64); 2]) -> Vec<Number> {
     let [(_, cells), (_, gap)] = at;
     let of_measure = |measure: &&str| {
         let name = format!("{measure}, a/h = {cells}, gap {gap:.3} a");
@@ -161,7 +161,7 @@ fn of_place(table: &Table, method: &Method, at: &[(&'static str, f64); 2]) -> Ve
     DISC.measures[..3].iter().flat_map(of_measure).collect()
 }
 
-fn numbers_of_disc(table: &Table) -> Vec<Number> {
+fn numbers_of_disc(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in holding(FILM_METHODS) {
         for at in table.places(method.name, ["a/h", "gap"]) {
@@ -169,24 +169,24 @@ fn numbers_of_disc(table: &Table) -> Vec<Number> {
             let [(_, cells), (_, gap)] = at;
             let name = format!("coupling, a/h = {cells}, gap {gap:.3} a");
             let coupling = largest(&table.values("coupling", method.name, &at));
-            numbers.push(Number::new(Kind::Size, name, method.name, coupling));
+            numbers.push(Number::new(NumberKind::Size, name, method.name, coupling));
         }
     }
     numbers
 }
 
-fn numbers_of_sphere(table: &Table) -> Vec<Number> {
+fn numbers_of_sphere(table: &CaseTable) -> Vec<Number> {
     let mut numbers = Vec::new();
     for method in holding(FILM_METHODS) {
         let places = table.places(method.name, ["a/h", "gap"]);
         numbers.extend(places.iter().flat_map(|at| of_place(table, method, at)));
         let asymmetry = largest(&table.values("reciprocity", method.name, &[]));
-        numbers.push(Number::new(Kind::Size, "reciprocity".to_owned(), method.name, asymmetry));
+        numbers.push(Number::new(NumberKind::Size, "reciprocity".to_owned(), method.name, asymmetry));
     }
     numbers
 }
 
-fn plot(table: &Table, y: &'static str, cells: f64) -> Plot {
+fn plot(table: &CaseTable, y: &'static str, cells: f64) -> Plot {
     let things = &DISC.measures[..3];
     Plot::of_methods("gap in radii", y, things, |method, thing| {
         let at = |gap| [("a/h", cells), ("gap", gap)];

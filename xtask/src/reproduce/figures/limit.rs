@@ -27,7 +27,7 @@ const FILMS: [(f64, &str); 4] = [(0.2, "#a9cdb8"), (0.1, "#6db08b"), (0.05, "#3a
 const GLUEY: Stroke = Stroke { color: "#0b4f9e", width: 1.8, dashes: Some("9 4") };
 
 /// Gap and memory over time, in radii.
-struct Run {
+struct Encounter {
     gap: Vec<(f64, f64)>,
     memory: Vec<(f64, f64)>,
 }
@@ -35,13 +35,13 @@ struct Run {
 /// Gaps above, memories below.
 pub fn limit() -> Canvas {
     let label = |s: f64| format!("lubrication, *s* = {s}");
-    let mut runs: Vec<(String, Stroke, Option<Run>)> = FILMS
+    let mut runs: Vec<(String, Stroke, Option<Encounter>)> = FILMS
         .map(|(s, color)| (label(s), Stroke { color, width: 1.8, dashes: None }, lubricated(s)))
         .into_iter()
         .collect();
     runs.push(("gluey contact".to_owned(), GLUEY, gluey()));
-    let curves = |points: fn(&Run) -> &Vec<(f64, f64)>| -> Vec<Curve> {
-        let curve = |(label, stroke, run): &(String, Stroke, Option<Run>)| Curve {
+    let curves = |points: fn(&Encounter) -> &Vec<(f64, f64)>| -> Vec<Curve> {
+        let curve = |(label, stroke, run): &(String, Stroke, Option<Encounter>)| Curve {
             label: Some(label.clone()),
             stroke: *stroke,
             pieces: run.iter().map(|run| points(run).clone()).collect(),
@@ -73,9 +73,9 @@ fn steps() -> impl Iterator<Item = f64> {
 }
 
 /// With a film of resistance `s a / g`; `None` if it closes.
-fn lubricated(s: f64) -> Option<Run> {
+fn lubricated(s: f64) -> Option<Encounter> {
     let (mut particles, mut integrator) = (pair(), Integrator::new(Scheme::AdamsBashforth2));
-    let mut run = Run { gap: Vec::new(), memory: Vec::new() };
+    let mut run = Encounter { gap: Vec::new(), memory: Vec::new() };
     for t in steps() {
         let gap = particles[0].gap(&particles[1]);
         run.gap.push((t, gap));
@@ -99,12 +99,12 @@ fn lubricated(s: f64) -> Option<Run> {
 }
 
 /// With gluey contact; `None` if that fails.
-fn gluey() -> Option<Run> {
+fn gluey() -> Option<Encounter> {
     let (mut particles, mut integrator) = (pair(), Integrator::new(Scheme::AdamsBashforth2));
     let params =
         ContactParams { exact_gap: true, gamma_update: GammaUpdate::Consistent, ..Default::default() };
     let mut contact = PairContact::new(params);
-    let mut run = Run { gap: Vec::new(), memory: Vec::new() };
+    let mut run = Encounter { gap: Vec::new(), memory: Vec::new() };
     for t in steps() {
         let gamma: f64 = contact.contacts().iter().map(|contact| contact.gamma).sum();
         run.gap.push((t, particles[0].gap(&particles[1])));

@@ -62,10 +62,10 @@ fn axes(curves: &[Curve]) -> (Axis, Axis) {
         (values().reduce(f64::min).unwrap_or(0.0), values().reduce(f64::max).unwrap_or(1.0))
     };
     let (x, y) = (bounds(|p| p.0), bounds(|p| p.1));
-    (axis("*x*", x), axis("*y*", y))
+    (axis("*x*", x.0, x.1), axis("*y*", y.0, y.1))
 }
 
-fn axis(label: &str, (low, high): (f64, f64)) -> Axis {
+fn axis(label: &str, low: f64, high: f64) -> Axis {
     let tick = [0.2, 0.1, 0.05, 0.02].into_iter().find(|tick| high - low > 3.5 * tick).unwrap_or(0.01);
     let half = 0.5 * tick;
     let (min, max) = ((low / half - 0.2).floor() * half, (high / half + 0.2).ceil() * half);

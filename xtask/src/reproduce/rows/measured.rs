@@ -26,12 +26,12 @@ pub struct Evidence<'a> {
 
 impl Evidence<'_> {
     /// A run that reached its end; one that is too short is as good as none.
-    pub fn run(&self, case: CaseName, approach: Approach) -> Option<View<'_>> {
+    pub fn run(&self, case: CaseName, approach: Approach) -> Option<RunView<'_>> {
         let key = RunKey { case, approach };
         let (run, settings) = (self.data.runs.get(&key)?, self.data.settings.get(&key)?);
         let is_whole = run.end() >= settings.end * (1.0 - 1e-9);
         let (exact, approach) = (self.exact(case), Some(approach));
-        is_whole.then_some(View { run, exact, case, approach, evidence: self })
+        is_whole.then_some(RunView { run, exact, case, approach, evidence: self })
     }
 
     /// The exact solution of a case.
@@ -42,7 +42,7 @@ impl Evidence<'_> {
 
 /// A run, or an exact solution, and what it may be compared with.
 #[derive(Clone, Copy)]
-pub struct View<'a> {
+pub struct RunView<'a> {
     /// Its trajectory.
     pub run: &'a Trajectory,
     /// The exact solution of its case.
@@ -56,15 +56,15 @@ pub struct View<'a> {
 }
 
 /// A number that a run has, if it can be measured.
-pub type Measure = fn(&View<'_>) -> Option<f64>;
+pub type RunMeasure = fn(&RunView<'_>) -> Option<f64>;
 
 /// The measure of this name.
-pub fn measure(name: &str) -> Option<Measure> {
+pub fn measure(name: &str) -> Option<RunMeasure> {
     MEASURES.iter().find(|(own, _)| *own == name).map(|(_, measure)| *measure)
 }
 
 /// Gaps, then times, then places.
-const MEASURES: &[(&str, Measure)] = &[
+const MEASURES: &[(&str, RunMeasure)] = &[
     ("smallest D/a", smallest),
     ("smallest D/a of all pairs", smallest),
     ("smallest D/a, relative error", |v| Some(smallest(v)? / smallest_gap(v.exact?)? - 1.0)),
@@ -137,33 +137,33 @@ const MEASURES: &[(&str, Measure)] = &[
     ("largest distance of a centre from the exact one to t = 6, in radii", |v| off_exact(v, 6.0)),
 ];
 
-impl View<'_> {
+impl RunView<'_> {
     /// Another run of its case.
-    fn beside(&self, approach: Approach) -> Option<View<'_>> {
+    fn beside(&self, approach: Approach) -> Option<RunView<'_>> {
         self.evidence.run(self.case, approach)
     }
 }
 
-fn smallest(v: &View<'_>) -> Option<f64> {
+fn smallest(v: &RunView<'_>) -> Option<f64> {
     smallest_gap(v.run)
 }
 
-fn largest(v: &View<'_>) -> Option<f64> {
+fn largest(v: &RunView<'_>) -> Option<f64> {
     largest_gap(v.run, PAIR)
 }
 
-fn largest_in_contact(v: &View<'_>) -> Option<f64> {
+fn largest_in_contact(v: &RunView<'_>) -> Option<f64> {
     largest_gap_while_touching(v.run, v.beside(Approach::Gluey)?.run)
 }
 
-fn reversibility(v: &View<'_>) -> Option<f64> {
+fn reversibility(v: &RunView<'_>) -> Option<f64> {
     v.evidence.reports.get(&RunKey { case: v.case, approach: v.approach? })?.reversibility_error
 }
 
-fn off_exact(v: &View<'_>, until: f64) -> Option<f64> {
+fn off_exact(v: &RunView<'_>, until: f64) -> Option<f64> {
     Some(center_deviation(v.run, v.exact?, until)? / RADIUS)
 }
 
-fn off_gluey(v: &View<'_>) -> Option<f64> {
+fn off_gluey(v: &RunView<'_>) -> Option<f64> {
     Some(center_deviation(v.run, v.beside(Approach::Gluey)?.run, TO_THE_END)? / RADIUS)
 }

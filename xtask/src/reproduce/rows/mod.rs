@@ -7,12 +7,12 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::plan::FigureName;
-use super::verdict::{Claim, Row};
-pub use measured::{Evidence, View, measure};
+use super::verdict::{Claim, JudgedClaim};
+pub use measured::{Evidence, RunView, measure};
 
-/// What stands in `rows.toml`.
+/// The content of `rows.toml`.
 #[derive(Deserialize)]
-struct Rows {
+struct RowsFile {
     figure: Vec<FigureText>,
     row: Vec<Claim>,
 }
@@ -27,7 +27,7 @@ pub struct FigureText {
     pub columns: Vec<String>,
 }
 
-static ROWS: LazyLock<Rows> =
+static ROWS: LazyLock<RowsFile> =
     LazyLock::new(|| toml::from_str(include_str!("rows.toml")).expect("a test reads it"));
 
 /// All rows before they are judged.
@@ -41,7 +41,7 @@ pub fn text(figure: FigureName) -> &'static FigureText {
 }
 
 /// The rows of the chosen figures.
-pub fn all(figures: &[FigureName], evidence: &Evidence<'_>) -> Vec<Row> {
+pub fn all(figures: &[FigureName], evidence: &Evidence<'_>) -> Vec<JudgedClaim> {
     let quick = evidence.data.quick;
     let of_figure = |figure| claims().iter().filter(move |claim| claim.figure == figure);
     let chosen = figures.iter().copied().flat_map(of_figure).filter(|claim| !quick || !claim.full_only);

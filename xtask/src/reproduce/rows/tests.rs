@@ -7,10 +7,10 @@ use crate::reproduce::figures::Data;
 use crate::reproduce::plan::{Approach, CaseName, RunKey};
 use crate::reproduce::reference;
 use crate::reproduce::settings::Settings;
-use crate::reproduce::verdict::Kind;
+use crate::reproduce::verdict::ClaimKind;
 use clap::ValueEnum;
 use gluey::RunReport;
-use gluey_verify::Outcome;
+use gluey_verify::Judgement;
 
 const RUNS: [(CaseName, f64); 3] =
     [(CaseName::Pair2d, 30.0), (CaseName::Pair3d, 16.8), (CaseName::Trio2d, 12.0)];
@@ -43,10 +43,10 @@ impl Exact {
 
     /// The rows that compare `unfitted` with the exact solutions, but for the one that is read from a
     /// report.
-    fn rows(&self) -> Vec<Row> {
+    fn rows(&self) -> Vec<JudgedClaim> {
         let evidence = Evidence { data: &self.data, reports: &self.reports };
         let mut rows = all(FigureName::value_variants(), &evidence);
-        rows.retain(|row| row.claim.kind == Kind::Exact && row.claim.run.ends_with("unfitted"));
+        rows.retain(|row| row.claim.kind == ClaimKind::Exact && row.claim.run.ends_with("unfitted"));
         rows.retain(|row| row.claim.id != "fig7a-reversibility-unfitted");
         rows
     }
@@ -56,7 +56,7 @@ impl Exact {
 fn the_exact_solutions_agree_with_themselves() {
     let rows = Exact::new(0.0, |end| end).rows();
     assert_eq!(rows.len(), 9);
-    assert!(rows.iter().all(|row| row.outcome == Outcome::Yes), "{rows:#?}");
+    assert!(rows.iter().all(|row| row.outcome == Judgement::Yes), "{rows:#?}");
 }
 
 #[test]
@@ -66,14 +66,14 @@ fn a_clock_ten_percent_slow_is_noticed() {
     // a only.
     let timeless = ["fig5-distance-unfitted", "fig6-circle-unfitted", "fig7a-smallest-unfitted"];
     for row in rows.iter().filter(|row| !timeless.contains(&&*row.claim.id)) {
-        assert_eq!(row.outcome, Outcome::No, "{row:#?}");
+        assert_eq!(row.outcome, Judgement::No, "{row:#?}");
     }
 }
 
 #[test]
 fn a_run_that_ends_too_early_measures_nothing() {
     for row in Exact::new(0.0, |end| 2.0 * end).rows() {
-        assert_eq!((row.outcome, row.value), (Outcome::NotMeasured, None), "{row:#?}");
+        assert_eq!((row.outcome, row.value), (Judgement::NotMeasured, None), "{row:#?}");
     }
 }
 
@@ -81,7 +81,7 @@ fn a_run_that_ends_too_early_measures_nothing() {
 fn missing_runs_are_failures() {
     let (data, reports) = (Data::default(), BTreeMap::new());
     let rows = all(FigureName::value_variants(), &Evidence { data: &data, reports: &reports });
-    assert!(rows.len() > 40 && rows.iter().all(Row::is_failure), "{rows:#?}");
+    assert!(rows.len() > 40 && rows.iter().all(JudgedClaim::is_failure), "{rows:#?}");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn every_figure_with_runs_has_statements_and_every_row_its_own_name() {
     let rows = all(FigureName::value_variants(), &Evidence { data: &data, reports: &reports });
     for figure in FigureName::all().filter(|figure| !figure.approaches().is_empty()) {
         let statements =
-            rows.iter().filter(|row| row.claim.figure == figure && row.claim.kind == Kind::Paper);
+            rows.iter().filter(|row| row.claim.figure == figure && row.claim.kind == ClaimKind::Paper);
         assert!(statements.count() >= 2, "{figure}");
     }
     let mut names: Vec<&str> = rows.iter().map(|row| &*row.claim.id).collect();
