@@ -5,7 +5,7 @@ use gluey_geom::Vector;
 use gluey_levelset::Ball;
 use serde::Serialize;
 
-/// Seed of the lattice of [`Case::M3`].
+/// Seed of the lattice of [`BenchCase::M3`].
 const LATTICE_SEED: u64 = 2010;
 /// Half the width of the jitter of the lattice.
 const JITTER: f64 = 0.03;
@@ -14,7 +14,7 @@ const RADII: [f64; 2] = [0.05, 0.1];
 
 /// A benchmark case; the digit is the dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
-pub enum Case {
+pub enum BenchCase {
     /// No particle, constant viscosity, a polynomial force.
     #[value(name = "C2")]
     C2,
@@ -32,7 +32,7 @@ pub enum Case {
     M3,
 }
 
-impl Case {
+impl BenchCase {
     /// 2 or 3.
     pub fn dimension(self) -> usize {
         match self {
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_spheres_of_the_lattice_neither_touch_nor_leave_the_box() {
-        let spheres = Case::M3.balls::<3>();
+        let spheres = BenchCase::M3.balls::<3>();
         assert_eq!(spheres.len(), 27);
         for (i, a) in spheres.iter().enumerate() {
             assert!(a.center().iter().all(|&x| x > 0.1 && x < 0.9));

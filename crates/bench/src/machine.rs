@@ -14,7 +14,7 @@ const TRIAD_CHUNK: usize = 1 << 16;
 
 /// Seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Times {
+pub struct SolveTimes {
     /// By the clock on the wall.
     pub wall: f64,
     /// Of all threads together, where the system tells.
@@ -34,9 +34,9 @@ impl Stopwatch {
     }
 
     /// What went by since the start.
-    pub fn stop(&self) -> Times {
+    pub fn stop(&self) -> SolveTimes {
         let cpu = cpu_s().zip(self.cpu).map(|(now, start)| now - start);
-        Times { wall: self.wall.elapsed().as_secs_f64(), cpu }
+        SolveTimes { wall: self.wall.elapsed().as_secs_f64(), cpu }
     }
 }
 

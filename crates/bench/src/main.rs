@@ -18,7 +18,7 @@ use clap::Parser;
 #[command(bin_name = "cargo xtask bench-stokes", max_term_width = 100)]
 struct Arguments {
     #[command(flatten)]
-    options: options::Options,
+    options: options::StokesBenchOptions,
 }
 
 fn main() -> ExitCode {

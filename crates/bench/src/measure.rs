@@ -15,8 +15,8 @@ use gluey_stokes::{
     MultigridSolver, Problem, Refinement, SaddleSolver, SolveReport, StokesSystem, SystemOperator,
 };
 
-use crate::machine::{Stopwatch, Times};
-use crate::options::Options;
+use crate::machine::{SolveTimes, Stopwatch};
+use crate::options::StokesBenchOptions;
 use crate::report::Report;
 use crate::{cases, machine};
 
@@ -30,7 +30,7 @@ const BAND: f64 = 2.0;
 const OPERATOR_SAMPLES: usize = 15;
 
 /// Solves the case once, on as many threads as asked for.
-pub fn run(options: &Options) -> anyhow::Result<Report> {
+pub fn run(options: &StokesBenchOptions) -> anyhow::Result<Report> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
     let pool = pool.map_err(|error| anyhow!("cannot start the threads: {error}"))?;
     pool.install(|| match options.case.dimension() {
@@ -39,18 +39,18 @@ pub fn run(options: &Options) -> anyhow::Result<Report> {
     })
 }
 
-/// What a solve was and took.
+/// A solve, and what it took.
 struct Solved<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     report: SolveReport,
-    times: Times,
+    times: SolveTimes,
     residual_rel: f64,
     twists: Vec<Twist<D>>,
 }
 
-fn measure<const D: usize>(options: &Options) -> anyhow::Result<Report>
+fn measure<const D: usize>(options: &StokesBenchOptions) -> anyhow::Result<Report>
 where
     Dim<D>: Space<D>,
 {
@@ -94,7 +94,9 @@ where
 }
 
 /// Everything up to the first iteration, but for the right-hand side.
-fn prepare<const D: usize>(options: &Options) -> anyhow::Result<(Problem<D>, MultigridSolver<D>, Times)>
+fn prepare<const D: usize>(
+    options: &StokesBenchOptions,
+) -> anyhow::Result<(Problem<D>, MultigridSolver<D>, SolveTimes)>
 where
     Dim<D>: Space<D>,
 {
@@ -108,7 +110,7 @@ where
 }
 
 /// `n` cells a side everywhere, or where the particles are.
-fn mesh<const D: usize>(options: &Options, balls: &[Ball<D>]) -> Result<TreeMesh<D>, MeshError> {
+fn mesh<const D: usize>(options: &StokesBenchOptions, balls: &[Ball<D>]) -> Result<TreeMesh<D>, MeshError> {
     let (roots, periodic) = ([1; D], [false; D]);
     if !options.adaptive {
         return TreeMesh::uniform(Aabb::unit(), roots, periodic, options.level());
@@ -118,7 +120,7 @@ fn mesh<const D: usize>(options: &Options, balls: &[Ball<D>]) -> Result<TreeMesh
 }
 
 fn solve<const D: usize>(
-    options: &Options,
+    options: &StokesBenchOptions,
     problem: &Problem<D>,
     solver: &mut MultigridSolver<D>,
 ) -> anyhow::Result<Solved<D>>
@@ -167,7 +169,7 @@ where
 }
 
 /// What goes on, for somebody who waits at a terminal.
-fn progress(options: &Options, what: &str) {
+fn progress(options: &StokesBenchOptions, what: &str) {
     if std::io::stderr().is_terminal() {
         eprintln!("{:?}, N = {}: {what}", options.case, options.cells_per_side());
     }

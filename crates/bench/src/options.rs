@@ -6,14 +6,14 @@ use clap::ValueEnum;
 use gluey_stokes::{Formulation, Lubrication, PaperParams};
 use serde::Serialize;
 
-use crate::cases::Case;
+use crate::cases::BenchCase;
 
 /// The command line of `bench-stokes`.
 #[derive(clap::Args, Debug)]
-pub struct Options {
+pub struct StokesBenchOptions {
     /// C2, C3: no particle; S2, S3: two; M3: twenty-seven. The digit is the dimension.
     #[arg(long, value_name = "CASE", ignore_case = true)]
-    pub case: Case,
+    pub case: BenchCase,
     /// Cells per side of the uniform mesh, or of its finest level with --adaptive: a power of two.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = level)]
     n: u8,
@@ -44,7 +44,7 @@ pub enum FormulationName {
     Paper,
 }
 
-impl Options {
+impl StokesBenchOptions {
     /// Cells per side at the finest level.
     pub fn cells_per_side(&self) -> u64 {
         1 << self.n

@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use crate::cases::Case;
+use crate::cases::BenchCase;
 use crate::options::FormulationName;
 
-/// One measurement. What the system does not tell is `null`.
+/// A measurement. What the system does not tell is `null`.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// The case.
-    pub case: Case,
+    pub case: BenchCase,
     /// The formulation.
     pub formulation: FormulationName,
     /// Cells per side of the finest level.
