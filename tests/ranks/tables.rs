@@ -121,7 +121,7 @@ fn with_a_fault(fault: (usize, usize)) -> Vec<(Result<(), String>, usize)> {
     let options = RunOptions { vtk: Some(vtk), ..with_checkpoints(folder.path()) };
     let case = line_of_discs(0.1);
     let done = Threads::run(3, |ranks| {
-        let ranks = Failing::new(ranks, fault);
+        let ranks = Failing::new(ranks, fault.0, fault.1);
         let agreements = ranks.agreements();
         let said = run_shared(&case, &options, &Silent, &Ranks::new(ranks)).map(|_| ());
         (said.map_err(|error| whole(&error)), agreements.load(Ordering::Relaxed))

@@ -20,7 +20,7 @@ pub struct Failing {
 
 impl Failing {
     /// Fails at the agreement `at`, counted from 0, if it is the rank `rank`.
-    pub fn new(ranks: &Ranks, (rank, at): (usize, usize)) -> Self {
+    pub fn new(ranks: &Ranks, rank: usize, at: usize) -> Self {
         let fails_at = Some(at).filter(|_| ranks.rank() == rank);
         Self { ranks: ranks.clone(), fails_at, agreements: Arc::default() }
     }

@@ -13,7 +13,7 @@ pub struct Table {
     row_count: usize,
 }
 
-/// Why a text is no table, or a table has no such value.
+/// A reason for which a text is no table, or a table has no such value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TableError {
     /// There is no header line.

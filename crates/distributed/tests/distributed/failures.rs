@@ -30,7 +30,7 @@ fn fail_in_turn(
         let work = work.clone();
         let run = move || {
             on_ranks(RANKS, |ranks| {
-                let ranks = Failing::new(ranks, fault);
+                let ranks = Failing::new(ranks, fault.0, fault.1);
                 let agreements = ranks.agreements();
                 (work(&Ranks::new(ranks)), agreements.load(Ordering::Relaxed))
             })

@@ -78,7 +78,7 @@ impl PairStrain {
     }
 }
 
-/// What a pair does in a strain.
+/// The motion and the stresslets of a pair in a strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairInStrain {
     /// Stresslet of either sphere over that of a single one, `20/3 pi mu a^3 E`. It has the shape of the
