@@ -182,13 +182,15 @@ impl Record {
         Dim<D>: Space<D>,
     {
         let motions = mine
+            .flow
             .twists
             .iter()
             .flat_map(|twist| twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin)));
-        let bits = mine.velocity.iter().flatten().chain(&mine.pressure).chain(motions).map(|x| x.to_bits());
+        let velocity = mine.velocity();
+        let bits = velocity.iter().flatten().chain(mine.pressure()).chain(motions).map(|x| x.to_bits());
         let hashes = ranks.all_gather(&[hash(bits)]);
         let &Options { dimension, level, adaptive, bodies, pair, tolerance, .. } = options;
-        let solve = TrafficRecord::new(ranks, &mine.solve_traffic);
+        let solve = TrafficRecord::new(ranks, &mine.flow.solve_traffic);
         Self {
             dimension,
             level,
@@ -197,8 +199,8 @@ impl Record {
             pair,
             tolerance,
             ranks: ranks.size(),
-            iterations: mine.iterations,
-            relative_residual: mine.relative_residual,
+            iterations: mine.flow.iteration_count,
+            relative_residual: mine.flow.residual,
             checksum: format!("{:016x}", hash(hashes.into_iter())),
             levels: mine.levels.iter().map(|sizes| LevelRecord::new(ranks, sizes)).collect(),
             setup: TrafficRecord::new(ranks, &mine.setup_traffic),

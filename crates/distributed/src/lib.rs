@@ -19,7 +19,7 @@
 //!     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-10, max_iterations: 100 };
 //!     let mine = flow.solve(&mut tree, &cuts, ranks, &shear).expect("a flow");
 //!     // Between moving walls every node moves with its height.
-//!     mine.points.iter().zip(&mine.velocity).all(|(x, u)| (u - shear(x)).norm() < 1e-8)
+//!     mine.points().iter().zip(mine.velocity()).all(|(x, u)| (u - shear(x)).norm() < 1e-8)
 //! })?;
 //! assert_eq!(speeds, [true; 3]);
 //! # Ok::<(), gluey_parallel::RankFailure>(())
@@ -30,23 +30,19 @@
 //! Surfaces that cut cells are those of the formulation `unfitted` on the part of each rank
 //! (`docs/design/ranks.md`). Not for viscosities that vary.
 
-mod agreement;
-mod bodies;
-mod cells;
 mod contact;
 mod cuts;
 mod flow;
-mod levels;
 mod memory;
 mod moving;
 mod orders;
-mod space;
 mod surface;
 mod warm_start;
 
 pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
-pub use flow::{BoxFlow, FlowError, LevelSizes, LocalFlow, PartError};
+pub use flow::{BoxFlow, LocalFlow};
+pub use gluey_stokes::part::LevelSizes;
 pub use memory::Memory;
 pub use moving::{Follower, SharedHydrodynamics, SharedSuspension, SuspensionError};
 pub use orders::{FrameName, ask_for_fields, ask_to_keep};

@@ -25,7 +25,7 @@ where
     let places = [[0.3, 0.4, 0.5], [0.651, 0.4, 0.5]].map(|x| Vector::<D>::from_fn(|d, _| x[d]));
     let particles = small.suspension.particles(&places);
     let solve = |suspension: &SharedSuspension<D>, ranks: &Ranks| {
-        suspension.solve(ranks, &Configuration::at(0.0, &particles)).unwrap().iterations
+        suspension.solve(ranks, &Configuration::at(0.0, &particles)).unwrap().flow.iteration_count
     };
     let found = Threads::run(ranks, |ranks| {
         solve(&small, ranks);

@@ -5,7 +5,6 @@
 
 mod error;
 mod estimate;
-mod fields;
 mod params;
 mod prepared;
 
@@ -13,10 +12,8 @@ use std::time::Instant;
 
 use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::Ball;
-use gluey_motion::{Configuration, Fields, Film, FlowStatistics, Hydrodynamics, Prediction, ResumeError};
-use gluey_stokes::{
-    Drive, Flow, FlowParams, FlowSolver, NodalFields, PhaseTimes, RaisedPenalties, Suspension,
-};
+use gluey_motion::{Configuration, Fields, Film, Hydrodynamics, Prediction, ResumeError};
+use gluey_stokes::{Drive, Flow, FlowParams, FlowSolver, NodalFields, Suspension};
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
@@ -103,13 +100,13 @@ where
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, FlowError> {
         let Self { suspension, solver, params: FlowParams { viscosity, .. }, .. } = self;
         let (balls, start) = (suspension.balls(configuration), Instant::now());
-        let mesh = suspension.mesh(&balls)?;
+        let mesh = solver.discretised(suspension.mesh(&balls)?);
         let meshed = start.elapsed().as_secs_f64();
-        let solve = |drive: &Drive<'_, D>| solver.solve_driven::<FlowError>(mesh, &balls, drive);
+        let solve = |drive: &Drive<'_, D>| solver.solve_driven::<FlowError>(&mesh, &balls, drive);
         let (mut flow, rate) = suspension.driven(configuration, *viscosity, solve)?;
         flow.times.assembly += meshed;
-        let prediction = suspension.prediction(configuration, *viscosity, (&flow).into(), rate);
-        let statistics = statistics(&flow, solver.take_raised_penalties());
+        let prediction = suspension.prediction(configuration, *viscosity, &flow, rate);
+        let statistics = flow.statistics(solver.take_raised_penalties());
         self.places = configuration.particles.iter().map(|particle| particle.pose.position).collect();
         self.strain = configuration.strain;
         self.last = Some(Last { flow, balls, shear_factor: configuration.shear_factor });
@@ -126,7 +123,7 @@ where
 
     fn fields(&self) -> Option<Fields<D>> {
         let Last { flow, balls, shear_factor } = self.last.as_ref()?;
-        let fields = fields::fields(flow, balls, &self.params);
+        let fields = flow.fields(balls, &self.params);
         Some(self.suspension.in_space(fields, flow.discretisation.mesh.shear(), *shear_factor))
     }
 
@@ -158,24 +155,5 @@ where
         self.solver.set_warm_start(mesh, last.into(), before.map(Into::into)).map_err(FlowError::from)?;
         (self.places, self.strain) = (centers, strain);
         Ok(())
-    }
-}
-
-/// Size and effort of a flow.
-fn statistics<const D: usize>(flow: &Flow<D>, raised: RaisedPenalties) -> FlowStatistics
-where
-    Dim<D>: Space<D>,
-{
-    let PhaseTimes { assembly, preparation, solve } = flow.times;
-    FlowStatistics {
-        cell_count: flow.discretisation.mesh.cell_count(),
-        dof_count: flow.discretisation.dof_count(),
-        solve_count: flow.solve_count,
-        iteration_count: flow.iteration_count,
-        residual: flow.residual,
-        penalties_doubled: raised.doubled,
-        cells_raised: raised.cells,
-        solved_again: raised.solved_again,
-        phases: vec![("mesh and assembly", assembly), ("solver set-up", preparation), ("solve", solve)],
     }
 }

@@ -1,5 +1,6 @@
 //! What ranks say to each other.
 
+use std::ops::Add;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::failure::RankFailure;
@@ -36,6 +37,19 @@ impl Traffic {
             bytes: self.bytes - before.bytes,
             exchanges: self.exchanges - before.exchanges,
             reductions: self.reductions - before.reductions,
+        }
+    }
+}
+
+impl Add for Traffic {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            messages: self.messages + other.messages,
+            bytes: self.bytes + other.bytes,
+            exchanges: self.exchanges + other.exchanges,
+            reductions: self.reductions + other.reductions,
         }
     }
 }

@@ -1,10 +1,8 @@
 //! The ghosts of a vector, with the ranks that own them: nothing where a rank is alone.
 
-use std::fmt::Display;
 use std::ops::{AddAssign, Range};
 
 use crate::communicator::Communicator;
-use crate::failure::RankFailure;
 use crate::ghosts::GhostPlan;
 use crate::number::Number;
 use crate::ranks::Ranks;
@@ -74,17 +72,6 @@ impl Halo {
     /// The number of ghosts, and of ranks that this one sends values to.
     pub fn counts(&self) -> [usize; 2] {
         self.0.as_deref().map_or([0; 2], |shared| [shared.plan.ghost_count(), shared.plan.neighbour_count()])
-    }
-
-    /// [`Ranks::agreed`] of the ranks that have the ghosts.
-    ///
-    /// # Errors
-    /// The failure of another rank.
-    pub fn agreed<T, E: Display>(&self, outcome: Result<T, E>) -> Result<Result<T, E>, RankFailure> {
-        match self.0.as_deref() {
-            Some(Shared { ranks, .. }) => ranks.agreed(outcome),
-            None => Ok(outcome),
-        }
     }
 
     /// Adds up numbers over all ranks.

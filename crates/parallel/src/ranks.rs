@@ -30,6 +30,21 @@ impl Ranks {
         }
     }
 
+    /// The records of all ranks, in their order. All ranks call this.
+    pub fn gathered<const N: usize>(&self, own: &[[u64; N]]) -> Vec<[u64; N]> {
+        let counts = self.all_gather(&[own.len() as u64]);
+        let most = counts.iter().copied().max().unwrap_or(0) as usize;
+        if most == 0 {
+            return Vec::new();
+        }
+        let mut padded = own.as_flattened().to_vec();
+        padded.resize(most * N, 0);
+        let all = self.all_gather(&padded);
+        let of_rank =
+            |(records, &count): (&[u64], &u64)| records.as_chunks::<N>().0[..count as usize].to_vec();
+        all.chunks_exact(most * N).zip(&counts).flat_map(of_rank).collect()
+    }
+
     /// The only rank of a program.
     pub fn alone() -> Self {
         Self::new(Alone::default())

@@ -2,7 +2,6 @@
 
 use gluey_fem::MeshError;
 use gluey_linalg::{BadDiagonal, BlockError, DirectError, KrylovError, SparseError};
-use gluey_parallel::{Halo, RankFailure};
 
 /// Failure of a Stokes solve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -109,6 +108,9 @@ pub enum StokesError {
         /// What was asked for.
         what: &'static str,
     },
+    /// Walls drive a flow that has none.
+    #[error("the box has no wall whose velocity could drive a flow")]
+    NoWall,
     /// A parameter is out of range.
     #[error("{name} = {value}: {wanted}")]
     Parameter {
@@ -197,12 +199,6 @@ impl StokesError {
         }
         self
     }
-}
-
-/// A failure of one rank as one of all. All ranks call this.
-pub fn agreed<T>(halo: &Halo, outcome: Result<T, StokesError>) -> Result<T, StokesError> {
-    let elsewhere = |first: RankFailure| StokesError::Elsewhere { rank: first.rank, message: first.message };
-    halo.agreed(outcome).map_err(elsewhere)?
 }
 
 /// A part of the diagonal of an operator that has no inverse.

@@ -57,13 +57,15 @@ pub use formulation::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion}
 // Why there is no flow.
 pub use error::{DiagonalError, SmallMatrix, StokesError};
 // What drives the particles of a suspension, and what its flow predicts.
-pub use suspension::{Drive, FlowOfBodies, NotDriven, Suspension};
+pub use suspension::{Drive, NotDriven, Suspension};
 // The linear system and its solvers.
 pub use formulation::Problem;
 pub use operator::{StokesSystem, SystemOperator};
 pub use solver::{DirectSolver, MultigridSolver, SaddleSolver, SolveReport, SolverKind};
 // The parts of the system: unknowns, planes that cut bodies flat.
-pub use space::{Discretisation, Partition, PressureSpace, SolidNodes, VelocitySpace, solid_nodes};
+pub use space::{
+    Discretisation, PartBodies, PartNodes, Partition, PressureSpace, SolidNodes, VelocitySpace, solid_nodes,
+};
 pub use surface::{Flat, Flats};
 // The crates whose types appear in this one.
 pub use {

@@ -86,17 +86,8 @@ where
         let found = suspension.solve_from(ranks, &input.configuration(), memory);
         memory.is_sharing.set(false);
         let (flow, prediction) = found?;
-        let statistics = FlowStatistics {
-            cell_count: flow.cell_count,
-            dof_count: flow.dof_count,
-            solve_count: flow.solve_count,
-            iteration_count: flow.iterations,
-            residual: flow.relative_residual,
-            penalties_doubled: flow.raised_penalties.doubled,
-            cells_raised: flow.raised_penalties.cells,
-            solved_again: flow.raised_penalties.solved_again,
-            phases: vec![("shared flow", start.elapsed().as_secs_f64())],
-        };
+        let phases = vec![("shared flow", start.elapsed().as_secs_f64())];
+        let statistics = FlowStatistics { phases, ..flow.flow.statistics(flow.raised_penalties) };
         self.last = Some(flow);
         Ok(Prediction { statistics, ..prediction })
     }

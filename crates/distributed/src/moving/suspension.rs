@@ -1,16 +1,16 @@
 //! The flow around particles that move, on ranks.
 
 use gluey_fem::{ImplicitTree, MeshError};
-use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_geom::{Dim, Space, Vector};
 use gluey_levelset::BallTree;
 use gluey_motion::{Configuration, Fields, Prediction};
 use gluey_parallel::{Communicator, Ranks};
-use gluey_stokes::{Conditions, Drive, FlowOfBodies, NotDriven, Suspension};
+use gluey_stokes::{NotDriven, StokesError, Suspension};
 
 use super::step_input::StepInput;
 use crate::contact::ContactFollower;
 use crate::cuts::cuts_of_work;
-use crate::flow::{BoxFlow, FlowError, LocalFlow};
+use crate::flow::{BoxFlow, LocalFlow};
 use crate::memory::Memory;
 use crate::orders::{FrameName, Order};
 use crate::surface::{SharedTree, SurfaceBodies};
@@ -36,14 +36,11 @@ pub enum SuspensionError {
     Mesh(#[from] MeshError),
     /// The flow failed, on all ranks.
     #[error(transparent)]
-    Flow(#[from] FlowError),
+    Flow(#[from] StokesError),
     /// The forces between particles drive them faster than the stress that is given.
     #[error(transparent)]
     NotDriven(#[from] NotDriven),
 }
-
-/// Solves for a flow under some conditions.
-type Solve<'s, const D: usize> = dyn FnMut(&Conditions<'_, D>) -> Result<LocalFlow<D>, FlowError> + 's;
 
 impl<const D: usize> SharedSuspension<D>
 where
@@ -90,22 +87,22 @@ where
         }
         let bodies = SurfaceBodies { balls: &balls, lubrication: suspension.lubrication };
         let mut kept = memory.last.take();
-        let mut first = Some(&mut kept);
         let mut leaves = SharedTree { tree: &mut whole, cuts: &cuts, ranks };
-        let mut solve = |conditions: &Conditions<'_, D>| {
-            self.flow.solve_from(&bodies, &mut leaves, conditions, first.take())
-        };
-        let (flow, rate) =
-            suspension.driven(configuration, *viscosity, |drive| solve_driven(drive, &mut solve))?;
+        let (flow, rate) = suspension.driven(configuration, *viscosity, |drive| {
+            self.flow.solve_from(&bodies, &mut leaves, &mut kept, |solver, mesh| {
+                solver.solve_driven::<SuspensionError>(mesh, &balls, drive)
+            })
+        })?;
         memory.last.replace(kept);
-        let prediction = suspension.prediction(configuration, *viscosity, of_bodies(&flow), rate);
+        let prediction = suspension.prediction(configuration, *viscosity, &flow.flow, rate);
         Ok((flow, prediction))
     }
 
     /// The fields of a flow in the cells of a rank, in space.
     pub(super) fn fields(&self, flow: &LocalFlow<D>, input: &StepInput<D>) -> Fields<D> {
-        let fields = flow.fields(&self.suspension.balls(&input.configuration()));
-        self.suspension.in_space(fields, flow.shear(), input.shear_factor)
+        let (balls, flow) = (self.suspension.balls(&input.configuration()), &flow.flow);
+        let fields = flow.fields(&balls, &self.flow.params(self.suspension.lubrication));
+        self.suspension.in_space(fields, flow.discretisation.mesh.shear(), input.shear_factor)
     }
 
     /// Does what rank zero asks for with its [`crate::SharedHydrodynamics::leading`], until that ends. All
@@ -146,39 +143,6 @@ where
             }
         }
     }
-}
-
-/// The flow that this drives, and [`Drive::rate`].
-fn solve_driven<const D: usize>(
-    drive: &Drive<'_, D>,
-    solve: &mut Solve<'_, D>,
-) -> Result<(LocalFlow<D>, f64), SuspensionError>
-where
-    Dim<D>: Space<D>,
-{
-    let flow = solve(&drive.conditions)?;
-    if drive.pushes.is_empty() {
-        let rate = drive.rate(flow.stress.as_ref(), None)?;
-        return Ok((flow, rate));
-    }
-    let pushed = solve(&Conditions::at_rest().with_wrenches(drive.pushes).with_stress())?;
-    let rate = drive.rate(flow.stress.as_ref(), pushed.stress.as_ref())?;
-    let wrenches: Vec<Wrench<D>> = drive.pushes.iter().map(|wrench| *wrench * rate.recip()).collect();
-    let mut both = solve(&drive.conditions.with_wrenches(&wrenches))?;
-    both.solve_count += flow.solve_count + pushed.solve_count;
-    both.raised_penalties += flow.raised_penalties;
-    both.raised_penalties += pushed.raised_penalties;
-    both.iterations += flow.iterations + pushed.iterations;
-    Ok((both, rate))
-}
-
-fn of_bodies<const D: usize>(flow: &LocalFlow<D>) -> FlowOfBodies<'_, D>
-where
-    Dim<D>: Space<D>,
-{
-    let LocalFlow { twists, wrenches, mean_velocity, mean_force, stress, .. } = flow;
-    let (mean_velocity, mean_force, stress) = (*mean_velocity, *mean_force, stress.as_ref());
-    FlowOfBodies { twists, wrenches, mean_velocity, mean_force, stress }
 }
 
 /// What other ranks do with flows when rank zero asks for it.

@@ -1,12 +1,11 @@
 //! What is kept of films, on its way from the rank that had a film to the one that has it now.
 
-use gluey_fem::ImplicitTree;
 use gluey_geom::{Dim, Space};
+use gluey_levelset::Ball;
 use gluey_parallel::{Communicator, route};
+use gluey_stokes::Partition;
 use gluey_stokes::part::numbers_of_film;
 use serde::{Deserialize, Serialize};
-
-use crate::bodies::Shared;
 
 /// Numbers of a film beside its bodies, at most.
 const MOST_NUMBERS: usize = 12;
@@ -73,15 +72,15 @@ where
     numbers
 }
 
-/// The films whose first bodies are `asked` for here, wherever they were. `films` become those of first
-/// bodies that this rank owns. All ranks call this.
+/// The films whose first bodies are near the part of the rank, wherever they were. `films` become those of
+/// first bodies that it owns. All ranks call this.
 pub fn exchanged<const D: usize>(
-    (tree, shared): (&ImplicitTree<'_, D>, &Shared<'_, '_, D>),
+    partition: &Partition<D>,
+    balls: &[Ball<D>],
     films: &mut Vec<KeptFilm>,
-    asked: &[u32],
 ) -> Vec<KeptFilm> {
-    let ranks = shared.ranks;
-    let owner = |body: u32| shared.owner(tree, &shared.bodies.balls()[body as usize]);
+    let (ranks, asked) = (&partition.ranks, &partition.bodies.ids);
+    let owner = |body: u32| partition.owner_of_point(balls[body as usize].center());
     let sent = films.iter().map(|film| (owner(film.first_body()), film.0)).collect();
     *films = route(ranks, sent).into_iter().map(KeptFilm).collect();
     films.sort_by_key(KeptFilm::first_body);

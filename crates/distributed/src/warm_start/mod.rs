@@ -14,4 +14,3 @@ mod transfer;
 
 pub use flows::WarmStart;
 pub use pieces::{PieceError, SavedPiece};
-pub use transfer::TransferredFlows;

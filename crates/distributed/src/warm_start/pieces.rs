@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use super::films::KeptFilm;
 use super::flows::{GlobalState, MOST, Piece, WarmStart};
-use crate::bodies::rigid;
 
 /// The flows in the cells of one run in the order of cells, of how many runs, and what belongs to no mesh.
 ///
@@ -114,7 +113,7 @@ where
             return Err(unfit("runs out of order"));
         }
         let cuts = Cuts::new(firsts.to_vec(), *end);
-        let motions = count * rigid::<D>();
+        let motions = count * Dim::<D>::RIGID;
         if !(1..=MOST).contains(&any.bodies.len()) || any.bodies.iter().any(|all| all.len() != motions) {
             return Err(unfit("motions of another number of particles"));
         }

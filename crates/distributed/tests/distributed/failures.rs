@@ -4,13 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
-use gluey_distributed::{
-    BoxFlow, ContactFollower, FlowError, SharedContact, SharedSuspension, SuspensionError,
-};
+use gluey_distributed::{BoxFlow, ContactFollower, SharedContact, SharedSuspension, SuspensionError};
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_motion::Configuration;
 use gluey_parallel::{Communicator, Ranks};
-use gluey_stokes::{Lubrication, Refinement, Suspension};
+use gluey_stokes::{Lubrication, Refinement, StokesError, Suspension};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 
 use crate::support::{self, on_ranks};
@@ -99,7 +97,7 @@ fn a_rank_that_fails_anywhere_in_a_flow_ends_all() {
     let held = vec![Some(Twist::default()), None];
     a_flow_fails_as_one(
         "held",
-        33,
+        17,
         Suspension { given: held, ..suspension::<2>(Lubrication::Deficit, true) },
     );
 }
@@ -136,5 +134,5 @@ fn bodies_that_are_too_small_are_so_on_all_ranks() {
     let run = move || on_ranks(RANKS, |ranks| failure(&small, ranks, [0.5; 2]).unwrap()).unwrap();
     let errors = within_a_minute("small bodies", run);
     assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
-    assert!(matches!(errors[0], SuspensionError::Flow(FlowError::Part(_))), "{errors:?}");
+    assert!(matches!(errors[0], SuspensionError::Flow(StokesError::Unresolved { .. })), "{errors:?}");
 }

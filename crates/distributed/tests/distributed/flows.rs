@@ -1,9 +1,10 @@
 //! Flows on several ranks: those of one rank, and those of the serial solver.
 
-use gluey_distributed::{BoxFlow, FlowError, LocalFlow, equal_cuts, weighted_cuts};
+use gluey_distributed::{BoxFlow, LocalFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
 use gluey_geom::{Aabb, Dim, Space, Vector};
 use gluey_parallel::Ranks;
+use gluey_stokes::StokesError;
 
 use crate::support::{largest_difference, on_ranks};
 
@@ -60,8 +61,8 @@ fn joined<const D: usize>(parts: &[LocalFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>)
 where
     Dim<D>: Space<D>,
 {
-    let velocity = parts.iter().flat_map(|part| part.velocity.iter().copied()).collect();
-    (velocity, parts.iter().flat_map(|part| part.pressure.iter().copied()).collect())
+    let velocity = parts.iter().flat_map(LocalFlow::velocity).collect();
+    (velocity, parts.iter().flat_map(|part| part.pressure().iter().copied()).collect())
 }
 
 /// Velocities and pressures are those of one rank but for these limits.
@@ -70,22 +71,24 @@ where
     Dim<D>: Space<D>,
 {
     let alone = example.solve::<D>(&Ranks::alone());
-    assert!(alone.relative_residual < 1e-11);
+    assert!(alone.flow.residual < 1e-11);
     for size in [2, 3, 4, 8] {
         let run = || on_ranks(size, |ranks| example.solve::<D>(ranks)).unwrap();
         let parts = run();
         let (velocity, pressure) = joined(&parts);
-        let difference = largest_difference(&alone.velocity, &velocity);
-        let iterations = [alone.iterations, parts[0].iterations];
+        let difference = largest_difference(&alone.velocity(), &velocity);
+        let iterations = [alone.flow.iteration_count, parts[0].flow.iteration_count];
         println!("{size} ranks: {difference:.1e}, iterations {iterations:?}");
         assert!(difference < limits[0], "{size} ranks: {difference:e}");
-        let scale = alone.pressure.iter().fold(0.0f64, |m, p| m.max(p.abs()));
-        let pressures = alone.pressure.iter().zip(&pressure);
+        let scale = alone.pressure().iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        let pressures = alone.pressure().iter().zip(&pressure);
         let difference = pressures.fold(0.0f64, |m, (a, b)| m.max((a - b).abs())) / scale;
         println!("{size} ranks: pressures {difference:.1e}");
         assert!(difference < limits[1], "{size} ranks: pressures {difference:e}");
-        let iterations: Vec<usize> = parts.iter().map(|part| part.iterations).collect();
-        assert!(iterations.iter().all(|&n| n == iterations[0] && n.abs_diff(alone.iterations) <= 1));
+        let iterations: Vec<usize> = parts.iter().map(|part| part.flow.iteration_count).collect();
+        assert!(
+            iterations.iter().all(|&n| n == iterations[0] && n.abs_diff(alone.flow.iteration_count) <= 1)
+        );
         assert_eq!(joined(&run()), (velocity, pressure), "the same bits on every run");
     }
 }
@@ -148,7 +151,7 @@ fn ranks_without_cells_take_part() {
     let alone = example.solve::<2>(&Ranks::alone());
     let parts = on_ranks(40, |ranks| example.solve::<2>(ranks)).unwrap();
     assert!(parts.iter().any(|part| part.levels[0].cells == 0));
-    let difference = largest_difference(&alone.velocity, &joined(&parts).0);
+    let difference = largest_difference(&alone.velocity(), &joined(&parts).0);
     assert!(difference < 1e-9, "{difference:e}");
 }
 
@@ -183,5 +186,5 @@ fn a_box_without_walls_is_an_error_on_all_ranks() {
         let cuts = equal_cuts(&tree, ranks);
         FLOW.solve(&mut tree, &cuts, ranks, &walls).err()
     });
-    assert_eq!(errors.unwrap(), [(); 3].map(|()| Some(FlowError::NoWall)));
+    assert_eq!(errors.unwrap(), [(); 3].map(|()| Some(StokesError::NoWall)));
 }

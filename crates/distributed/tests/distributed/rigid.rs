@@ -1,7 +1,7 @@
 //! Rigid bodies whose cells ranks share: their flow and their motions are those of the serial solver, and the
 //! same on any number of ranks.
 
-use gluey_distributed::{BoxFlow, FlowError, LocalFlow, PartError, SurfaceBodies, equal_cuts};
+use gluey_distributed::{BoxFlow, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
 use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
@@ -134,21 +134,37 @@ where
         let run = || on_ranks(size, |ranks| example.solve::<D>(ranks)).unwrap();
         let parts = run();
         let found = velocities(&parts);
-        let points: Vec<&Vector<D>> = parts.iter().flat_map(|part| &part.points).collect();
+        let points: Vec<Vector<D>> = parts.iter().flat_map(LocalFlow::points).collect();
         let [exact, fluid] = [&velocity, &found].map(|all| {
             let in_fluid = all.iter().zip(&points).filter(|(_, x)| is_in_fluid(&balls, x));
             in_fluid.map(|(u, _)| *u).collect::<Vec<_>>()
         });
         let difference = largest_difference(&exact, &fluid);
-        let motion = largest_difference(&motions(&twists), &motions(&parts[0].twists));
-        println!("{size} ranks: {difference:.1e}, {motion:.1e}, iterations {}", parts[0].iterations);
+        let motion = largest_difference(&motions(&twists), &motions(&parts[0].flow.twists));
+        println!(
+            "{size} ranks: {difference:.1e}, {motion:.1e}, iterations {}",
+            parts[0].flow.iteration_count
+        );
         assert!(difference < 7.5e-10, "{size} ranks: velocities {difference:e}");
         assert!(motion < 1.4e-9, "{size} ranks: bodies {motion:e}");
-        let is_close = |part: &LocalFlow<D>| part.iterations.abs_diff(alone.iterations) <= 1;
-        assert!(parts.iter().all(is_close), "{} {}", parts[0].iterations, alone.iterations);
-        assert!(parts.iter().all(|part| part.twists == parts[0].twists), "ranks agree on all bodies");
+        let is_close =
+            |part: &LocalFlow<D>| part.flow.iteration_count.abs_diff(alone.flow.iteration_count) <= 1;
+        assert!(
+            parts.iter().all(is_close),
+            "{} {}",
+            parts[0].flow.iteration_count,
+            alone.flow.iteration_count
+        );
+        assert!(
+            parts.iter().all(|part| part.flow.twists == parts[0].flow.twists),
+            "ranks agree on all bodies"
+        );
         let again = if size == 1 { vec![alone.clone()] } else { run() };
-        assert_eq!((velocities(&again), &again[0].twists), (found, &parts[0].twists), "the same bits");
+        assert_eq!(
+            (velocities(&again), &again[0].flow.twists),
+            (found, &parts[0].flow.twists),
+            "the same bits"
+        );
     }
 }
 
@@ -183,7 +199,7 @@ fn a_body_is_known_to_the_ranks_whose_cells_it_touches() {
 }
 
 /// What all ranks say.
-fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
+fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<StokesError> {
     let (balls, wants) = (example.balls::<2>(), |_: &Vector<2>, _: f64, _: u8| true);
     let found = on_ranks(3, |ranks| {
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], 3, &wants).unwrap();
@@ -199,8 +215,8 @@ fn errors(example: Example<'_>, wrenches: &[Wrench<2>]) -> Vec<FlowError> {
 fn all_ranks_refuse_what_cannot_be_computed() {
     let tiny = Example { bodies: &[([0.4, 0.5, 0.5], 0.2), ([0.81, 0.3, 0.5], 0.05)], ..PAIR };
     let (radius, cell_size) = (0.05, 0.125);
-    let refused = FlowError::Part(PartError::Stokes(StokesError::Unresolved { body: 1, radius, cell_size }));
+    let refused = StokesError::Unresolved { body: 1, radius, cell_size };
     assert_eq!(errors(tiny, &[]), vec![refused; 3]);
     let one = [Wrench::default()];
-    assert_eq!(errors(PAIR, &one), vec![FlowError::Count { found: 1, bodies: 2 }; 3]);
+    assert_eq!(errors(PAIR, &one), vec![StokesError::Count { what: "wrenches", found: 1, bodies: 2 }; 3]);
 }

@@ -34,7 +34,7 @@ where
         let parts = on_ranks(size, |ranks| {
             let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], [false; D], level, &wants).unwrap();
             let cuts = equal_cuts(&tree, ranks);
-            FLOW.solve(&mut tree, &cuts, ranks, &walls).unwrap().velocity
+            FLOW.solve(&mut tree, &cuts, ranks, &walls).unwrap().velocity()
         });
         let velocity: Vec<f64> = parts.unwrap().iter().flatten().flatten().copied().collect();
         assert_eq!(velocity.len(), serial.velocity.len());

@@ -45,7 +45,7 @@ pub fn velocities<const D: usize>(parts: &[LocalFlow<D>]) -> Vec<Vector<D>>
 where
     Dim<D>: Space<D>,
 {
-    parts.iter().flat_map(|part| part.velocity.iter().copied()).collect()
+    parts.iter().flat_map(|part| part.velocity()).collect()
 }
 
 /// Largest difference over the largest of `a`.

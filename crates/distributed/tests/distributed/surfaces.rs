@@ -123,14 +123,14 @@ where
             let velocity = velocities(&parts);
             assert_eq!(velocity.len() * D, serial.velocity.len());
             let pairs = velocity.iter().zip(serial.velocity.as_chunks::<D>().0);
-            let points = parts.iter().flat_map(|part| &part.points);
-            let in_fluid = pairs.zip(points).filter(|pair| is_in_fluid(&balls, pair.1));
+            let points = parts.iter().flat_map(LocalFlow::points);
+            let in_fluid = pairs.zip(points).filter(|pair| is_in_fluid(&balls, &pair.1));
             let differences = in_fluid.map(|((a, &b), _)| (a - Vector::from(b)).norm() / scale);
             let difference = differences.fold(0.0, largest);
-            let twists = parts[0].twists.iter().zip(&serial.twists);
+            let twists = parts[0].flow.twists.iter().zip(&serial.twists);
             let of_twists = twists.map(|(a, b)| distance(a, b)).fold(0.0, largest);
-            let iterations = [parts[0].iterations, serial.iteration_count];
-            let of_wrenches = self.largest_wrench_difference(&parts[0], &serial);
+            let iterations = [parts[0].flow.iteration_count, serial.iteration_count];
+            let of_wrenches = self.largest_wrench_difference(&parts[0].flow, &serial);
             println!(
                 "{size} ranks: {difference:.1e}, twists {of_twists:.1e}, wrenches {of_wrenches:.1e}, iterations {iterations:?}"
             );
@@ -140,17 +140,21 @@ where
                 size > 1 || difference.max(of_twists).max(of_wrenches) < ALONE,
                 "one rank is one process"
             );
-            let solves = parts[0].solve_count;
+            let solves = parts[0].flow.solve_count;
             assert_eq!(solves, serial.solve_count, "{size} ranks");
             assert!(iterations[0].abs_diff(iterations[1]) <= solves, "{size} ranks: {iterations:?}");
             let again = run();
-            assert_eq!((velocities(&again), &again[0].twists), (velocity, &parts[0].twists), "the same bits");
+            assert_eq!(
+                (velocities(&again), &again[0].flow.twists),
+                (velocity, &parts[0].flow.twists),
+                "the same bits"
+            );
         }
     }
 
     /// Forces and torques on bodies, mean velocity and mean force beside those of the serial solver, over the
     /// largest force.
-    fn largest_wrench_difference(&self, part: &LocalFlow<D>, serial: &Flow<D>) -> f64 {
+    fn largest_wrench_difference(&self, part: &Flow<D>, serial: &Flow<D>) -> f64 {
         assert_eq!(part.mean_velocity.is_some(), serial.mean_velocity.is_some());
         let mean = part.mean_velocity.zip(serial.mean_velocity).map_or(0.0, |(a, b)| (a - b).norm());
         let scale = serial.wrenches.iter().map(|wrench| wrench.force.norm()).fold(0.0, f64::max);

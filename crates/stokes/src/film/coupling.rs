@@ -68,6 +68,12 @@ impl<const D: usize> FilmForce<D>
 where
     Dim<D>: Space<D>,
 {
+    /// The same with other numbers of bodies.
+    #[must_use]
+    pub(crate) fn renumbered(self, number: impl Fn(u32) -> u32) -> Self {
+        Self { film: self.film.renumbered(number), ..self }
+    }
+
     /// The first moment of the forces on a side, `F r` with `r` from its centre to the middle of the film:
     /// its symmetric part without trace is a share of the stresslet.
     pub fn moment(&self, side: usize) -> Matrix<D> {
@@ -194,11 +200,6 @@ where
     pub fn of_motions(&self, x: &[f64], b: &[f64]) -> Vec<f64> {
         let motion = |row: &[(u32, f64)]| row.iter().map(|&(k, weight)| weight * x[k as usize]).sum::<f64>();
         self.rows.iter().zip(b).map(|(row, b)| motion(row) - b).collect()
-    }
-
-    /// The first body of each film.
-    pub fn first_bodies(&self) -> impl Iterator<Item = u32> + '_ {
-        self.films.iter().map(|film| film.body)
     }
 
     /// Number of rows.

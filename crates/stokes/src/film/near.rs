@@ -60,6 +60,16 @@ impl Partner {
 }
 
 impl<const D: usize> Film<D> {
+    /// The same with other numbers of bodies.
+    #[must_use]
+    pub fn renumbered(self, number: impl Fn(u32) -> u32) -> Self {
+        let partner = match self.partner {
+            Partner::Body(other) => Partner::Body(number(other)),
+            wall @ Partner::Wall { .. } => wall,
+        };
+        Self { body: number(self.body), partner, ..self }
+    }
+
     /// `A` of the profile `H(r) = g + r^2 / A`.
     pub fn curvature_radius(&self) -> f64 {
         2.0 / (1.0 / self.radii[0] + 1.0 / self.radii[1])
@@ -138,6 +148,14 @@ impl<const D: usize> Film<D> {
     pub fn branch(&self) -> Vector<D> {
         let beyond = if self.partner.is_wall() { 0.0 } else { self.radii[1] };
         self.normal * (self.radii[0] + self.gap + beyond)
+    }
+
+    /// Its middle in a box with this shear, relative to which bodies are.
+    pub fn middle(&self, shear: f64) -> Vector<D> {
+        let beyond = if self.partner.is_wall() { self.gap } else { 0.0 };
+        let mut middle = self.normal * (self.arm(0) + 0.5 * beyond);
+        middle[0] -= shear * middle[1];
+        self.center + middle
     }
 
     /// The point of the wall or the partner's surface that is nearest to the body.

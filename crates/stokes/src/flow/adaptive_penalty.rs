@@ -47,11 +47,10 @@ where
     ) -> Result<bool, StokesError> {
         let mut is_stiffened = false;
         loop {
-            let error = match self.solver(problem).prepare(problem) {
-                Err(error @ (StokesError::SurfaceBlock { .. } | StokesError::AtSurface(_))) => error,
-                other => return other.map(|_| is_stiffened),
-            };
-            *method = method.stiffened().ok_or(error)?;
+            let Err(error) = self.solver(problem).prepare(problem) else { return Ok(is_stiffened) };
+            let is_weak = matches!(error, StokesError::SurfaceBlock { .. } | StokesError::AtSurface(_));
+            let stiffer = method.stiffened().filter(|_| problem.discretisation().any(is_weak));
+            *method = stiffer.ok_or(error)?;
             self.raised_penalties.doubled += 1;
             self.rebuild(problem, method.as_ref())?;
             is_stiffened = true;
@@ -60,9 +59,9 @@ where
 
     /// The same problem with another method.
     fn rebuild(&self, problem: &mut Problem<D>, method: &dyn Method<D>) -> Result<(), StokesError> {
-        let held = problem.system.space.held().to_vec();
+        let held = problem.system.space.held_of_all().to_vec();
         let discretisation = problem.discretisation().clone();
-        *problem = Problem::on(&discretisation, &problem.bodies, self.params.viscosity, method)?;
+        *problem = Problem::on(&discretisation, &problem.all_bodies, self.params.viscosity, method)?;
         problem.system.space.hold(&held);
         Ok(())
     }
@@ -82,15 +81,15 @@ where
         let mut wasted = Effort::default();
         for rounds in 0.. {
             let mut x = guess.to_vec();
-            let solved = self.solved(problem, conditions, &mut x);
-            let weak = match &solved {
-                Ok(flow) => problem.rigidity.weak_cells(problem, &flow.velocity, &flow.strain),
-                Err(StokesError::Krylov(KrylovError::NotConverged { .. })) => {
-                    let velocity = problem.velocity(&conditions.data(problem)?.0, &x);
-                    problem.rigidity.weak_cells(problem, &velocity, &conditions.strain)
-                }
-                Err(_) => Vec::new(),
+            let (lift, mut b) = problem.discretisation().agreed(conditions.data(problem))?;
+            problem.system.complete(&mut b);
+            let solved = self.solved(problem, conditions, [&lift, &b], &mut x);
+            let velocity = match &solved {
+                Ok(flow) => &flow.velocity,
+                Err(StokesError::Krylov(KrylovError::NotConverged { .. })) => &problem.velocity(&lift, &x),
+                Err(error) => return Err(error.clone()),
             };
+            let weak = problem.weak_cells(velocity, &conditions.strain);
             let Some(first) = weak.first() else {
                 let mut flow = solved?;
                 flow.solve_count += wasted.solve_count;

@@ -41,7 +41,7 @@ where
         if conditions.stress {
             return unsupported("stresses of flows without mean flow around held bodies");
         }
-        let held = conditions.held(problem.bodies.len());
+        let held = conditions.held(problem.all_bodies.len());
         let at_rest: Vec<GivenOf<D>> = held.into_iter().map(GivenOf::at_rest).collect();
         let (mut permeability, mut driven, mut is_raised) = (Matrix::<D>::zeros(), Vec::new(), false);
         for axis in 0..D {
@@ -85,4 +85,5 @@ where
     flow.solve_count += other.solve_count;
     flow.iteration_count += other.iteration_count;
     flow.fine_operator_applications += other.fine_operator_applications;
+    flow.solve_traffic = flow.solve_traffic + other.solve_traffic;
 }

@@ -5,7 +5,6 @@
 
 use std::time::Instant;
 
-use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Wrench};
 use gluey_levelset::Ball;
 use gluey_linalg::vector;
@@ -14,6 +13,7 @@ use super::adaptive_penalty::FlowWithAdaptedPenalty;
 use super::conditions::{Conditions, Given};
 use super::{Effort, Flow, FlowSolver, PhaseTimes, flow_of};
 use crate::error::StokesError;
+use crate::space::Discretisation;
 
 impl<const D: usize> FlowSolver<D>
 where
@@ -21,23 +21,23 @@ where
 {
     /// The flow under some conditions, without forces on the bodies, plus a multiple of the flow that the
     /// `wrenches` make in a box at rest: `factor` tells the multiple from the two. Without wrenches there is
-    /// one flow, and the factor is not asked for.
+    /// one flow, and the factor is not asked for. All ranks call this.
     ///
     /// # Errors
-    /// Those of [`FlowSolver::solve_under`], and of `factor`.
+    /// Those of [`FlowSolver::solve_on`], and of `factor`.
     pub fn solve_combined<E: From<StokesError>>(
         &mut self,
-        mesh: TreeMesh<D>,
+        discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         conditions: &Conditions<'_, D>,
         wrenches: &[Wrench<D>],
         factor: impl FnOnce(&Flow<D>, &Flow<D>) -> Result<f64, E>,
     ) -> Result<Flow<D>, E> {
         if wrenches.is_empty() {
-            return Ok(self.solve_under(mesh, bodies, conditions)?);
+            return Ok(self.solve_on(discretisation, bodies, conditions)?);
         }
         let start = Instant::now();
-        let mut problem = self.problem(mesh, bodies)?;
+        let mut problem = self.problem(discretisation, bodies)?;
         let assembled = Instant::now();
         let mut method = self.method.clone();
         self.prepare(&mut problem, &mut method)?;
@@ -77,6 +77,7 @@ impl Effort {
             iteration_count: first.iteration_count + second.iteration_count,
             residual: first.residual.max(second.residual),
             fine_operator_applications: first.fine_operator_applications + second.fine_operator_applications,
+            traffic: first.solve_traffic + second.solve_traffic,
         }
     }
 }

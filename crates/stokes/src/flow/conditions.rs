@@ -156,7 +156,20 @@ where
         Self { bodies: Given::Each(bodies), ..self }
     }
 
-    /// The wrenches on the bodies in a flow under these conditions: those given, or what they lack.
+    /// # Errors
+    /// [`StokesError::Count`] unless there is one entry for each of so many bodies, or none.
+    pub fn check_count(&self, bodies: usize) -> Result<(), StokesError> {
+        let (what, found) = match self.bodies {
+            Given::Wrenches([]) => return Ok(()),
+            Given::Wrenches(wrenches) => ("wrenches", wrenches.len()),
+            Given::Twists(twists) => ("twists", twists.len()),
+            Given::Each(each) => ("wrenches or twists", each.len()),
+        };
+        if found == bodies { Ok(()) } else { Err(StokesError::Count { what, found, bodies }) }
+    }
+
+    /// The wrenches on the bodies in a flow under these conditions: those given, or what they lack. All ranks
+    /// call this.
     pub(super) fn wrenches(
         &self,
         problem: &Problem<D>,
@@ -164,7 +177,7 @@ where
         pressure: &[f64],
     ) -> Result<Vec<Wrench<D>>, StokesError> {
         match self.bodies {
-            Given::Wrenches([]) => Ok(vec![Wrench::default(); problem.bodies.len()]),
+            Given::Wrenches([]) => Ok(vec![Wrench::default(); problem.all_bodies.len()]),
             Given::Wrenches(wrenches) => Ok(wrenches.to_vec()),
             Given::Twists(_) => problem.wrenches(velocity, pressure, self.force, &self.strain),
             Given::Each(bodies) => {
@@ -202,8 +215,8 @@ where
         }
     }
 
-    /// The field that carries the data, and its residual with the loads.
-    pub(crate) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
+    /// The field that carries the data, and its residual with the loads, of own cells and bodies.
+    pub(super) fn data(&self, problem: &Problem<D>) -> Result<(Vec<f64>, Vec<f64>), StokesError> {
         let mut lift = problem.lift(self.boundary);
         if let Some(twists) = self.twists() {
             problem.set_twists(&twists, &mut lift)?;

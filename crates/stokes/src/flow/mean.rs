@@ -6,36 +6,41 @@ use gluey_fem::element::{gauss_cube, multi_index, node_count, value};
 use gluey_geom::{Dim, Space, Vector};
 use rayon::prelude::*;
 
+use crate::error::StokesError;
 use crate::formulation::Problem;
 use crate::space::{Discretisation, VelocitySpace};
 use crate::surface::{CellState, CutCell, CutCells, SurfaceCoupling};
 
-/// The mean over fluid and bodies of a velocity (nodal values, then twists) around surfaces.
+/// The mean over fluid and bodies of a velocity (nodal values, then twists) around surfaces. All ranks call
+/// this.
 pub fn mean_velocity<const D: usize>(
     problem: &Problem<D>,
     surfaces: &SurfaceCoupling<D>,
     velocity: &[f64],
-) -> Vector<D>
+) -> Result<Vector<D>, StokesError>
 where
     Dim<D>: Space<D>,
 {
-    let space = &problem.system.space;
     let discretisation = problem.discretisation();
     let weights = fluid_weights(discretisation, &discretisation.velocity, &surfaces.cut);
-    let (mut volume, mut sum) = (weights.iter().sum::<f64>(), Vector::<D>::zeros());
+    let mut sum = Vector::<D>::zeros();
     for (weight, u) in weights.iter().zip(velocity.chunks_exact(D)) {
         sum += Vector::<D>::from_column_slice(u) * *weight;
     }
+    let mut sums = vec![weights.iter().sum::<f64>()];
+    sums.extend(sum.iter());
+    discretisation.sum_over_ranks(&mut sums);
+    let (mut volume, mut sum) = (sums[0], Vector::<D>::from_column_slice(&sums[1..]));
     // The bodies take what the fluid leaves of the box, in proportion to their volumes.
-    let bodies = || problem.bodies.iter().map(gluey_levelset::Body::bounding_radius);
+    let bodies = || problem.all_bodies.iter().map(gluey_levelset::Body::bounding_radius);
     let rest = discretisation.mesh.domain().extent().product() - volume;
     let all: f64 = bodies().map(|radius| radius.powi(D as i32)).sum();
-    for (body, radius) in bodies().enumerate() {
+    for (twist, radius) in problem.twists(velocity)?.iter().zip(bodies()) {
         let share = rest * radius.powi(D as i32) / all;
-        sum += space.twist(velocity, body).velocity * share;
+        sum += twist.velocity * share;
         volume += share;
     }
-    sum / volume
+    Ok(sum / volume)
 }
 
 /// Takes `by` from the velocities of all bodies and of the nodes that are `moved`.
@@ -58,10 +63,17 @@ pub fn subtract<const D: usize>(
     }
 }
 
-/// The mean of a nodal field for the integrals of its functions.
-pub fn mean_of(weights: &[f64], values: &[f64]) -> f64 {
-    weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>()
-        / weights.iter().sum::<f64>()
+/// The mean of the pressure over the fluid. All ranks call this.
+pub fn mean_pressure<const D: usize>(
+    discretisation: &Discretisation<D>,
+    cut: &CutCells<D>,
+    pressure: &[f64],
+) -> f64 {
+    let weights = fluid_weights(discretisation, &discretisation.pressure, cut);
+    let sum = weights.iter().zip(pressure).map(|(weight, p)| weight * p).sum::<f64>();
+    let mut sums = [sum, weights.iter().sum::<f64>()];
+    discretisation.sum_over_ranks(&mut sums);
+    sums[0] / sums[1]
 }
 
 /// Nodes of a cell in 3D.
@@ -77,7 +89,7 @@ fn integrals<const D: usize>(cut: &CutCell<D>, shapes: &[Vec<f64>]) -> [f64; MOS
 }
 
 /// Integrals over the fluid of the own cells of the functions of degree 1 or 2.
-pub fn fluid_weights<const D: usize>(
+fn fluid_weights<const D: usize>(
     discretisation: &Discretisation<D>,
     nodes: &NodeMap<D>,
     cut: &CutCells<D>,

@@ -4,6 +4,7 @@ mod adaptive_penalty;
 mod balance;
 mod combined;
 mod conditions;
+mod fields;
 mod mean;
 mod prepared;
 mod raised;
@@ -17,21 +18,21 @@ use std::time::Instant;
 use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
+use gluey_parallel::Traffic;
 
 use crate::error::StokesError;
 use crate::film::{FilmForce, Lubrication};
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity, symmetric};
+use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
+use stress::stress_of;
+use warm_start::WarmStart;
 
-pub use adaptive_penalty::MOST_ROUNDS;
 pub use conditions::{Conditions, Field, Given, GivenOf};
-pub(crate) use mean::{fluid_weights, subtract as subtract_uniform};
 pub use prepared::Prepared;
 pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
 pub use stress::Stress;
-pub(crate) use warm_start::WarmStart;
 pub use warm_start::{NodalFields, WarmStartError};
 
 /// Parameters of a [`FlowSolver`].
@@ -89,7 +90,8 @@ where
     pub mean_force: Vector<D>,
     /// Stress of the suspension, where [`Conditions::with_stress`] asked for it.
     pub stress: Option<Stress<D>>,
-    /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it.
+    /// What films too thin for the mesh exert on bodies and walls, where lubrication theory gives it; on
+    /// ranks each has some.
     pub films: Vec<FilmForce<D>>,
     /// Linear solves made.
     pub solve_count: usize,
@@ -100,6 +102,8 @@ where
     pub residual: f64,
     /// Applications of the operator over all solves, see [`crate::SolveReport::fine_operator_applications`].
     pub fine_operator_applications: f64,
+    /// What the rank sent in the solves.
+    pub solve_traffic: Traffic,
     /// Where the time went.
     pub times: PhaseTimes,
 }
@@ -156,10 +160,12 @@ struct Effort {
     iteration_count: usize,
     residual: f64,
     fine_operator_applications: f64,
+    traffic: Traffic,
 }
 
 impl Effort {
-    fn add(&mut self, report: &SolveReport) {
+    fn add(&mut self, report: &SolveReport, traffic: Traffic) {
+        self.traffic = self.traffic + traffic;
         let norm = report.reference;
         self.residual = report.residuals.last().filter(|_| norm > 0.0).map_or(0.0, |last| last / norm);
         self.solve_count += 1;
@@ -226,7 +232,26 @@ where
         conditions: &Conditions<'_, D>,
     ) -> Result<Flow<D>, StokesError> {
         let start = Instant::now();
-        let mut problem = self.problem(mesh, bodies)?;
+        let discretisation = self.discretised(mesh);
+        let numbered = start.elapsed().as_secs_f64();
+        let mut flow = self.solve_on(&discretisation, bodies, conditions)?;
+        flow.times.assembly += numbered;
+        Ok(flow)
+    }
+
+    /// The same on a mesh whose nodes are known, or on the part of it that a rank has. All ranks call this,
+    /// with the same bodies and conditions.
+    ///
+    /// # Errors
+    /// As above, on all ranks.
+    pub fn solve_on(
+        &mut self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        conditions: &Conditions<'_, D>,
+    ) -> Result<Flow<D>, StokesError> {
+        let start = Instant::now();
+        let mut problem = self.problem(discretisation, bodies)?;
         problem.system.space.hold(&conditions.held(bodies.len()));
         let assembled = Instant::now();
         let mut method = self.method.clone();
@@ -247,9 +272,12 @@ where
         Ok(flow)
     }
 
-    fn problem(&mut self, mesh: TreeMesh<D>, bodies: &[Ball<D>]) -> Result<Problem<D>, StokesError> {
-        let discretisation = self.discretised(mesh);
-        Problem::on(&discretisation, bodies, self.params.viscosity, self.method.as_ref())
+    fn problem(
+        &self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+    ) -> Result<Problem<D>, StokesError> {
+        Problem::on(discretisation, bodies, self.params.viscosity, self.method.as_ref())
     }
 
     /// The solver for free bodies, or for where any is held.
@@ -263,23 +291,38 @@ where
         &mut self,
         problem: &Problem<D>,
         conditions: &Conditions<'_, D>,
+        [lift, b]: [&[f64]; 2],
         x: &mut [f64],
     ) -> Result<Flow<D>, StokesError> {
-        let (lift, b) = conditions.data(problem)?;
-        let mut effort = Effort::default();
-        let tolerance = self.params.tolerance;
-        let solver = self.solver(problem);
+        let (mut effort, tolerance) = (Effort::default(), self.params.tolerance);
+        let (solver, system) = (self.solver(problem), &problem.system);
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
-            effort.add(&solver.solve(&problem.system, b, x, tolerance * tightening)?);
+            let before = problem.discretisation().traffic();
+            let report = solver.solve(system, b, x, tolerance * tightening);
+            system.update(x);
+            effort.add(&report?, problem.discretisation().traffic().since(before));
             Ok(())
         };
-        let data = Data { lift: &lift, b: &b };
-        let multiplier = problem.rigidity.solve(problem, &data, x, &mut solve)?;
-        flow_of(problem, conditions, (&lift, x), multiplier, &effort)
+        let multiplier = problem.rigidity.solve(problem, &Data { lift, b }, x, &mut solve)?;
+        flow_of(problem, conditions, (lift, x), multiplier, &effort)
+    }
+
+    /// The same on parts of meshes, of which the levels below the one with the bodies are `coarser`; a solve
+    /// is given up after so many iterations.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] for solvers on whole meshes only.
+    pub fn on_parts(
+        mut self,
+        coarser: &[Discretisation<D>],
+        max_iterations: usize,
+    ) -> Result<Self, StokesError> {
+        self.solvers.iter_mut().try_for_each(|solver| solver.share(coarser, max_iterations))?;
+        Ok(self)
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.
-    fn discretised(&mut self, mesh: TreeMesh<D>) -> Discretisation<D> {
+    pub fn discretised(&mut self, mesh: TreeMesh<D>) -> Discretisation<D> {
         let kept = self.discretisation.take().filter(|last| *last.mesh == mesh);
         let discretisation = kept.unwrap_or_else(|| Discretisation::new(mesh));
         self.discretisation = Some(discretisation.clone());
@@ -302,7 +345,20 @@ where
         last: NodalFields,
         before: Option<NodalFields>,
     ) -> Result<(), WarmStartError> {
-        self.warm_start = Some(WarmStart::restore(mesh, last, before)?);
+        self.start_from(Discretisation::new(mesh), last, before)
+    }
+
+    /// The same on a mesh whose nodes are known, or on the part of it that a rank has.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn start_from(
+        &mut self,
+        discretisation: Discretisation<D>,
+        last: NodalFields,
+        before: Option<NodalFields>,
+    ) -> Result<(), WarmStartError> {
+        self.warm_start = Some(WarmStart::restore(discretisation, last, before)?);
         Ok(())
     }
 
@@ -360,20 +416,21 @@ where
     if let Some(surfaces) = problem.system.surfaces()
         && space.holds_any()
     {
-        mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity));
+        mean_velocity = Some(mean::mean_velocity(problem, surfaces, &velocity)?);
     }
     if let (false, Some(surfaces)) = (space.is_anchored(), problem.system.surfaces()) {
-        let mean = mean::mean_velocity(problem, surfaces, &velocity);
+        let mean = mean::mean_velocity(problem, surfaces, &velocity)?;
         mean::subtract(space, &mut velocity, &mean, |_| true);
         // Guesses made of solutions would let what no equation determines grow from step to step.
         mean::subtract(space, x, &mean, |node| space.is_free(node));
     }
     let twists = problem.twists(&velocity)?;
     let wrenches = conditions.wrenches(problem, &velocity, &pressure)?;
-    let stress = conditions.stress.then(|| stress_of(problem, conditions, [&velocity, &pressure], x));
+    let stress = conditions.stress.then(|| stress_of(problem, &conditions.strain, [&velocity, &pressure], x));
     let stress = stress.transpose()?;
     velocity.truncate(problem.system.space.full_dim());
     pressure.truncate(problem.system.pressure.dim());
+    let body_number = |body: u32| problem.discretisation().body_number(body);
     let flow = Flow {
         discretisation: problem.discretisation().clone(),
         velocity,
@@ -385,68 +442,15 @@ where
         mean_velocity,
         mean_force: Vector::zeros(),
         stress,
-        films: problem.film_forces(x),
+        films: problem.film_forces(x).into_iter().map(|force| force.renumbered(body_number)).collect(),
         solve_count: effort.solve_count,
         iteration_count: effort.iteration_count,
         residual: effort.residual,
         fine_operator_applications: effort.fine_operator_applications,
+        solve_traffic: effort.traffic,
         times: PhaseTimes::default(),
     };
     Ok(flow)
-}
-
-/// The stress of a flow: its velocity, nodal and of bodies, and pressure, and the reduced vector.
-fn stress_of<const D: usize>(
-    problem: &Problem<D>,
-    conditions: &Conditions<'_, D>,
-    [velocity, pressure]: [&[f64]; 2],
-    x: &[f64],
-) -> Result<Stress<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
-    if problem.system.surfaces().is_none() {
-        return Err(StokesError::Unsupported { what: "stresses of suspensions" });
-    }
-    let mut pressure = pressure[..problem.system.pressure.dim()].to_vec();
-    let mean = stress::mean_pressure(problem, &pressure);
-    pressure.iter_mut().for_each(|p| *p -= mean);
-    own_stress(problem, &conditions.strain, [velocity, &pressure], x)
-}
-
-/// What the own cells and films add to the stress, with pressures whose mean over the fluid vanishes.
-pub(crate) fn own_stress<const D: usize>(
-    problem: &Problem<D>,
-    strain: &Matrix<D>,
-    [velocity, pressure]: [&[f64]; 2],
-    x: &[f64],
-) -> Result<Stress<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
-    let moments = problem.rigidity.first_moments(problem, [velocity, pressure], strain)?;
-    let of_films = problem.system.parts(x)[2].iter().map(|g| g * g).sum::<f64>();
-    let dissipation = stress::dissipation(problem, velocity, strain);
-    Ok(Stress {
-        moments: moments.iter().map(symmetric).collect(),
-        of_films: film_moments(&problem.film_forces(x), problem.bodies.len()).iter().map(symmetric).collect(),
-        dissipation: dissipation + of_films,
-        dissipation_of_films: of_films,
-    })
-}
-
-/// The first moments of the forces of films on each body.
-fn film_moments<const D: usize>(films: &[FilmForce<D>], body_count: usize) -> Vec<Matrix<D>>
-where
-    Dim<D>: Space<D>,
-{
-    let mut sums = vec![Matrix::zeros(); body_count];
-    for force in films {
-        for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
-            sums[body] += force.moment(side);
-        }
-    }
-    sums
 }
 
 fn check(params: &FlowParams) -> Result<(), StokesError> {

@@ -16,7 +16,8 @@ use nalgebra::DMatrix;
 
 use super::adaptive_penalty::FlowWithAdaptedPenalty;
 use super::conditions::Conditions;
-use super::{Flow, FlowSolver, film_moments};
+use super::stress::film_moments;
+use super::{Flow, FlowSolver};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem, symmetric_and_traceless};
 
@@ -86,7 +87,8 @@ where
         mesh: TreeMesh<D>,
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'_, D>, StokesError> {
-        let problem = self.problem(mesh, bodies)?;
+        let discretisation = self.discretised(mesh);
+        let problem = self.problem(&discretisation, bodies)?;
         let method = self.method.clone();
         Ok(Prepared { solver: Lent::Borrowed(self), problem, method, ready: [None, None] })
     }
@@ -100,7 +102,8 @@ where
         mesh: TreeMesh<D>,
         bodies: &[Ball<D>],
     ) -> Result<Prepared<'static, D>, StokesError> {
-        let problem = self.problem(mesh, bodies)?;
+        let discretisation = self.discretised(mesh);
+        let problem = self.problem(&discretisation, bodies)?;
         let method = self.method.clone();
         Ok(Prepared { solver: Lent::Owned(Box::new(self)), problem, method, ready: [None, None] })
     }

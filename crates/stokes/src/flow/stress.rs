@@ -11,9 +11,11 @@
 use gluey_geom::{Dim, Matrix, Space};
 use rayon::prelude::*;
 
-use super::mean::{fluid_weights, mean_of};
-use crate::formulation::Problem;
-use crate::surface::StrainEnergy;
+use super::mean::mean_pressure;
+use crate::error::StokesError;
+use crate::film::FilmForce;
+use crate::formulation::{Problem, symmetric};
+use crate::surface::{CutCells, StrainEnergy};
 
 /// What the bodies add to the stress, and the power that is dissipated.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,14 +38,63 @@ impl<const D: usize> Stress<D> {
     }
 }
 
-/// Power that the fluid of the own cells dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative
-/// to a linear flow with this strain.
-pub fn dissipation<const D: usize>(problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> f64
+/// The stress of a flow: its velocity, nodal and of bodies, and pressure, and the reduced vector. All ranks
+/// call this.
+///
+/// # Errors
+/// [`StokesError::Unsupported`] but around surfaces.
+pub fn stress_of<const D: usize>(
+    problem: &Problem<D>,
+    strain: &Matrix<D>,
+    [velocity, pressure]: [&[f64]; 2],
+    x: &[f64],
+) -> Result<Stress<D>, StokesError>
 where
     Dim<D>: Space<D>,
 {
-    let Some(surfaces) = problem.system.surfaces() else { return 0.0 };
-    let cut = &surfaces.cut;
+    let (system, mesh) = (&problem.system, problem.discretisation());
+    let Some(surfaces) = system.surfaces() else {
+        return Err(StokesError::Unsupported { what: "stresses of suspensions" });
+    };
+    let mut pressure = pressure[..system.pressure.dim()].to_vec();
+    let mean = mean_pressure(mesh, &surfaces.cut, &pressure);
+    pressure.iter_mut().for_each(|p| *p -= mean);
+    let moments = mesh.agreed(problem.rigidity.first_moments(problem, [velocity, &pressure], strain))?;
+    let of_films = film_moments(&problem.film_forces(x), problem.bodies.len());
+    let [moments, of_films] =
+        [moments, of_films].map(|near| mesh.sums_of_bodies(near).iter().map(symmetric).collect());
+    let of_films_here = system.parts(x)[2].iter().map(|g| g * g).sum::<f64>();
+    let mut powers = [dissipation(problem, &surfaces.cut, velocity, strain), of_films_here];
+    mesh.sum_over_ranks(&mut powers);
+    let [of_fluid, dissipation_of_films] = powers;
+    Ok(Stress { moments, of_films, dissipation: of_fluid + dissipation_of_films, dissipation_of_films })
+}
+
+/// The first moments of the forces of films on each body.
+pub fn film_moments<const D: usize>(films: &[FilmForce<D>], body_count: usize) -> Vec<Matrix<D>>
+where
+    Dim<D>: Space<D>,
+{
+    let mut sums = vec![Matrix::zeros(); body_count];
+    for force in films {
+        for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
+            sums[body] += force.moment(side);
+        }
+    }
+    sums
+}
+
+/// Power that the fluid of the own cells dissipates, `int 2 eta eps:eps`, in a nodal velocity field relative
+/// to a linear flow with this strain.
+fn dissipation<const D: usize>(
+    problem: &Problem<D>,
+    cut: &CutCells<D>,
+    velocity: &[f64],
+    strain: &Matrix<D>,
+) -> f64
+where
+    Dim<D>: Space<D>,
+{
     let energy = StrainEnergy::new(problem.discretisation(), cut);
     let of_cell = |cell: usize| match problem.discretisation().is_own(cell) {
         true => energy.in_cell(cell, velocity, strain),
@@ -51,14 +102,4 @@ where
     };
     let cells: Vec<f64> = (0..cut.states.len()).into_par_iter().with_min_len(256).map(of_cell).collect();
     problem.system.viscosity() * cells.iter().sum::<f64>()
-}
-
-/// The mean pressure of the fluid.
-pub fn mean_pressure<const D: usize>(problem: &Problem<D>, pressure: &[f64]) -> f64
-where
-    Dim<D>: Space<D>,
-{
-    let Some(surfaces) = problem.system.surfaces() else { return 0.0 };
-    let discretisation = problem.discretisation();
-    mean_of(&fluid_weights(discretisation, &discretisation.pressure, &surfaces.cut), pressure)
 }

@@ -8,7 +8,7 @@
 //! `docs/archive/experiments/0010-krylov-vectors.md`.
 
 use gluey_fem::Evaluator;
-use gluey_fem::{NodeMap, TreeMesh};
+use gluey_fem::NodeMap;
 use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
@@ -87,11 +87,10 @@ where
     /// # Errors
     /// If their lengths do not fit the mesh.
     pub fn restore(
-        mesh: TreeMesh<D>,
+        discretisation: Discretisation<D>,
         last: NodalFields,
         before: Option<NodalFields>,
     ) -> Result<Self, WarmStartError> {
-        let discretisation = Discretisation::new(mesh);
         let velocity_count = discretisation.velocity.node_count() * D;
         let pressure_count = discretisation.pressure.node_count();
         for NodalFields { velocity, pressure, .. } in std::iter::once(&last).chain(&before) {
@@ -142,18 +141,9 @@ where
         }
     }
 
-    /// The reduced vector a solve on its mesh starts from for the right-hand side `b`, and the last flow.
+    /// The reduced vector a solve on its mesh starts from for the right-hand side `b`, and the last flow. All
+    /// ranks call this.
     pub fn into_guess(self, system: &StokesSystem<D>, b: &[f64]) -> (Vec<f64>, NodalFields) {
-        (self.guess(system, b, &mut |_| ()), self.last)
-    }
-
-    /// The reduced vector. Films get forces after `complete` brought velocities from elsewhere to it.
-    pub fn guess(
-        &self,
-        system: &StokesSystem<D>,
-        b: &[f64],
-        complete: &mut dyn FnMut(&mut [f64]),
-    ) -> Vec<f64> {
         let mut guess = self.last.clone();
         if let Some(before) = &self.before {
             extrapolate(&before.velocity, &mut guess.velocity);
@@ -170,7 +160,7 @@ where
             bodies.copy_from_slice(&guess.bodies);
         }
         space.clear_held(&mut x);
-        complete(&mut x);
+        system.halos().velocities.clone().update(&mut x);
         if let Some(films) = system.films() {
             guess.films = films.of_motions(&x, system.parts(b)[2]);
             films.restore(&self.last.films, &mut guess.films);
@@ -184,7 +174,8 @@ where
         x.append(&mut guess.pressure);
         x.append(&mut guess.films);
         x.resize(system.dim(), 0.0);
-        x
+        system.halo().clear(&mut x);
+        (x, self.last)
     }
 }
 

@@ -24,7 +24,8 @@ use crate::space::Discretisation;
 #[cfg(feature = "paper")]
 pub use paper::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
 pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
-pub use unfitted::{OFFSET as OFFSET_OF_LEVELS, Unfitted};
+#[cfg(test)]
+pub use unfitted::Unfitted;
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -158,8 +158,10 @@ where
 {
     /// The matrix, which knows mesh and nodes.
     pub system: StokesSystem<D>,
-    /// The rigid bodies.
+    /// The rigid bodies, on a part of a mesh those near it.
     pub bodies: Vec<Ball<D>>,
+    /// All of them.
+    pub(crate) all_bodies: Vec<Ball<D>>,
     /// How they are rigid.
     pub(crate) rigidity: Arc<dyn Rigidity<D>>,
 }
@@ -168,8 +170,8 @@ impl<const D: usize> Problem<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The problem around `bodies` on a mesh whose nodes are known, with what a formulation keeps from mesh
-    /// to mesh.
+    /// The problem around all `bodies` on a mesh whose nodes are known, with what a formulation keeps from
+    /// mesh to mesh. All ranks call this.
     ///
     /// # Errors
     /// [`StokesError::Parameter`] for values out of range, [`StokesError::Unresolved`] for a body smaller
@@ -181,8 +183,11 @@ where
         method: &dyn Method<D>,
     ) -> Result<Self, StokesError> {
         check_viscosity(viscosity)?;
-        let (system, rigidity) = method.discretised(discretisation, bodies, viscosity)?;
-        Ok(Self { system, bodies: bodies.to_vec(), rigidity })
+        let (near, all_bodies) = (discretisation.near(bodies), bodies.to_vec());
+        let made = method.discretised(discretisation, &near, viscosity);
+        let (mut system, rigidity) = discretisation.agreed(made)?;
+        system.share();
+        Ok(Self { system, bodies: near, all_bodies, rigidity })
     }
 
     /// Mesh and nodes.
@@ -274,8 +279,8 @@ where
         Ok(())
     }
 
-    /// Adds the loads of forces and torques on the bodies to a reduced right-hand side; no entries stand for
-    /// none on any.
+    /// Adds the loads of forces and torques on all bodies to a reduced right-hand side, on parts of a mesh of
+    /// those whose twists the rank owns; no entries stand for none on any.
     ///
     /// # Errors
     /// [`StokesError::Count`] unless there is one entry per body, and those of [`Rigidity::add_wrenches`].
@@ -284,7 +289,8 @@ where
             return Ok(());
         }
         self.check_count("wrenches", wrenches.len())?;
-        self.rigidity.add_wrenches(self, wrenches, b)
+        let mesh = self.discretisation();
+        self.rigidity.add_wrenches(self, &mesh.of_owned(&mesh.near(wrenches)), b)
     }
 
     /// Makes bodies move with these twists, one entry for each body or `None` for one that is free, in a
@@ -296,6 +302,7 @@ where
     pub fn set_twists(&self, twists: &[Option<Twist<D>>], lift: &mut [f64]) -> Result<(), StokesError> {
         self.check_count("twists", twists.len())?;
         let space = self.space_with_twists("bodies that are held")?;
+        let twists = self.discretisation().near(twists);
         let held = twists.iter().enumerate().filter_map(|(body, twist)| Some((body, twist.as_ref()?)));
         held.for_each(|(body, twist)| space.set_twist(lift, body, twist));
         space.expand(lift);
@@ -303,7 +310,8 @@ where
     }
 
     /// The forces and torques on the bodies that make this velocity (as [`Problem::velocity`] gives it) and
-    /// pressure a solution, by action and reaction: what is missing in the rows of the twists.
+    /// pressure a solution, by action and reaction: what is missing in the rows of the twists. All ranks call
+    /// this.
     ///
     /// # Errors
     /// [`StokesError::Unsupported`] in a formulation without unknowns for twists.
@@ -318,11 +326,12 @@ where
         let mut b = self.loads(force);
         self.add_strain(strain, &mut b)?;
         self.rigidity.residual(&self.system, [velocity, pressure], &mut b);
-        Ok((0..self.bodies.len()).map(|body| -space.wrench(&b, body)).collect())
+        let lacking = (0..self.bodies.len()).map(|body| -space.wrench(&b, body)).collect();
+        Ok(self.discretisation().sums_of_bodies(lacking))
     }
 
     fn check_count(&self, what: &'static str, found: usize) -> Result<(), StokesError> {
-        let bodies = self.bodies.len();
+        let bodies = self.all_bodies.len();
         if found == bodies { Ok(()) } else { Err(StokesError::Count { what, found, bodies }) }
     }
 
@@ -344,8 +353,28 @@ where
         velocity
     }
 
-    /// What films exert on bodies and walls.
-    pub fn film_forces(&self, x: &[f64]) -> Vec<FilmForce<D>> {
+    /// The cells of all ranks whose penalty is too small for a velocity that [`Problem::velocity`] gave,
+    /// relative to a linear flow with this strain. All ranks call this.
+    pub(crate) fn weak_cells(&self, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {
+        let weak = self.rigidity.weak_cells(self, velocity, strain);
+        let Some(partition) = self.discretisation().partition() else { return weak };
+        let mesh = &partition.part.mesh;
+        let record = |weak: &WeakCell| {
+            let key = weak.place.map_or(u64::MAX, |place| mesh.key(&mesh.cells()[place as usize]));
+            let body = self.discretisation().body_number(weak.body);
+            [key, u64::from(weak.cell), u64::from(body), weak.share.to_bits()]
+        };
+        let records: Vec<_> = weak.iter().map(record).collect();
+        let of_record = |[key, cell, body, share]: [u64; 4]| {
+            let place = mesh.cells().binary_search_by_key(&key, |cell| mesh.key(cell)).ok();
+            let [cell, body] = [cell, body].map(|number| number as u32);
+            WeakCell { cell, place: place.map(|place| place as u32), body, share: f64::from_bits(share) }
+        };
+        partition.ranks.gathered(&records).into_iter().map(of_record).collect()
+    }
+
+    /// What films exert on bodies and walls, on parts of a mesh own films, with the numbers of bodies here.
+    pub(crate) fn film_forces(&self, x: &[f64]) -> Vec<FilmForce<D>> {
         let system = &self.system;
         system.films().map_or(Vec::new(), |films| films.forces(&system.space, system.parts(x)[2]))
     }
@@ -364,12 +393,13 @@ where
         pressure
     }
 
-    /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
+    /// Velocity and spin of each body in a field that [`Problem::velocity`] gave. All ranks call this.
     ///
     /// # Errors
     /// Those of [`Rigidity::twists`].
     pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
-        self.rigidity.twists(self, velocity)
+        let (mesh, near) = (self.discretisation(), self.rigidity.twists(self, velocity)?);
+        Ok(mesh.sums_of_bodies(mesh.of_owned(&near)))
     }
 }
 

@@ -59,13 +59,12 @@ impl Unfitted {
         Self { penalty: self.penalty.clone().raised(cells), ..*self }
     }
 
-    /// The system around these bodies, with the forces of the films that are `wanted`.
+    /// The system around these bodies, with the forces of the films whose middles are in the run of the rank.
     pub fn system<const D: usize>(
         &self,
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
-        wanted: &dyn Fn(&Film<D>) -> bool,
     ) -> Result<StokesSystem<D>, StokesError>
     where
         Dim<D>: Space<D>,
@@ -74,7 +73,8 @@ impl Unfitted {
         let mut films = thin_films(bodies, discretisation.mesh.domain(), &heights);
         let flats = flats(&films, bodies.len(), &heights);
         let mut system = around(discretisation, bodies, &flats, viscosity, &self.penalty)?;
-        films.retain(wanted);
+        let shear = discretisation.mesh.shear();
+        films.retain(|film| discretisation.is_own_point(&film.middle(shear)));
         let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
         if let Some(surfaces) = system.surfaces().filter(|_| lubricates) {
             let spaces = (&system.space, &system.pressure);
@@ -96,7 +96,7 @@ where
         viscosity: f64,
     ) -> Result<(StokesSystem<D>, Arc<dyn Rigidity<D>>), StokesError> {
         check_resolved(discretisation, bodies, |body| reaches_into(&discretisation.mesh, &bodies[body]))?;
-        let system = self.system(discretisation, bodies, viscosity, &|_| true)?;
+        let system = self.system(discretisation, bodies, viscosity)?;
         Ok((system, Arc::new(self.clone())))
     }
 
@@ -105,7 +105,7 @@ where
     }
 
     fn raised(&self, cells: &[WeakCell]) -> Option<Arc<dyn Method<D>>> {
-        let factors = cells.iter().map(|weak| (weak.cell, weak.factor()));
+        let factors = cells.iter().filter_map(|weak| Some((weak.place?, weak.factor())));
         Some(Arc::new(self.with_raised_penalties(factors)))
     }
 }

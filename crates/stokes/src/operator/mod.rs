@@ -4,6 +4,7 @@ mod assembly;
 mod cells;
 mod diagonal;
 mod element;
+mod halos;
 mod pressure_forces;
 mod restricted;
 mod shared;
@@ -14,6 +15,7 @@ pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, facto
 pub use cells::{AddedViscosity, CellViscosities, CellVisitor, viscous_diagonal};
 pub use diagonal::{BlockDiagonal, DiagonalSums, nodal_diagonal};
 pub use element::{Elements, Source};
+pub use halos::SystemHalos;
 pub use pressure_forces::PressureForces;
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};
 pub use shared::{OnOwned, Summed};

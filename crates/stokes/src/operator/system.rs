@@ -10,10 +10,11 @@ use std::sync::Arc;
 use gluey_fem::cells::{CellOperator, Workspace};
 use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectError, LinOp, Scalar, vector};
-use gluey_parallel::{Halo, Number};
+use gluey_parallel::{Communicator, Halo, Number};
 
 use super::cells::{AddedViscosity, cell_operator};
-use crate::film::{FilmCorrection, FilmCoupling, FilmNetwork, FilmRow};
+use super::halos::SystemHalos;
+use crate::film::{FilmCorrection, FilmCoupling, FilmNetwork, FilmRow, SharedTwists};
 use crate::space::{
     ActiveCell, Discretisation, PressureSpace, VelocitySpace, active_cells, all_cells, own_cells,
 };
@@ -35,8 +36,8 @@ pub struct StokesSystem<const D: usize> {
     pub(crate) terms: Terms<D>,
     viscosity: f64,
     operator: CellOperator<f64, D>,
-    /// Of vectors, and of their velocities, where ranks share them.
-    halos: [Halo; 2],
+    /// Of vectors, where ranks share them.
+    halos: SystemHalos,
 }
 
 impl<const D: usize> StokesSystem<D>
@@ -92,26 +93,42 @@ where
         self.term()
     }
 
-    /// Makes the system of the part of a mesh that of all ranks, by the halos of vectors, velocities and
-    /// pressures. Vectors are zero at ghosts. All ranks call this.
-    pub fn share(&mut self, [all, velocities, pressures]: [Halo; 3]) {
-        self.halos = [all, velocities];
+    /// Makes the system of the part of a mesh that of all ranks; nothing where the mesh is whole. Vectors are
+    /// zero at ghosts. All ranks call this.
+    pub fn share(&mut self) {
+        let Some(partition) = self.discretisation().partition() else { return };
+        let (halos, pressures) = SystemHalos::new(&self.space, &self.pressure, &self.terms, partition);
+        self.halos = halos;
         self.pressure.share(pressures);
     }
 
     /// The halo of vectors: nothing on one rank.
     pub fn halo(&self) -> &Halo {
-        &self.halos[0]
+        &self.halos.all
     }
 
-    /// The halo of their velocities and twists.
-    pub fn halo_of_velocities(&self) -> &Halo {
-        &self.halos[1]
+    /// The halos of vectors.
+    pub fn halos(&self) -> &SystemHalos {
+        &self.halos
     }
 
-    /// From sums over own cells to a right-hand side, of all ranks.
+    /// Makes a solution, whose pressures lose their mean, right at all cells around own ones that are cut;
+    /// nothing on one rank. All ranks call this.
+    pub fn update(&self, x: &mut [f64]) {
+        if !self.discretisation().is_part() {
+            return;
+        }
+        self.pressure.remove_mean(self.parts_mut(x)[1]);
+        self.halos.all.clone().update(x);
+        self.halos.around.clone().update(x);
+    }
+
+    /// From sums over own cells to a right-hand side, of all ranks; nothing on one rank.
     pub fn complete(&self, b: &mut [f64]) {
-        self.halos[0].clone().accumulate(b);
+        if !self.discretisation().is_part() {
+            return;
+        }
+        self.halo().clone().accumulate(b);
         let [_, p, _] = self.parts_mut(b);
         self.pressure.remove_mean(p);
     }
@@ -136,7 +153,7 @@ where
     pub fn fluid_norm(&self, b: &[f64]) -> f64 {
         let fluid = &b[..b.len() - self.row_count()];
         let mut square = [vector::dot(fluid, fluid)];
-        self.halos[0].sum_over_ranks(&mut square);
+        self.halo().sum_over_ranks(&mut square);
         square[0].sqrt()
     }
 
@@ -147,19 +164,26 @@ where
         blocks
     }
 
-    /// The rows of the films' motions, on the twists of the bodies.
-    pub fn rows_of_motion(&self) -> Vec<FilmRow> {
-        self.films().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()))
-    }
-
-    /// The network of its films; `None` without films.
+    /// The network of the films of all ranks, of which each has it whole, and the forces of its own films;
+    /// `None` without films. All ranks call this.
     ///
     /// # Errors
     /// Those of [`FilmNetwork::new`].
     pub fn film_network(&self) -> Result<Option<FilmNetwork>, DirectError> {
-        let rows = self.rows_of_motion();
-        let blocks = if rows.is_empty() { Vec::new() } else { self.twist_blocks() };
-        FilmNetwork::new::<D>(&blocks, self.space.held(), &rows, rows.clone())
+        let own = self.films().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()));
+        let Some(partition) = self.discretisation().partition() else {
+            let blocks = if own.is_empty() { Vec::new() } else { self.twist_blocks() };
+            return FilmNetwork::new::<D>(&blocks, self.space.held(), &own, own.clone());
+        };
+        let (ranks, bodies) = (&partition.ranks, partition.bodies.ids.clone());
+        let own: Vec<_> = own.into_iter().map(|row| row.renumbered(|body| bodies[body as usize])).collect();
+        let numbers: Vec<_> = own.iter().map(FilmRow::to_numbers).collect();
+        let all: Vec<_> = ranks.gathered(&numbers).iter().map(FilmRow::from_numbers).collect();
+        let blocks = partition.sums_of_bodies(&self.twist_blocks(), Dim::<D>::RIGID.pow(2));
+        let is_own = partition.bodies.owners.iter().map(|&owner| owner == ranks.rank()).collect();
+        let twists = SharedTwists { halo: self.halo().clone(), bodies, is_own };
+        let network = FilmNetwork::new::<D>(&blocks, self.space.held_of_all(), &all, own)?;
+        Ok(network.map(|network| network.with_shared(twists)))
     }
 
     /// Length of the terms' part of a vector.

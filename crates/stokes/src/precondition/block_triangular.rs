@@ -46,7 +46,7 @@ where
             pressure: zeros(),
             answer: zeros(),
             films,
-            halos: [system.halo_of_velocities().clone(), system.pressure.halo().clone()],
+            halos: [system.halos().velocities.clone(), system.pressure.halo().clone()],
         }
     }
 }

@@ -9,6 +9,7 @@ use gluey_geom::{Dim, Space};
 use crate::error::StokesError;
 use crate::formulation::Problem;
 use crate::operator::StokesSystem;
+use crate::space::Discretisation;
 
 pub use direct::DirectSolver;
 pub use kind::SolverKind;
@@ -47,4 +48,13 @@ where
         x: &mut [f64],
         tolerance: f64,
     ) -> Result<SolveReport, StokesError>;
+
+    /// Takes parts of meshes for the levels below those of the systems, which ranks share, and gives up after
+    /// so many iterations.
+    ///
+    /// # Errors
+    /// [`StokesError::Unsupported`] for solvers on whole meshes only.
+    fn share(&mut self, _coarser: &[Discretisation<D>], _max_iterations: usize) -> Result<(), StokesError> {
+        Err(StokesError::Unsupported { what: "flows on ranks by this solver" })
+    }
 }

@@ -13,14 +13,14 @@ use gluey_geom::{Dim, Space};
 use gluey_linalg::{Gcr, GcrParams, LinOp, Preconditioner, Reference, Scalar};
 
 use super::{SaddleSolver, SolveReport};
-use crate::error::{StokesError, agreed};
+use crate::error::StokesError;
 use crate::film::FilmNetwork;
 use crate::formulation::Problem;
 use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle};
 use crate::precondition::{BlockTriangular, CycleLevels};
-use crate::space::{VelocitySpace, solid_nodes};
+use crate::space::{Discretisation, VelocitySpace, solid_nodes};
 
 /// Iterations between restarts.
 const RESTART: usize = 60;
@@ -43,6 +43,8 @@ where
     schur: Option<SchurInverse<D>>,
     forces: Option<PressureForces<D>>,
     films: Option<FilmNetwork>,
+    /// Below the finest mesh, where ranks have parts of it.
+    coarser: Vec<Discretisation<D>>,
 }
 
 impl<const D: usize> Default for MultigridSolver<D>
@@ -59,6 +61,7 @@ where
             schur: None,
             forces: None,
             films: None,
+            coarser: Vec::new(),
         }
     }
 }
@@ -67,31 +70,6 @@ impl<const D: usize> MultigridSolver<D>
 where
     Dim<D>: Space<D>,
 {
-    /// A solver whose ranks have prepared the parts of it, which gives up after so many iterations.
-    pub fn of_parts(
-        system: &StokesSystem<D>,
-        cycle: VCycle<D>,
-        schur: SchurInverse<D>,
-        films: Option<FilmNetwork>,
-        max_iterations: usize,
-    ) -> Self {
-        let params = GcrParams { max_iterations, restart: RESTART, ..GcrParams::default() };
-        Self {
-            double: Gcr::with_directions(params),
-            noise: f64::INFINITY,
-            cycle: Some(cycle),
-            schur: Some(schur),
-            forces: Some(PressureForces::new(system)),
-            films,
-            ..Self::default()
-        }
-    }
-
-    /// Its cycle, for other surfaces; `None` before the solver was prepared.
-    pub fn into_cycle(self) -> Option<VCycle<D>> {
-        self.cycle
-    }
-
     /// One V-cycle on the velocity block, for reduced velocities; `None` before the solver was prepared.
     pub fn velocity_cycle(&mut self) -> Option<&mut impl Preconditioner<f64>> {
         self.cycle.as_mut()
@@ -110,16 +88,25 @@ where
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError> {
         let system = &problem.system;
         let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
-        let before = self.cycle.take().map(|cycle| cycle.hierarchy).unwrap_or_default();
-        let hierarchy = Hierarchy::new(problem.discretisation(), before);
+        let (finest, before) = (problem.discretisation(), self.cycle.take().map(|cycle| cycle.hierarchy));
+        let hierarchy = match finest.is_part() {
+            true => Hierarchy::of_parts(self.coarser.iter().chain([finest]).cloned().collect()),
+            false => Hierarchy::new(finest, before.unwrap_or_default()),
+        };
         let (before, meshes) = (self.schur.take(), hierarchy.meshes.clone());
-        let (schur, cycle) = rayon::join(
-            || SchurInverse::new(&meshes, &elements, before),
-            || velocity_cycle(problem, &elements, hierarchy),
-        );
+        let schur = || SchurInverse::new(&meshes, &elements, before);
+        let cycle = || velocity_cycle(problem, &elements, hierarchy);
+        let (schur, cycle) = match finest.is_part() {
+            // One after the other, as others wait for messages.
+            true => {
+                let cycle = cycle()?;
+                (schur(), Ok(cycle))
+            }
+            false => rayon::join(schur, cycle),
+        };
         (self.schur, self.cycle) = (Some(schur?), Some(cycle?));
         self.forces = Some(PressureForces::new(system));
-        self.films = system.film_network()?;
+        self.films = finest.agreed(system.film_network().map_err(StokesError::from))?;
         // Penalties and extrapolated nodes in thin films leave large numbers that nearly cancel.
         self.noise = if system.terms.is_empty() { rounding_noise(system) } else { f64::INFINITY };
         Ok(())
@@ -140,7 +127,8 @@ where
         let [of_iterates, of_steps] =
             [(); 2].map(|()| self.films.as_ref().map(FilmNetwork::correction).transpose());
         let corrections = of_iterates.and_then(|of_iterates| Ok((of_iterates, of_steps?)));
-        let (of_iterates, of_steps) = agreed(system.halo(), corrections.map_err(StokesError::from))?;
+        let corrections = corrections.map_err(StokesError::from);
+        let (of_iterates, of_steps) = system.discretisation().agreed(corrections)?;
         let operator = &mut SystemOperator::new(system).with_films(of_iterates);
         let preconditioner = &mut BlockTriangular::new(system, (forces, cycle, schur), of_steps);
         let goal = Goal { tolerance, reference: system.fluid_norm(b) };
@@ -156,6 +144,14 @@ where
             reference: goal.reference,
         })
     }
+
+    fn share(&mut self, coarser: &[Discretisation<D>], max_iterations: usize) -> Result<(), StokesError> {
+        let params = GcrParams { max_iterations, restart: RESTART, ..GcrParams::default() };
+        self.single = Gcr::with_steps(params);
+        self.double = Gcr::with_directions(params);
+        self.coarser = coarser.to_vec();
+        Ok(())
+    }
 }
 
 /// The cycle whose levels are those the formulation asks for.
@@ -167,15 +163,16 @@ fn velocity_cycle<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let Problem { system, bodies, rigidity } = problem;
+    let Problem { system, all_bodies, rigidity, .. } = problem;
     let levels = CycleLevels { meshes: &hierarchy.meshes, radius: problem.largest_radius() };
-    let held = system.space.held();
+    let held = system.space.held_of_all();
     let mut finest = rigidity.finest_level(problem);
     finest.hold(held);
     let correction = rigidity.correction(elements, &finest, levels)?;
     let coarser = hierarchy.meshes[..hierarchy.meshes.len() - 1].iter().map(|mesh| {
-        let solid = solid_nodes(mesh, bodies, rigidity.coarse_offset());
-        let mut space = VelocitySpace::new(mesh, bodies, &solid);
+        let bodies = mesh.near(all_bodies);
+        let solid = solid_nodes(mesh, &bodies, rigidity.coarse_offset());
+        let mut space = VelocitySpace::new(mesh, &bodies, &solid);
         space.hold(held);
         (space, false)
     });

@@ -5,9 +5,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use gluey_fem::{Chunks, Interpolation, NodeMap, ReferenceMatrices, TreeMesh};
+use gluey_geom::Vector;
 use gluey_linalg::vector;
+use gluey_parallel::{Communicator, RankFailure, Traffic};
 
+use super::body_numbers::BodyNumbers;
 use super::partition::Partition;
+use crate::error::StokesError;
 
 /// A mesh with the nodes of the Q2-Q1 pair. Cheap to clone: clones share all of it.
 #[derive(Clone, Debug)]
@@ -35,13 +39,16 @@ impl<const D: usize> Discretisation<D> {
 
     /// A part of a larger mesh: operators are sums over the cells of `partition`, sums over all cells those
     /// of all parts.
-    pub fn of_part(
-        mesh: Arc<TreeMesh<D>>,
-        [velocity, pressure]: [Arc<NodeMap<D>>; 2],
-        chunks: Arc<Chunks<D>>,
-        partition: Partition<D>,
-    ) -> Self {
-        Self { mesh, velocity, pressure, chunks, partition: Some(Arc::new(partition)) }
+    pub fn of_part(partition: Partition<D>) -> Self {
+        let [velocity, pressure] = [&partition.velocity, &partition.pressure].map(|nodes| nodes.map.clone());
+        let chunks = Arc::new(Chunks::new(&velocity, &pressure));
+        Self {
+            mesh: partition.part.mesh.clone(),
+            velocity,
+            pressure,
+            chunks,
+            partition: Some(partition.into()),
+        }
     }
 
     /// The same mesh as one that no ranks share.
@@ -60,25 +67,95 @@ impl<const D: usize> Discretisation<D> {
         self.partition.is_some()
     }
 
-    /// Whether a cell is added up here: all are, but in a part.
+    /// The cells that are added up here: all, but in a part.
+    pub fn own_cells(&self) -> Range<usize> {
+        self.partition().map_or(0..self.mesh.cell_count(), |part| part.part.own())
+    }
+
+    /// Whether a cell is added up here.
     pub fn is_own(&self, cell: usize) -> bool {
-        self.partition().is_none_or(|part| part.part.own().contains(&cell))
+        self.own_cells().contains(&cell)
+    }
+
+    /// Of the values of all bodies, if there are any, those of the bodies near the part.
+    pub fn near<T: Clone>(&self, all: &[T]) -> Vec<T> {
+        match self.partition() {
+            Some(part) => part.bodies.ids.iter().filter_map(|&id| all.get(id as usize).cloned()).collect(),
+            None => all.to_vec(),
+        }
+    }
+
+    /// The values of the bodies near the part that the rank owns, nothing of others.
+    pub fn of_owned<T: Clone + Default>(&self, near: &[T]) -> Vec<T> {
+        let Some(part) = self.partition() else { return near.to_vec() };
+        let mut own = vec![T::default(); near.len()];
+        part.own_bodies().for_each(|body| own[body] = near[body].clone());
+        own
+    }
+
+    /// Sums over ranks of what each has of the bodies near its part; of all bodies. All ranks call this.
+    pub fn sums_of_bodies<T: BodyNumbers>(&self, near: Vec<T>) -> Vec<T> {
+        let Some(part) = self.partition() else { return near };
+        let mut numbers = vec![0.0; near.len() * T::COUNT];
+        let of_bodies = near.iter().zip(numbers.chunks_exact_mut(T::COUNT));
+        of_bodies.for_each(|(value, numbers)| value.write(numbers));
+        part.sums_of_bodies(&numbers, T::COUNT).chunks_exact(T::COUNT).map(T::read).collect()
+    }
+
+    /// Whether something holds on any rank. All ranks call this.
+    pub fn any(&self, holds: bool) -> bool {
+        self.partition().map_or(holds, |part| part.ranks.all_gather(&[u64::from(holds)]).contains(&1))
+    }
+
+    /// What the rank has sent so far.
+    pub fn traffic(&self) -> Traffic {
+        self.partition().map_or_else(Traffic::default, |part| part.ranks.traffic())
+    }
+
+    /// Adds up numbers over all ranks.
+    pub fn sum_over_ranks(&self, numbers: &mut [f64]) {
+        if let Some(part) = self.partition() {
+            part.ranks.sum(numbers);
+        }
+    }
+
+    /// A failure of one rank as one of all, with the number of a body among all. All ranks call this.
+    pub fn agreed<T>(&self, outcome: Result<T, StokesError>) -> Result<T, StokesError> {
+        let Some(part) = self.partition() else { return outcome };
+        let outcome = outcome.map_err(|error| error.with_bodies(|place| part.bodies.ids[place] as usize));
+        let elsewhere = |RankFailure { rank, message, .. }| StokesError::Elsewhere { rank, message };
+        part.ranks.agreed(outcome).map_err(elsewhere)?
+    }
+
+    /// Whether the rank is the one whose run holds a point.
+    pub fn is_own_point(&self, point: &Vector<D>) -> bool {
+        self.partition().is_none_or(|part| part.owner_of_point(point) == part.ranks.rank())
+    }
+
+    /// The index in the whole mesh of an own cell.
+    pub fn cell_number(&self, cell: usize) -> usize {
+        self.partition().map_or(cell, |part| part.before[0] + cell - part.part.own().start)
+    }
+
+    /// The number among all bodies of one of those near the part.
+    pub fn body_number(&self, body: u32) -> u32 {
+        self.partition().map_or(body, |part| part.bodies.ids[body as usize])
     }
 
     /// The velocity nodes that this rank owns.
     pub fn own_nodes(&self) -> Range<usize> {
-        self.partition().map_or(0..self.velocity.node_count(), |part| part.nodes.clone())
+        self.partition().map_or(0..self.velocity.node_count(), |part| part.velocity.owned.clone())
     }
 
     /// The pressure nodes that this rank owns.
     pub fn own_pressure_nodes(&self) -> Range<usize> {
-        self.partition().map_or(0..self.pressure.node_count(), |part| part.pressure_nodes.clone())
+        self.partition().map_or(0..self.pressure.node_count(), |part| part.pressure.owned.clone())
     }
 
     /// Pseudo-random numbers at the own pressures, for any number of ranks those of one; zero at others.
     pub fn pseudo_random_pressures(&self) -> Vec<f32> {
         let mut numbers = vec![0.0; self.pressure.node_count()];
-        let before = self.partition().map_or(0, |part| part.pressures_before);
+        let before = self.partition().map_or(0, |part| part.before[2]);
         vector::fill_pseudo_random_from(1, before, &mut numbers[self.own_pressure_nodes()]);
         numbers
     }
@@ -91,11 +168,11 @@ impl<const D: usize> Discretisation<D> {
             vector::fill_pseudo_random(1, &mut numbers);
             return numbers;
         };
-        let [all, before] = part.node_counts;
-        let own = part.nodes.start * D..part.nodes.end * D;
+        let [all, before] = [part.counts[1], part.before[1]];
+        let own = part.velocity.owned.start * D..part.velocity.owned.end * D;
         vector::fill_pseudo_random_from(1, before * D, &mut numbers[own]);
         for body in part.own_bodies() {
-            let first = all * D + part.bodies[body] as usize * width;
+            let first = all * D + part.bodies.ids[body] as usize * width;
             vector::fill_pseudo_random_from(1, first, &mut numbers[nodal + body * width..][..width]);
         }
         numbers
@@ -120,9 +197,16 @@ impl<const D: usize> Discretisation<D> {
         Cow::Owned(finest_levels(&self.mesh, &self.velocity))
     }
 
-    /// Velocity and pressure unknowns of the mesh, as if there were no bodies and no hanging nodes.
+    /// Cells of the whole mesh.
+    pub fn cell_count(&self) -> usize {
+        self.partition().map_or(self.mesh.cell_count(), |part| part.counts[0])
+    }
+
+    /// Velocity and pressure unknowns of the whole mesh, as if there were no bodies and no hanging nodes.
     pub fn dof_count(&self) -> usize {
-        self.velocity.node_count() * D + self.pressure.node_count()
+        let here = || [0, self.velocity.node_count(), self.pressure.node_count()];
+        let [_, velocities, pressures] = self.partition().map_or_else(here, |part| part.counts);
+        velocities * D + pressures
     }
 
     /// The element matrices of its cells, which are sheared like the box.

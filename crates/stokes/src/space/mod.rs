@@ -1,10 +1,12 @@
 //! The unknowns: velocities with boundary, hanging and rigid nodes eliminated, pressures; the marking of
 //! nodes and cells.
 
+mod body_numbers;
 mod cells;
 mod discretisation;
 mod expansion;
 mod marking;
+mod part_nodes;
 mod partition;
 mod pressure;
 mod velocity;
@@ -16,7 +18,8 @@ pub use cells::{ActiveCell, active_cells, all_cells, own_cells};
 pub use discretisation::{Discretisation, finest_levels};
 pub use expansion::{pressure_expansion, velocity_expansion};
 pub use marking::{around_finest_cells, cells_touching, moves_as_one, nodes_of_cells_with, solid_nodes};
-pub use partition::Partition;
+pub use part_nodes::PartNodes;
+pub use partition::{PartBodies, Partition, owner_of_point};
 pub use pressure::PressureSpace;
 pub use velocity::{SolidNodes, VelocitySpace};
 

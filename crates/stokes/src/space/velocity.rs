@@ -43,8 +43,9 @@ pub struct VelocitySpace<const D: usize> {
     is_ghost: Vec<bool>,
     /// Whether bodies are coupled to the fluid through their surfaces: then no node has to be rigid.
     by_surface: bool,
-    /// See [`VelocitySpace::hold`]; empty where none is held.
+    /// See [`VelocitySpace::hold`]; of the bodies here and of all, empty where none is held.
     held: Vec<bool>,
+    held_of_all: Vec<bool>,
     /// Of reduced vectors, and of a square matrix for each twist.
     halos: [Halo; 2],
 }
@@ -82,6 +83,7 @@ where
             is_ghost: vec![false; nodes.node_count()],
             by_surface: false,
             held: Vec::new(),
+            held_of_all: Vec::new(),
             halos,
         };
         let fit = &space.fit;
@@ -170,7 +172,7 @@ where
     pub fn is_anchored(&self) -> bool {
         let holds_nodes = || self.rigid.iter().any(|r| self.is_held(r.body as usize));
         let holds = self.holds_any() && (self.by_surface || holds_nodes());
-        holds || !self.boundary.is_empty()
+        holds || self.discretisation.mesh.periodic().contains(&false)
     }
 
     /// Number of bodies, active or not.

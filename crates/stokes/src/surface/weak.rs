@@ -27,8 +27,10 @@ const AFTERWARDS: f64 = 0.125;
 /// A cut cell that takes too much of the strain energy around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeakCell {
-    /// Index in the mesh.
+    /// Index in the whole mesh.
     pub cell: u32,
+    /// Index in the mesh of the rank, if it has the cell.
+    pub place: Option<u32>,
     /// The first body that cuts it.
     pub body: u32,
     /// The share that it takes; infinite where there is no energy around it.
@@ -71,7 +73,9 @@ where
             return None;
         }
         let share = taken / around(cell);
-        (share > MOST).then(|| WeakCell { cell, body: cut.cells[place].bodies[0], share })
+        let number = discretisation.cell_number(cell as usize) as u32;
+        let body = cut.cells[place].bodies[0];
+        (share > MOST).then_some(WeakCell { cell: number, place: Some(cell), body, share })
     };
     let is_bad = |place: &usize| {
         let cell = cut.cells[*place].cell as usize;

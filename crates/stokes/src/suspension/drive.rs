@@ -6,7 +6,6 @@
 //! strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale with the flow; their stress is known after the
 //! step only and is no part of what is given.
 
-use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Space, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::Configuration;
@@ -14,6 +13,7 @@ use gluey_motion::Configuration;
 use super::Suspension;
 use crate::error::StokesError;
 use crate::flow::{Conditions, Flow, FlowSolver, GivenOf, Stress};
+use crate::space::Discretisation;
 
 /// What drives the flow of a configuration.
 pub struct Drive<'a, const D: usize>
@@ -162,13 +162,13 @@ impl<const D: usize> FlowSolver<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The flow that this drives, and [`Drive::rate`].
+    /// The flow that this drives, and [`Drive::rate`]. All ranks call this.
     ///
     /// # Errors
     /// Those of [`FlowSolver::solve_combined`], and [`NotDriven`].
     pub fn solve_driven<E: From<StokesError> + From<NotDriven>>(
         &mut self,
-        mesh: TreeMesh<D>,
+        discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         drive: &Drive<'_, D>,
     ) -> Result<(Flow<D>, f64), E> {
@@ -178,7 +178,8 @@ where
             found = Some(rate);
             Ok::<_, E>(rate.recip())
         };
-        let flow = self.solve_combined(mesh, bodies, &drive.conditions, drive.pushes, inverse_rate)?;
+        let flow =
+            self.solve_combined(discretisation, bodies, &drive.conditions, drive.pushes, inverse_rate)?;
         let rate = found.map_or_else(|| drive.rate(flow.stress.as_ref(), None), Ok)?;
         Ok((flow, rate))
     }

@@ -14,7 +14,6 @@ use crate::film::Lubrication;
 use crate::flow::Refinement;
 
 pub use drive::{Drive, NotDriven};
-pub use prediction::FlowOfBodies;
 
 /// A box with particles in a shear flow, `u = rate (y - middle) e_x` on its walls, or far away where it has
 /// none: then its images in `y` slide along each other.
@@ -40,10 +39,10 @@ pub use prediction::FlowOfBodies;
 /// let particles = suspension.particles(&[Vector::<2>::new(0.5, 0.7)]);
 /// let now = Configuration::at(0.0, &particles);
 /// let (balls, mut solver) = (suspension.balls(&now), FlowSolver::new(FlowParams::for_dimension(2))?);
-/// let mesh = suspension.mesh(&balls)?;
-/// let solved = suspension.driven(&now, 1.0, |drive| solver.solve_driven(mesh, &balls, drive));
+/// let mesh = solver.discretised(suspension.mesh(&balls)?);
+/// let solved = suspension.driven(&now, 1.0, |drive| solver.solve_driven(&mesh, &balls, drive));
 /// let (flow, rate) = solved.map_err(|error: Box<dyn std::error::Error>| error)?;
-/// let prediction = suspension.prediction(&now, 1.0, (&flow).into(), rate);
+/// let prediction = suspension.prediction(&now, 1.0, &flow, rate);
 /// // Here as of a flow between walls that move.
 /// let walls = |x: &Vector<2>| Vector::<2>::new(2.0 * (x[1] - 0.5), 0.0);
 /// assert_eq!(prediction.twists, solver.solve(suspension.mesh(&balls)?, &balls, &walls)?.twists);

@@ -1,40 +1,11 @@
 //! What a flow predicts of the particles of a configuration.
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, Prediction};
 
 use super::Suspension;
 use crate::film::{self, Lubrication};
-use crate::flow::{Flow, Stress};
-
-/// What a flow says of the bodies in it, see [`Flow`].
-#[derive(Clone, Copy, Debug)]
-pub struct FlowOfBodies<'f, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
-    /// Velocity and spin of each body.
-    pub twists: &'f [Twist<D>],
-    /// Force and torque on each by something other than the fluid.
-    pub wrenches: &'f [Wrench<D>],
-    /// Mean velocity of fluid and bodies, where some are held.
-    pub mean_velocity: Option<Vector<D>>,
-    /// The uniform force that stops the mean flow.
-    pub mean_force: Vector<D>,
-    /// The stress, where it was wanted.
-    pub stress: Option<&'f Stress<D>>,
-}
-
-impl<'f, const D: usize> From<&'f Flow<D>> for FlowOfBodies<'f, D>
-where
-    Dim<D>: Space<D>,
-{
-    fn from(flow: &'f Flow<D>) -> Self {
-        let Flow { twists, wrenches, mean_velocity, mean_force, stress, .. } = flow;
-        let (mean_velocity, mean_force, stress) = (*mean_velocity, *mean_force, stress.as_ref());
-        Self { twists, wrenches, mean_velocity, mean_force, stress }
-    }
-}
+use crate::flow::Flow;
 
 impl<const D: usize> Suspension<D>
 where
@@ -46,22 +17,18 @@ where
         &self,
         configuration: &Configuration<'_, D>,
         viscosity: f64,
-        flow: FlowOfBodies<'_, D>,
+        flow: &Flow<D>,
         rate: f64,
     ) -> Prediction<D> {
         Prediction {
             rate,
-            stress: self.mean_stress(configuration, viscosity, &flow, rate),
-            holding: self.holding(configuration, &flow),
-            ..Prediction::of(self.twists_in_space(configuration, &flow))
+            stress: self.mean_stress(configuration, viscosity, flow, rate),
+            holding: self.holding(configuration, flow),
+            ..Prediction::of(self.twists_in_space(configuration, flow))
         }
     }
 
-    fn twists_in_space(
-        &self,
-        configuration: &Configuration<'_, D>,
-        flow: &FlowOfBodies<'_, D>,
-    ) -> Vec<Twist<D>> {
+    fn twists_in_space(&self, configuration: &Configuration<'_, D>, flow: &Flow<D>) -> Vec<Twist<D>> {
         let undisturbed = self.undisturbed(configuration.shear_factor);
         let in_space = |index: usize| match self.is_sheared() {
             true => flow.twists[index] + undisturbed.twist(&configuration.particles[index].pose.position),
@@ -77,12 +44,12 @@ where
         &self,
         configuration: &Configuration<'_, D>,
         viscosity: f64,
-        flow: &FlowOfBodies<'_, D>,
+        flow: &Flow<D>,
         rate: f64,
     ) -> Option<MeanStress<D>> {
-        let stress = flow.stress.filter(|_| configuration.with_stress)?;
+        let stress = flow.stress.as_ref().filter(|_| configuration.with_stress)?;
         let volume = self.domain.extent().product();
-        let powers = self.wrenches.iter().zip(flow.twists).map(|(wrench, twist)| wrench.power(twist));
+        let powers = self.wrenches.iter().zip(&flow.twists).map(|(wrench, twist)| wrench.power(twist));
         Some(MeanStress {
             rate: self.shear_rate * configuration.shear_factor,
             viscosity,
@@ -96,11 +63,7 @@ where
     }
 
     /// What holds the particles whose motions are given.
-    fn holding(
-        &self,
-        configuration: &Configuration<'_, D>,
-        flow: &FlowOfBodies<'_, D>,
-    ) -> Option<Holding<D>> {
+    fn holding(&self, configuration: &Configuration<'_, D>, flow: &Flow<D>) -> Option<Holding<D>> {
         let acting = self.acting(configuration);
         let holds = |index: usize| flow.wrenches[index] - acting.get(index).copied().unwrap_or_default();
         let held = (0..self.given.len()).filter(|&index| self.given[index].is_some());

@@ -51,7 +51,8 @@ where
         let bodies = [self.ball];
         let system =
             around(&self.discretisation(), &bodies, &self.flats, 1.0, &PenaltyFactor::new(PENALTY)).unwrap();
-        Problem { system, bodies: bodies.to_vec(), rigidity: Arc::new(Unfitted::new(Lubrication::None)) }
+        let (bodies, all_bodies) = (bodies.to_vec(), bodies.to_vec());
+        Problem { system, bodies, all_bodies, rigidity: Arc::new(Unfitted::new(Lubrication::None)) }
     }
 
     /// The flow with these values on the boundary.

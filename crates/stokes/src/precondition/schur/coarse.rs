@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::mass::pressure_matrix;
 use super::weights::without_bodies;
-use crate::error::{SmallMatrix, StokesError, agreed};
+use crate::error::{SmallMatrix, StokesError};
 use crate::operator::{Elements, StokesSystem, SystemOperator, assemble_viscous, factorised};
 use crate::space::Discretisation;
 
@@ -88,7 +88,7 @@ where
         let old = before.filter(|old| Arc::ptr_eq(&old.meshes[0].mesh, &all[0].mesh));
         let old = old.and_then(|old| old.whole).filter(|old| old.viscosity == viscosity);
         let whole = || old.map_or_else(|| Whole::new(&all[0].alone(), viscosity), Ok);
-        let whole = agreed(halo, holds_all.then(whole).transpose())?;
+        let whole = meshes[0].agreed(holds_all.then(whole).transpose())?;
         let transfers = all.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.pressure));
         let halo = |mesh: &Discretisation<D>| {
             mesh.partition().map_or_else(Halo::default, |part| part.pressures.clone())

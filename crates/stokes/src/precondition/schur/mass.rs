@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::cells::PressureMatrices;
 use super::weights::scale_by_weights;
-use crate::error::{StokesError, agreed};
+use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::space::pressure_expansion;
 use crate::surface::SurfaceCoupling;
@@ -24,12 +24,11 @@ pub fn pressure_matrix<const D: usize>(
 where
     Dim<D>: Space<D>,
 {
-    let halo = elements.system().pressure.halo();
     let matrices = PressureMatrices::new(elements, viscosity);
     let mass = matrices
         .map_err(StokesError::from)
         .and_then(|matrices| Ok((pressure_mass(elements.system(), &matrices)?, matrices)));
-    let (mut mass, matrices) = agreed(halo, mass)?;
+    let (mut mass, matrices) = elements.system().discretisation().agreed(mass)?;
     scale_by_weights(&mut mass, elements, &matrices);
     mass.values_mut().iter_mut().for_each(|m| *m *= 0.5);
     Ok(mass)

@@ -20,7 +20,7 @@ use gluey_parallel::Halo;
 #[cfg(test)]
 pub use {cells::PressureMatrices, weights::weights};
 
-use crate::error::{StokesError, agreed};
+use crate::error::StokesError;
 use crate::operator::{Elements, OnOwned, Summed};
 use crate::space::{Discretisation, PressureSpace};
 use coarse::CoarseSchur;
@@ -76,7 +76,8 @@ where
             diagonal.iter_mut().filter(|entry| **entry == 0.0).for_each(|entry| *entry = 1.0);
         }
         let mut mass = SellMatrix::new(&mass);
-        let mut jacobi = agreed(&halo, Jacobi::new(&diagonal).map_err(StokesError::PressureMass))?;
+        let jacobi = Jacobi::new(&diagonal).map_err(StokesError::PressureMass);
+        let mut jacobi = system.discretisation().agreed(jacobi)?;
         let start = system.discretisation().pseudo_random_pressures();
         let mut on_owned = OnOwned::new(&mut mass, &mut halo);
         let largest = estimate_lambda_max_from(start, &mut on_owned, &mut jacobi, LANCZOS_STEPS)?;

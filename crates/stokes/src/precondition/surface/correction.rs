@@ -44,24 +44,17 @@ impl<const D: usize> SurfaceCorrection<D>
 where
     Dim<D>: Space<D>,
 {
-    /// For the system of `elements`, on levels of which the finest has the velocities `rigid`.
+    /// For the system of `elements`, on levels of which the finest has the velocities `rigid`. All ranks call
+    /// this.
     pub fn new(
         elements: &Elements<'_, D>,
         surfaces: &SurfaceCoupling<D>,
         rigid: &VelocitySpace<D>,
     ) -> Result<Self, StokesError> {
-        Ok(Self::with_smoother(SurfaceSmoother::new(elements, surfaces)?, &elements.system().space, rigid))
-    }
-
-    /// The same with this smoother of the velocities `space`.
-    pub fn with_smoother(
-        smoother: SurfaceSmoother<D>,
-        space: &VelocitySpace<D>,
-        rigid: &VelocitySpace<D>,
-    ) -> Self {
+        let (smoother, space) = (SurfaceSmoother::new(elements, surfaces)?, &elements.system().space);
         let dim = space.dim();
         let [x, r, velocity] = [(); 3].map(|()| vec![0.0; dim]);
-        Self {
+        Ok(Self {
             smoother,
             halo: rigid.halo().clone(),
             rigid: rigid.clone(),
@@ -72,7 +65,7 @@ where
             spread: vec![0.0; dim],
             correction: velocity.clone(),
             velocity,
-        }
+        })
     }
 
     /// `z = V r`, `x += z`, `r -= A z` for the residual in the workspace.

@@ -5,4 +5,3 @@ mod roots;
 mod smoother;
 
 pub use correction::SurfaceCorrection;
-pub use smoother::{AssembledSmoother, SurfaceSmoother};

@@ -16,7 +16,7 @@ use gluey_parallel::Halo;
 
 use crate::error::{DiagonalError, StokesError};
 use crate::operator::{
-    BlockDiagonal, Elements, OnOwned, Summed, ViscousOperator, add_at, gather, nodal_diagonal,
+    BlockDiagonal, Elements, OnOwned, Summed, SystemHalos, ViscousOperator, add_at, gather, nodal_diagonal,
 };
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
@@ -72,19 +72,22 @@ impl<const D: usize> SurfaceSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoothers of a system with cut cells on one rank.
+    /// The smoothers of a system with cut cells. Vectors that they are applied to hold the same at ghosts as
+    /// at their owners. All ranks call this.
     ///
     /// # Errors
-    /// If a block or an entry of the diagonal is not positive.
+    /// If a block or an entry of the diagonal is not positive, on all ranks.
     pub fn new(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Result<Self, StokesError> {
-        Self::assembled(elements, surfaces)?.completed(elements, <[Halo; 2]>::default())
+        let discretisation = elements.system().discretisation();
+        let assembled = discretisation.agreed(Self::assembled(elements, surfaces))?;
+        discretisation.agreed(assembled.completed(elements))
     }
 
     /// What of it needs no other part.
     ///
     /// # Errors
     /// If a block or an entry of the diagonal is not positive.
-    pub fn assembled(
+    fn assembled(
         elements: &Elements<'_, D>,
         surfaces: &SurfaceCoupling<D>,
     ) -> Result<AssembledSmoother<D>, StokesError> {
@@ -106,7 +109,7 @@ where
 }
 
 /// A smoother whose parts do not know of each other yet.
-pub struct AssembledSmoother<const D: usize> {
+struct AssembledSmoother<const D: usize> {
     operator: ViscousOperator<D>,
     blocks: Blocks<D>,
     /// The inverse diagonal at the nodes of own cells.
@@ -119,18 +122,14 @@ impl<const D: usize> AssembledSmoother<D>
 where
     Dim<D>: Space<D>,
 {
-    /// The smoother, with the halos of reduced velocities and of the blocks of twists. Vectors that it is
-    /// applied to hold the same at ghosts as at their owners. All ranks call this.
+    /// The smoother. All ranks call this.
     ///
     /// # Errors
     /// If the block of a twist is not positive.
-    pub fn completed(
-        self,
-        elements: &Elements<'_, D>,
-        [mut halo, mut of_blocks]: [Halo; 2],
-    ) -> Result<SurfaceSmoother<D>, StokesError> {
+    fn completed(self, elements: &Elements<'_, D>) -> Result<SurfaceSmoother<D>, StokesError> {
         let Self { mut operator, blocks, nodal, near } = self;
         let system = elements.system();
+        let SystemHalos { velocities: mut halo, twist_blocks: mut of_blocks, .. } = system.halos().clone();
         // Parts that fail send all messages first, which others wait for.
         let (mut diagonal, failure) = diagonal(elements, nodal, [&mut halo, &mut of_blocks]);
         let near: Vec<u32> = if system.discretisation().is_part() {

@@ -7,9 +7,8 @@ use gluey_parallel::Halo;
 use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
-use crate::error::{StokesError, agreed};
+use crate::error::StokesError;
 use crate::precondition::Correction;
-use crate::precondition::surface::{SurfaceCorrection, SurfaceSmoother};
 use crate::space::{VelocitySpace, norm};
 
 /// A level that a cycle is to have.
@@ -53,13 +52,13 @@ where
         viscosity: f64,
     ) -> Result<Self, StokesError> {
         let level = |(level, plan): (usize, LevelPlan<D>)| {
-            let halo = plan.space.halo().clone();
+            let mesh = plan.space.discretisation().clone();
             let made = Level::new(plan.space, viscosity, plan.smoothing);
-            agreed(&halo, made.map_err(|source| StokesError::Smoother { level, source }))
+            mesh.agreed(made.map_err(|source| StokesError::Smoother { level, source }))
         };
         let levels = plans.into_iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
         let coarse = levels[0].space.whole().map(|space| CoarseSolver::new(space, viscosity));
-        let coarse = agreed(&levels[0].halo, coarse.transpose())?;
+        let coarse = levels[0].space.discretisation().agreed(coarse.transpose())?;
         Ok(Self { hierarchy, levels, coarse, correction, wide: Default::default() })
     }
 
@@ -90,14 +89,6 @@ where
             None => x.fill(0.0),
         }
         halo.sum(x);
-    }
-
-    /// The same levels under this smoother of the velocities `space` around surfaces.
-    #[must_use]
-    pub fn with_surfaces(self, smoother: SurfaceSmoother<D>, space: &VelocitySpace<D>) -> Self {
-        let rigid = &self.levels[self.levels.len() - 1].space;
-        let surfaces = SurfaceCorrection::with_smoother(smoother, space, rigid);
-        Self { correction: Some(Box::new(surfaces)), ..self }
     }
 }
 

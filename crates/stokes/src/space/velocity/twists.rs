@@ -59,20 +59,24 @@ where
         wrench
     }
 
-    /// Makes the twists of these bodies data, which are zero in reduced vectors, and those of the others
-    /// unknowns; no entries stand for none. Vectors keep their length and maps what they do, but for
+    /// Makes the twists of these bodies, of all, data, which are zero in reduced vectors, and those of the
+    /// others unknowns; no entries stand for none. Vectors keep their length and maps what they do, but for
     /// projections, which leave twists that are data at zero; operators and solvers leave out their rows and
     /// columns.
     pub fn hold(&mut self, held: &[bool]) {
-        self.held.clear();
-        if held.contains(&true) {
-            self.held.extend_from_slice(held);
-        }
+        let held = if held.contains(&true) { held } else { &[] };
+        self.held = self.discretisation.near(held);
+        self.held_of_all = held.to_vec();
     }
 
     /// Which bodies have twists that are data; no entries where none has.
     pub fn held(&self) -> &[bool] {
         &self.held
+    }
+
+    /// The same of all bodies, where the mesh is a part.
+    pub fn held_of_all(&self) -> &[bool] {
+        &self.held_of_all
     }
 
     /// Whether the twist of a body is data.
@@ -82,7 +86,7 @@ where
 
     /// Whether the twist of any body is data.
     pub fn holds_any(&self) -> bool {
-        !self.held.is_empty()
+        !self.held_of_all.is_empty()
     }
 
     /// Clears the twists of a reduced vector where they are data.

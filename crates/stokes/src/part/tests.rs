@@ -1,18 +1,16 @@
 //! Matrices of pressures that one rank cannot invert.
 
-use gluey_fem::{Cell, ImplicitTree};
+use gluey_fem::{Cell, Cuts, ImplicitTree, ReferenceMatrices};
 use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Threads};
-use gluey_stokes::Lubrication;
-use gluey_stokes::part::PartMethod;
 use gluey_testkit::failing::within_a_minute;
 
-use super::space::PartHalos;
-use crate::bodies::Shared;
-use crate::cuts::equal_cuts;
-use crate::levels::Levels;
-use crate::space::GhostLayer;
+use super::{GhostLayer, levels};
+use crate::film::Lubrication;
+use crate::formulation::{Method, Unfitted};
+use crate::operator::Elements;
+use crate::precondition::schur::SchurInverse;
 
 /// What ranks say of masses that one of them multiplies by `factor`.
 fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
@@ -20,18 +18,18 @@ fn with_masses_of_one_rank(factor: f64) -> Vec<Option<String>> {
         Threads::run(3, |ranks| {
             let wants = |_: &Vector<2>, _: f64, _: u8| true;
             let mut tree = ImplicitTree::new(Aabb::unit(), [1; 2], [false; 2], 4, &wants).unwrap();
-            let cuts = equal_cuts(&tree, ranks);
+            let cuts = Cuts::equal(&mut tree, ranks.size());
             let none: [Ball<2>; 0] = [];
             let bodies = BallTree::new(&none);
-            let shared = Shared { cuts: &cuts, ranks, bodies: &bodies, held: &[] };
             let around = GhostLayer { rings: 1, spreads: &|_: &Cell<2>| false };
-            let levels = Levels::new(&mut tree, &shared, 1.0, &around).unwrap();
+            let meshes = levels(&mut tree, ranks, &cuts, &bodies, &around);
             let viscosity = if ranks.rank() == 1 { factor.recip() } else { 1.0 };
-            let method = PartMethod::new(Lubrication::None);
-            let mut problem = method.problem(&levels.discretisation, &none, viscosity, &|_| true).unwrap();
-            let halos = PartHalos::new(&mut tree, &shared, &levels.finest, &problem);
-            problem.system.share(halos.of_system);
-            problem.schur_inverse(&levels.cycle).err().map(|error| error.to_string())
+            let finest = &meshes[meshes.len() - 1];
+            let (mut system, _) =
+                Unfitted::new(Lubrication::None).discretised(finest, &none, viscosity).unwrap();
+            system.share();
+            let elements = Elements::new(&system, ReferenceMatrices::<2>::VELOCITY);
+            SchurInverse::new(&meshes, &elements, None).err().map(|error| error.to_string())
         })
     };
     within_a_minute("masses", run).unwrap()
