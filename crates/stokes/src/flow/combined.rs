@@ -3,15 +3,12 @@
 //! A suspension that is sheared at a given stress: the stress is `r A + B` with the flow at the rate one, the
 //! flow of the forces between bodies, and the rate `r` that the stress asks for.
 
-use std::time::Instant;
-
 use gluey_geom::{Dim, Space, Wrench};
 use gluey_levelset::Ball;
 use gluey_linalg::vector;
 
-use super::adaptive_penalty::FlowWithAdaptedPenalty;
 use super::conditions::{Conditions, Given};
-use super::{Effort, Flow, FlowSolver, PhaseTimes, flow_of};
+use super::{Effort, FirstFlow, Flow, FlowSolver, flow_of};
 use crate::error::StokesError;
 use crate::space::Discretisation;
 
@@ -36,16 +33,8 @@ where
         if wrenches.is_empty() {
             return Ok(self.solve_on(discretisation, bodies, conditions)?);
         }
-        let start = Instant::now();
-        let mut problem = self.problem(discretisation, bodies)?;
-        let assembled = Instant::now();
-        let mut method = self.method.clone();
-        self.prepare(&mut problem, &mut method)?;
-        let prepared = Instant::now();
-        let (guess, before) = self.initial_guess(&problem, conditions)?;
-        let FlowWithAdaptedPenalty { flow: first, mut x, .. } =
-            self.solve_with_adaptive_penalty(&mut problem, &mut method, conditions, &guess)?;
-        self.keep_for_next(&problem, &x, &first.pressure, before);
+        let FirstFlow { mut problem, mut method, flow: first, mut x, watch } =
+            self.first_flow(discretisation, bodies, conditions)?;
         let pushed =
             Conditions { stress: conditions.stress, ..Conditions::at_rest().with_wrenches(wrenches) };
         let guess = vec![0.0; x.len()];
@@ -57,11 +46,7 @@ where
         let lift = problem.lift(conditions.boundary);
         let effort = Effort::of([&first, &second.flow]);
         let mut flow = flow_of(&problem, &both, (&lift, &mut x), Vec::new(), &effort)?;
-        flow.times = PhaseTimes {
-            assembly: (assembled - start).as_secs_f64(),
-            preparation: (prepared - assembled).as_secs_f64(),
-            solve: prepared.elapsed().as_secs_f64(),
-        };
+        flow.times = watch.times();
         Ok(flow)
     }
 }

@@ -10,6 +10,7 @@ mod prepared;
 mod raised;
 mod refinement;
 mod stress;
+mod times;
 mod warm_start;
 
 use std::sync::Arc;
@@ -26,6 +27,7 @@ use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use stress::stress_of;
+use times::Watch;
 use warm_start::WarmStart;
 
 pub use conditions::{Conditions, Field, Given, GivenOf};
@@ -33,6 +35,7 @@ pub use prepared::Prepared;
 pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
 pub use stress::Stress;
+pub use times::PhaseTimes;
 pub use warm_start::{NodalFields, WarmStartError};
 
 /// Parameters of a [`FlowSolver`].
@@ -127,15 +130,17 @@ where
     }
 }
 
-/// Seconds of wall time in the phases of a prediction.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PhaseTimes {
-    /// Nodes, level sets and operator.
-    pub assembly: f64,
-    /// Preparation of the linear solver.
-    pub preparation: f64,
-    /// Solves, with their right-hand sides and the twists.
-    pub solve: f64,
+/// A flow with its problem, for which the solver is prepared.
+struct FirstFlow<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    problem: Problem<D>,
+    method: Arc<dyn Method<D>>,
+    flow: Flow<D>,
+    /// The reduced vector it belongs to.
+    x: Vec<f64>,
+    watch: Watch,
 }
 
 /// Computes flows one after the other, keeping what can be reused.
@@ -250,26 +255,34 @@ where
         bodies: &[Ball<D>],
         conditions: &Conditions<'_, D>,
     ) -> Result<Flow<D>, StokesError> {
+        let FirstFlow { mut problem, mut method, mut flow, watch, .. } =
+            self.first_flow(discretisation, bodies, conditions)?;
+        if conditions.without_mean {
+            (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;
+        }
+        flow.times = watch.times();
+        Ok(flow)
+    }
+
+    /// The flow from the last one, which it becomes.
+    fn first_flow(
+        &mut self,
+        discretisation: &Discretisation<D>,
+        bodies: &[Ball<D>],
+        conditions: &Conditions<'_, D>,
+    ) -> Result<FirstFlow<D>, StokesError> {
         let start = Instant::now();
         let mut problem = self.problem(discretisation, bodies)?;
         problem.system.space.hold(&conditions.held(bodies.len()));
         let assembled = Instant::now();
         let mut method = self.method.clone();
         self.prepare(&mut problem, &mut method)?;
-        let prepared = Instant::now();
+        let watch = Watch { start, assembled, prepared: Instant::now() };
         let (guess, before) = self.initial_guess(&problem, conditions)?;
         let adapted = self.solve_with_adaptive_penalty(&mut problem, &mut method, conditions, &guess)?;
-        let (mut flow, x) = (adapted.flow, adapted.x);
+        let (flow, x) = (adapted.flow, adapted.x);
         self.keep_for_next(&problem, &x, &flow.pressure, before);
-        if conditions.without_mean {
-            (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;
-        }
-        flow.times = PhaseTimes {
-            assembly: (assembled - start).as_secs_f64(),
-            preparation: (prepared - assembled).as_secs_f64(),
-            solve: prepared.elapsed().as_secs_f64(),
-        };
-        Ok(flow)
+        Ok(FirstFlow { problem, method, flow, x, watch })
     }
 
     fn problem(
