@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 
-use crate::Film;
+use gluey_contact::Film;
 
 /// What velocities are predicted from.
 ///

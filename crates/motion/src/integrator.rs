@@ -6,7 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::films::{Film, FilmError, FilmMemory, FilmReport, Step};
+use gluey_contact::{Film, FilmError, FilmMemory, FilmReport, FilmStep};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -147,9 +147,9 @@ where
         self.film_step(dt, particles).reach_in_shear(twists, rate)
     }
 
-    fn film_step<'a>(&'a self, dt: f64, particles: &'a [Particle<D>]) -> Step<'a, D> {
+    fn film_step<'a>(&'a self, dt: f64, particles: &'a [Particle<D>]) -> FilmStep<'a, D> {
         let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
-        Step { weight, history_weight, particles, history: &self.history }
+        FilmStep { weight, history_weight, particles, history: &self.history }
     }
 
     /// Moves and turns the particles over `dt` with the (corrected) velocities `twists` and remembers these.

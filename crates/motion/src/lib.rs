@@ -26,7 +26,6 @@
 //! Not for inertia: velocities follow positions at once (Stokes flow), there is no mass and no acceleration.
 
 mod approach;
-mod films;
 mod hydrodynamics;
 mod integrator;
 mod linear_flow;
@@ -34,7 +33,7 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
-pub use films::{Film, FilmClosed, FilmEnds, FilmError, FilmReport};
+pub use gluey_contact::{Film, FilmClosed, FilmEnds, FilmError, FilmReport};
 pub use hydrodynamics::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
     ResumeError,

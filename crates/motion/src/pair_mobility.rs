@@ -6,9 +6,10 @@
 
 use std::f64::consts::PI;
 
+use gluey_contact::Film;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 
-use crate::{Configuration, Film, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
+use crate::{Configuration, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
 
 /// Why a pair has no velocities.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -34,6 +34,7 @@ fn a_program_outside_the_workspace_runs() {
             "gluey-linalg",
             "gluey-levelset",
             "gluey-fem",
+            "gluey-contact",
             "gluey-motion",
             "gluey-stokes",
         ],

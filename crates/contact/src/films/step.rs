@@ -6,12 +6,15 @@ use super::error::FilmEnds;
 use super::film::{Film, memory_reach};
 
 /// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
-pub(crate) struct Step<'a, const D: usize>
+pub struct Step<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
+    /// Weight of `u^n`.
     pub weight: f64,
+    /// Weight of `u^{n-1}`.
     pub history_weight: f64,
+    /// The particles.
     pub particles: &'a [Particle<D>],
     /// `u^{n-1}`; empty at the first step.
     pub history: &'a [Twist<D>],
@@ -21,14 +24,14 @@ impl<const D: usize> Step<'_, D>
 where
     Dim<D>: Space<D>,
 {
-    /// See [`crate::Integrator::film_reach`].
+    /// The gap up to which films have to be known before a step with these velocities.
     pub fn reach(&self, twists: &[Twist<D>]) -> f64 {
         let farthest = (0..twists.len()).map(|k| self.shift(k, twists).norm()).fold(0.0, f64::max);
         // Two particles approach each other at twice the speed of each.
         self.memory_reach() + 2.0 * farthest
     }
 
-    /// See [`crate::Integrator::film_reach_in_shear`].
+    /// The same where images slide in a simple shear of this rate.
     pub fn reach_in_shear(&self, twists: &[Twist<D>], rate: f64) -> f64 {
         let strain = rate * (self.weight + self.history_weight);
         let rest = |k: usize| {

@@ -29,7 +29,8 @@ mod step;
 pub use error::{FilmClosed, FilmEnds, FilmError};
 pub use film::Film;
 use opening::open;
-pub(crate) use step::Step;
+pub use step::Step as FilmStep;
+use step::Step;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 #[cfg(feature = "serde")]
@@ -43,7 +44,7 @@ const MOST_PUSHED: f64 = 1.0;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub(crate) struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
+pub struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
 
 /// What films did in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
