@@ -4,7 +4,7 @@
 use gluey_geom::Vector;
 
 use super::cells::CellList;
-use super::search::{Broadphase, meet};
+use super::search::Broadphase;
 
 /// Balls in a binary tree of boxes: for sizes so different that cells would hold too many.
 ///
@@ -40,7 +40,7 @@ impl<const D: usize> Broadphase<D> for Hierarchy {
 #[cfg(any(feature = "dim2", feature = "dim3"))]
 fn are_pair<const D: usize>(centers: &[Vector<D>], radii: &[f64], i: u32, j: u32) -> bool {
     let (here, there) = (i as usize, j as usize);
-    j > i && meet(&centers[here], &centers[there], radii[here] + radii[there])
+    j > i && super::search::meet(&centers[here], &centers[there], radii[here] + radii[there])
 }
 
 #[cfg(any(feature = "dim2", feature = "dim3"))]
