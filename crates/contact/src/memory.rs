@@ -40,10 +40,18 @@ pub struct ContactState {
 impl ContactState {
     /// Memory of a pair; none is `gamma = lambda = 0`.
     pub fn get(&self, pair: PairKey) -> PairState {
-        match self.pairs.binary_search_by_key(&pair, |state| state.pair) {
-            Ok(place) => self.pairs[place],
-            Err(_) => PairState { pair, gamma: 0.0, lambda: 0.0 },
-        }
+        self.find(pair).copied().unwrap_or(PairState { pair, gamma: 0.0, lambda: 0.0 })
+    }
+
+    /// Memory of a pair that has one.
+    pub(crate) fn find(&self, pair: PairKey) -> Option<&PairState> {
+        let place = self.pairs.binary_search_by_key(&pair, |state| state.pair).ok()?;
+        Some(&self.pairs[place])
+    }
+
+    /// Changes the sign of the forces.
+    pub(crate) fn reverse(&mut self) {
+        self.pairs.iter_mut().for_each(|pair| pair.lambda = -pair.lambda);
     }
 
     /// Sorts by pair, and drops repetitions and pairs without memory or force.

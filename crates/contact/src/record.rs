@@ -38,6 +38,6 @@ impl ContactRecord {
 
     /// Changes the sign of remembered forces.
     pub(crate) fn reverse(&mut self) {
-        self.state.pairs.iter_mut().for_each(|pair| pair.lambda = -pair.lambda);
+        self.state.reverse();
     }
 }

@@ -68,7 +68,7 @@ where
     /// Time from the history to now; negative when the flow was reversed since.
     history_age: f64,
     /// Forces in films at the last step.
-    films: FilmMemory<D>,
+    films: FilmMemory,
 }
 
 impl<const D: usize> Integrator<D>

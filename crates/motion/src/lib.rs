@@ -33,7 +33,7 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
-pub use gluey_contact::{Film, FilmClosed, FilmEnds, FilmError, FilmReport};
+pub use gluey_contact::{Film, FilmError, FilmReport, PairKey};
 pub use hydrodynamics::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
     ResumeError,

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_contact::Film;
+use gluey_contact::{Film, PairKey};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 
 use crate::{Configuration, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
@@ -112,7 +112,7 @@ impl Hydrodynamics<3> for PairMobility {
         let gap = branch.norm() - 2.0 * first.radius;
         let (slide, curvature_radius) = (Vector::zeros(), first.radius);
         let film =
-            Film { first: 0, second: Some(1), branch, slide, is_held: [false; 2], gap, curvature_radius };
+            Film { pair: PairKey::new(0, 1), branch, slide, is_held: [false; 2], gap, curvature_radius };
         let keeps_open = self.offset == 0.0 && gap > 0.0 && gap < reach;
         keeps_open.then_some(film).into_iter().collect()
     }

@@ -2,23 +2,22 @@
 //!
 //! Each film asks for an impulse `I`. Particles may be so crowded that they have fewer ways to move than
 //! there are films, and cannot do what all ask for. Displaced by `x` from where the flow takes it, the
-//! particle `i` of the radius `a_i` meets the impulse `2 a_i x_i` of its drag, and
+//! particle `i` of the radius `a_i` meets the impulse `a_i x_i` of its drag, and
 //!
-//! `2 a_i x_i = sum_k +- n_k L_k`, `L_k = A_k (I_k - Phi(g_k))`, `g_k = gap_k(x) > 0`,
+//! `a_i x_i = sum_k +- n_k L_k`, `L_k = I_k - Phi(g_k)`, `g_k = gap_k(x) > 0`:
 //!
-//! in the units in which the drag of two particles against each other is `A_k`, as in `R`: what films do not
-//! get loads the particles. That is the minimum of `sum_k A_k int (Phi - I_k) dg_k + sum_i a_i |x_i|^2`. A
-//! film much thinner than its neighbours is changed by them in proportion to itself: none is closed, whatever
-//! they ask for.
+//! what films do not get loads the particles. That is the minimum of `sum_k int (Phi - I_k) dg_k + sum_i a_i
+//! |x_i|^2 / 2`. A film much thinner than its neighbours is changed by them in proportion to itself: none is
+//! closed, whatever they ask for.
 //!
-//! Solved for the loads `L`, which are free: `gap_k(x(L)) - Phi^-1(I_k - L_k/A_k) = 0`, where gaps are linear
+//! Solved for the loads `L`, which are free: `gap_k(x(L)) - Phi^-1(I_k - L_k) = 0`, where gaps are linear
 //! in `x` the gradient of a convex function, by Newton's method with conjugate gradients. Gaps are linearised
 //! about the bodies where they are, then about where they went, until they are exact. The distance of
 //! centres is convex in `x`: gaps are never below those linearised.
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use super::error::{FilmClosed, FilmError};
+use super::error::FilmError;
 use super::film::Film;
 use super::step::Step;
 
@@ -56,7 +55,7 @@ struct Balance<'a, const D: usize> {
     wanted: &'a [(&'a Film<D>, f64)],
     /// Their particles; a wall has the number that comes after those of the particles.
     ends: Vec<[usize; 2]>,
-    /// `1/(2 a)` of each particle; zero for those that are held, and for walls.
+    /// `1/a` of each particle; zero for those that are held, and for walls.
     mobilities: Vec<f64>,
     normals: Vec<Vector<D>>,
     /// Gaps without loads.
@@ -119,11 +118,12 @@ where
 {
     fn new(step: &Step<'_, D>, wanted: &'a [(&'a Film<D>, f64)]) -> Self {
         let wall = step.particles.len();
-        let mut mobilities: Vec<f64> = step.particles.iter().map(|particle| 0.5 / particle.radius).collect();
+        let mut mobilities: Vec<f64> = step.particles.iter().map(|particle| 1.0 / particle.radius).collect();
         mobilities.push(0.0);
         let mut ends = Vec::with_capacity(wanted.len());
         for (film, _) in wanted {
-            let both = [film.first, film.second.unwrap_or(wall)];
+            let (first, second) = film.pair.particles();
+            let both = [first, second.unwrap_or(wall)];
             both.iter().zip(film.is_held).filter(|(_, held)| *held).for_each(|(&k, _)| mobilities[k] = 0.0);
             ends.push(both);
         }
@@ -138,8 +138,8 @@ where
     fn linearise(&mut self, step: &Step<'_, D>, free: &[Twist<D>], moved: Option<&[Twist<D>]>) {
         self.normals.clear();
         for ((film, _), free_gap) in self.wanted.iter().zip(&mut self.free_gaps) {
-            let normal = match (film.second, moved) {
-                (Some(_), Some(moved)) => step.branch_after(film, moved).normalize(),
+            let normal = match moved {
+                Some(moved) if !film.is_flat() => step.branch_after(film, moved).normalize(),
                 _ => film.branch.normalize(),
             };
             *free_gap = normal.dot(&step.branch_after(film, free)) - film.branch.norm() + film.gap;
@@ -159,15 +159,15 @@ where
         let (thinnest, farthest) = (most(&|k| -left(k)), most(&off));
         let told = |k: usize| {
             let film = self.wanted[k].0;
-            let radius = step.particles[film.first].radius;
-            (step.ends(film), [film.gap, left(k), self.state.gaps[k]].map(|gap| gap / radius))
+            let radius = step.particles[film.pair.first as usize].radius;
+            (film.pair, [film.gap, left(k), self.state.gaps[k]].map(|gap| gap / radius))
         };
         if left(thinnest) <= 0.0 {
-            let (ends, [gap, left, _]) = told(thinnest);
-            return FilmError::Closed(FilmClosed { ends, gap, left, is_given: false });
+            let (pair, [gap, left, _]) = told(thinnest);
+            return FilmError::Closed { pair, gap, left, is_given: false };
         }
-        let (ends, [gap, left, wanted]) = told(farthest);
-        FilmError::NotBalanced { ends, gap, left, wanted, corrections: self.corrections }
+        let (pair, [gap, left, wanted]) = told(farthest);
+        FilmError::NotBalanced { pair, gap, left, wanted, corrections: self.corrections }
     }
 }
 
@@ -175,7 +175,7 @@ impl<const D: usize> Balance<'_, D> {
     /// The impulses of the films under their loads.
     fn impulses(&self) -> Vec<f64> {
         let loads = self.loads.iter().zip(self.wanted);
-        loads.map(|(load, (film, impulse))| impulse - load / film.curvature_radius).collect()
+        loads.map(|(load, (_, impulse))| impulse - load).collect()
     }
 
     /// Displacements of all particles under these loads.
@@ -201,10 +201,9 @@ impl<const D: usize> Balance<'_, D> {
         let openings = self.openings(loads);
         let mut state = State::default();
         for (k, (film, impulse)) in self.wanted.iter().enumerate() {
-            let a = film.curvature_radius;
-            let (gap, slope) = film.gap_of(impulse - loads[k] / a, self.state.gaps[k]);
+            let (gap, compliance) = film.gap_of(impulse - loads[k], self.state.gaps[k]);
             state.gaps.push(gap);
-            state.compliances.push(slope / a);
+            state.compliances.push(compliance);
             state.excess.push(self.free_gaps[k] + openings[k] - gap);
         }
         state

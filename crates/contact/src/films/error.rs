@@ -1,26 +1,36 @@
 //! Why films cannot be kept open.
 
-use std::fmt;
+use crate::PairKey;
 
-/// The gaps after a step could not be found. A smaller step may have some.
+/// The gaps after a step could not be found. A smaller step may have some. Gaps are in radii of the first
+/// particle.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FilmError {
     /// There is no room for a film.
-    #[error(transparent)]
-    Closed(#[from] FilmClosed),
+    #[error("the film between {pair} would close: its gap of {gap:.3e} radii becomes {left:.3e} in a step{}", cure(*is_given))]
+    Closed {
+        /// What it is between.
+        pair: PairKey,
+        /// Gap before the step.
+        gap: f64,
+        /// Gap after it.
+        left: f64,
+        /// Whether both move as they are told.
+        is_given: bool,
+    },
     /// The impulses in films do not come to a balance.
     #[error(
-        "the films do not come to a balance in {corrections} corrections: that between {ends} is farthest from it, its \
+        "the films do not come to a balance in {corrections} corrections: that between {pair} is farthest from it, its \
          gap of {gap:.3e} radii becomes {left:.3e} and should be {wanted:.3e}"
     )]
     NotBalanced {
-        /// The film that is farthest off, relative to its gap.
-        ends: FilmEnds,
-        /// Gap before the step, in radii of the first particle.
+        /// What the film is between that is farthest off, relative to its gap.
+        pair: PairKey,
+        /// Gap before the step.
         gap: f64,
-        /// Gap after it, in these.
+        /// Gap after it.
         left: f64,
-        /// The gap that its impulse asks for, in these.
+        /// The gap that its impulse asks for.
         wanted: f64,
         /// Corrections made.
         corrections: usize,
@@ -38,44 +48,7 @@ pub enum FilmError {
 impl FilmError {
     /// Whether a smaller step is no help: particles meet because they move as they are told.
     pub fn is_given(&self) -> bool {
-        matches!(self, Self::Closed(closed) if closed.is_given)
-    }
-}
-
-/// A gap that could not be kept open; gaps in radii of the first particle.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the film between {ends} would close: its gap of {gap:.3e} radii becomes {left:.3e} in a step{}", cure(*is_given))]
-pub struct FilmClosed {
-    /// What it is between.
-    pub ends: FilmEnds,
-    /// Gap before the step.
-    pub gap: f64,
-    /// Gap after it.
-    pub left: f64,
-    /// Whether both move as they are told.
-    pub is_given: bool,
-}
-
-/// What a film is between, as messages say it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FilmEnds {
-    /// Index of the particle, from 0; messages count from 1.
-    pub first: usize,
-    /// Index of its partner; `None` for a wall.
-    pub second: Option<usize>,
-    /// Whether the partner is an image across a border of the box.
-    pub is_image: bool,
-}
-
-impl fmt::Display for FilmEnds {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let first = self.first + 1;
-        match self.second.map(|second| second + 1) {
-            None => write!(f, "particle {first} and a wall"),
-            Some(second) if second == first => write!(f, "particle {first} and its own image"),
-            Some(second) if self.is_image => write!(f, "particle {first} and an image of particle {second}"),
-            Some(second) => write!(f, "particles {first} and {second}"),
-        }
+        matches!(self, Self::Closed { is_given: true, .. })
     }
 }
 
@@ -88,20 +61,18 @@ fn cure(is_given: bool) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::{FilmClosed, FilmEnds};
+    use super::FilmError;
+    use crate::PairKey;
 
     #[test]
     fn messages_name_both_sides_as_users_count() {
-        let told = |second, is_image| {
-            let ends = FilmEnds { first: 0, second, is_image };
-            FilmClosed { ends, gap: 1e-3, left: -0.1, is_given: false }.to_string()
-        };
+        let told = |pair| FilmError::Closed { pair, gap: 1e-3, left: -0.1, is_given: false }.to_string();
         assert_eq!(
-            told(Some(2), false),
+            told(PairKey::new(0, 2)),
             "the film between particles 1 and 3 would close: its gap of 1.000e-3 radii becomes -1.000e-1 in a step"
         );
-        assert!(told(Some(2), true).contains("between particle 1 and an image of particle 3 would"));
-        assert!(told(Some(0), true).contains("between particle 1 and its own image would"));
-        assert!(told(None, false).contains("between particle 1 and a wall would"));
+        assert!(told(PairKey::across(0, 2, [0, 1, 0])).contains("1 and 3 (its image [0, 1, 0]) would"));
+        assert!(told(PairKey::across(0, 0, [1, 0, 0])).contains("1 and 1 (its image [1, 0, 0]) would"));
+        assert!(told(PairKey::wall(0, 1)).contains("between particle 1 and wall 2 would"));
     }
 }

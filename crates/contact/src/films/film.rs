@@ -2,14 +2,14 @@
 
 use gluey_geom::Vector;
 
+use crate::PairKey;
+
 /// Two particles, or one and a wall, with a film between them that lubrication keeps open.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Film<const D: usize> {
-    /// Index of the particle.
-    pub first: usize,
-    /// Index of its partner; `None` for a wall, through which nothing flows: where the flow comes in or goes
-    /// out a gap changes without a force, and the impulse says nothing.
-    pub second: Option<usize>,
+    /// The particle and its partner. Nothing flows through a wall: where the flow comes in or goes out a gap
+    /// changes without a force, and the impulse says nothing.
+    pub pair: PairKey,
     /// From the centre of the first to that of its partner (the image that is meant), or to the wall.
     pub branch: Vector<D>,
     /// Velocity of the partner's image beyond its particle's own: in simple shear of the rate `r` the image
@@ -49,7 +49,12 @@ pub(super) fn memory_reach(largest_radius: f64) -> f64 {
 impl<const D: usize> Film<D> {
     /// Whether neither side can yield.
     pub(super) fn is_given(&self) -> bool {
-        self.is_held[0] && (self.is_held[1] || self.second.is_none())
+        self.is_held[0] && (self.is_held[1] || self.is_flat())
+    }
+
+    /// Whether it is one at a wall: its gap is that along the normal.
+    pub(super) fn is_flat(&self) -> bool {
+        self.pair.particles().1.is_none()
     }
 
     pub(super) fn thinnest(&self) -> f64 {
@@ -65,21 +70,27 @@ impl<const D: usize> Film<D> {
         REACH * self.curvature_radius
     }
 
-    /// `R(g)`.
+    /// The drag of the two particles against each other, over `6 pi eta`.
+    fn drag(&self) -> f64 {
+        0.5 * self.curvature_radius
+    }
+
+    /// `R(g)`, a force over `6 pi eta` per velocity.
     pub(super) fn resistance(&self, gap: f64) -> f64 {
         let rho = |gap: f64| match D {
             2 => (self.curvature_radius / gap).powf(1.5),
             _ => self.curvature_radius / gap,
         };
         let reach = self.reach_of_correction();
-        if gap < reach { REST + SCALE * (rho(gap) - rho(reach)) } else { REST }
+        let over_drag = if gap < reach { REST + SCALE * (rho(gap) - rho(reach)) } else { REST };
+        over_drag * self.drag()
     }
 
     /// `Phi(g)`, zero at `G`.
     pub(super) fn impulse(&self, gap: f64) -> f64 {
         let (reach, a) = (self.reach_of_correction(), self.curvature_radius);
         if gap >= reach {
-            return REST * (gap - reach);
+            return REST * (gap - reach) * self.drag();
         }
         let singular = match D {
             2 => {
@@ -88,7 +99,7 @@ impl<const D: usize> Film<D> {
             }
             _ => a * (gap / reach).ln() - a / reach * (gap - reach),
         };
-        REST * (gap - reach) + SCALE * singular
+        (REST * (gap - reach) + SCALE * singular) * self.drag()
     }
 
     /// The gap with this impulse, sought from another one, and its derivative by the impulse.
@@ -111,7 +122,7 @@ impl<const D: usize> Film<D> {
     fn open_gap_of(&self, impulse: f64, start: f64) -> f64 {
         let reach = self.reach_of_correction();
         if impulse >= 0.0 {
-            return reach + impulse / REST;
+            return reach + impulse / (REST * self.drag());
         }
         let (mut lower, mut upper) = (self.thinnest(), reach);
         let mut gap = start.clamp(lower, upper);
@@ -135,6 +146,7 @@ impl<const D: usize> Film<D> {
     /// Difference of a vector between the partner and the first; walls have none. An image moves for a time
     /// by its own slide besides: 1 makes velocities of it, the length of a step displacements.
     pub(super) fn across(&self, of: impl Fn(usize) -> Vector<D>, time: f64) -> Vector<D> {
-        self.second.map_or(Vector::zeros(), |second| of(second) + self.slide * time) - of(self.first)
+        let (first, second) = self.pair.particles();
+        second.map_or(Vector::zeros(), |second| of(second) + self.slide * time) - of(first)
     }
 }

@@ -10,15 +10,14 @@
 //! is taken by the same scheme instead, at the same order: the film asks for the impulse `I = Phi(g^n) + c
 //! F^n + (dt - c) F^{n-1}`. What it asks for and what it has at the gap after the step are brought to balance
 //! with the drag of the particles ([`balance`]): for one pair, which the flow alone would take to the gap
-//! `g*`,
-//! `g + Phi(g) = g* + I`. Since `Phi -> -inf` as `g -> 0`, gaps stay positive for any step. `Phi` is what the
-//! gluey contact model remembers as `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its limit of a
-//! vanishing viscosity a gap is closed as long as `gamma < 0`. Here that limit is met where a film is thinner
-//! than positions resolve.
+//! `g*`, `g + 2 Phi(g)/A = g* + 2 I/A`. Since `Phi -> -inf` as `g -> 0`, gaps stay positive for any step.
+//! `Phi` is what the gluey contact model remembers as `gamma` (Lefebvre 2009, 10.1051/m2an/2008042): in its
+//! limit of a vanishing viscosity a gap is closed as long as `gamma < 0`. Here that limit is met where a film
+//! is thinner than positions resolve.
 //!
-//! Only the shape of `R` matters, not its scale: over the drag of two particles against each other it is
-//! `R = s (rho(g) - rho(G))` for `g < G`, and next to nothing beyond, with `rho = A/g` for spheres,
-//! `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
+//! Only the shape of `R` matters, not its scale: over the drag of two particles against each other, `A/2` in
+//! the units of contact, it is `s (rho(g) - rho(G))` for `g < G`, and next to nothing beyond, with
+//! `rho = A/g` for spheres, `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
 
 mod balance;
 mod error;
@@ -26,25 +25,27 @@ mod film;
 mod opening;
 mod step;
 
-pub use error::{FilmClosed, FilmEnds, FilmError};
+pub use error::FilmError;
 pub use film::Film;
 use opening::open;
 pub use step::Step as FilmStep;
 use step::Step;
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Space, Twist};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
+
+use crate::{ContactState, PairState};
 
 /// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
 /// beyond what the flow closes, so that no two can meet that were not known to be near.
 const MOST_PUSHED: f64 = 1.0;
 
-/// The forces in films at the last step.
+/// Forces and impulses of films at the last step, remembered like those of contacts: `lambda = -F`,
+/// `gamma = Phi`.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct FilmMemory<const D: usize>(Vec<Remembered<D>>);
+pub struct FilmMemory(ContactState);
 
 /// What films did in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,89 +56,52 @@ pub struct FilmReport {
     pub largest_push: f64,
 }
 
-/// The force `F` in a film and its impulse.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = ""))]
-struct Remembered<const D: usize> {
-    first: usize,
-    second: Option<usize>,
-    branch: Vector<D>,
-    force: f64,
-    /// `Phi` after the step.
-    impulse: f64,
-}
-
-impl<const D: usize> FilmMemory<D>
-where
-    Dim<D>: Space<D>,
-{
+impl FilmMemory {
     /// Tells that the flow was reversed.
     pub fn reverse(&mut self) {
-        self.0.iter_mut().for_each(|film| film.force = -film.force);
+        self.0.reverse();
     }
 
     /// Corrects `twists` so that films have the gaps that their impulses give, and remembers the forces.
     ///
     /// # Errors
     /// [`FilmError`] where others leave no room; the memory is as before then.
-    pub fn correct(
+    pub fn correct<const D: usize>(
         &mut self,
         step: &Step<'_, D>,
         films: &[Film<D>],
         twists: &mut [Twist<D>],
-    ) -> Result<FilmReport, FilmError> {
+    ) -> Result<FilmReport, FilmError>
+    where
+        Dim<D>: Space<D>,
+    {
         let free = twists.to_vec();
-        let (mut impulses, mut memory) = (Vec::with_capacity(films.len()), Vec::with_capacity(films.len()));
-        for film in films {
-            let Film { first, second, branch, .. } = *film;
+        let asked = |film: &Film<D>| {
             let gap = film.gap.max(film.thinnest());
-            let rate =
-                |twists: &[Twist<D>]| branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
-            let force = film.resistance(gap) * rate(twists);
-            let before = self.of(film, films);
-            let old_force = match (before, step.history) {
+            let force = |twists: &[Twist<D>]| {
+                let rate = film.branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
+                -film.resistance(gap) * rate
+            };
+            let (before, lambda) = (self.0.find(film.pair), force(twists));
+            let old_lambda = match (before, step.history) {
                 (_, []) => 0.0,
-                (Some(before), _) => before.force,
-                (None, history) => film.resistance(gap) * rate(history),
+                (Some(before), _) => before.lambda,
+                (None, history) => force(history),
             };
             let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
-            let start = closed.map_or(film.impulse(gap), |before| before.impulse);
-            let impulse = start + step.weight * force + step.history_weight * old_force;
-            memory.push(Remembered { first, second, branch, force, impulse });
-            impulses.push(impulse);
-        }
-        open(step, films, &mut impulses, twists)?;
-        memory.iter_mut().zip(impulses).for_each(|(film, impulse)| film.impulse = impulse);
+            let start = closed.map_or(film.impulse(gap), |before| before.gamma);
+            let gamma = start - step.weight * lambda - step.history_weight * old_lambda;
+            PairState { pair: film.pair, gamma, lambda }
+        };
+        let mut states: Vec<PairState> = films.iter().map(asked).collect();
+        open(step, films, &mut states, twists)?;
         let (particle, largest_push) = step.largest_push(&free, twists);
         if largest_push > MOST_PUSHED {
             return Err(FilmError::Pushed { particle, pushed: largest_push });
         }
-        self.0 = memory;
+        states.sort_unstable_by_key(|state| state.pair);
+        self.0.pairs = states;
         let closed_count = films.iter().filter(|film| film.is_closed()).count();
         Ok(FilmReport { closed_count, largest_push })
     }
-
-    /// What is remembered of a film, which is one of these.
-    fn of(&self, film: &Film<D>, films: &[Film<D>]) -> Option<&Remembered<D>> {
-        let old = of_pair(&self.0, film, |old| (old.first, old.second));
-        let apart = |old: &Remembered<D>, film: &Film<D>| (old.branch - film.branch).norm_squared();
-        let nearest = old.iter().min_by(|a, b| apart(a, film).total_cmp(&apart(b, film)))?;
-        // Of images across borders, the one in about this direction, if it is not that of another film.
-        let mut others = of_pair(films, film, |film| (film.first, film.second)).iter();
-        let is_of_another = others.any(|other| apart(nearest, other) < apart(nearest, film));
-        (nearest.branch.dot(&film.branch) > 0.0 && !is_of_another).then_some(nearest)
-    }
-}
-
-/// The part of a list, sorted by particles, that joins the same as a film.
-fn of_pair<'a, T, const D: usize>(
-    list: &'a [T],
-    film: &Film<D>,
-    pair: impl Fn(&T) -> (usize, Option<usize>),
-) -> &'a [T] {
-    let wanted = (film.first, film.second);
-    let start = list.partition_point(|item| pair(item) < wanted);
-    let count = list[start..].iter().take_while(|item| pair(item) == wanted).count();
-    &list[start..start + count]
 }

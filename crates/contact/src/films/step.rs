@@ -2,7 +2,6 @@
 
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 
-use super::error::FilmEnds;
 use super::film::{Film, memory_reach};
 
 /// The step of a scheme: displacements are `weight u^n + history_weight u^{n-1}`.
@@ -71,16 +70,6 @@ where
         (0..twists.len()).map(push).fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
     }
 
-    /// What a film is between.
-    pub fn ends(&self, film: &Film<D>) -> FilmEnds {
-        let Film { first, second, branch, .. } = *film;
-        let position = |k: usize| self.particles[k].pose.position;
-        // Images are a period away, which is more than a diameter or so.
-        let is_away =
-            |second| (position(second) - position(first) - branch).norm() > self.particles[first].radius;
-        FilmEnds { first, second, is_image: second.is_some_and(is_away) }
-    }
-
     /// From the centre of the first particle of a film to its partner, or to the wall, after the step.
     pub fn branch_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> Vector<D> {
         let dt = self.weight + self.history_weight;
@@ -90,10 +79,7 @@ where
     /// Gap of a film after the step.
     pub fn gap_after(&self, film: &Film<D>, twists: &[Twist<D>]) -> f64 {
         let (moved, distance) = (self.branch_after(film, twists), film.branch.norm());
-        match film.second {
-            Some(_) => moved.norm() - distance + film.gap,
-            // Along a wall the distance is that along its normal.
-            None => moved.dot(&film.branch) / distance - distance + film.gap,
-        }
+        let left = if film.is_flat() { moved.dot(&film.branch) / distance } else { moved.norm() };
+        left - distance + film.gap
     }
 }

@@ -3,7 +3,7 @@
 //! method for the displacements, and trajectories beside small steps of a scheme that knows nothing of films.
 
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
-use gluey_motion::{Film, FilmError, Integrator, Scheme};
+use gluey_motion::{Film, FilmError, Integrator, PairKey, Scheme};
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +63,8 @@ where
 
     /// All films up to a gap, of all images.
     fn films(&self, reach: f64) -> Vec<Film<D>> {
-        let lattice = Lattice::<D>::new([Some(self.size); D]).tilted(self.strain * self.size).reduced();
+        let sheared = Lattice::<D>::new([Some(self.size); D]).tilted(self.strain * self.size);
+        let lattice = sheared.reduced();
         let mut films = Vec::new();
         for first in 0..self.particles.len() {
             for second in first..self.particles.len() {
@@ -77,10 +78,10 @@ where
                     if gap < reach && (first != second || is_upper) {
                         let mut slide = Vector::zeros();
                         slide[0] = branch[1] - apart[1];
-                        let second = Some(second);
+                        let (_, name) = sheared.nearest(&(apart - branch));
+                        let name = std::array::from_fn(|d| name.get(d).copied().unwrap_or(0));
                         films.push(Film {
-                            first,
-                            second,
+                            pair: PairKey::across(first, second, name),
                             branch,
                             slide,
                             is_held: [false; 2],
@@ -103,7 +104,8 @@ where
         });
         for film in self.films(REACH) {
             let (normal, r) = (film.branch.normalize(), self.scale * resistance::<D>(film.gap.max(1e-9)));
-            let sides = [(film.first, -1.0), (film.second.unwrap(), 1.0)];
+            let (first, second) = film.pair.particles();
+            let sides = [(first, -1.0), (second.unwrap(), 1.0)];
             for (i, sign) in sides {
                 for (j, other) in sides {
                     let mut block = drag.view_mut((D * i, D * j), (D, D));
@@ -280,11 +282,11 @@ where
         let wanted: Vec<_> = films
             .iter()
             .map(|film| {
-                let second = film.second.unwrap();
-                let relative = twists[second].velocity + film.slide - twists[film.first].velocity;
+                let (first, second) = (film.pair.first as usize, film.pair.particles().1.unwrap());
+                let relative = twists[second].velocity + film.slide - twists[first].velocity;
                 let rate = film.branch.normalize().dot(&relative);
                 let asked = impulse::<D>(film.gap) + dt * resistance::<D>(film.gap) * rate;
-                ((film.first, second, film.branch + relative * dt, asked), film.gap)
+                ((first, second, film.branch + relative * dt, asked), film.gap)
             })
             .filter(|((_, _, branch, asked), gap)| gap.min(branch.norm() - 2.0) < REACH || *asked < 0.0)
             .map(|(film, _)| film)
@@ -335,7 +337,7 @@ where
     let exact_films = exact.films(0.1);
     let at = |crowd: &Crowd<D>, film: &Film<D>| {
         let all = crowd.films(0.5);
-        let same = all.iter().filter(|other| (other.first, other.second) == (film.first, film.second));
+        let same = all.iter().filter(|other| other.pair.particles() == film.pair.particles());
         let nearest =
             same.min_by(|a, b| (a.branch - film.branch).norm().total_cmp(&(b.branch - film.branch).norm()));
         nearest.map_or(f64::INFINITY, |film| film.gap)

@@ -1,7 +1,7 @@
 //! Films to images that slide, as in simple shear for ever (Lees and Edwards 1972).
 
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
-use gluey_motion::{Film, Integrator, LinearFlow, Scheme};
+use gluey_motion::{Film, Integrator, LinearFlow, PairKey, Scheme};
 
 const HEIGHT: f64 = 7.0;
 const LENGTH: f64 = 9.0;
@@ -69,8 +69,7 @@ where
         let velocities = [relative * -0.5, relative * 0.5 - slide];
         let mut twists = velocities.map(|velocity| Twist { velocity, ..Twist::default() });
         let film = Film {
-            first: 0,
-            second: Some(1),
+            pair: PairKey::across(0, 1, [0, self.rows, 0]),
             branch,
             slide,
             is_held: [false; 2],
@@ -159,13 +158,14 @@ fn a_film_to_a_sliding_image_is_of_second_order() {
 fn images_of_one_partner_are_told_apart() {
     let (radius, dt) = (1.0, 0.1);
     let particles = [Vector::<2>::zeros(), Vector::<2>::new(2.0, 2.1)].map(|x| Particle::new(x, radius));
-    let film = |x: f64| {
+    let film = |x: f64, image: i32| {
         let branch = Vector::<2>::new(x, 2.1);
         let gap = branch.norm() - 2.0 * radius;
         let slide = Vector::zeros();
-        Film { first: 0, second: Some(1), branch, slide, is_held: [false; 2], gap, curvature_radius: radius }
+        let pair = PairKey::across(0, 1, [image, 0, 0]);
+        Film { pair, branch, slide, is_held: [false; 2], gap, curvature_radius: radius }
     };
-    let (right, left) = (film(2.0), film(-2.0));
+    let (right, left) = (film(2.0, 0), film(-2.0, -1));
     let mut predicted = [Twist::default(); 2];
     predicted[1].velocity = Vector::<2>::new(-1.0, 0.0);
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);

@@ -100,10 +100,15 @@ where
 
     /// The particles of a configuration as the mesh sees them.
     pub fn balls(&self, configuration: &Configuration<'_, D>) -> Vec<Ball<D>> {
-        let tilt = if self.is_sheared() { configuration.strain * self.domain.extent()[1] } else { 0.0 };
-        let (lattice, origin) = (Lattice::new(self.periods).tilted(tilt), self.domain.lower[1]);
+        let (lattice, origin) = (self.lattice(configuration), self.domain.lower[1]);
         let places = configuration.particles.iter().map(|particle| particle.pose.position).zip(&self.radii);
         places.map(|(place, &radius)| Ball::in_space(&place, radius, &lattice, origin)).collect()
+    }
+
+    /// The lattice of the images of a configuration, whose tilt is not brought back into the period.
+    fn lattice(&self, configuration: &Configuration<'_, D>) -> Lattice<D> {
+        let tilt = if self.is_sheared() { configuration.strain * self.domain.extent()[1] } else { 0.0 };
+        Lattice::new(self.periods).tilted(tilt)
     }
 
     /// A mesh for them.

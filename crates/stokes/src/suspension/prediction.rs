@@ -1,10 +1,10 @@
 //! What a flow predicts of the particles of a configuration.
 
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
-use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, Prediction};
+use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, PairKey, Prediction};
 
 use super::Suspension;
-use crate::film::{self, Lubrication};
+use crate::film::{self, Lubrication, Partner};
 use crate::flow::Flow;
 
 impl<const D: usize> Suspension<D>
@@ -83,8 +83,7 @@ where
         films.retain(|film| !film.is_across_flow());
         let is_held = |body: usize| self.given.get(body).is_some_and(Option::is_some);
         let film = |film: film::Film<D>| Film {
-            first: film.body as usize,
-            second: film.side(1),
+            pair: self.pair(configuration, &film),
             branch: film.branch(),
             slide: self.slide(configuration, &film),
             is_held: [0, 1].map(|side| film.side(side).is_some_and(is_held)),
@@ -92,6 +91,24 @@ where
             curvature_radius: film.curvature_radius(),
         };
         films.into_iter().map(film).collect()
+    }
+
+    /// The name of a film. Walls are counted as those of contact: from those across `y` on, through which no
+    /// flow goes.
+    fn pair(&self, configuration: &Configuration<'_, D>, film: &film::Film<D>) -> PairKey {
+        let first = film.body as usize;
+        match film.partner {
+            Partner::Wall { axis, is_upper } => {
+                PairKey::wall(first, 2 * (axis as usize - 1) + usize::from(is_upper))
+            }
+            Partner::Body(second) => {
+                let place = |body: usize| configuration.particles[body].pose.position;
+                let direct = place(second as usize) - place(first);
+                let (_, image) = self.lattice(configuration).nearest(&(direct - film.branch()));
+                let image = std::array::from_fn(|d| image.get(d).copied().unwrap_or(0));
+                PairKey::across(first, second as usize, image)
+            }
+        }
     }
 
     /// Velocity of the image at a film beyond that of its particle.

@@ -2,8 +2,8 @@
 
 use gluey_geom::{Aabb, Particle, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_motion::{Film, Integrator, Scheme};
-use gluey_stokes::{FlowSolver, Refinement};
+use gluey_motion::{Film, Integrator, PairKey, Scheme};
+use gluey_stokes::{FlowSolver, Partner, Refinement};
 
 use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
 use crate::method::{METHODS, Method};
@@ -98,8 +98,7 @@ fn open_films(
 ) -> Result<(), VerifyError> {
     let reach = integrator.film_reach(step, particles, twists);
     let film = |film: gluey_stokes::Film<2>| Film {
-        first: film.body as usize,
-        second: film.side(1),
+        pair: name(&film),
         branch: film.branch(),
         slide: Vector::zeros(),
         is_held: [false; 2],
@@ -110,6 +109,15 @@ fn open_films(
         gluey_stokes::films(discs, &Aabb::unit(), reach).into_iter().map(film).collect();
     integrator.open_films(step, particles, &films, twists)?;
     Ok(())
+}
+
+/// The name of a film, its walls counted by axes.
+fn name(film: &gluey_stokes::Film<2>) -> PairKey {
+    let body = film.body as usize;
+    match film.partner {
+        Partner::Body(other) => PairKey::new(body, other as usize),
+        Partner::Wall { axis, is_upper } => PairKey::wall(body, 2 * axis as usize + usize::from(is_upper)),
+    }
 }
 
 /// Sine of the angle from one line to another.

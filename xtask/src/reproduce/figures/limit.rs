@@ -12,7 +12,7 @@
 
 use gluey_contact::{ContactModel, ContactParams, GammaUpdate, PairContact, StepGeometry};
 use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Film, Integrator, Scheme};
+use gluey_motion::{Film, Integrator, PairKey, Scheme};
 
 use crate::book;
 use gluey_pictures::{Canvas, Curve, Stroke, stack};
@@ -83,15 +83,8 @@ fn lubricated(s: f64) -> Option<Encounter> {
         let mut twists = twists(-t.cos() / (1.0 + s / gap));
         let branch = particles[1].pose.position - particles[0].pose.position;
         let slide = Vector::zeros();
-        let film = Film {
-            first: 0,
-            second: Some(1),
-            branch,
-            slide,
-            is_held: [false; 2],
-            gap,
-            curvature_radius: 1.0,
-        };
+        let film =
+            Film { pair: PairKey::new(0, 1), branch, slide, is_held: [false; 2], gap, curvature_radius: 1.0 };
         integrator.open_films(STEP, &particles, &[film], &mut twists).ok()?;
         integrator.advance(STEP, &mut particles, &twists);
     }
