@@ -55,7 +55,9 @@ pub(crate) trait Response<R: JacobianRow> {
     fn respond(&self, motions: &mut [R::Motion]);
 
     /// `R` with `S A S = R R^T`, if it is known and sparse.
-    fn factor(&self, rows: &[R]) -> Option<Factor>;
+    fn factor(&self, _rows: &[R]) -> Option<Factor> {
+        None
+    }
 
     /// See [`DelassusOperator::complete`].
     fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}

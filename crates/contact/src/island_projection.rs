@@ -10,7 +10,7 @@ use crate::delassus::{JacobianRow, Response, ScaledDelassus, scale_rows};
 use crate::islands::{Island, Islands, Slot};
 use crate::parallel;
 use crate::projection::{self, Effort, Failure, LinearProblem, Linearised, Tuning};
-use crate::rows::{GROUND, Row};
+use crate::rows::{GROUND, NormalRow, Row};
 use crate::solver::{Factor, SolveFailure, SolveReport, defect};
 use crate::{ContactParams, Mobility};
 
@@ -46,42 +46,6 @@ pub(crate) struct IslandWorkspace<const D: usize> {
 
 /// The outcome of an island.
 pub(crate) type Outcome = Result<Effort, Failure>;
-
-/// The row `(-e, e)` of a contact between two slots.
-#[derive(Clone, Copy, Debug)]
-struct NormalRow<const D: usize> {
-    normal: Vector<D>,
-    tail: u32,
-    head: u32,
-}
-
-impl<const D: usize> JacobianRow for NormalRow<D> {
-    type Motion = Vector<D>;
-    type Weight = f64;
-
-    fn zero() -> Vector<D> {
-        Vector::zeros()
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        Self { normal: self.normal * factor, ..*self }
-    }
-
-    /// That of a unit normal, whatever the scale.
-    fn compliance(&self, weights: &[f64]) -> f64 {
-        weights[self.tail as usize] + weights[self.head as usize]
-    }
-
-    fn add_force(&self, force: f64, loads: &mut [Vector<D>]) {
-        let push = self.normal * force;
-        loads[self.head as usize] += push;
-        loads[self.tail as usize] -= push;
-    }
-
-    fn opening(&self, motions: &[Vector<D>]) -> f64 {
-        self.normal.dot(&(motions[self.head as usize] - motions[self.tail as usize]))
-    }
-}
 
 impl<const D: usize> IslandWorkspace<D> {
     /// Makes room for `islands`, whose rows start with the first and are bounded by the second number of

@@ -41,6 +41,17 @@ where
     pub dt: f64,
 }
 
+impl<const D: usize> BodyStep<'_, D>
+where
+    Dim<D>: Space<D>,
+{
+    /// Displacements of the centres with these velocities.
+    pub(crate) fn moves(&self, twists: &[Twist<D>]) -> Vec<Vector<D>> {
+        let moves = twists.iter().zip(self.drift);
+        moves.map(|(twist, drift)| twist.velocity * self.velocity_weight + drift.velocity).collect()
+    }
+}
+
 /// Corrects predicted velocities so that bodies do not overlap.
 pub trait ContactModel<const D: usize>
 where

@@ -2,6 +2,7 @@
 
 use gluey_geom::Vector;
 
+use crate::delassus::JacobianRow;
 use crate::neighbours::{Candidate, NeighbourList};
 use crate::{ContactError, Domain, StepGeometry, Wall};
 
@@ -87,7 +88,11 @@ impl<const D: usize> Row<D> {
     /// Vector between the centres (from the origin, for a wall) when places have moved by `displacements`.
     pub(crate) fn separation(&self, positions: &[Vector<D>], displacements: &[Vector<D>]) -> Vector<D> {
         // As the integrator does it: first each end position, rounded, then their difference.
-        let end = |place: u32| positions[place as usize] + displacements[place as usize];
+        self.between(|place| positions[place as usize] + displacements[place as usize])
+    }
+
+    /// The same for places whose ends are given.
+    pub(crate) fn between(&self, end: impl Fn(u32) -> Vector<D>) -> Vector<D> {
         if self.tail == GROUND { end(self.head) } else { end(self.head) + self.shift - end(self.tail) }
     }
 
@@ -100,6 +105,42 @@ impl<const D: usize> Row<D> {
     /// Gap when places have moved by `displacements`.
     pub(crate) fn gap_after(&self, positions: &[Vector<D>], displacements: &[Vector<D>]) -> f64 {
         self.gap_at(&self.separation(positions, displacements))
+    }
+}
+
+/// The row `(-e, e)` of a contact between two slots.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalRow<const D: usize> {
+    pub normal: Vector<D>,
+    pub tail: u32,
+    pub head: u32,
+}
+
+impl<const D: usize> JacobianRow for NormalRow<D> {
+    type Motion = Vector<D>;
+    type Weight = f64;
+
+    fn zero() -> Vector<D> {
+        Vector::zeros()
+    }
+
+    fn scaled(&self, factor: f64) -> Self {
+        Self { normal: self.normal * factor, ..*self }
+    }
+
+    /// That of a unit normal, whatever the scale.
+    fn compliance(&self, weights: &[f64]) -> f64 {
+        weights[self.tail as usize] + weights[self.head as usize]
+    }
+
+    fn add_force(&self, force: f64, loads: &mut [Vector<D>]) {
+        let push = self.normal * force;
+        loads[self.head as usize] += push;
+        loads[self.tail as usize] -= push;
+    }
+
+    fn opening(&self, motions: &[Vector<D>]) -> f64 {
+        self.normal.dot(&(motions[self.head as usize] - motions[self.tail as usize]))
     }
 }
 

@@ -277,7 +277,7 @@ where
     fn try_to_open_films(&mut self) -> Result<FilmReport, FilmError> {
         let (dt, rate) = (self.part_length(), self.sliding_rate());
         let particles = &self.particles;
-        let reach = self.integrator.film_reach_in_shear(dt, particles, self.twists(), rate);
+        let reach = self.integrator.film_reach(dt, particles, self.twists(), rate);
         let (shear_factor, strain) = (self.shear_factor(), self.strain);
         let now = Configuration { shear_factor, strain, ..Configuration::at(self.time(), particles) };
         let films = self.hydrodynamics.films(&now, reach);

@@ -6,7 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
-use gluey_contact::{Film, FilmError, FilmMemory, FilmReport, FilmStep};
+use gluey_contact::{BodyStep, Film, FilmError, FilmMemory, FilmReport, film_reach};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -125,31 +125,23 @@ where
         twists: &mut [Twist<D>],
     ) -> Result<FilmReport, FilmError> {
         let mut memory = std::mem::take(&mut self.films);
-        let corrected = memory.correct(&self.film_step(dt, particles), films, twists);
+        let corrected = self.in_step(dt, particles, |step| memory.open(step, films, twists));
         self.films = memory;
         corrected
     }
 
-    /// The gap up to which [`Integrator::open_films`] has to know films, before a step with these velocities.
-    pub fn film_reach(&self, dt: f64, particles: &[Particle<D>], twists: &[Twist<D>]) -> f64 {
-        self.film_step(dt, particles).reach(twists)
+    /// The gap up to which [`Integrator::open_films`] has to know films, before a step with these velocities,
+    /// where images slide in a simple shear of this rate.
+    pub fn film_reach(&self, dt: f64, particles: &[Particle<D>], twists: &[Twist<D>], rate: f64) -> f64 {
+        self.in_step(dt, particles, |step| film_reach(step, twists, rate))
     }
 
-    /// The same where images slide in a simple shear of this rate: displacements count from the sheared
-    /// lattice then, in which particles move little against each other, however far up in `y` they are.
-    pub fn film_reach_in_shear(
-        &self,
-        dt: f64,
-        particles: &[Particle<D>],
-        twists: &[Twist<D>],
-        rate: f64,
-    ) -> f64 {
-        self.film_step(dt, particles).reach_in_shear(twists, rate)
-    }
-
-    fn film_step<'a>(&'a self, dt: f64, particles: &'a [Particle<D>]) -> FilmStep<'a, D> {
-        let (weight, history_weight) = (self.velocity_weight(dt), self.history_weight(dt));
-        FilmStep { weight, history_weight, particles, history: &self.history }
+    fn in_step<T>(&self, dt: f64, particles: &[Particle<D>], ask: impl FnOnce(&BodyStep<'_, D>) -> T) -> T {
+        let (poses, radii): (Vec<_>, Vec<_>) = particles.iter().map(|p| (p.pose, p.radius)).unzip();
+        let mut drift = vec![Twist::default(); particles.len()];
+        self.body_drift(dt, &mut drift);
+        let velocity_weight = self.velocity_weight(dt);
+        ask(&BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight, dt })
     }
 
     /// Moves and turns the particles over `dt` with the (corrected) velocities `twists` and remembers these.

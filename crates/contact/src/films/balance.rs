@@ -11,288 +11,181 @@
 //! closed, whatever they ask for.
 //!
 //! Solved for the loads `L`, which are free: `gap_k(x(L)) - Phi^-1(I_k - L_k) = 0`, where gaps are linear
-//! in `x` the gradient of a convex function, by Newton's method with conjugate gradients. Gaps are linearised
-//! about the bodies where they are, then about where they went, until they are exact. The distance of
-//! centres is convex in `x`: gaps are never below those linearised.
+//! in `x` the gradient of a convex function (`solver/laws.rs`). Gaps are linearised about the bodies where
+//! they are, then about where they went, until they are exact. The distance of centres is convex in `x`: gaps
+//! are never below those linearised.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Space, Vector};
 
 use super::error::FilmError;
-use super::film::Film;
-use super::step::Step;
+use super::film::FilmLaw;
+use crate::delassus::{JacobianRow, Response, ScaledDelassus};
+use crate::projection::{self, Effort, Failure, Linearised};
+use crate::rows::{GROUND, NormalRow, Row};
+use crate::solver::{LEAST, LawProblem, Loads, SolveFailure, SolveReport, TOLERANCE, farthest};
+use crate::{BodyStep, ContactParams};
 
-/// A gap this near to where it should be, relative to it, is there: what is left adds up over thousands of
-/// steps...
-const TOLERANCE: f64 = 1e-10;
-/// ... or as near as this share of the thinnest film.
-const LEAST: f64 = 1e-2;
 /// After the last linearisation a gap may be off by this share of itself, and by that of the thinnest film.
 const ACCEPTED: f64 = 1e-6;
 /// Linearisations of the gaps at most. Steps in which particles move far around each other would take more.
 const MOST_PASSES: usize = 50;
-/// Newton steps of one of them at most. A linear problem takes one to ten.
-const MOST_NEWTON_STEPS: usize = 100;
-/// Iterations of a Newton step at most; what is left then is left to the next.
-const MOST_ITERATIONS: usize = 2000;
-/// Films are taken to yield at least so much in a Newton step, over the mobility of their particles
-/// (Levenberg 1944, 10.1090/qam/10666): where more of them are closed than particles have ways to move, gaps
-/// do not tell their loads. More where steps had to be shortened a lot, less where they were right.
-const SOFTENINGS: [f64; 2] = [1e-6, 0.1];
-/// By which factor.
-const HARDENING: f64 = 10.0;
-/// Newton steps are shortened where the slope along them does not fall to this share of itself...
-const SLOPE: f64 = 0.9;
-/// ... to no less than this share.
-const SHORTEST: f64 = 1e-12;
-/// Steps below this share are much shortened.
-const SHORT: f64 = 0.25;
-/// Linear problems are solved this much more accurately than gaps.
-const MARGIN: f64 = 0.1;
 
-/// Films whose gaps are linear in the displacements of their particles.
-struct Balance<'a, const D: usize> {
-    /// Films, and the impulses that they ask for.
-    wanted: &'a [(&'a Film<D>, f64)],
-    /// Their particles; a wall has the number that comes after those of the particles.
-    ends: Vec<[usize; 2]>,
-    /// `1/a` of each particle; zero for those that are held, and for walls.
-    mobilities: Vec<f64>,
-    normals: Vec<Vector<D>>,
-    /// Gaps without loads.
-    free_gaps: Vec<f64>,
-    /// `L`.
-    loads: Vec<f64>,
-    state: State,
-    /// Newton steps so far.
-    corrections: usize,
+/// Films in balance.
+pub(super) struct Balanced<const D: usize> {
+    /// Displacements of the particles, and how far they are from the free ones.
+    pub moved: Vec<Vector<D>>,
+    pub changes: Vec<Vector<D>>,
+    /// Those that films have.
+    pub impulses: Vec<f64>,
 }
 
-/// What loads lead to.
-#[derive(Clone, Default)]
-struct State {
-    /// Gaps that films have under their loads.
-    gaps: Vec<f64>,
-    /// `-dg/dL` of each film.
-    compliances: Vec<f64>,
-    /// Gaps between the particles less those of their films.
-    excess: Vec<f64>,
-}
-
-/// Moves particles so that impulses balance; returns those that films have then.
+/// Displaces particles so that impulses balance.
 ///
 /// # Errors
 /// [`FilmError`].
 pub(super) fn balance<const D: usize>(
-    step: &Step<'_, D>,
-    wanted: &[(&Film<D>, f64)],
-    twists: &mut [Twist<D>],
-) -> Result<Vec<f64>, FilmError>
+    step: &BodyStep<'_, D>,
+    free: &[Vector<D>],
+    laws: Vec<FilmLaw<'_, D>>,
+) -> Result<Balanced<D>, FilmError>
 where
     Dim<D>: Space<D>,
 {
-    let free = twists.to_vec();
-    let mut balance = Balance::new(step, wanted);
-    for pass in 0..MOST_PASSES {
-        balance.linearise(step, &free, (pass > 0).then_some(&*twists));
-        let is_solved = balance.solve();
-        for ((twist, free), moved) in twists.iter_mut().zip(&free).zip(balance.displacements(&balance.loads))
-        {
-            twist.velocity = free.velocity + moved / step.weight;
-        }
-        if !is_solved {
-            break;
-        }
-        let off = |k: usize| step.gap_after(wanted[k].0, twists) - balance.state.gaps[k];
-        let allowed = |k: usize| ACCEPTED * balance.state.gaps[k] + LEAST * wanted[k].0.thinnest();
-        let is_accepted = pass + 1 == MOST_PASSES && (0..wanted.len()).all(|k| off(k).abs() <= allowed(k));
-        if is_accepted || balance.farthest(off) <= 2.0 * TOLERANCE {
-            return Ok(balance.impulses());
-        }
-    }
-    Err(balance.failure(step, twists))
+    let params = ContactParams { exact_gap: true, pass_limit: MOST_PASSES, ..ContactParams::default() };
+    let (mut problem, mut effort) = (Balance::new(step, free, laws), Effort::default());
+    projection::solve(&mut problem, &params, &mut effort)
+        .map_err(|failure| problem.explain(&failure, effort.iterations, step.radii))?;
+    let Balance { laws, moved, mut changes, loads, .. } = problem;
+    let impulses = laws.iter().zip(loads.loads).map(|(law, load)| law.asked - load).collect();
+    changes.remove(0);
+    Ok(Balanced { moved, changes, impulses })
 }
 
-impl<'a, const D: usize> Balance<'a, D>
-where
-    Dim<D>: Space<D>,
-{
-    fn new(step: &Step<'_, D>, wanted: &'a [(&'a Film<D>, f64)]) -> Self {
-        let wall = step.particles.len();
-        let mut mobilities: Vec<f64> = step.particles.iter().map(|particle| 1.0 / particle.radius).collect();
-        mobilities.push(0.0);
-        let mut ends = Vec::with_capacity(wanted.len());
-        for (film, _) in wanted {
+/// Films whose gaps are linear in the displacements of their particles.
+struct Balance<'a, const D: usize> {
+    laws: Vec<FilmLaw<'a, D>>,
+    rows: Vec<Row<D>>,
+    /// Displacements of the particles without loads, and with them.
+    free: &'a [Vector<D>],
+    moved: Vec<Vector<D>>,
+    /// By how much they differ; the first is that of walls.
+    changes: Vec<Vector<D>>,
+    /// `1/a` of each particle; zero for those that are held, and for walls.
+    weights: Vec<f64>,
+    /// Gaps without loads.
+    free_gaps: Vec<f64>,
+    loads: Loads,
+}
+
+impl<'a, const D: usize> Balance<'a, D> {
+    fn new(step: &BodyStep<'_, D>, free: &'a [Vector<D>], laws: Vec<FilmLaw<'a, D>>) -> Self
+    where
+        Dim<D>: Space<D>,
+    {
+        let mut weights = vec![0.0];
+        weights.extend(step.radii.iter().map(|radius| 1.0 / radius));
+        for film in laws.iter().map(|law| law.film) {
             let (first, second) = film.pair.particles();
-            let both = [first, second.unwrap_or(wall)];
-            both.iter().zip(film.is_held).filter(|(_, held)| *held).for_each(|(&k, _)| mobilities[k] = 0.0);
-            ends.push(both);
+            let ends = [Some(first), second].into_iter().zip(film.is_held);
+            ends.filter(|(_, is_held)| *is_held)
+                .filter_map(|(end, _)| end)
+                .for_each(|k| weights[k + 1] = 0.0);
         }
-        let (zeros, normals) = (vec![0.0; wanted.len()], Vec::with_capacity(wanted.len()));
-        let state = State { gaps: wanted.iter().map(|(film, _)| film.gap).collect(), ..State::default() };
-        let (free_gaps, loads) = (zeros.clone(), zeros);
-        Self { wanted, ends, mobilities, normals, free_gaps, loads, state, corrections: 0 }
-    }
-
-    /// Linearises about the bodies where these velocities take them, or where they are now: the gap after
-    /// displacements is `n . (b + x) - |b| + g`.
-    fn linearise(&mut self, step: &Step<'_, D>, free: &[Twist<D>], moved: Option<&[Twist<D>]>) {
-        self.normals.clear();
-        for ((film, _), free_gap) in self.wanted.iter().zip(&mut self.free_gaps) {
-            let normal = match moved {
-                Some(moved) if !film.is_flat() => step.branch_after(film, moved).normalize(),
-                _ => film.branch.normalize(),
-            };
-            *free_gap = normal.dot(&step.branch_after(film, free)) - film.branch.norm() + film.gap;
-            self.normals.push(normal);
+        Self {
+            rows: laws.iter().map(|law| law.film.row(step.dt)).collect(),
+            free,
+            moved: free.to_vec(),
+            changes: vec![Vector::zeros(); weights.len()],
+            weights,
+            free_gaps: vec![0.0; laws.len()],
+            loads: Loads::new(laws.iter().map(|law| law.film.gap).collect()),
+            laws,
         }
     }
 
-    /// Why there is no balance: a film that is closed, or the one that is farthest off.
-    fn failure(&self, step: &Step<'_, D>, twists: &[Twist<D>]) -> FilmError {
-        let left = |k: usize| step.gap_after(self.wanted[k].0, twists);
-        let off =
-            |k: usize| (left(k) - self.state.gaps[k]).abs().max(self.state.excess[k].abs()) / self.unit(k);
-        let most = |of: &dyn Fn(usize) -> f64| {
-            let films = 0..self.wanted.len();
-            films.max_by(|&a, &b| of(a).total_cmp(&of(b))).expect("without films there is balance")
-        };
-        let (thinnest, farthest) = (most(&|k| -left(k)), most(&off));
-        let told = |k: usize| {
-            let film = self.wanted[k].0;
-            let radius = step.particles[film.pair.first as usize].radius;
-            (film.pair, [film.gap, left(k), self.state.gaps[k]].map(|gap| gap / radius))
-        };
-        if left(thinnest) <= 0.0 {
-            let (pair, [gap, left, _]) = told(thinnest);
-            return FilmError::Closed { pair, gap, left, is_given: false };
+    /// Gap of a film where the particles are now.
+    fn gap(&self, k: usize) -> f64 {
+        self.rows[k].gap_at(&self.rows[k].between(|place| self.moved[place as usize]))
+    }
+
+    /// Gaps without loads, linear along the normals.
+    fn set_free_gaps(&mut self) {
+        for (row, free_gap) in self.rows.iter().zip(&mut self.free_gaps) {
+            *free_gap = row.normal.dot(&row.between(|place| self.free[place as usize])) - row.rest;
         }
-        let (pair, [gap, left, wanted]) = told(farthest);
-        FilmError::NotBalanced { pair, gap, left, wanted, corrections: self.corrections }
+    }
+
+    /// Why there is no balance after so many corrections: a film that is closed, or the one that is farthest
+    /// off.
+    fn explain(&self, failure: &Failure, corrections: usize, radii: &[f64]) -> FilmError {
+        let (worst, more) = match failure {
+            Failure::Solve(failure) => (failure.worst, failure.report.iterations),
+            Failure::Gap { contact, .. } => (*contact, 0),
+        };
+        let thinnest = (0..self.rows.len()).min_by(|&a, &b| self.gap(a).total_cmp(&self.gap(b)));
+        let closed = thinnest.filter(|&k| self.gap(k) <= 0.0);
+        let k = closed.unwrap_or(worst);
+        let (film, pair) = (self.laws[k].film, self.laws[k].film.pair);
+        let over_radius = |gap: f64| gap / radii[pair.first as usize];
+        let (gap, left) = (over_radius(film.gap), over_radius(self.gap(k)));
+        match closed {
+            Some(_) => FilmError::Closed { pair, gap, left, is_given: false },
+            None => {
+                let wanted = over_radius(self.loads.gaps()[k]);
+                FilmError::NotBalanced { pair, gap, left, wanted, corrections: corrections + more }
+            }
+        }
     }
 }
 
-impl<const D: usize> Balance<'_, D> {
-    /// The impulses of the films under their loads.
-    fn impulses(&self) -> Vec<f64> {
-        let loads = self.loads.iter().zip(self.wanted);
-        loads.map(|(load, (_, impulse))| impulse - load).collect()
+impl<const D: usize> Linearised for Balance<'_, D> {
+    fn begin(&mut self) {
+        self.set_free_gaps();
     }
 
-    /// Displacements of all particles under these loads.
-    fn displacements(&self, loads: &[f64]) -> Vec<Vector<D>> {
-        let mut moved = vec![Vector::zeros(); self.mobilities.len()];
-        for ((&[first, second], normal), &load) in self.ends.iter().zip(&self.normals).zip(loads) {
-            moved[first] -= normal * load;
-            moved[second] += normal * load;
+    fn project(&mut self) -> Result<SolveReport, SolveFailure> {
+        let slot = |place: u32| if place == GROUND { 0 } else { place + 1 };
+        let normal_row =
+            |row: &Row<D>| NormalRow { normal: row.normal, tail: slot(row.tail), head: slot(row.head) };
+        let rows: Vec<NormalRow<D>> = self.rows.iter().map(normal_row).collect();
+        let diagonal: Vec<f64> = rows.iter().map(|row| row.compliance(&self.weights)).collect();
+        let response = FilmMobility(&self.weights);
+        let mut operator = ScaledDelassus { rows: &rows, response, motions: &mut self.changes };
+        let (laws, free_gaps) = (&self.laws, &self.free_gaps);
+        let mut problem = LawProblem { operator: &mut operator, diagonal: &diagonal, laws, free_gaps };
+        let outcome = self.loads.solve(&mut problem);
+        operator.move_bodies(&self.loads.loads);
+        for (moved, (free, change)) in self.moved.iter_mut().zip(self.free.iter().zip(&self.changes[1..])) {
+            *moved = free + change;
         }
-        moved.iter_mut().zip(&self.mobilities).for_each(|(moved, mobility)| *moved *= *mobility);
-        moved
+        outcome
     }
 
-    /// By how much these loads open each gap.
-    fn openings(&self, loads: &[f64]) -> Vec<f64> {
-        let moved = self.displacements(loads);
-        let normals = self.ends.iter().zip(&self.normals);
-        normals.map(|(&[first, second], normal)| normal.dot(&(moved[second] - moved[first]))).collect()
-    }
-
-    /// What these loads lead to; gaps are sought from those of the last.
-    fn state(&self, loads: &[f64]) -> State {
-        let openings = self.openings(loads);
-        let mut state = State::default();
-        for (k, (film, impulse)) in self.wanted.iter().enumerate() {
-            let (gap, compliance) = film.gap_of(impulse - loads[k], self.state.gaps[k]);
-            state.gaps.push(gap);
-            state.compliances.push(compliance);
-            state.excess.push(self.free_gaps[k] + openings[k] - gap);
+    /// About the bodies where they are now; walls stay as they are.
+    fn linearise(&mut self, pass: usize) -> Option<(usize, f64)> {
+        let off = |k: usize| self.gap(k) - self.loads.gaps()[k];
+        let allowed = |k: usize| ACCEPTED * self.loads.gaps()[k] + LEAST * self.laws[k].film.thinnest();
+        let is_accepted = pass == MOST_PASSES && (0..self.rows.len()).all(|k| off(k).abs() <= allowed(k));
+        let (worst, error) = farthest(&self.laws, self.loads.gaps(), off);
+        if is_accepted || error <= 2.0 * TOLERANCE {
+            return None;
         }
-        state
-    }
-
-    /// The unit in which errors of a gap are told.
-    fn unit(&self, k: usize) -> f64 {
-        self.state.gaps[k] + LEAST / TOLERANCE * self.wanted[k].0.thinnest()
-    }
-
-    /// The largest of some errors of gaps, in their units.
-    fn farthest(&self, error: impl Fn(usize) -> f64) -> f64 {
-        // What is not a number is farthest.
-        let farther = |most: f64, off: f64| if off > most || off.is_nan() { off } else { most };
-        (0..self.wanted.len()).map(|k| error(k).abs() / self.unit(k)).fold(0.0, farther)
-    }
-
-    /// Newton's method for the loads; whether it came to an end.
-    fn solve(&mut self) -> bool {
-        self.state = self.state(&self.loads);
-        let [least, most] = SOFTENINGS;
-        let mut softening = least;
-        for _ in 0..MOST_NEWTON_STEPS {
-            let off = self.farthest(|k| self.state.excess[k]);
-            if off <= TOLERANCE {
-                return true;
-            }
-            self.corrections += 1;
-            let step = self.newton_step(softening);
-            softening = match self.go_along(&step) {
-                ..SHORT => (softening * HARDENING).min(most),
-                1.0 => (softening / HARDENING).max(least),
-                _ => softening,
-            };
+        let gap = self.gap(worst);
+        for row in self.rows.iter_mut().filter(|row| !row.is_flat) {
+            row.normal = row.between(|place| self.moved[place as usize]).normalize();
         }
-        false
+        self.set_free_gaps();
+        Some((worst, gap))
     }
+}
 
-    /// Goes along a step as far as the slope of what is minimised allows; returns the share of it.
-    fn go_along(&mut self, step: &[f64]) -> f64 {
-        let slope_of = |state: &State| state.excess.iter().zip(step).map(|(f, x)| f * x).sum::<f64>();
-        let slope = slope_of(&self.state);
-        let mut length = 1.0;
-        loop {
-            let loads: Vec<f64> = self.loads.iter().zip(step).map(|(load, x)| load + length * x).collect();
-            let state = self.state(&loads);
-            if slope_of(&state) <= SLOPE * slope.abs() || length <= SHORTEST {
-                (self.loads, self.state) = (loads, state);
-                return length;
-            }
-            length *= 0.5;
-        }
-    }
+/// Particles each of which feels its own drag.
+struct FilmMobility<'a>(&'a [f64]);
 
-    /// Solves `(B M B^T + C) x = -excess` with the compliances `C`, by conjugate gradients with its diagonal
-    /// as preconditioner (Hestenes and Stiefel 1952).
-    fn newton_step(&self, softening: f64) -> Vec<f64> {
-        let State { compliances, excess, .. } = &self.state;
-        let soft = self.ends.iter().zip(compliances).map(|(ends, c)| c + softening * self.mobility(ends));
-        let compliances: Vec<f64> = soft.collect();
-        let diagonal: Vec<f64> =
-            self.ends.iter().zip(&compliances).map(|(ends, c)| c + self.mobility(ends)).collect();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let scaled = |r: &[f64]| r.iter().zip(&diagonal).map(|(r, d)| r / d).collect::<Vec<f64>>();
-        let mut residual: Vec<f64> = excess.iter().map(|f| -f).collect();
-        let mut x = vec![0.0; residual.len()];
-        let mut direction = scaled(&residual);
-        let mut square = dot(&residual, &direction);
-        for _ in 0..MOST_ITERATIONS {
-            if self.farthest(|k| residual[k]) <= MARGIN * TOLERANCE {
-                break;
-            }
-            let mut image = self.openings(&direction);
-            image.iter_mut().zip(&compliances).zip(&direction).for_each(|((y, c), x)| *y += c * x);
-            let length = square / dot(&direction, &image);
-            for k in 0..x.len() {
-                x[k] += length * direction[k];
-                residual[k] -= length * image[k];
-            }
-            let ahead = scaled(&residual);
-            let next = dot(&residual, &ahead);
-            let turn = next / square;
-            direction.iter_mut().zip(ahead).for_each(|(x, y)| *x = y + turn * *x);
-            square = next;
-        }
-        x
-    }
+impl<const D: usize> Response<NormalRow<D>> for FilmMobility<'_> {
+    const IS_COUPLED: bool = false;
 
-    fn mobility(&self, ends: &[usize; 2]) -> f64 {
-        ends.iter().map(|&k| self.mobilities[k]).sum()
+    fn respond(&self, motions: &mut [Vector<D>]) {
+        motions.iter_mut().zip(self.0).for_each(|(motion, weight)| *motion *= *weight);
     }
 }

@@ -1,8 +1,11 @@
 //! A film between two particles, and how it resists.
 
-use gluey_geom::Vector;
+use gluey_geom::{Dim, Space, Twist, Vector};
 
-use crate::PairKey;
+use crate::neighbours::{AffineFit, Frame};
+use crate::rows::{GROUND, Row};
+use crate::solver::GapLaw;
+use crate::{BodyStep, PairKey};
 
 /// Two particles, or one and a wall, with a film between them that lubrication keeps open.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,10 +43,24 @@ const REST: f64 = 0.1;
 /// less it is remembered, and the film opens when it has been made up for: that is the gluey contact.
 const THINNEST: f64 = 1e-9;
 
-/// The gap up to which films are to be known, between particles no larger than this.
-pub(super) fn memory_reach(largest_radius: f64) -> f64 {
+/// The gap up to which films have to be known before a step with these velocities. Where images slide in a
+/// simple shear of this rate displacements count from the sheared lattice, in which particles move little
+/// against each other, however far up in `y` they are.
+pub fn film_reach<const D: usize>(step: &BodyStep<'_, D>, twists: &[Twist<D>], rate: f64) -> f64
+where
+    Dim<D>: Space<D>,
+{
+    let shear = rate * step.dt;
+    let centers: Vec<Vector<D>> = step.poses.iter().map(|pose| pose.position).collect();
+    let moves = step.moves(twists);
+    let lattice = AffineFit::new(&centers, &moves, &Frame { free: [false; D], shear });
+    let farthest = centers.iter().zip(&moves).map(|(x, s)| lattice.rest(x, s)).fold(0.0, f64::max);
+    let largest = step.radii.iter().copied().fold(0.0, f64::max);
     // A wall has `A = 2 a`.
-    2.0 * largest_radius * REACH * MEMORY_REACH
+    let memory = 2.0 * largest * REACH * MEMORY_REACH;
+    // Two particles approach each other at twice the speed of each; centres at the distance `2 a + reach` by
+    // the strain times that, besides.
+    (memory + 2.0 * farthest + shear.abs() * 2.0 * largest) / (1.0 - shear.abs().min(0.5))
 }
 
 impl<const D: usize> Film<D> {
@@ -148,5 +165,40 @@ impl<const D: usize> Film<D> {
     pub(super) fn across(&self, of: impl Fn(usize) -> Vector<D>, time: f64) -> Vector<D> {
         let (first, second) = self.pair.particles();
         second.map_or(Vector::zeros(), |second| of(second) + self.slide * time) - of(first)
+    }
+
+    /// The row of its gap in a step of this length, for places that are displacements of the particles.
+    pub(super) fn row(&self, dt: f64) -> Row<D> {
+        let (first, second) = self.pair.particles();
+        let (first, distance, slide) = (first as u32, self.branch.norm(), self.slide * dt);
+        let (tail, head, sign) = second.map_or((GROUND, first, -1.0), |second| (first, second as u32, 1.0));
+        Row {
+            candidate: 0,
+            tail,
+            head,
+            shift: self.branch + slide,
+            slide,
+            normal: self.branch * (sign / distance),
+            rest: if tail == GROUND { 0.0 } else { distance } - self.gap,
+            is_flat: tail == GROUND,
+            rank: (0, 0, [0; 3]),
+        }
+    }
+}
+
+/// The law of a film that asks for an impulse: what it does not get loads its particles.
+pub(super) struct FilmLaw<'a, const D: usize> {
+    pub film: &'a Film<D>,
+    /// The impulse.
+    pub asked: f64,
+}
+
+impl<const D: usize> GapLaw for FilmLaw<'_, D> {
+    fn gap(&self, load: f64, start: f64) -> (f64, f64) {
+        self.film.gap_of(self.asked - load, start)
+    }
+
+    fn thinnest(&self) -> f64 {
+        self.film.thinnest()
     }
 }

@@ -23,19 +23,16 @@ mod balance;
 mod error;
 mod film;
 mod opening;
-mod step;
 
 pub use error::FilmError;
-pub use film::Film;
+pub use film::{Film, film_reach};
 use opening::open;
-pub use step::Step as FilmStep;
-use step::Step;
 
 use gluey_geom::{Dim, Space, Twist};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{ContactState, PairState};
+use crate::{BodyStep, ContactState, PairState};
 
 /// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
 /// beyond what the flow closes, so that no two can meet that were not known to be near.
@@ -65,40 +62,38 @@ impl FilmMemory {
     /// Corrects `twists` so that films have the gaps that their impulses give, and remembers the forces.
     ///
     /// # Errors
-    /// [`FilmError`] where others leave no room; the memory is as before then.
-    pub fn correct<const D: usize>(
+    /// [`FilmError`] where others leave no room; twists and memory are as before then.
+    pub fn open<const D: usize>(
         &mut self,
-        step: &Step<'_, D>,
+        step: &BodyStep<'_, D>,
         films: &[Film<D>],
         twists: &mut [Twist<D>],
     ) -> Result<FilmReport, FilmError>
     where
         Dim<D>: Space<D>,
     {
-        let free = twists.to_vec();
+        let (weight, old_weight) = (step.velocity_weight, step.dt - step.velocity_weight);
         let asked = |film: &Film<D>| {
             let gap = film.gap.max(film.thinnest());
-            let force = |twists: &[Twist<D>]| {
-                let rate = film.branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
-                -film.resistance(gap) * rate
-            };
-            let (before, lambda) = (self.0.find(film.pair), force(twists));
-            let old_lambda = match (before, step.history) {
-                (_, []) => 0.0,
-                (Some(before), _) => before.lambda,
-                (None, history) => force(history),
-            };
+            let (normal, resistance) = (film.branch.normalize(), film.resistance(gap));
+            let lambda = -resistance * normal.dot(&film.across(|k| twists[k].velocity, 1.0));
+            let before = self.0.find(film.pair);
+            let of_history =
+                || -resistance * normal.dot(&film.across(|k| step.drift[k].velocity, old_weight));
+            let known = before.map_or_else(of_history, |before| old_weight * before.lambda);
             let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
             let start = closed.map_or(film.impulse(gap), |before| before.gamma);
-            let gamma = start - step.weight * lambda - step.history_weight * old_lambda;
-            PairState { pair: film.pair, gamma, lambda }
+            PairState { pair: film.pair, gamma: start - weight * lambda - known, lambda }
         };
         let mut states: Vec<PairState> = films.iter().map(asked).collect();
-        open(step, films, &mut states, twists)?;
-        let (particle, largest_push) = step.largest_push(&free, twists);
+        let changes = open(step, films, &mut states, &step.moves(twists))?;
+        let pushes = changes.iter().zip(step.radii).map(|(change, radius)| change.norm() / radius);
+        let farther = |most: (usize, f64), next: (usize, f64)| if next.1 > most.1 { next } else { most };
+        let (particle, largest_push) = pushes.enumerate().fold((0, 0.0), farther);
         if largest_push > MOST_PUSHED {
             return Err(FilmError::Pushed { particle, pushed: largest_push });
         }
+        twists.iter_mut().zip(changes).for_each(|(twist, change)| twist.velocity += change / weight);
         states.sort_unstable_by_key(|state| state.pair);
         self.0.pairs = states;
         let closed_count = films.iter().filter(|film| film.is_closed()).count();

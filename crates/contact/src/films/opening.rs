@@ -1,67 +1,65 @@
 //! Keeps the films of a step open.
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::{Dim, Space, Vector};
 
 use super::balance::balance;
 use super::error::FilmError;
-use super::film::Film;
-use super::step::Step;
-use crate::PairState;
+use super::film::{Film, FilmLaw};
+use crate::rows::Row;
+use crate::{BodyStep, PairState};
 
 /// Gaps that corrections push below this share of the reach are corrected too.
 const PUSHED: f64 = 0.5;
 
-/// Corrects velocities so that films have the gaps that the impulses of `states` give, as far as these agree,
-/// and puts there what the films have in the end.
+/// Displacements of the particles, beside the `free` ones, with which films have the gaps that the impulses
+/// of `states` give, as far as these agree; puts there what the films have in the end.
 ///
 /// # Errors
 /// [`FilmError`].
 pub(super) fn open<const D: usize>(
-    step: &Step<'_, D>,
+    step: &BodyStep<'_, D>,
     films: &[Film<D>],
     states: &mut [PairState],
-    twists: &mut [Twist<D>],
-) -> Result<(), FilmError>
+    free: &[Vector<D>],
+) -> Result<Vec<Vector<D>>, FilmError>
 where
     Dim<D>: Space<D>,
 {
-    let free = twists.to_vec();
-    let is_near = |film: &Film<D>, twists: &[Twist<D>], share: f64| {
-        !film.is_given() && step.gap_after(film, twists) < share * film.reach_of_correction()
+    let rows: Vec<Row<D>> = films.iter().map(|film| film.row(step.dt)).collect();
+    let gap = |k: usize, moved: &[Vector<D>]| rows[k].gap_at(&rows[k].between(|place| moved[place as usize]));
+    let is_near = |k: usize, moved: &[Vector<D>], share: f64| {
+        !films[k].is_given() && gap(k, moved) < share * films[k].reach_of_correction()
     };
     let concerns = |k: usize| {
-        let film = &films[k];
-        let is_wanted = film.gap < film.reach_of_correction() || states[k].gamma < 0.0;
-        is_near(film, &free, 1.0) || (is_wanted && !film.is_given())
+        let is_wanted = films[k].gap < films[k].reach_of_correction() || states[k].gamma < 0.0;
+        is_near(k, free, 1.0) || (is_wanted && !films[k].is_given())
     };
     let mut is_in: Vec<bool> = (0..films.len()).map(concerns).collect();
-    let found = loop {
-        twists.copy_from_slice(&free);
+    let (chosen, found) = loop {
         let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
-        let wanted: Vec<_> = chosen.iter().map(|&k| (&films[k], states[k].gamma)).collect();
-        let found = balance(step, &wanted, twists)?;
+        let laws = chosen.iter().map(|&k| FilmLaw { film: &films[k], asked: states[k].gamma });
+        let found = balance(step, free, laws.collect())?;
         // Large steps push particles onto others that were far away.
         let more: Vec<usize> =
-            (0..films.len()).filter(|&k| !is_in[k] && is_near(&films[k], twists, PUSHED)).collect();
+            (0..films.len()).filter(|&k| !is_in[k] && is_near(k, &found.moved, PUSHED)).collect();
         more.iter().for_each(|&k| is_in[k] = true);
         if more.is_empty() {
-            break chosen.into_iter().zip(found);
+            break (chosen, found);
         }
     };
-    found.for_each(|(k, impulse)| states[k].gamma = impulse);
-    films.iter().try_for_each(|film| check(step, film, twists))
+    chosen.into_iter().zip(found.impulses).for_each(|(k, impulse)| states[k].gamma = impulse);
+    for (k, film) in films.iter().enumerate() {
+        check(film, gap(k, &found.moved), step.radii)?;
+    }
+    Ok(found.changes)
 }
 
 /// Refuses what closes a film by more than rounding, such as given motions.
-fn check<const D: usize>(step: &Step<'_, D>, film: &Film<D>, twists: &[Twist<D>]) -> Result<(), FilmError>
-where
-    Dim<D>: Space<D>,
-{
-    let left = step.gap_after(film, twists);
+fn check<const D: usize>(film: &Film<D>, left: f64, radii: &[f64]) -> Result<(), FilmError> {
     if left >= -film.thinnest() {
         return Ok(());
     }
-    let radius = step.particles[film.pair.first as usize].radius;
+    let radius = radii[film.pair.first as usize];
     let (gap, left) = (film.gap / radius, left / radius);
     Err(FilmError::Closed { pair: film.pair, gap, left, is_given: film.is_given() })
 }

@@ -11,7 +11,7 @@ use gluey_geom::{Lattice, Vector};
 
 use crate::broadphase::BestOf;
 use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
-use affine::{AffineFit, Frame};
+pub(crate) use affine::{AffineFit, Frame};
 pub(crate) use images::{for_each_image, wrap};
 pub(crate) use order::SpatialOrder;
 pub(crate) use ownership::Ownership;

@@ -22,6 +22,7 @@ mod auto;
 mod envelope;
 mod factor;
 mod infeasibility;
+mod laws;
 mod newton;
 mod spectrum;
 mod uzawa;
@@ -31,6 +32,7 @@ pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
 pub use auto::Auto;
 pub use factor::Factor;
+pub(crate) use laws::{GapLaw, LEAST, LawProblem, Loads, TOLERANCE, farthest};
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 

@@ -123,7 +123,7 @@ where
     fn step(&mut self, dt: f64) -> Result<f64, FilmError> {
         let mut twists: Vec<Twist<D>> =
             self.velocities().into_iter().map(|velocity| Twist { velocity, ..Twist::default() }).collect();
-        let films = self.films(self.integrator.film_reach_in_shear(dt, &self.particles, &twists, 1.0));
+        let films = self.films(self.integrator.film_reach(dt, &self.particles, &twists, 1.0));
         self.integrator.open_films(dt, &self.particles, &films, &mut twists)?;
         self.integrator.advance(dt, &mut self.particles, &twists);
         self.strain += dt;
@@ -278,7 +278,7 @@ where
         let mut twists: Vec<Twist<D>> =
             crowd.velocities().into_iter().map(|velocity| Twist { velocity, ..Twist::default() }).collect();
         twists.iter_mut().for_each(|twist| twist.velocity += noise::<D>(random) * 0.02);
-        let films = crowd.films(crowd.integrator.film_reach_in_shear(dt, &crowd.particles, &twists, 1.0));
+        let films = crowd.films(crowd.integrator.film_reach(dt, &crowd.particles, &twists, 1.0));
         let wanted: Vec<_> = films
             .iter()
             .map(|film| {

@@ -31,7 +31,7 @@ fn encounter(steps: &[f64]) -> Vec<Seen> {
         seen.push(Seen { time, gap: particles[0].gap(&particles[1]) / 0.05, has_passed: -line.x });
         let now = Configuration::at(time, &particles);
         let mut twists = flow.predict(&now).unwrap().twists;
-        let films: Vec<Film<3>> = flow.films(&now, integrator.film_reach(dt, &particles, &twists));
+        let films: Vec<Film<3>> = flow.films(&now, integrator.film_reach(dt, &particles, &twists, 0.0));
         integrator.open_films(dt, &particles, &films, &mut twists).unwrap();
         integrator.advance(dt, &mut particles, &twists);
         time += dt;

@@ -76,7 +76,7 @@ where
             gap,
             curvature_radius: 1.0,
         };
-        let reach = self.integrator.film_reach_in_shear(dt, &self.particles, &twists, self.rate);
+        let reach = self.integrator.film_reach(dt, &self.particles, &twists, self.rate);
         let films: Vec<_> = [film].into_iter().filter(|film| film.gap < reach.min(self.widest)).collect();
         self.integrator.open_films(dt, &self.particles, &films, &mut twists).unwrap();
         self.integrator.advance(dt, &mut self.particles, &twists);
@@ -198,8 +198,8 @@ fn the_reach_covers_what_a_step_brings_near() {
     };
     let twists: Vec<Twist<2>> = particles.iter().enumerate().map(twist).collect();
     let integrator = Integrator::new(Scheme::AdamsBashforth2);
-    let reach = integrator.film_reach_in_shear(dt, &particles, &twists, rate);
-    let all_rows = integrator.film_reach(dt, &particles, &twists);
+    let reach = integrator.film_reach(dt, &particles, &twists, rate);
+    let all_rows = integrator.film_reach(dt, &particles, &twists, 0.0);
     println!("reach {reach}, without the shear {all_rows}");
     // 1.5 A, the random motion of both, and a tenth of the distance of the centres.
     assert!((3.0..6.0).contains(&reach) && all_rows > 2.0 * reach, "{reach} {all_rows}");

@@ -96,7 +96,7 @@ fn open_films(
     discs: &[Ball<2>],
     twists: &mut [Twist<2>],
 ) -> Result<(), VerifyError> {
-    let reach = integrator.film_reach(step, particles, twists);
+    let reach = integrator.film_reach(step, particles, twists, 0.0);
     let film = |film: gluey_stokes::Film<2>| Film {
         pair: name(&film),
         branch: film.branch(),

@@ -66,7 +66,7 @@ fn advance(
     for n in 0..steps {
         let now = Configuration { shear_factor, ..Configuration::at(step * f64::from(n), particles) };
         let mut twists = flow.predict(&now)?.twists;
-        let films = flow.films(&now, integrator.film_reach(step, particles, &twists));
+        let films = flow.films(&now, integrator.film_reach(step, particles, &twists, 0.0));
         integrator.open_films(step, particles, &films, &mut twists)?;
         integrator.advance(step, particles, &twists);
     }
