@@ -10,7 +10,6 @@ use gluey::{
     CaseError, CheckpointError, CheckpointSummary, Ended, FileError, NotText, OccupiedError, ResultPaths,
     RowsError, RunError, StepError,
 };
-use gluey_motion::FilmError;
 use miette::{Diagnostic, MietteHandlerOpts, NamedSource, SourceSpan};
 
 /// An error with a hint and, for case files, the lines around it.
@@ -124,7 +123,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Occupied(_) => {
             "write elsewhere with --out DIR, or replace those results with --force".into()
         }
-        RunError::Step(StepError::Film { source, .. }) => film_hint(source)?,
+        RunError::Step(StepError::Film { source, .. }) if !source.is_given() => FILM_HINT.into(),
         RunError::LeftBox { .. } => {
             "end the run earlier, or take a larger box; contact keeps particles from its walls \
                                      (y), not from open sides"
@@ -143,14 +142,9 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
 }
 
 /// What to do where films cannot be kept open, also in the smallest part of a step: to resume is no help.
-fn film_hint(error: &FilmError) -> Option<String> {
-    (!error.is_given()).then(|| {
-        "to go on from there would end there again: run the case anew with a smaller time.step or with more \
-         time.halvings, up to 20 (--set time.step=..., --force or --out DIR), or let a repulsion keep particles apart \
-         ([repulsion]); where particles that are held or driven leave no room, nothing of this helps"
-            .into()
-    })
-}
+const FILM_HINT: &str = "to go on from there would end there again: run the case anew with a smaller time.step or with more \
+     time.halvings, up to 20 (--set time.step=..., --force or --out DIR), or let a repulsion keep particles apart \
+     ([repulsion]); where particles that are held or driven leave no room, nothing of this helps";
 
 /// What may have been meant by a path that is no case file.
 fn unread_hint(path: &Path) -> String {

@@ -71,7 +71,7 @@ pub use gluey_geom as geom;
 
 pub use domain::{Domain, Wall};
 pub use error::{ContactError, Quantity};
-pub use films::{Film, FilmError, FilmMemory, FilmReport, film_reach};
+pub use films::{Film, FilmError, FilmMemory, FilmReport, GapReport, film_reach};
 pub use key::{PairKey, Partner};
 pub use memory::{ContactState, MemoryError, PairState};
 pub use mobility::{Mobility, StokesDrag, WithFixed};

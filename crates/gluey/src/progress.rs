@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use gluey_motion::FilmError;
+use gluey_contact::FilmError;
 
 use crate::case::{Case, IdleKey};
 use crate::number_text::shown;

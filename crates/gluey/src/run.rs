@@ -298,8 +298,6 @@ where
     fn observe(&mut self) -> Result<(), RunError> {
         self.tell("flow");
         self.simulation.predict().map_err(StepError::widen)?;
-        self.tell("motion");
-        self.simulation.open_films().map_err(StepError::widen)?;
         self.tell("contact");
         self.simulation.correct().map_err(StepError::widen)?;
         self.tell("output");
@@ -314,11 +312,11 @@ where
     fn log_effort(&mut self, step: usize, time: f64) -> Result<(), RunError> {
         let (simulation, strain) = (&self.simulation, self.case.strain_after(step));
         let (flow, motion, phases) = (simulation.statistics(), simulation.motion(), simulation.phases());
-        let contact = simulation.contact_report();
-        let row = SolverRow { step, time, strain, flow, contact, motion, phases };
+        let gaps = simulation.gaps();
+        let row = SolverRow { step, time, strain, flow, gaps, motion, phases };
         self.progress.step(&row);
         let before = self.tally;
-        self.tally.add(motion, flow);
+        self.tally.add(motion, &gaps.films, flow);
         Notice::of_first(&before, &self.tally, &row).iter().for_each(|notice| self.progress.notice(notice));
         if motion.parts > 0 {
             self.tables.write_effort(&row)?;

@@ -5,11 +5,13 @@ mod part;
 mod repelling;
 mod strain_clock;
 
-use gluey_contact::{BodyStep, Contact, ContactModel, ContactReport, ContactState, Domain};
-use gluey_geom::{Dim, Matrix, Particle, Pose, Space, Twist};
+use gluey_contact::{
+    Contact, ContactModel, ContactState, Domain, FilmError, FilmMemory, FilmReport, GapReport, film_reach,
+};
+use gluey_geom::{Dim, Matrix, Particle, Space, Twist};
 use gluey_motion::{
-    Configuration, Fields, FilmError, FilmReport, FlowStatistics, Holding, Hydrodynamics, Integrator,
-    MeanStress, NoForces, Prediction, Scheme,
+    Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, NoForces,
+    Prediction, Scheme,
 };
 use gluey_suspension::Repulsion;
 
@@ -62,15 +64,13 @@ where
     has_forces: bool,
     strain: f64,
     particles: Vec<Particle<D>>,
-    radii: Vec<f64>,
     integrator: Integrator<D>,
     hydrodynamics: H,
+    films: FilmMemory,
     contact: C,
-    poses: Vec<Pose<D>>,
-    drift: Vec<Twist<D>>,
     /// The last one, its velocities corrected; of the statistics, those of all flows of the step so far.
     prediction: Prediction<D>,
-    contact_report: ContactReport,
+    gaps: GapReport,
     motion: StepMotion,
     phases: PhaseTable,
 }
@@ -105,6 +105,8 @@ where
     pub particles: Vec<Particle<D>>,
     /// Velocity history.
     pub integrator: Integrator<D>,
+    /// Memory of films.
+    pub films: FilmMemory,
     /// Memory of the contact model.
     pub contact: ContactState,
     /// Warm start of the flow, as [`Hydrodynamics::checkpoint`] gave it.
@@ -131,15 +133,13 @@ where
             clock: None,
             has_forces: false,
             strain: 0.0,
-            radii: particles.iter().map(|particle| particle.radius).collect(),
-            poses: particles.iter().map(|particle| particle.pose).collect(),
             particles,
             integrator: Integrator::new(scheme),
             hydrodynamics,
+            films: FilmMemory::default(),
             contact,
-            drift: vec![Twist::default(); count],
             prediction: Prediction::of(vec![Twist::default(); count]),
-            contact_report: ContactReport::default(),
+            gaps: GapReport::default(),
             motion: StepMotion::default(),
             phases: PhaseTable::default(),
         }
@@ -206,7 +206,6 @@ where
     /// Does one step.
     pub fn step(&mut self) -> Result<(), StepError<H::Error>> {
         self.predict()?;
-        self.open_films()?;
         self.correct()?;
         self.advance()
     }
@@ -252,65 +251,51 @@ where
     }
 
     /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the
-    /// step until they do.
-    pub fn open_films(&mut self) -> Result<(), StepError<H::Error>> {
-        let predicted = self.prediction.twists.clone();
+    /// step until they do, and so that nothing overlaps.
+    pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
+        let films = self.open_films()?;
+        let (step, time, dt) = (self.step, self.time(), self.part_length());
+        if let Some(Sliding { height, .. }) = self.sliding {
+            self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * dt);
+        }
+        let Self { integrator, particles, contact, prediction, .. } = self;
+        let correct = || {
+            integrator.with_step(dt, particles, |step| contact.correct_bodies(step, &mut prediction.twists))
+        };
+        let contacts = self.phases.time("contact", correct).map_err(|source| StepError::Contact {
+            step,
+            time,
+            source,
+        })?;
+        if self.part.is_first() {
+            self.gaps = GapReport { films, contacts };
+        }
+        self.gaps.films.largest_push = self.gaps.films.largest_push.max(films.largest_push);
+        Ok(())
+    }
+
+    fn open_films(&mut self) -> Result<FilmReport, StepError<H::Error>> {
         loop {
             let source = match self.try_to_open_films() {
-                Ok(FilmReport { closed_count, largest_push }) => {
-                    if self.part.is_first() {
-                        self.motion.closed_films = closed_count;
-                    }
-                    self.motion.film_push = self.motion.film_push.max(largest_push);
-                    return Ok(());
-                }
+                Ok(report) => return Ok(report),
                 Err(error) => error,
             };
             let half = self.part.halved(self.most_halvings).filter(|_| !source.is_given());
             let (step, time, length) = (self.step, self.time(), self.part_length());
             self.part = half.ok_or(StepError::Film { step, time, length, source })?;
             self.motion.refused = Some(source);
-            self.prediction.twists.copy_from_slice(&predicted);
         }
     }
 
     fn try_to_open_films(&mut self) -> Result<FilmReport, FilmError> {
-        let (dt, rate) = (self.part_length(), self.sliding_rate());
-        let particles = &self.particles;
-        let reach = self.integrator.film_reach(dt, particles, self.twists(), rate);
+        let (dt, rate, time) = (self.part_length(), self.sliding_rate(), self.time());
         let (shear_factor, strain) = (self.shear_factor(), self.strain);
-        let now = Configuration { shear_factor, strain, ..Configuration::at(self.time(), particles) };
-        let films = self.hydrodynamics.films(&now, reach);
-        let (integrator, twists) = (&mut self.integrator, &mut self.prediction.twists);
-        self.phases.time("motion", || integrator.open_films(dt, particles, &films, twists))
-    }
-
-    /// Corrects the predicted velocities for contact.
-    pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
-        let (step, time, dt) = (self.step, self.time(), self.part_length());
-        if let Some(Sliding { height, .. }) = self.sliding {
-            self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * dt);
-        }
-        for (pose, particle) in self.poses.iter_mut().zip(&self.particles) {
-            *pose = particle.pose;
-        }
-        self.integrator.body_drift(dt, &mut self.drift);
-        let body_step = BodyStep {
-            poses: &self.poses,
-            radii: &self.radii,
-            drift: &self.drift,
-            velocity_weight: self.integrator.velocity_weight(dt),
-            dt,
-        };
-        let (contact, twists) = (&mut self.contact, &mut self.prediction.twists);
-        let report = self
-            .phases
-            .time("contact", || contact.correct_bodies(&body_step, twists))
-            .map_err(|source| StepError::Contact { step, time, source })?;
-        if self.part.is_first() {
-            self.contact_report = report;
-        }
-        Ok(())
+        let Self { integrator, particles, hydrodynamics, films, prediction, phases, .. } = self;
+        integrator.with_step(dt, particles, |step| {
+            let now = Configuration { shear_factor, strain, ..Configuration::at(time, particles) };
+            let near = hydrodynamics.films(&now, film_reach(step, &prediction.twists, rate));
+            phases.time("motion", || films.open(step, &near, &mut prediction.twists))
+        })
     }
 
     /// Moves the particles with the corrected velocities. Where these are for a part of the step only, the
@@ -320,7 +305,6 @@ where
         while let Some(next) = self.part.next() {
             self.part = next;
             self.predict()?;
-            self.open_films()?;
             self.correct()?;
             self.advance_part();
         }
@@ -351,6 +335,7 @@ where
             true => self.integrator.restart(),
             false => self.integrator.reverse(),
         }
+        self.films.reverse();
         self.contact.reverse();
     }
 
@@ -394,9 +379,10 @@ where
         self.contact.contacts()
     }
 
-    /// Effort and outcome of the last correction, of the first part of the step.
-    pub fn contact_report(&self) -> &ContactReport {
-        &self.contact_report
+    /// Effort and outcome of the last correction, of the first part of the step; the largest push of films is
+    /// that of all parts so far.
+    pub fn gaps(&self) -> &GapReport {
+        &self.gaps
     }
 
     /// Flow fields of the last prediction.
@@ -446,6 +432,7 @@ where
             clock: self.clock.clone(),
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
+            films: self.films.clone(),
             contact: self.contact.checkpoint(),
             hydrodynamics: self.hydrodynamics.checkpoint()?,
         })
@@ -457,8 +444,8 @@ where
     /// If it is not of a simulation like this one, which is unchanged then but for the flow.
     pub fn restore(&mut self, state: SimulationState<D>) -> Result<(), RestoreError<H::Error>> {
         let radii = state.particles.iter().map(|particle| particle.radius);
-        if !radii.eq(self.radii.iter().copied()) {
-            let (saved, present) = (state.particles.len(), self.radii.len());
+        if !radii.eq(self.particles.iter().map(|particle| particle.radius)) {
+            let (saved, present) = (state.particles.len(), self.particles.len());
             return Err(RestoreError::Particles { saved, present });
         }
         self.hydrodynamics.resume(&state.hydrodynamics)?;
@@ -469,6 +456,7 @@ where
         self.clock = state.clock;
         self.particles = state.particles;
         self.integrator = state.integrator;
+        self.films = state.films;
         Ok(())
     }
 

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use gluey_motion::{FilmError, FlowStatistics};
+use gluey_contact::{FilmError, FilmReport};
+use gluey_motion::FlowStatistics;
 use serde::{Deserialize, Serialize};
 
 /// Films that move no particle by more than this, in its radii, are nothing to be told of at the end of a
@@ -18,10 +19,6 @@ pub struct StepMotion {
     pub shortest: f64,
     /// Why the step was halved, where it was: what was found at the shortest length that could not be done.
     pub refused: Option<FilmError>,
-    /// Films that are closed at the beginning: their gaps are a floor and no measurement.
-    pub closed_films: usize,
-    /// How far films moved a particle from where the flow alone would have taken it, at most, in its radii.
-    pub film_push: f64,
 }
 
 /// Steps that were halved, films that closed, penalties that were changed.
@@ -50,15 +47,15 @@ pub struct Tally {
 
 impl Tally {
     /// Adds a step.
-    pub(crate) fn add(&mut self, motion: &StepMotion, flow: &FlowStatistics) {
+    pub(crate) fn add(&mut self, motion: &StepMotion, films: &FilmReport, flow: &FlowStatistics) {
         self.halved_steps += usize::from(motion.parts > 1);
         if motion.parts > 0 {
             let before = if self.shortest_part > 0.0 { self.shortest_part } else { 1.0 };
             self.shortest_part = before.min(motion.shortest);
         }
-        self.closed_films = self.closed_films.max(motion.closed_films);
-        self.rows_with_closed_films += usize::from(motion.closed_films > 0);
-        self.film_push = self.film_push.max(motion.film_push);
+        self.closed_films = self.closed_films.max(films.closed_count);
+        self.rows_with_closed_films += usize::from(films.closed_count > 0);
+        self.film_push = self.film_push.max(films.largest_push);
         self.penalties_doubled += flow.penalties_doubled;
         self.cells_raised += flow.cells_raised;
         self.flows_solved_again += flow.solved_again;
@@ -110,10 +107,12 @@ mod tests {
     fn what_happened_is_told_and_no_more() {
         let mut tally = Tally::default();
         let whole = StepMotion { parts: 1, shortest: 1.0, ..StepMotion::default() };
-        tally.add(&whole, &FlowStatistics::default());
+        tally.add(&whole, &FilmReport::default(), &FlowStatistics::default());
         assert_eq!((tally.shortest_part, tally.to_string().as_str()), (1.0, ""));
-        let halved = StepMotion { parts: 3, shortest: 0.25, closed_films: 2, film_push: 0.5, refused: None };
-        tally.add(&halved, &FlowStatistics { cells_raised: 4, solved_again: 1, ..FlowStatistics::default() });
+        let halved = StepMotion { parts: 3, shortest: 0.25, refused: None };
+        let films = FilmReport { closed_count: 2, largest_push: 0.5 };
+        let flow = FlowStatistics { cells_raised: 4, solved_again: 1, ..FlowStatistics::default() };
+        tally.add(&halved, &films, &flow);
         let told = tally.to_string();
         assert!(told.contains("in parts: 1, the shortest part 1/4") && told.contains("2 at most, in 1 rows"));
         assert!(told.contains("5.00e-1 radii") && told.contains("in 4 cells; 1 flows"), "{told}");

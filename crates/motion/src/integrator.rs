@@ -6,7 +6,7 @@
 
 use std::{fmt, str::FromStr};
 
-use gluey_contact::{BodyStep, Film, FilmError, FilmMemory, FilmReport, film_reach};
+use gluey_contact::BodyStep;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -53,8 +53,8 @@ impl FromStr for Scheme {
 
 /// Moves particles with their velocities; owns the velocity history, which serialises for checkpoints.
 ///
-/// One step of a simulation: predict `u*`, ask for [`Integrator::velocity_weight`] and [`Integrator::drift`],
-/// correct the velocities for contact, [`Integrator::advance`].
+/// One step of a simulation: predict `u*`, correct the velocities so that films stay open and nothing
+/// overlaps ([`Integrator::with_step`]), [`Integrator::advance`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
@@ -67,8 +67,6 @@ where
     history: Vec<Twist<D>>,
     /// Time from the history to now; negative when the flow was reversed since.
     history_age: f64,
-    /// Forces in films at the last step.
-    films: FilmMemory,
 }
 
 impl<const D: usize> Integrator<D>
@@ -77,7 +75,7 @@ where
 {
     /// An integrator without history.
     pub fn new(scheme: Scheme) -> Self {
-        Self { scheme, history: Vec::new(), history_age: 0.0, films: FilmMemory::default() }
+        Self { scheme, history: Vec::new(), history_age: 0.0 }
     }
 
     /// The scheme.
@@ -99,49 +97,19 @@ where
         }
     }
 
-    /// Writes the displacement and rotation known before `u^n`, one twist per particle.
-    pub fn body_drift(&self, dt: f64, drift: &mut [Twist<D>]) {
-        let weight = self.history_weight(dt);
-        drift.fill(Twist::default());
-        for (drift, twist) in drift.iter_mut().zip(&self.history) {
-            *drift = *twist * weight;
-        }
-    }
-
-    /// Corrects velocities so that the gaps of `films` after the step are those that their impulses give,
-    /// which are positive; see [`Film`]. To be called once a step, with the films that [`Hydrodynamics`]
-    /// names, sorted by particles.
-    ///
-    /// # Errors
-    /// [`FilmError`] where particles are so crowded that none can be given room: nothing is remembered of
-    /// this step then, and it can be tried again with the velocities as they were and half the length.
-    ///
-    /// [`Hydrodynamics`]: crate::Hydrodynamics
-    pub fn open_films(
-        &mut self,
+    /// What `correct` makes of a step of these particles, such as a contact model.
+    pub fn with_step<T>(
+        &self,
         dt: f64,
         particles: &[Particle<D>],
-        films: &[Film<D>],
-        twists: &mut [Twist<D>],
-    ) -> Result<FilmReport, FilmError> {
-        let mut memory = std::mem::take(&mut self.films);
-        let corrected = self.in_step(dt, particles, |step| memory.open(step, films, twists));
-        self.films = memory;
-        corrected
-    }
-
-    /// The gap up to which [`Integrator::open_films`] has to know films, before a step with these velocities,
-    /// where images slide in a simple shear of this rate.
-    pub fn film_reach(&self, dt: f64, particles: &[Particle<D>], twists: &[Twist<D>], rate: f64) -> f64 {
-        self.in_step(dt, particles, |step| film_reach(step, twists, rate))
-    }
-
-    fn in_step<T>(&self, dt: f64, particles: &[Particle<D>], ask: impl FnOnce(&BodyStep<'_, D>) -> T) -> T {
+        correct: impl FnOnce(&BodyStep<'_, D>) -> T,
+    ) -> T {
         let (poses, radii): (Vec<_>, Vec<_>) = particles.iter().map(|p| (p.pose, p.radius)).unzip();
-        let mut drift = vec![Twist::default(); particles.len()];
-        self.body_drift(dt, &mut drift);
+        let weight = self.history_weight(dt);
+        let mut drift: Vec<Twist<D>> = self.history.iter().map(|twist| *twist * weight).collect();
+        drift.resize(particles.len(), Twist::default());
         let velocity_weight = self.velocity_weight(dt);
-        ask(&BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight, dt })
+        correct(&BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight, dt })
     }
 
     /// Moves and turns the particles over `dt` with the (corrected) velocities `twists` and remembers these.
@@ -161,7 +129,7 @@ where
     }
 
     /// Forgets the velocities: the next step is Euler. For a jump of the flow with no relation to what was
-    /// before. What pressed closed films together stays to be made up for.
+    /// before.
     pub fn restart(&mut self) {
         self.history.clear();
         self.history_age = 0.0;
@@ -175,7 +143,6 @@ where
     /// `dt^2 |u'|`, a restart by Euler by `dt^2/2 |u'|`.
     pub fn reverse(&mut self) {
         self.history_age = -self.history_age;
-        self.films.reverse();
         for twist in &mut self.history {
             *twist = -*twist;
         }

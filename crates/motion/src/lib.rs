@@ -33,7 +33,8 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
-pub use gluey_contact::{Film, FilmError, FilmReport, PairKey};
+/// Names of what [`Hydrodynamics::films`] returns.
+pub use gluey_contact::{Film, PairKey};
 pub use hydrodynamics::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
     ResumeError,

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use gluey_motion::{FilmError, PairMobilityError};
+use gluey_contact::FilmError;
+use gluey_motion::PairMobilityError;
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
 use gluey_suspension::packing::PackingError;

@@ -32,7 +32,7 @@ use gluey_geom::{Dim, Space, Twist};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{BodyStep, ContactState, PairState};
+use crate::{BodyStep, ContactReport, ContactState, PairState};
 
 /// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
 /// beyond what the flow closes, so that no two can meet that were not known to be near.
@@ -51,6 +51,15 @@ pub struct FilmReport {
     pub closed_count: usize,
     /// How far they move a particle from where the flow alone takes it, at most, in radii.
     pub largest_push: f64,
+}
+
+/// Report on the gaps of a step: those of films, then those of contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GapReport {
+    /// Films.
+    pub films: FilmReport,
+    /// Contacts.
+    pub contacts: ContactReport,
 }
 
 impl FilmMemory {

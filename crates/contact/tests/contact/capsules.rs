@@ -120,16 +120,13 @@ where
     let mut particles = [Particle::new(at(-2.0, 0.3), 1.0), Particle::new(at(2.0, -0.3), 1.0)];
     let mut flow = BackgroundFlow::new(LinearFlow::shear(1.0, 0.0));
     let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
-    let (mut drift, dt) = ([Twist::default(); 2], 0.05);
-    let mut contact_count = 0;
+    let (mut contact_count, dt) = (0, 0.05);
     for step in 0..120 {
         let now = Configuration::at(step as f64 * dt, &particles);
         let mut twists = flow.predict(&now).expect("no forces").twists;
-        integrator.body_drift(dt, &mut drift);
-        let poses = particles.map(|particle| particle.pose);
-        let velocity_weight = integrator.velocity_weight(dt);
-        let body_step = BodyStep { poses: &poses, radii: &[1.0; 2], drift: &drift, velocity_weight, dt };
-        contact.correct_bodies(&body_step, &mut twists).expect("a good step");
+        let corrected =
+            integrator.with_step(dt, &particles, |step| contact.correct_bodies(step, &mut twists));
+        corrected.expect("a good step");
         contact_count += contact.contacts().len();
         integrator.advance(dt, &mut particles, &twists);
     }

@@ -1,7 +1,10 @@
 //! Set-up that the contact tests share: two spheres in unbounded shear, stepped as a simulation would.
 
-use gluey_contact::{ContactModel, ContactParams, ContactReport, PairContact, StepGeometry};
-use gluey_geom::{Particle, Vector};
+use gluey_contact::{
+    ContactModel, ContactParams, ContactReport, Film, FilmError, FilmMemory, FilmReport, PairContact,
+    StepGeometry, film_reach,
+};
+use gluey_geom::{Dim, Particle, Space, Twist, Vector};
 use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 
 pub const RADIUS: f64 = 0.05;
@@ -66,5 +69,48 @@ impl Encounter {
         self.shear_factor = factor;
         self.integrator.reverse();
         self.contact.reverse();
+    }
+}
+
+/// A scheme that keeps films open.
+#[derive(Clone)]
+pub struct FilmIntegrator<const D: usize>
+where
+    Dim<D>: Space<D>,
+{
+    pub scheme: Integrator<D>,
+    memory: FilmMemory,
+}
+
+impl<const D: usize> FilmIntegrator<D>
+where
+    Dim<D>: Space<D>,
+{
+    pub fn new(scheme: Scheme) -> Self {
+        Self { scheme: Integrator::new(scheme), memory: FilmMemory::default() }
+    }
+
+    /// Up to which gap films have to be known where images slide at this rate.
+    pub fn film_reach(&self, dt: f64, particles: &[Particle<D>], twists: &[Twist<D>], rate: f64) -> f64 {
+        self.scheme.with_step(dt, particles, |step| film_reach(step, twists, rate))
+    }
+
+    pub fn open_films(
+        &mut self,
+        dt: f64,
+        particles: &[Particle<D>],
+        films: &[Film<D>],
+        twists: &mut [Twist<D>],
+    ) -> Result<FilmReport, FilmError> {
+        self.scheme.with_step(dt, particles, |step| self.memory.open(step, films, twists))
+    }
+
+    pub fn advance(&mut self, dt: f64, particles: &mut [Particle<D>], twists: &[Twist<D>]) {
+        self.scheme.advance(dt, particles, twists);
+    }
+
+    pub fn reverse(&mut self) {
+        self.scheme.reverse();
+        self.memory.reverse();
     }
 }

@@ -3,7 +3,7 @@
 
 use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Particle, Space, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
 use gluey_parallel::Communicator;
@@ -86,18 +86,13 @@ where
 {
     let (mut particles, mut integrator) = (particles::<D>(meeting), Integrator::new(Scheme::AdamsBashforth2));
     let mut contact = PairContact::new(ContactParams::default());
-    let count = particles.len();
-    let (radii, mut touched, mut iterations) = (vec![meeting.radius; count], false, Vec::new());
-    let mut drift = vec![Twist::default(); count];
+    let (mut touched, mut iterations) = (false, Vec::new());
     for step in 0..STEPS {
         let predicted = flow.predict(&Configuration::at(step as f64 * STEP, &particles)).unwrap();
         let mut twists = predicted.twists;
         iterations.push(predicted.statistics.iteration_count);
-        integrator.body_drift(STEP, &mut drift);
-        let poses: Vec<_> = particles.iter().map(|particle| particle.pose).collect();
-        let velocity_weight = integrator.velocity_weight(STEP);
-        let body_step = BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight, dt: STEP };
-        contact.correct_bodies(&body_step, &mut twists).unwrap();
+        let correct = |step: &BodyStep<'_, D>| contact.correct_bodies(step, &mut twists);
+        integrator.with_step(STEP, &particles, correct).unwrap();
         touched |= !contact.contacts().is_empty();
         integrator.advance(STEP, &mut particles, &twists);
     }

@@ -7,7 +7,7 @@
 use std::fmt;
 use std::path::Path;
 
-use gluey_contact::ContactReport;
+use gluey_contact::{ContactReport, FilmReport, GapReport};
 use gluey_motion::FlowStatistics;
 
 use super::append_log::{Draft, DraftMark, RowsError};
@@ -43,7 +43,7 @@ pub struct SolverRow<'a> {
     /// The flow.
     pub flow: &'a FlowStatistics,
     /// The correction for contact.
-    pub contact: &'a ContactReport,
+    pub gaps: &'a GapReport,
     /// How the particles were moved.
     pub motion: &'a StepMotion,
     /// Wall time since the run began, this step's included.
@@ -53,7 +53,7 @@ pub struct SolverRow<'a> {
 impl fmt::Display for SolverRow<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FlowStatistics { dof_count, iteration_count, residual, .. } = self.flow;
-        let ContactReport { pair_count, active_count, .. } = self.contact;
+        let ContactReport { pair_count, active_count, .. } = self.gaps.contacts;
         write!(
             f,
             "step {}, t = {:.4}: {dof_count} unknowns, {iteration_count} iterations to {residual:.1e}, \
@@ -106,14 +106,15 @@ impl SolverLog {
 
 /// What is the same on every run, with the comma behind it.
 fn facts(row: &SolverRow<'_>) -> String {
-    let SolverRow { step, time, strain, flow, contact, motion, .. } = row;
+    let SolverRow { step, time, strain, flow, gaps, motion, .. } = row;
     let FlowStatistics { cell_count, dof_count, solve_count, iteration_count, residual, .. } = flow;
     let FlowStatistics { penalties_doubled, cells_raised, .. } = flow;
-    let ContactReport { pair_count, active_count, iterations, .. } = contact;
-    let StepMotion { parts, closed_films, film_push, .. } = motion;
+    let ContactReport { pair_count, active_count, iterations, .. } = gaps.contacts;
+    let FilmReport { closed_count, largest_push } = gaps.films;
+    let StepMotion { parts, .. } = motion;
     format!(
         "{step},{time:.16e},{strain:.16e},{cell_count},{dof_count},{solve_count},{iteration_count},\
-         {residual:.3e},{pair_count},{active_count},{iterations},{parts},{closed_films},{film_push:.3e},\
+         {residual:.3e},{pair_count},{active_count},{iterations},{parts},{closed_count},{largest_push:.3e},\
          {penalties_doubled},{cells_raised},"
     )
 }
@@ -134,16 +135,14 @@ mod tests {
     fn seconds_are_those_since_the_row_before() {
         let folder = tempfile::tempdir().expect("a folder");
         let csv = folder.path().join("t.csv");
-        let (flow, contact) =
-            (FlowStatistics { iteration_count: 9, ..Default::default() }, Default::default());
+        let (flow, gaps) = (FlowStatistics { iteration_count: 9, ..Default::default() }, Default::default());
         let mut phases = PhaseTable::default();
         let mut log = SolverLog::create(&csv).expect("a file");
         for step in 0..2 {
             phases.add("solve", 1.5 + step as f64);
             let (time, strain) = (step as f64, 0.0);
-            let (flow, contact, motion) =
-                (&flow, &contact, &StepMotion { parts: 2, ..StepMotion::default() });
-            let row = SolverRow { step, time, strain, flow, contact, motion, phases: &phases };
+            let (flow, gaps, motion) = (&flow, &gaps, &StepMotion { parts: 2, ..StepMotion::default() });
+            let row = SolverRow { step, time, strain, flow, gaps, motion, phases: &phases };
             log.write(&row).expect("a row");
         }
         log.finish().expect("complete");

@@ -1,7 +1,7 @@
 //! Why a simulation cannot go on.
 
-use gluey_contact::{ContactError, MemoryError};
-use gluey_motion::{FilmError, NoForces, ResumeError};
+use gluey_contact::{ContactError, FilmError, MemoryError};
+use gluey_motion::{NoForces, ResumeError};
 use thiserror::Error;
 
 use crate::number_text::shown;

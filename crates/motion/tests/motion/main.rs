@@ -2,9 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
-mod crowds;
 mod examples;
-mod films;
 mod integrator;
 mod pair_mobility;
-mod sliding;

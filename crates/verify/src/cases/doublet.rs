@@ -1,8 +1,9 @@
 //! Reversibility: a pair that turns half around comes back to its distance.
 
+use gluey_contact::{BodyStep, Film, FilmError, FilmMemory, FilmReport, PairKey, film_reach};
 use gluey_geom::{Aabb, Particle, Twist, Vector};
 use gluey_levelset::Ball;
-use gluey_motion::{Film, Integrator, PairKey, Scheme};
+use gluey_motion::{Integrator, Scheme};
 use gluey_stokes::{FlowSolver, Partner, Refinement};
 
 use crate::case::{CaseTable, Extent, Task, VerificationCase, VerifyError};
@@ -64,14 +65,15 @@ fn measure(method: &Method, number: f64, cells: f64, step: f64) -> Result<Vec<f6
     let first = particles[1].pose.position - particles[0].pose.position;
     let gap_at_start = particles[0].gap(&particles[1]) / RADIUS;
     let mut solver = FlowSolver::new(method.params::<2>(DEFAULT_TOLERANCE))?;
-    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let (mut integrator, mut memory) = (Integrator::new(Scheme::AdamsBashforth2), FilmMemory::default());
     let (mut before, mut smallest) = ((0.0, gap_at_start), gap_at_start);
     let steps = (MOST_TIME / step) as usize;
     for n in 0..steps {
         let discs = particles.map(|p| Ball::new(p.pose.position, p.radius));
         let mut twists = solver.solve(mesh(&refinement, &discs)?, &discs, &couette)?.twists;
         if method.lubricates {
-            open_films(&mut integrator, step, &particles, &discs, &mut twists)?;
+            integrator
+                .with_step(step, &particles, |step| open_films(&mut memory, step, &discs, &mut twists))?;
         }
         integrator.advance(step, &mut particles, &twists);
         let line = particles[1].pose.position - particles[0].pose.position;
@@ -90,13 +92,12 @@ fn measure(method: &Method, number: f64, cells: f64, step: f64) -> Result<Vec<f6
 
 /// As a run does it in each step: films have the gaps that their impulses give.
 fn open_films(
-    integrator: &mut Integrator<2>,
-    step: f64,
-    particles: &[Particle<2>],
+    memory: &mut FilmMemory,
+    step: &BodyStep<'_, 2>,
     discs: &[Ball<2>],
     twists: &mut [Twist<2>],
-) -> Result<(), VerifyError> {
-    let reach = integrator.film_reach(step, particles, twists, 0.0);
+) -> Result<FilmReport, FilmError> {
+    let reach = film_reach(step, twists, 0.0);
     let film = |film: gluey_stokes::Film<2>| Film {
         pair: name(&film),
         branch: film.branch(),
@@ -107,8 +108,7 @@ fn open_films(
     };
     let films: Vec<Film<2>> =
         gluey_stokes::films(discs, &Aabb::unit(), reach).into_iter().map(film).collect();
-    integrator.open_films(step, particles, &films, twists)?;
-    Ok(())
+    memory.open(step, &films, twists)
 }
 
 /// The name of a film, its walls counted by axes.

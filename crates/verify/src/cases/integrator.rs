@@ -1,5 +1,6 @@
 //! Orders in time of the integrators, with exact velocities.
 
+use gluey_contact::{FilmMemory, film_reach};
 use gluey_geom::{Particle, Vector};
 use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 use gluey_testkit::convergence_order;
@@ -48,16 +49,19 @@ fn measure(scheme: Scheme, step: f64, steps: u32) -> Result<Vec<f64>, VerifyErro
     let starts = [Vector::<3>::new(0.3, 0.525, 0.5), Vector::<3>::new(0.7, 0.475, 0.5)];
     let mut particles = starts.map(|x| Particle::new(x, RADIUS));
     let mut integrator = Integrator::new(scheme);
-    advance(1.0, &mut integrator, &mut particles, step, steps)?;
+    let mut films = FilmMemory::default();
+    advance(1.0, &mut integrator, &mut films, &mut particles, step, steps)?;
     let end = (particles[0].pose.position - exact).norm() / RADIUS;
     integrator.reverse();
-    advance(-1.0, &mut integrator, &mut particles, step, steps)?;
+    films.reverse();
+    advance(-1.0, &mut integrator, &mut films, &mut particles, step, steps)?;
     Ok(vec![end, (particles[0].pose.position - starts[0]).norm() / RADIUS])
 }
 
 fn advance(
     shear_factor: f64,
     integrator: &mut Integrator<3>,
+    films: &mut FilmMemory,
     particles: &mut [Particle<3>; 2],
     step: f64,
     steps: u32,
@@ -66,8 +70,10 @@ fn advance(
     for n in 0..steps {
         let now = Configuration { shear_factor, ..Configuration::at(step * f64::from(n), particles) };
         let mut twists = flow.predict(&now)?.twists;
-        let films = flow.films(&now, integrator.film_reach(step, particles, &twists, 0.0));
-        integrator.open_films(step, particles, &films, &mut twists)?;
+        integrator.with_step(step, particles, |step| {
+            let near = flow.films(&now, film_reach(step, &twists, 0.0));
+            films.open(step, &near, &mut twists)
+        })?;
         integrator.advance(step, particles, &twists);
     }
     Ok(())

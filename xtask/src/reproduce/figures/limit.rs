@@ -8,11 +8,11 @@
 //!
 //! For `s -> 0` the gap tends to `I` where that is positive; where it is negative the gap tends to zero and
 //! `s a ln(g / a)` to `I`, which is the gluey memory `gamma` but for its unit. Both sides are computed by
-//! what runs use: films by [`Integrator::open_films`], contact by [`PairContact`].
+//! what runs use: films by [`FilmMemory::open`], contact by [`PairContact`].
 
-use gluey_contact::{ContactModel, ContactParams, GammaUpdate, PairContact, StepGeometry};
+use gluey_contact::{ContactModel, ContactParams, Film, FilmMemory, GammaUpdate, PairContact, PairKey};
 use gluey_geom::{Particle, Twist, Vector};
-use gluey_motion::{Film, Integrator, PairKey, Scheme};
+use gluey_motion::{Integrator, Scheme};
 
 use crate::book;
 use gluey_pictures::{Canvas, Curve, Stroke, stack};
@@ -75,6 +75,7 @@ fn steps() -> impl Iterator<Item = f64> {
 /// With a film of resistance `s a / g`; `None` if it closes.
 fn lubricated(s: f64) -> Option<Encounter> {
     let (mut particles, mut integrator) = (pair(), Integrator::new(Scheme::AdamsBashforth2));
+    let mut films = FilmMemory::default();
     let mut run = Encounter { gap: Vec::new(), memory: Vec::new() };
     for t in steps() {
         let gap = particles[0].gap(&particles[1]);
@@ -85,7 +86,7 @@ fn lubricated(s: f64) -> Option<Encounter> {
         let slide = Vector::zeros();
         let film =
             Film { pair: PairKey::new(0, 1), branch, slide, is_held: [false; 2], gap, curvature_radius: 1.0 };
-        integrator.open_films(STEP, &particles, &[film], &mut twists).ok()?;
+        integrator.with_step(STEP, &particles, |step| films.open(step, &[film], &mut twists)).ok()?;
         integrator.advance(STEP, &mut particles, &twists);
     }
     Some(run)
@@ -104,16 +105,7 @@ fn gluey() -> Option<Encounter> {
         // Impulses move the two spheres by gamma / a each.
         run.memory.push((t, 2.0 * gamma));
         let mut twists = twists(-t.cos());
-        let mut drift = [Vector::zeros(); 2];
-        integrator.drift(STEP, &mut drift);
-        let step = StepGeometry {
-            positions: &[particles[0].pose.position, particles[1].pose.position],
-            radii: &[1.0; 2],
-            drift: &drift,
-            velocity_weight: integrator.velocity_weight(STEP),
-            dt: STEP,
-        };
-        contact.correct(&step, &mut twists).ok()?;
+        integrator.with_step(STEP, &particles, |step| contact.correct_bodies(step, &mut twists)).ok()?;
         integrator.advance(STEP, &mut particles, &twists);
     }
     Some(run)

@@ -2,11 +2,14 @@
 //! known here, and drag and films are all there is: steps of films in balance stand beside a dense Newton's
 //! method for the displacements, and trajectories beside small steps of a scheme that knows nothing of films.
 
+use gluey_contact::{Film, FilmError, PairKey};
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
-use gluey_motion::{Film, FilmError, Integrator, PairKey, Scheme};
+use gluey_motion::Scheme;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::common::FilmIntegrator;
 
 /// Films are felt up to this gap, which is that of `R`.
 const REACH: f64 = 1.0;
@@ -21,7 +24,7 @@ where
     particles: Vec<Particle<D>>,
     size: f64,
     strain: f64,
-    integrator: Integrator<D>,
+    integrator: FilmIntegrator<D>,
     /// Resistance of its films over that which the scheme takes for granted, `R`.
     scale: f64,
 }
@@ -57,7 +60,7 @@ where
             }
         }
         let particles = before_shear(&x);
-        let integrator = Integrator::new(Scheme::AdamsBashforth2);
+        let integrator = FilmIntegrator::new(Scheme::AdamsBashforth2);
         Self { particles, size, strain: 0.0, integrator, scale: 1.0 }
     }
 

@@ -1,9 +1,10 @@
 //! Films stay open, and at the order of the scheme.
 
+use gluey_contact::{Film, FilmError, PairKey};
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
-use gluey_motion::{
-    Configuration, Film, FilmError, Hydrodynamics, Integrator, LinearFlow, PairKey, PairMobility, Scheme,
-};
+use gluey_motion::{Configuration, Hydrodynamics, LinearFlow, PairMobility, Scheme};
+
+use crate::common::FilmIntegrator;
 
 /// The gap over the radius of a pair in shear at a time.
 #[derive(Clone, Copy)]
@@ -21,7 +22,7 @@ fn encounter(steps: &[f64]) -> Vec<Seen> {
         Particle::new(Vector::<3>::new(0.3, 0.525, 0.5), 0.05),
         Particle::new(Vector::<3>::new(0.7, 0.475, 0.5), 0.05),
     ];
-    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let mut integrator = FilmIntegrator::new(Scheme::AdamsBashforth2);
     let (mut seen, mut time) = (Vec::new(), 0.0);
     for &dt in steps.iter().cycle() {
         if time > 16.0 {
@@ -87,8 +88,8 @@ fn steps_that_are_halved_and_doubled_keep_the_order() {
 fn a_closed_film_stays_closed_over_a_restart() {
     let push = |is_restarted: bool| {
         let mut particles = [0.0, 2.0 + 1e-6].map(|x| Particle::new(Vector::<3>::new(x, 0.0, 0.0), 1.0));
-        let mut integrator = Integrator::new(Scheme::Euler);
-        let mut step = |integrator: &mut Integrator<3>, speed: f64| {
+        let mut integrator = FilmIntegrator::new(Scheme::Euler);
+        let mut step = |integrator: &mut FilmIntegrator<3>, speed: f64| {
             let pair = [film(&particles, 0, Some(1))];
             let velocity = |sign: f64| Vector::<3>::new(sign * speed * pair[0].gap.max(1e-9), 0.0, 0.0);
             let mut twists =
@@ -100,7 +101,7 @@ fn a_closed_film_stays_closed_over_a_restart() {
         // The impulse falls by half the speed a step, from ln 1e-6 / 2 on.
         let closed: usize = (0..20).map(|_| step(&mut integrator, 1.0)).sum();
         if is_restarted {
-            integrator.restart();
+            integrator.scheme.restart();
         }
         let pulls = (1usize..100).find(|_| step(&mut integrator, -1.0) == 0);
         (closed, pulls)
@@ -143,7 +144,7 @@ where
         .map(|k| Particle::new(place(k), if k % 2 == 0 { 1.0 } else { 0.8 }))
         .collect();
     let count = particles.len();
-    let mut integrator = Integrator::new(scheme);
+    let mut integrator = FilmIntegrator::new(scheme);
     for _ in 0..6 {
         let mut films: Vec<Film<D>> = Vec::new();
         for first in 0..count {
@@ -181,7 +182,7 @@ fn what_is_held_does_not_yield() {
     };
     let velocities = [0.0, -0.15, -0.4].map(|x| Vector::<2>::new(x, 0.0));
     let mut twists = velocities.map(|velocity| Twist { velocity, ..Twist::default() });
-    let mut integrator = Integrator::new(Scheme::Euler);
+    let mut integrator = FilmIntegrator::new(Scheme::Euler);
     integrator.open_films(1.0, &particles, &films(&particles), &mut twists).unwrap();
     assert_eq!(twists[1].velocity, velocities[1]);
     // All of what opens a film is done by the side that yields.
@@ -211,7 +212,7 @@ fn what_is_held_does_not_yield() {
     (crushed[0].is_held, crushed[1].is_held) = ([true, false], [false, true]);
     let mut closing =
         [0.5, 0.0, -0.5].map(|x| Twist { velocity: Vector::<2>::new(x, 0.0), ..Twist::default() });
-    let error = Integrator::new(Scheme::Euler).open_films(1.0, &row, &crushed, &mut closing).unwrap_err();
+    let error = FilmIntegrator::new(Scheme::Euler).open_films(1.0, &row, &crushed, &mut closing).unwrap_err();
     assert!(matches!(error, FilmError::Closed { is_given: false, .. }), "{error:?}");
 }
 
@@ -219,7 +220,7 @@ fn what_is_held_does_not_yield() {
 /// flow towards the middle with the resistance `A^2 / (4 g)` of films over that of a sphere of the radius 1.
 struct Crowd {
     particles: Vec<Particle<3>>,
-    integrator: Integrator<3>,
+    integrator: FilmIntegrator<3>,
 }
 
 /// Films are felt up to this gap.
@@ -236,7 +237,7 @@ impl Crowd {
         let corners = (0..8).map(|k| Vector::<3>::from_fn(|d, _| if k >> d & 1 == 0 { 1.85 } else { -1.8 }));
         let places = std::iter::once(Vector::zeros()).chain((0..6).map(place)).chain(corners);
         let particles = places.map(|x| Particle::new(x, 1.0)).collect();
-        Self { particles, integrator: Integrator::new(Scheme::AdamsBashforth2) }
+        Self { particles, integrator: FilmIntegrator::new(Scheme::AdamsBashforth2) }
     }
 
     fn films(&self) -> Vec<Film<3>> {

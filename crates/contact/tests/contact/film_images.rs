@@ -1,7 +1,10 @@
 //! Films to images that slide, as in simple shear for ever (Lees and Edwards 1972).
 
+use gluey_contact::{Film, PairKey};
 use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
-use gluey_motion::{Film, Integrator, LinearFlow, PairKey, Scheme};
+use gluey_motion::{LinearFlow, Scheme};
+
+use crate::common::FilmIntegrator;
 
 const HEIGHT: f64 = 7.0;
 const LENGTH: f64 = 9.0;
@@ -18,7 +21,7 @@ where
     rate: f64,
     /// Films with larger gaps are not told of: the first force of each comes from the history then.
     widest: f64,
-    integrator: Integrator<D>,
+    integrator: FilmIntegrator<D>,
 }
 
 impl<const D: usize> Pair<D>
@@ -34,7 +37,7 @@ where
             lattice,
             rate: 1.0,
             widest: f64::INFINITY,
-            integrator: Integrator::new(scheme),
+            integrator: FilmIntegrator::new(scheme),
         };
         let shift = pair.shift();
         pair.particles[1].pose.position -= shift;
@@ -168,7 +171,7 @@ fn images_of_one_partner_are_told_apart() {
     let (right, left) = (film(2.0, 0), film(-2.0, -1));
     let mut predicted = [Twist::default(); 2];
     predicted[1].velocity = Vector::<2>::new(-1.0, 0.0);
-    let mut integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let mut integrator = FilmIntegrator::new(Scheme::AdamsBashforth2);
     let mut relative = Vector::<2>::zeros();
     for films in [&[right][..], &[left, right]] {
         let mut twists = predicted;
@@ -197,7 +200,7 @@ fn the_reach_covers_what_a_step_brings_near() {
         ..Twist::default()
     };
     let twists: Vec<Twist<2>> = particles.iter().enumerate().map(twist).collect();
-    let integrator = Integrator::new(Scheme::AdamsBashforth2);
+    let integrator = FilmIntegrator::new(Scheme::AdamsBashforth2);
     let reach = integrator.film_reach(dt, &particles, &twists, rate);
     let all_rows = integrator.film_reach(dt, &particles, &twists, 0.0);
     println!("reach {reach}, without the shear {all_rows}");
