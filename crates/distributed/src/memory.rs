@@ -7,13 +7,13 @@ use gluey_geom::{Dim, Space};
 use gluey_parallel::Ranks;
 use gluey_stokes::Suspension;
 
-use crate::warm_start::{PieceError, SavedPiece, WarmStart};
+use crate::warm_start::{KeptFlows, PieceError, SavedPiece};
 
 /// The flows that the next one starts from, as far as they are on this rank, and those that a checkpoint of
 /// the step before would have.
 pub struct Memory<const D: usize> {
-    pub(crate) last: RefCell<Option<Arc<WarmStart<D>>>>,
-    remembered: RefCell<Option<Arc<WarmStart<D>>>>,
+    pub(crate) last: RefCell<Option<Arc<KeptFlows<D>>>>,
+    remembered: RefCell<Option<Arc<KeptFlows<D>>>>,
     /// Whether something that ranks share has begun and not ended.
     pub(crate) is_sharing: Cell<bool>,
 }
@@ -55,8 +55,7 @@ where
         ranks: &Ranks,
         saved: Vec<SavedPiece>,
     ) -> Result<(), PieceError> {
-        let tree_box = (suspension.domain, suspension.roots, suspension.periodic());
-        let restored = WarmStart::restored(tree_box, suspension.radii.len(), ranks, saved)?;
+        let restored = KeptFlows::restored(suspension, ranks, saved)?;
         self.last.replace(Some(Arc::new(restored)));
         Ok(())
     }

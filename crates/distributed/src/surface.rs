@@ -16,7 +16,7 @@ use gluey_stokes::part::{GhostLayer, levels, owner_of_point, rings_around_surfac
 use gluey_stokes::{Conditions, Discretisation, Film, Flow, FlowSolver, Lubrication, StokesError};
 
 use crate::flow::{BoxFlow, LocalFlow};
-use crate::warm_start::WarmStart;
+use crate::warm_start::KeptFlows;
 
 /// Cells between the middle of a cell and a surface, at most, if the part is to hold what is around it.
 const CELLS_AT_SURFACE: f64 = 3.5;
@@ -94,7 +94,7 @@ impl BoxFlow {
         &self,
         around: &SurfaceBodies<'_, D>,
         leaves: &mut SharedTree<'_, '_, D>,
-        kept: &mut Option<Arc<WarmStart<D>>>,
+        kept: &mut Option<Arc<KeptFlows<D>>>,
         solve: impl FnOnce(&mut FlowSolver<D>, &Discretisation<D>) -> Result<(Flow<D>, T), E>,
     ) -> Result<(LocalFlow<D>, T), E>
     where
@@ -115,7 +115,7 @@ impl BoxFlow {
         let frame = leaves.tree.frame();
         *kept = solver
             .warm_start()
-            .map(|(last, _)| Arc::new(WarmStart::new(frame, partition, last.clone(), before)));
+            .map(|(last, _)| Arc::new(KeptFlows::new(frame, partition, last.clone(), before)));
         let sent = leaves.ranks.traffic().since(start);
         let flow = LocalFlow {
             raised_penalties: solver.take_raised_penalties(),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers of a film beside its bodies, at most.
 const MOST_NUMBERS: usize = 12;
 
-/// What is kept of a film of a flow: how old the flow is, the bodies by their numbers among all, and numbers
+/// A film of a flow that is kept: how old the flow is, the bodies by their numbers among all, and numbers
 /// that [`gluey_stokes::NodalFields::films`] has.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeptFilm([u64; 3 + MOST_NUMBERS]);

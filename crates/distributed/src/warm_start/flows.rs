@@ -13,18 +13,18 @@ pub const MOST: usize = 2;
 /// Velocities and pressures at the nodes of one mesh.
 pub type Values = [Vec<f64>; 2];
 
-/// What a rank keeps of the last flows for the next one.
-pub struct WarmStart<const D: usize> {
+/// The last flows as a rank keeps them for the next one.
+pub struct KeptFlows<const D: usize> {
     /// The box, without cells.
     pub frame: TreeMesh<D>,
     /// Between the runs of the pieces.
     pub cuts: Cuts,
-    pub pieces: Vec<Piece<D>>,
+    pub pieces: Vec<FlowPiece<D>>,
     pub small: GlobalState,
 }
 
 /// The flows in the cells of one run, the last one first.
-pub struct Piece<const D: usize> {
+pub struct FlowPiece<const D: usize> {
     pub run: usize,
     pub mesh: Arc<TreeMesh<D>>,
     /// Those of the run, of the cells of the mesh.
@@ -34,7 +34,7 @@ pub struct Piece<const D: usize> {
     pub flows: Vec<Values>,
 }
 
-/// What belongs to no mesh: of the last flow first.
+/// State that belongs to no mesh: of the last flow first.
 #[derive(Clone, Default)]
 pub struct GlobalState {
     /// Motions of all bodies, of each flow.

@@ -12,5 +12,5 @@ mod pieces;
 mod points;
 mod transfer;
 
-pub use flows::WarmStart;
+pub use flows::KeptFlows;
 pub use pieces::{PieceError, SavedPiece};

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use gluey_fem::{Cell, Cuts, ImplicitTree, MeshError, NodeMap, TreeMesh};
-use gluey_geom::{Aabb, Dim, Space};
+use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
+use gluey_stokes::Suspension;
 use serde::{Deserialize, Serialize};
 
 use super::films::KeptFilm;
-use super::flows::{GlobalState, MOST, Piece, WarmStart};
+use super::flows::{FlowPiece, GlobalState, KeptFlows, MOST};
 
 /// The flows in the cells of one run in the order of cells, of how many runs, and what belongs to no mesh.
 ///
@@ -63,7 +64,7 @@ impl SavedPiece {
     }
 }
 
-impl<const D: usize> WarmStart<D>
+impl<const D: usize> KeptFlows<D>
 where
     Dim<D>: Space<D>,
 {
@@ -72,7 +73,7 @@ where
         self.pieces.iter().map(|piece| self.saved_piece(piece)).collect()
     }
 
-    fn saved_piece(&self, piece: &Piece<D>) -> SavedPiece {
+    fn saved_piece(&self, piece: &FlowPiece<D>) -> SavedPiece {
         let cells = piece.mesh.cells()[piece.cells.clone()].to_vec();
         let level = self.frame.max_level();
         let levels = cells.iter().map(|cell| cell.level).collect();
@@ -94,26 +95,27 @@ where
         }
     }
 
-    /// What a rank goes on from: its pieces of a checkpoint of flows around `count` bodies in this box, or
-    /// any other piece where it has none.
+    /// What a rank goes on from: its pieces of a checkpoint of flows of a suspension, or any other piece
+    /// where it has none.
     ///
     /// # Errors
     /// [`PieceError`] for pieces that do not fit.
     pub fn restored(
-        (domain, roots, periodic): (Aabb<D>, [u32; D], [bool; D]),
-        count: usize,
+        suspension: &Suspension<D>,
         ranks: &Ranks,
         mut saved: Vec<SavedPiece>,
     ) -> Result<Self, PieceError> {
         let any = saved.first().cloned().ok_or(PieceError::Unfit { run: 0, what: "no piece" })?;
         let unfit = |what| PieceError::Unfit { run: any.run, what };
-        let frame = ImplicitTree::new(domain, roots, periodic, any.level, &|_, _, _| false)?.frame().clone();
+        let Suspension { domain, roots, .. } = *suspension;
+        let tree = ImplicitTree::new(domain, roots, suspension.periodic(), any.level, &|_, _, _| false)?;
+        let frame = tree.frame().clone();
         let (end, firsts) = any.firsts.split_last().ok_or(unfit("no runs"))?;
         if firsts.first() != Some(&0) || !any.firsts.is_sorted() {
             return Err(unfit("runs out of order"));
         }
         let cuts = Cuts::new(firsts.to_vec(), *end);
-        let motions = count * Dim::<D>::RIGID;
+        let motions = suspension.radii.len() * Dim::<D>::RIGID;
         if !(1..=MOST).contains(&any.bodies.len()) || any.bodies.iter().any(|all| all.len() != motions) {
             return Err(unfit("motions of another number of particles"));
         }
@@ -121,16 +123,17 @@ where
         saved.retain(|piece| SavedPiece::holder(piece.run, runs, ranks.size()) == ranks.rank());
         let films = saved.iter().flat_map(|piece| piece.films.iter().copied()).collect();
         let pieces: Result<Vec<_>, _> =
-            saved.into_iter().map(|piece| restored_piece(&frame, (&cuts, flow_count), piece)).collect();
+            saved.into_iter().map(|piece| restored_piece(&frame, &cuts, flow_count, piece)).collect();
         Ok(Self { pieces: pieces?, small: GlobalState { bodies: any.bodies, films }, frame, cuts })
     }
 }
 
 fn restored_piece<const D: usize>(
     frame: &TreeMesh<D>,
-    (cuts, flow_count): (&Cuts, usize),
+    cuts: &Cuts,
+    flow_count: usize,
     saved: SavedPiece,
-) -> Result<Piece<D>, PieceError> {
+) -> Result<FlowPiece<D>, PieceError> {
     let unfit = |what| PieceError::Unfit { run: saved.run, what };
     let own = if saved.run < cuts.count() { cuts.of(saved.run) } else { 0..0 };
     let coords = saved.coords.as_chunks::<D>().0;
@@ -152,7 +155,7 @@ fn restored_piece<const D: usize>(
     if saved.flows.len() != flow_count || !saved.flows.iter().all(fits) {
         return Err(unfit("values for other nodes"));
     }
-    Ok(Piece {
+    Ok(FlowPiece {
         run: saved.run,
         mesh: Arc::new(mesh),
         cells: 0..count,
@@ -163,7 +166,7 @@ fn restored_piece<const D: usize>(
 }
 
 /// For the nodes of a mesh that has the cells of a piece only, in their order, those of the piece.
-fn numbered<const D: usize>(mesh: &TreeMesh<D>, nodes: &NodeMap<D>, piece: &Piece<D>) -> Vec<u32> {
+fn numbered<const D: usize>(mesh: &TreeMesh<D>, nodes: &NodeMap<D>, piece: &FlowPiece<D>) -> Vec<u32> {
     let alone = NodeMap::new(mesh, nodes.degree());
     let mut places = vec![0; alone.node_count()];
     for (node, place) in alone.cells(0..mesh.cell_count()).iter().zip(nodes.cells(piece.cells.clone())) {

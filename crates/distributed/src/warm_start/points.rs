@@ -6,7 +6,7 @@ use gluey_fem::{Evaluator, NodeMap};
 use gluey_geom::Vector;
 use gluey_parallel::{Communicator, Ranks, route};
 
-use super::flows::{MOST, Piece, WarmStart};
+use super::flows::{FlowPiece, KeptFlows, MOST};
 use super::pieces::SavedPiece;
 
 /// Numbers of a question: who asks, for which node, the run and up to three coordinates.
@@ -15,9 +15,9 @@ const QUESTION: usize = 6;
 const ANSWER: usize = 1 + 3 * MOST;
 
 /// A point and the run that holds it.
-type Place<const D: usize> = (usize, Vector<D>);
+type PointInRun<const D: usize> = (usize, Vector<D>);
 
-impl<const D: usize> WarmStart<D> {
+impl<const D: usize> KeptFlows<D> {
     /// Number of flows that are kept, on all ranks.
     pub(super) fn flow_count(&self) -> usize {
         self.small.bodies.len()
@@ -28,7 +28,8 @@ impl<const D: usize> WarmStart<D> {
     pub(super) fn at_nodes(
         &self,
         ranks: &Ranks,
-        (nodes, cells): (&NodeMap<D>, Range<usize>),
+        nodes: &NodeMap<D>,
+        cells: Range<usize>,
         components: usize,
     ) -> Vec<Vec<f64>> {
         let mut wanted: Vec<u32> = nodes.cells(cells).to_vec();
@@ -48,9 +49,9 @@ impl<const D: usize> WarmStart<D> {
             question[3..].iter_mut().zip(&point).for_each(|(bits, x)| *bits = x.to_bits());
             questions.push((holder, question));
         }
-        let answers = self.answers(ranks, questions, (nodes.degree(), components));
+        let answers = self.answers(ranks, questions, nodes.degree(), components);
         let mut fields = vec![vec![0.0; nodes.node_count() * components]; self.flow_count()];
-        let values = self.at_places(&own_places, (nodes.degree(), components));
+        let values = self.at_places(&own_places, nodes.degree(), components);
         for (field, values) in fields.iter_mut().zip(&values) {
             for (&node, values) in own.iter().zip(values.chunks_exact(components)) {
                 field[node as usize * components..][..components].copy_from_slice(values);
@@ -71,14 +72,15 @@ impl<const D: usize> WarmStart<D> {
         &self,
         ranks: &Ranks,
         questions: Vec<(usize, [u64; QUESTION])>,
-        (degree, components): (usize, usize),
+        degree: usize,
+        components: usize,
     ) -> Vec<[u64; ANSWER]> {
         let asked = route(ranks, questions);
         let place = |question: &[u64; QUESTION]| {
             (question[2] as usize, Vector::from_fn(|d, _| f64::from_bits(question[3 + d])))
         };
-        let places: Vec<Place<D>> = asked.iter().map(place).collect();
-        let values = self.at_places(&places, (degree, components));
+        let places: Vec<PointInRun<D>> = asked.iter().map(place).collect();
+        let values = self.at_places(&places, degree, components);
         let answer = |(k, question): (usize, &[u64; QUESTION])| {
             let mut answer = [0; ANSWER];
             answer[0] = question[1];
@@ -98,11 +100,11 @@ impl<const D: usize> WarmStart<D> {
     }
 
     /// Values at points in the pieces of this rank, for each flow.
-    fn at_places(&self, places: &[Place<D>], (degree, components): (usize, usize)) -> Vec<Vec<f64>> {
+    fn at_places(&self, places: &[PointInRun<D>], degree: usize, components: usize) -> Vec<Vec<f64>> {
         let mut fields = vec![vec![0.0; places.len() * components]; self.flow_count()];
         for piece in &self.pieces {
             let here: Vec<usize> = (0..places.len()).filter(|&k| places[k].0 == piece.run).collect();
-            let values = piece.at_points((here.len(), |k| places[here[k]].1), (degree, components));
+            let values = piece.at_points((here.len(), |k| places[here[k]].1), degree, components);
             for (field, values) in fields.iter_mut().zip(values) {
                 for (&k, values) in here.iter().zip(values.chunks_exact(components)) {
                     field[k * components..][..components].copy_from_slice(values);
@@ -113,12 +115,13 @@ impl<const D: usize> WarmStart<D> {
     }
 }
 
-impl<const D: usize> Piece<D> {
+impl<const D: usize> FlowPiece<D> {
     /// Velocities or pressures at points in its cells, for each flow.
     fn at_points(
         &self,
         points: (usize, impl Fn(usize) -> Vector<D> + Sync),
-        (degree, components): (usize, usize),
+        degree: usize,
+        components: usize,
     ) -> Vec<Vec<f64>> {
         let (nodes, kind) = match degree {
             2 => (&self.velocity_nodes, 0),

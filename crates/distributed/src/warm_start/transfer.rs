@@ -7,7 +7,7 @@ use gluey_parallel::Communicator;
 use gluey_stokes::{Discretisation, NodalFields, Partition};
 
 use super::films::{self, KeptFilm};
-use super::flows::{GlobalState, MOST, Piece, Values, WarmStart};
+use super::flows::{FlowPiece, GlobalState, KeptFlows, MOST, Values};
 
 /// The last flows at the nodes of other cells.
 pub struct TransferredFlows {
@@ -16,7 +16,7 @@ pub struct TransferredFlows {
     pub small: GlobalState,
 }
 
-impl<const D: usize> WarmStart<D>
+impl<const D: usize> KeptFlows<D>
 where
     Dim<D>: Space<D>,
 {
@@ -40,7 +40,7 @@ where
         flows.truncate(MOST);
         small.bodies.truncate(MOST);
         small.films.retain(|film| film.age() < MOST);
-        let piece = Piece {
+        let piece = FlowPiece {
             run: partition.ranks.rank(),
             mesh: partition.part.mesh.clone(),
             cells: partition.part.own(),
@@ -55,7 +55,7 @@ where
     pub fn moved(&self, to: &Discretisation<D>) -> TransferredFlows {
         let ranks = &to.partition().expect("the mesh is a part").ranks;
         let [velocities, pressures] = [(&to.velocity, D), (&to.pressure, 1)]
-            .map(|(nodes, components)| self.at_nodes(ranks, (nodes, to.own_cells()), components));
+            .map(|(nodes, components)| self.at_nodes(ranks, nodes, to.own_cells(), components));
         let flows = velocities.into_iter().zip(pressures).map(|(velocity, pressure)| [velocity, pressure]);
         TransferredFlows { flows: flows.collect(), small: self.small.clone() }
     }

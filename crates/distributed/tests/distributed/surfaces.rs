@@ -13,8 +13,8 @@ use gluey_stokes::{
 use crate::support::{is_in_fluid, on_ranks, velocities};
 
 const TOLERANCE: f64 = 1e-11;
-/// What one rank may differ from one process by: only sums over bodies and cells for means are in another
-/// order.
+/// What one rank may differ from one process by: only pressures lose their mean, of which wrenches are
+/// sums.
 const ALONE: f64 = 1.4e-15;
 
 /// What drives a flow beside the walls.
