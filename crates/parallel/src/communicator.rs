@@ -15,7 +15,7 @@ pub struct Message {
     pub bytes: Vec<u8>,
 }
 
-/// What one rank has sent, and how often all waited for each other.
+/// Counts of what one rank has sent, and of how often all waited for each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Messages sent, those of sums included.
@@ -54,7 +54,7 @@ impl Add for Traffic {
     }
 }
 
-/// One rank among those that share a computation.
+/// A rank among those that share a computation.
 ///
 /// All ranks call the same methods in the same order. An implementation provides the first four; whatever
 /// adds numbers is built on them, in an order that depends on the number of ranks alone.
@@ -100,13 +100,13 @@ pub trait Communicator: Send + Sync {
         let length = size_of_val(&values[..]);
         for step in up_the_tree(self.rank(), self.size()) {
             match step {
-                Step::From(rank) => {
+                TreeStep::From(rank) => {
                     let bytes = receive(self, rank, length);
                     for (k, (value, other)) in values.iter_mut().zip(read_all::<f64>(&bytes)).enumerate() {
                         *value = if k < sums.len() { *value + other } else { larger(*value, other) };
                     }
                 }
-                Step::To(rank) => {
+                TreeStep::To(rank) => {
                     let mut bytes = Vec::new();
                     write_all(&values, &mut bytes);
                     send(self, rank, bytes);
@@ -151,11 +151,11 @@ pub trait Communicator: Send + Sync {
         let one = gathered.len();
         for step in up_the_tree(rank, size) {
             match step {
-                Step::From(from) => {
+                TreeStep::From(from) => {
                     let ranks = (from - rank).min(size - from);
                     gathered.extend(receive(self, from, ranks * one));
                 }
-                Step::To(to) => send(self, to, gathered.clone()),
+                TreeStep::To(to) => send(self, to, gathered.clone()),
             }
         }
         gathered.resize(size * one, 0);
@@ -171,14 +171,14 @@ fn larger(a: f64, b: f64) -> f64 {
 
 /// A message of this rank in a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
+enum TreeStep {
     From(usize),
     To(usize),
 }
 
 /// What a rank does while numbers move to rank zero: it hears from the ranks at distances 1, 2, 4 above it,
 /// then tells the one below.
-fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = Step> {
+fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = TreeStep> {
     let steps = (0..usize::BITS).map(|bit| 1usize << bit).take_while(|&step| step < size.max(1));
     let steps: Vec<usize> = steps.collect();
     let told = steps.iter().position(|&step| rank & step != 0).map_or(steps.len(), |k| k + 1);
@@ -188,9 +188,9 @@ fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = Step
         .filter_map(move |step| {
             let above = rank + step;
             if rank & step != 0 {
-                Some(Step::To(rank - step))
+                Some(TreeStep::To(rank - step))
             } else {
-                (above < size).then_some(Step::From(above))
+                (above < size).then_some(TreeStep::From(above))
             }
         })
         .collect::<Vec<_>>()
@@ -201,8 +201,8 @@ fn up_the_tree(rank: usize, size: usize) -> impl DoubleEndedIterator<Item = Step
 fn broadcast(ranks: &(impl Communicator + ?Sized), bytes: &mut Vec<u8>) {
     for step in up_the_tree(ranks.rank(), ranks.size()).rev() {
         match step {
-            Step::From(rank) => send(ranks, rank, bytes.clone()),
-            Step::To(rank) => *bytes = receive(ranks, rank, bytes.len()),
+            TreeStep::From(rank) => send(ranks, rank, bytes.clone()),
+            TreeStep::To(rank) => *bytes = receive(ranks, rank, bytes.len()),
         }
     }
 }
@@ -243,13 +243,13 @@ mod tests {
         for size in 1..=20 {
             for rank in 0..size {
                 let told: Vec<_> =
-                    up_the_tree(rank, size).filter(|step| matches!(step, Step::To(_))).collect();
+                    up_the_tree(rank, size).filter(|step| matches!(step, TreeStep::To(_))).collect();
                 assert_eq!(told.len(), usize::from(rank > 0));
                 for step in told {
-                    let Step::To(below) = step else { continue };
-                    assert!(up_the_tree(below, size).any(|step| step == Step::From(rank)));
+                    let TreeStep::To(below) = step else { continue };
+                    assert!(up_the_tree(below, size).any(|step| step == TreeStep::From(rank)));
                 }
-                let heard = up_the_tree(rank, size).filter(|step| matches!(step, Step::From(_)));
+                let heard = up_the_tree(rank, size).filter(|step| matches!(step, TreeStep::From(_)));
                 assert!(heard.count() <= size.ilog2() as usize + 1);
             }
         }

@@ -20,7 +20,7 @@ pub struct Wanted {
     pub place: u32,
 }
 
-/// Who sends what to whom, as often as it is needed.
+/// A plan of who sends what to whom, as often as it is needed.
 #[derive(Clone, Debug, Default)]
 pub struct GhostPlan {
     /// Ghosts elsewhere of what stands here.

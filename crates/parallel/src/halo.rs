@@ -10,10 +10,10 @@ use crate::ranks::Ranks;
 /// Copies that vectors of one kind hold of what other ranks own, entry by entry. Without ghosts, as in a
 /// program of one rank, all of it does nothing.
 #[derive(Clone, Debug, Default)]
-pub struct Halo(Option<Box<Shared>>);
+pub struct Halo(Option<Box<SharedEntries>>);
 
 #[derive(Clone, Debug)]
-struct Shared {
+struct SharedEntries {
     ranks: Ranks,
     plan: GhostPlan,
     /// Entries that this rank owns, in ascending order.
@@ -23,19 +23,19 @@ struct Shared {
 impl Halo {
     /// The ghosts of a plan of single entries, in vectors of which this rank owns some ranges.
     pub fn new(ranks: &Ranks, plan: GhostPlan, owned: Vec<Range<usize>>) -> Self {
-        Self(Some(Box::new(Shared { ranks: ranks.clone(), plan, owned })))
+        Self(Some(Box::new(SharedEntries { ranks: ranks.clone(), plan, owned })))
     }
 
     /// Sets the ghosts to what their owners have.
     pub fn update<T: Number>(&mut self, x: &mut [T]) {
-        if let Some(Shared { ranks, plan, .. }) = self.0.as_deref_mut() {
+        if let Some(SharedEntries { ranks, plan, .. }) = self.0.as_deref_mut() {
             plan.update::<T, 1>(ranks, x);
         }
     }
 
     /// Adds the ghosts to what their owners have, and clears them.
     pub fn accumulate<T: Number + AddAssign>(&mut self, x: &mut [T]) {
-        if let Some(Shared { ranks, plan, .. }) = self.0.as_deref_mut() {
+        if let Some(SharedEntries { ranks, plan, .. }) = self.0.as_deref_mut() {
             plan.accumulate::<T, 1>(ranks, x);
         }
     }
@@ -48,7 +48,7 @@ impl Halo {
 
     /// Clears what this rank does not own.
     pub fn clear<T: Copy + Default>(&self, x: &mut [T]) {
-        let Some(Shared { owned, .. }) = self.0.as_deref() else { return };
+        let Some(SharedEntries { owned, .. }) = self.0.as_deref() else { return };
         let mut first = 0;
         for range in owned {
             x[first..range.start].fill(T::default());
@@ -76,7 +76,7 @@ impl Halo {
 
     /// Adds up numbers over all ranks.
     pub fn sum_over_ranks(&self, numbers: &mut [f64]) {
-        if let Some(Shared { ranks, .. }) = self.0.as_deref() {
+        if let Some(SharedEntries { ranks, .. }) = self.0.as_deref() {
             ranks.sum(numbers);
         }
     }

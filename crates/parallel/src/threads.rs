@@ -20,7 +20,7 @@ pub struct Threads {
     traffic: Mutex<Traffic>,
 }
 
-/// Why a rank ended that waited for another one, which ended before.
+/// The reason why a rank ended that waited for another one, which ended before.
 struct Lost {
     other: usize,
 }
