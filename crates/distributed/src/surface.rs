@@ -102,14 +102,13 @@ impl BoxFlow {
     {
         let (last, start) = (kept.take(), leaves.ranks.traffic());
         let meshes = levels_around(around, leaves)?;
-        let [coarser @ .., finest] = &meshes[..] else { unreachable!("there is a finest level") };
+        let (finest, coarser) = meshes.split_last().expect("a tree has a finest level");
         let partition = finest.partition().expect("the mesh is a part");
         let mut solver =
             FlowSolver::new(self.params(around.lubrication))?.on_parts(coarser, self.max_iterations)?;
         let mut before = last.map(|last| last.moved(finest));
-        if let Some(before) = &mut before {
-            let [last, older] = before.near(partition, around.balls);
-            last.map(|last| solver.start_from(finest.clone(), last, older).expect("as many as nodes"));
+        if let Some([Some(last), older]) = before.as_mut().map(|flows| flows.near(partition, around.balls)) {
+            solver.start_from(finest.clone(), last, older).expect("flows were moved to these nodes");
         }
         let (flow, found) = solve(&mut solver, finest)?;
         let frame = leaves.tree.frame();

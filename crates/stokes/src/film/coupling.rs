@@ -52,7 +52,7 @@ pub struct FilmCoupling<const D: usize> {
     scales: Vec<f64>,
 }
 
-/// What a film exerts on its two sides beyond what the mesh resolves.
+/// Forces of a film on its two sides beyond what the mesh resolves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmForce<const D: usize>
 where

@@ -21,7 +21,7 @@ pub struct Heights {
     pub at_walls: f64,
 }
 
-/// What is on the other side of a film.
+/// A body or a wall on the other side of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Partner {
     /// Another body, or a periodic image of the same one.

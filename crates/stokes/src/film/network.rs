@@ -61,7 +61,7 @@ impl FilmRow {
     }
 
     /// As numbers, for messages.
-    pub fn to_numbers(&self) -> [u64; Self::NUMBERS] {
+    pub fn to_numbers(self) -> [u64; Self::NUMBERS] {
         let head = [self.row, self.bodies[0], self.bodies[1]].map(u64::from);
         let weights = self.weights.as_flattened();
         std::array::from_fn(|k| head.get(k).copied().unwrap_or_else(|| weights[k - head.len()].to_bits()))
@@ -189,7 +189,7 @@ impl FilmNetwork {
     }
 }
 
-/// What makes rows of films hold.
+/// A correction that makes rows of films hold.
 #[derive(Debug)]
 pub struct FilmCorrection<'n> {
     network: &'n FilmNetwork,

@@ -8,7 +8,7 @@ use gluey_linalg::KrylovError;
 
 use super::conditions::Conditions;
 use super::raised::RaisedPenalties;
-use super::{Effort, Flow, FlowSolver};
+use super::{Flow, FlowSolver, SolveEffort};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem};
 
@@ -78,7 +78,7 @@ where
         conditions: &Conditions<'_, D>,
         guess: &[f64],
     ) -> Result<FlowWithAdaptedPenalty<D>, StokesError> {
-        let mut wasted = Effort::default();
+        let mut wasted = SolveEffort::default();
         for rounds in 0.. {
             let mut x = guess.to_vec();
             let (lift, mut b) = problem.discretisation().agreed(conditions.data(problem))?;

@@ -8,7 +8,7 @@ use gluey_levelset::Ball;
 use gluey_linalg::vector;
 
 use super::conditions::{Conditions, Given};
-use super::{Effort, FirstFlow, Flow, FlowSolver, flow_of};
+use super::{FirstFlow, Flow, FlowSolver, SolveEffort, flow_of};
 use crate::error::StokesError;
 use crate::space::Discretisation;
 
@@ -44,14 +44,14 @@ where
         let pushes: Vec<Wrench<D>> = wrenches.iter().map(|wrench| *wrench * factor).collect();
         let both = Conditions { bodies: Given::Wrenches(&pushes), ..*conditions };
         let lift = problem.lift(conditions.boundary);
-        let effort = Effort::of([&first, &second.flow]);
-        let mut flow = flow_of(&problem, &both, (&lift, &mut x), Vec::new(), &effort)?;
+        let effort = SolveEffort::of([&first, &second.flow]);
+        let mut flow = flow_of(&problem, &both, &lift, &mut x, Vec::new(), &effort)?;
         flow.times = watch.times();
         Ok(flow)
     }
 }
 
-impl Effort {
+impl SolveEffort {
     /// That of two flows together, with the larger residual.
     fn of<const D: usize>([first, second]: [&Flow<D>; 2]) -> Self
     where

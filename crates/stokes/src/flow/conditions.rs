@@ -8,7 +8,7 @@ use crate::formulation::Problem;
 /// A vector field in the box.
 pub type Field<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 
-/// What drives a flow.
+/// Conditions that drive a flow.
 ///
 /// Wrenches are those that something other than the fluid exerts on the bodies (weight, contact, a hand that
 /// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the bodies: on the
@@ -34,7 +34,8 @@ where
     pub without_mean: bool,
 }
 
-/// What is known of the bodies, one entry each in their order; the other follows from the flow.
+/// Wrenches or motions that are known of the bodies, one entry each in their order; the other follows from
+/// the flow.
 #[derive(Clone, Copy, Debug)]
 pub enum Given<'a, const D: usize>
 where
@@ -48,7 +49,7 @@ where
     Each(&'a [GivenOf<D>]),
 }
 
-/// What is known of one body.
+/// A wrench or a motion that is known of one body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GivenOf<const D: usize>
 where

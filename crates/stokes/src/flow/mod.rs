@@ -23,7 +23,7 @@ use gluey_parallel::Traffic;
 
 use crate::error::StokesError;
 use crate::film::{FilmForce, Lubrication};
-use crate::formulation::{Data, Formulation, Method, Problem, check_viscosity};
+use crate::formulation::{FlowData, Formulation, Method, Problem, check_viscosity};
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use stress::stress_of;
@@ -160,7 +160,7 @@ where
 
 /// Effort of the solves of one prediction.
 #[derive(Default)]
-struct Effort {
+struct SolveEffort {
     solve_count: usize,
     iteration_count: usize,
     residual: f64,
@@ -168,7 +168,7 @@ struct Effort {
     traffic: Traffic,
 }
 
-impl Effort {
+impl SolveEffort {
     fn add(&mut self, report: &SolveReport, traffic: Traffic) {
         self.traffic = self.traffic + traffic;
         let norm = report.reference;
@@ -307,7 +307,7 @@ where
         [lift, b]: [&[f64]; 2],
         x: &mut [f64],
     ) -> Result<Flow<D>, StokesError> {
-        let (mut effort, tolerance) = (Effort::default(), self.params.tolerance);
+        let (mut effort, tolerance) = (SolveEffort::default(), self.params.tolerance);
         let (solver, system) = (self.solver(problem), &problem.system);
         let mut solve = |b: &[f64], x: &mut [f64], tightening: f64| {
             let before = problem.discretisation().traffic();
@@ -316,8 +316,8 @@ where
             effort.add(&report?, problem.discretisation().traffic().since(before));
             Ok(())
         };
-        let multiplier = problem.rigidity.solve(problem, &Data { lift, b }, x, &mut solve)?;
-        flow_of(problem, conditions, (lift, x), multiplier, &effort)
+        let multiplier = problem.rigidity.solve(problem, &FlowData { lift, b }, x, &mut solve)?;
+        flow_of(problem, conditions, lift, x, multiplier, &effort)
     }
 
     /// The same on parts of meshes, of which the levels below the one with the bodies are `coarser`; a solve
@@ -415,9 +415,10 @@ where
 fn flow_of<const D: usize>(
     problem: &Problem<D>,
     conditions: &Conditions<'_, D>,
-    (lift, x): (&[f64], &mut [f64]),
+    lift: &[f64],
+    x: &mut [f64],
     multiplier: Vec<f64>,
-    effort: &Effort,
+    effort: &SolveEffort,
 ) -> Result<Flow<D>, StokesError>
 where
     Dim<D>: Space<D>,

@@ -216,7 +216,7 @@ where
     /// The matrix whose columns are the responses to unit vectors.
     fn columns(
         &mut self,
-        respond: impl Fn(&mut Self, &[Pair<D>]) -> Result<Vec<Pair<D>>, StokesError>,
+        respond: impl Fn(&mut Self, &[Screw<D>]) -> Result<Vec<Screw<D>>, StokesError>,
     ) -> Result<DMatrix<f64>, StokesError> {
         let (bodies, rigid) = (self.problem.bodies.len(), Dim::<D>::RIGID);
         let mut matrix = DMatrix::zeros(bodies * rigid, bodies * rigid);
@@ -232,16 +232,16 @@ where
 }
 
 /// A velocity and a spin, or a force and a torque.
-type Pair<const D: usize> = (Vector<D>, Spin<D>);
+type Screw<const D: usize> = (Vector<D>, Spin<D>);
 
-/// Sets number `k` of a pair of zeros to one.
-fn set_unit<const D: usize>((vector, spin): &mut Pair<D>, k: usize)
+/// Sets number `k` of a screw of zeros to one.
+fn set_unit<const D: usize>(screw: &mut Screw<D>, k: usize)
 where
     Dim<D>: Space<D>,
 {
     match k.checked_sub(D) {
-        Some(k) => spin[k] = 1.0,
-        None => vector[k] = 1.0,
+        Some(k) => screw.1[k] = 1.0,
+        None => screw.0[k] = 1.0,
     }
 }
 

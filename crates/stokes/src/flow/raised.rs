@@ -2,7 +2,7 @@
 
 use std::ops::AddAssign;
 
-/// How penalties were changed.
+/// Counts of how penalties were changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RaisedPenalties {
     /// How often those of all cells at surfaces were doubled, for smoothers that need it.

@@ -10,7 +10,7 @@ const SLACK: f64 = 1e-9;
 /// Bodies are sought this much farther than they can matter, so that rounding loses none.
 const ENOUGH: f64 = 1.0 + SLACK;
 
-/// How a mesh follows the bodies.
+/// Levels by which a mesh follows the bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
     /// Every cell has at least this level.

@@ -17,7 +17,7 @@ use crate::film::FilmForce;
 use crate::formulation::{Problem, symmetric};
 use crate::surface::{CutCells, StrainEnergy};
 
-/// What the bodies add to the stress, and the power that is dissipated.
+/// The share of the bodies in the stress, and the power that is dissipated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stress<const D: usize> {
     /// `S_b` of the whole flow on the mesh, for each body. The pressure is relative to its mean over the

@@ -23,7 +23,7 @@ use crate::space::Discretisation;
 
 #[cfg(feature = "paper")]
 pub use paper::{PaperParams, ParticleVelocity, PointMatrices, SolidRegion};
-pub use problem::{Data, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
+pub use problem::{FlowData, Method, Problem, check_viscosity, symmetric, symmetric_and_traceless};
 #[cfg(test)]
 pub use unfitted::Unfitted;
 

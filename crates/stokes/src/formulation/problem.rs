@@ -66,7 +66,7 @@ where
     fn solve(
         &self,
         problem: &Problem<D>,
-        data: &Data<'_>,
+        data: &FlowData<'_>,
         x: &mut [f64],
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError>;
@@ -136,7 +136,7 @@ where
 
 /// Data of a prediction.
 #[derive(Clone, Copy, Debug)]
-pub struct Data<'a> {
+pub struct FlowData<'a> {
     /// The field that carries the boundary values.
     pub lift: &'a [f64],
     /// Residual of that field, with the loads of forces.

@@ -11,7 +11,7 @@ use gluey_fem::TreeMesh;
 use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 
-use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
+use super::problem::{FlowData, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::film::{Film, FilmCoupling, Heights, Lubrication, thin_films};
 use crate::operator::{Elements, StokesSystem};
@@ -77,9 +77,9 @@ impl Unfitted {
         films.retain(|film| discretisation.is_own_point(&film.middle(shear)));
         let lubricates = self.lubrication == Lubrication::Deficit && !films.is_empty();
         if let Some(surfaces) = system.surfaces().filter(|_| lubricates) {
-            let spaces = (&system.space, &system.pressure);
-            let flows = flows_through_films(spaces, &surfaces.cut, (bodies, &films, &heights));
-            system.terms.push(Arc::new(FilmCoupling::new(spaces.0, films, flows, &heights, viscosity)));
+            let (space, pressure) = (&system.space, &system.pressure);
+            let flows = flows_through_films(space, pressure, &surfaces.cut, bodies, &films, &heights);
+            system.terms.push(Arc::new(FilmCoupling::new(space, films, flows, &heights, viscosity)));
         }
         Ok(system)
     }
@@ -154,7 +154,7 @@ where
     let has_unknowns = |cell: usize| cut.states[cell].has_unknowns();
     let pressure =
         PressureSpace::around_surfaces(&discretisation.pressure, has_unknowns, &aggregates.pressure);
-    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, (cut, penalty), &aggregates)?;
+    let surfaces = SurfaceCoupling::new(&space, bodies, viscosity, cut, penalty, &aggregates)?;
     Ok(StokesSystem::beside(Arc::new(surfaces), space, pressure, viscosity))
 }
 
@@ -183,7 +183,7 @@ where
     fn solve(
         &self,
         _problem: &Problem<D>,
-        data: &Data<'_>,
+        data: &FlowData<'_>,
         x: &mut [f64],
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError> {
@@ -200,8 +200,7 @@ where
     ) -> Result<Vec<Matrix<D>>, StokesError> {
         let Problem { system, bodies, .. } = problem;
         let Some(surfaces) = system.surfaces() else { return Ok(Vec::new()) };
-        let fields = (fields, undisturbed);
-        Ok(first_moments(surfaces, &system.space, bodies, system.viscosity(), fields))
+        Ok(first_moments(surfaces, &system.space, bodies, system.viscosity(), fields, undisturbed))
     }
 
     fn weak_cells(&self, problem: &Problem<D>, velocity: &[f64], strain: &Matrix<D>) -> Vec<WeakCell> {

@@ -14,7 +14,7 @@ use gluey_linalg::{
     SparseMatrix, Subset, Symbolic,
 };
 
-use super::element::{Elements, Source};
+use super::element::{Elements, MatrixSource};
 use super::system::StokesSystem;
 use crate::error::StokesError;
 use crate::space::{VelocitySpace, pressure_expansion, velocity_expansion};
@@ -132,11 +132,11 @@ where
     Dim<D>: Space<D>,
 {
     let system = elements.system();
-    let numbering = Blocks::new(system, &unknowns);
+    let numbering = KeptBlocks::new(system, &unknowns);
     let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
-    let set_forms = |source: Source, local: &mut CellForms| match source {
-        Source::Cell { cell, .. } => forms(cell, local),
-        Source::Piece { cell, body, .. } => {
+    let set_forms = |source: MatrixSource, local: &mut CellForms| match source {
+        MatrixSource::Cell { cell, .. } => forms(cell, local),
+        MatrixSource::Piece { cell, body, .. } => {
             forms(cell, local);
             local.extend_by_twist(system, &unknowns, body);
         }
@@ -202,14 +202,14 @@ fn add_row(row: &[(u32, f64)], unknowns: impl Iterator<Item = usize>, target: &m
 }
 
 /// Blocks of the kept unknowns.
-struct Blocks {
+struct KeptBlocks {
     /// Block of each unknown.
     of: Vec<u32>,
     /// First unknown of each block, and the number of unknowns.
     first: Vec<u32>,
 }
 
-impl Blocks {
+impl KeptBlocks {
     fn new<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Self
     where
         Dim<D>: Space<D>,

@@ -10,7 +10,7 @@ use gluey_linalg::{BlockError, Jagged, parallel};
 
 use crate::space::{ActiveCell, Discretisation, VelocitySpace};
 
-/// What is called with a cell, a scale and the matrix that it is of, if it has its own.
+/// A function that is called with a cell, a scale and the matrix that it is of, if it has its own.
 pub type CellVisitor<'a> = dyn FnMut(u32, f64, Option<&[f64]>) + 'a;
 
 /// A viscosity beside that of the fluid, which may vary inside cells: in one pass with the fluid.

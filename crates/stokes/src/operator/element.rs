@@ -11,9 +11,10 @@ use crate::term::PieceMatrices;
 /// no velocity harmless. The solve corrects it.
 const COMPRESSIBILITY: f64 = 1e-9;
 
-/// What has a matrix: its place among its kind, its cell in the mesh, and for the pieces of terms the body.
+/// A cell or a piece that has a matrix: its place among its kind, its cell in the mesh, and for the pieces of
+/// terms the body.
 #[derive(Clone, Copy, Debug)]
-pub enum Source {
+pub enum MatrixSource {
     /// An active cell that no term covers.
     Cell {
         /// Place among the active cells.
@@ -34,7 +35,7 @@ pub enum Source {
     },
 }
 
-impl Source {
+impl MatrixSource {
     /// Index of the cell in the mesh.
     pub fn cell(self) -> usize {
         match self {
@@ -118,21 +119,21 @@ where
     }
 
     /// All that has a matrix.
-    pub fn sources(&self) -> impl Iterator<Item = Source> + 'a {
+    pub fn sources(&self) -> impl Iterator<Item = MatrixSource> + 'a {
         let cells = self.system.cells.iter().enumerate();
-        let cells = cells.map(|(index, cell)| Source::Cell { index, cell: cell.cell as usize });
+        let cells = cells.map(|(index, cell)| MatrixSource::Cell { index, cell: cell.cell as usize });
         let terms = self.system.terms.iter().enumerate();
         cells.chain(terms.flat_map(|(term, pieces)| {
             let pieces = pieces.pieces().enumerate();
-            pieces.map(move |(index, (cell, body))| Source::Piece { term, index, cell, body })
+            pieces.map(move |(index, (cell, body))| MatrixSource::Piece { term, index, cell, body })
         }))
     }
 
     /// Writes the matrix of a cell or a piece, row by row.
-    pub fn fill_source(&self, source: Source, matrix: &mut [f64]) {
+    pub fn fill_source(&self, source: MatrixSource, matrix: &mut [f64]) {
         match source {
-            Source::Cell { index, .. } => self.fill(index, matrix),
-            Source::Piece { term, index, .. } => {
+            MatrixSource::Cell { index, .. } => self.fill(index, matrix),
+            MatrixSource::Piece { term, index, .. } => {
                 let compressibility = COMPRESSIBILITY / self.system.viscosity();
                 self.system.terms[term].fill(index, compressibility, matrix);
             }
@@ -145,10 +146,15 @@ where
     }
 
     /// Writes the matrix of a cell, or the velocities' part of that of a piece, row by row.
-    pub fn fill_velocities(&self, source: Source, pieces: &mut [PieceMatrices<'_>], matrix: &mut [f64]) {
+    pub fn fill_velocities(
+        &self,
+        source: MatrixSource,
+        pieces: &mut [PieceMatrices<'_>],
+        matrix: &mut [f64],
+    ) {
         match source {
-            Source::Piece { term, index, .. } => pieces[term](index, matrix),
-            Source::Cell { index, .. } => self.fill(index, matrix),
+            MatrixSource::Piece { term, index, .. } => pieces[term](index, matrix),
+            MatrixSource::Cell { index, .. } => self.fill(index, matrix),
         }
     }
 

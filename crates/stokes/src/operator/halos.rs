@@ -33,7 +33,7 @@ impl SystemHalos {
         Dim<D>: Space<D>,
     {
         let (ranks, n) = (&partition.ranks, Dim::<D>::RIGID);
-        let masters = Masters::new(space, &partition.velocity);
+        let masters = CellMasters::new(space, &partition.velocity);
         let plan_of =
             |needed: &[bool]| partition.velocity.ghosts(ranks, |node| needed[node] && space.is_free(node));
         let nodes = plan_of(&masters.needed(partition, terms));
@@ -80,15 +80,15 @@ where
     nodes.ghosts(&partition.ranks, |node| needed[node] && pressure.is_free(node))
 }
 
-/// What nodes take their values from.
-struct Masters<'p, const D: usize> {
+/// Nodes from which others take their values.
+struct CellMasters<'p, const D: usize> {
     nodes: &'p PartNodes<D>,
     ghosts: &'p [Constraint],
     /// The constraint of each node among these, or none.
     ghost_of: Vec<u32>,
 }
 
-impl<'p, const D: usize> Masters<'p, D>
+impl<'p, const D: usize> CellMasters<'p, D>
 where
     Dim<D>: Space<D>,
 {

@@ -14,7 +14,7 @@ mod viscous;
 pub use assembly::{assemble_stokes, assemble_viscous, assemble_viscous_on, factorised};
 pub use cells::{AddedViscosity, CellViscosities, CellVisitor, viscous_diagonal};
 pub use diagonal::{BlockDiagonal, DiagonalSums, nodal_diagonal};
-pub use element::{Elements, Source};
+pub use element::{Elements, MatrixSource};
 pub use halos::SystemHalos;
 pub use pressure_forces::PressureForces;
 pub use restricted::{CountedOperator, Restricted, acting, add_at, gather};

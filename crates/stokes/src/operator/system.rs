@@ -177,7 +177,7 @@ where
         };
         let (ranks, bodies) = (&partition.ranks, partition.bodies.ids.clone());
         let own: Vec<_> = own.into_iter().map(|row| row.renumbered(|body| bodies[body as usize])).collect();
-        let numbers: Vec<_> = own.iter().map(FilmRow::to_numbers).collect();
+        let numbers: Vec<_> = own.iter().copied().map(FilmRow::to_numbers).collect();
         let all: Vec<_> = ranks.gathered(&numbers).iter().map(FilmRow::from_numbers).collect();
         let blocks = partition.sums_of_bodies(&self.twist_blocks(), Dim::<D>::RIGID.pow(2));
         let is_own = partition.bodies.owners.iter().map(|&owner| owner == ranks.rank()).collect();
@@ -283,8 +283,8 @@ where
 {
     system: &'a StokesSystem<D>,
     halo: Halo,
-    wide: Work<f64>,
-    narrow: Work<f32>,
+    wide: OperatorWork<f64>,
+    narrow: OperatorWork<f32>,
     applications: usize,
     /// What makes the films' rows of iterates hold.
     films: Option<FilmCorrection<'a>>,
@@ -292,7 +292,7 @@ where
 
 /// Workspace of the operator for vectors of `X`.
 #[derive(Debug)]
-struct Work<X> {
+struct OperatorWork<X> {
     /// The vector with its ghosts.
     x: Vec<X>,
     /// Pressures at all nodes.
@@ -310,8 +310,8 @@ where
         Self {
             halo: system.halo().clone(),
             system,
-            wide: Work::new(),
-            narrow: Work::new(),
+            wide: OperatorWork::new(),
+            narrow: OperatorWork::new(),
             applications: 0,
             films: None,
         }
@@ -329,7 +329,7 @@ where
     }
 }
 
-impl<X: Scalar + Number> Work<X> {
+impl<X: Scalar + Number> OperatorWork<X> {
     fn new() -> Self {
         Self { x: Vec::new(), pressure: Vec::new(), cells: Workspace::default(), scratch: Scratch::default() }
     }

@@ -6,7 +6,7 @@ use gluey_linalg::{BlockGroups, LocalTerm, Pattern, SparseError, SymmetricBlockM
 use rayon::prelude::*;
 
 use super::numbered::NumberedNodes;
-use crate::operator::{Elements, Source};
+use crate::operator::{Elements, MatrixSource};
 
 /// Stands for the constraint of a node that has none.
 const NONE: u32 = u32::MAX;
@@ -44,8 +44,8 @@ where
 /// order.
 pub fn for_each_matrix<const D: usize>(
     elements: &Elements<'_, D>,
-    sources: &[Source],
-    mut visit: impl FnMut(Source, &[f64]),
+    sources: &[MatrixSource],
+    mut visit: impl FnMut(MatrixSource, &[f64]),
 ) where
     Dim<D>: Space<D>,
 {

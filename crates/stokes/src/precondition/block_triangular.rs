@@ -34,7 +34,9 @@ where
 {
     pub fn new(
         system: &'a StokesSystem<D>,
-        (forces, cycle, schur): (&'a mut PressureForces<D>, &'a mut VCycle<D>, &'a mut SchurInverse<D>),
+        forces: &'a mut PressureForces<D>,
+        cycle: &'a mut VCycle<D>,
+        schur: &'a mut SchurInverse<D>,
         films: Option<FilmCorrection<'a>>,
     ) -> Self {
         let zeros = || vec![0.0; system.pressure.dim()];

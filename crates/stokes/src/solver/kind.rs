@@ -7,7 +7,7 @@ use super::direct::DirectSolver;
 use super::multigrid::MultigridSolver;
 use crate::dimension::in_dimension;
 
-/// Which linear solver.
+/// A linear solver by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolverKind {
     /// Sparse direct factorisation.

@@ -93,7 +93,8 @@ where
             true => Hierarchy::of_parts(self.coarser.iter().chain([finest]).cloned().collect()),
             false => Hierarchy::new(finest, before.unwrap_or_default()),
         };
-        let (before, meshes) = (self.schur.take(), hierarchy.meshes.clone());
+        let before = self.schur.take().filter(|_| !finest.is_part());
+        let meshes = hierarchy.meshes.clone();
         let schur = || SchurInverse::new(&meshes, &elements, before);
         let cycle = || velocity_cycle(problem, &elements, hierarchy);
         let (schur, cycle) = match finest.is_part() {
@@ -130,7 +131,7 @@ where
         let corrections = corrections.map_err(StokesError::from);
         let (of_iterates, of_steps) = system.discretisation().agreed(corrections)?;
         let operator = &mut SystemOperator::new(system).with_films(of_iterates);
-        let preconditioner = &mut BlockTriangular::new(system, (forces, cycle, schur), of_steps);
+        let preconditioner = &mut BlockTriangular::new(system, forces, cycle, schur, of_steps);
         let goal = Goal { tolerance, reference: system.fluid_norm(b) };
         let residuals = if self.noise <= MOST_NOISE {
             run(&mut self.single, operator, preconditioner, b, x, goal)?
@@ -182,7 +183,7 @@ where
     VCycle::new(hierarchy, plans, correction, system.viscosity())
 }
 
-/// Where a solve stops: at this fraction of a norm.
+/// A residual at which a solve stops: this fraction of a norm.
 #[derive(Clone, Copy)]
 struct Goal {
     tolerance: f64,

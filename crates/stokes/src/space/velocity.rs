@@ -19,7 +19,7 @@ use gluey_parallel::Halo;
 use super::discretisation::Discretisation;
 use rigid::{RigidNode, add_moment, gram_inverses, rigid_matrix, rigid_nodes, rotation_entry};
 
-/// Which body, if any, each node moves with.
+/// The body, if any, that each node moves with.
 pub type SolidNodes = Vec<Option<u32>>;
 
 const NO_BODY: u32 = u32::MAX;

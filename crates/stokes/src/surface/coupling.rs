@@ -69,7 +69,8 @@ where
         space: &VelocitySpace<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
-        (cut, penalty): (CutCells<D>, &PenaltyFactor),
+        cut: CutCells<D>,
+        penalty: &PenaltyFactor,
         aggregates: &Aggregates,
     ) -> Result<Self, StokesError> {
         let discretisation = space.discretisation();
@@ -89,13 +90,12 @@ where
         let boundary: Vec<u32> = (0..nodes.whole() as u32).filter(is_given).collect();
         let pieces: Vec<(u32, u32)> = cut.pieces().items().to_vec();
         let penalties = penalties(discretisation, &cut, aggregates, penalty)?;
-        let medium = (bodies, viscosity);
-        let data = PieceData::new(discretisation, medium, &cut, &penalties, [&nodes, &pressures]);
+        let data = PieceData::new(discretisation, bodies, viscosity, &cut, &penalties, &nodes, &pressures);
         let counts = [nodes.len(), pressures.len(), bodies.len()];
         let shear = discretisation.mesh.shear();
         let is_own = |piece: &&(u32, u32)| discretisation.is_own(cut.cells[piece.0 as usize].cell as usize);
         let own: Vec<&(u32, u32)> = pieces.iter().filter(is_own).collect();
-        let of_pieces = || own.iter().map(|&&piece| data.piece(piece));
+        let of_pieces = || own.iter().map(|&&(place, surface)| data.piece(place, surface));
         let (wide, narrow) = rayon::join(
             || CutOperator::new(of_pieces(), counts).sheared(shear),
             || CutOperator::new(of_pieces(), counts).sheared(shear),
@@ -329,7 +329,7 @@ where
     twist.velocity_at(arm)
 }
 
-/// What pieces are made of.
+/// Data that pieces are made of.
 struct PieceData<'a, const D: usize> {
     discretisation: &'a Discretisation<D>,
     bodies: &'a [Ball<D>],
@@ -348,10 +348,12 @@ where
 {
     fn new(
         discretisation: &'a Discretisation<D>,
-        (bodies, viscosity): (&'a [Ball<D>], f64),
+        bodies: &'a [Ball<D>],
+        viscosity: f64,
         cut: &'a CutCells<D>,
         beta: &[f64],
-        [nodes, pressures]: [&Subset; 2],
+        nodes: &Subset,
+        pressures: &Subset,
     ) -> Self {
         let of_cell = |(cell, beta): (&CutCell<D>, &f64)| {
             let surfaces = cell.moments.surfaces.iter();
@@ -372,7 +374,7 @@ where
         }
     }
 
-    fn piece(&self, (place, surface): (u32, u32)) -> CutPiece<'_, D> {
+    fn piece(&self, place: u32, surface: u32) -> CutPiece<'_, D> {
         let (place, surface) = (place as usize, surface as usize);
         let cell = &self.cut.cells[place];
         let h = self.discretisation.cell_size(cell.cell as usize);

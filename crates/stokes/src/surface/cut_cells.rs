@@ -18,7 +18,7 @@ const LEAST_SHARE: f64 = 1e-12;
 /// A cell with no more of a surface than this, in units of its faces, does not touch it.
 const LEAST_AREA: f64 = 1e-12;
 
-/// What bodies leave of a cell.
+/// The share of a cell that bodies leave to the fluid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellState {
     /// No body cuts it.
@@ -88,7 +88,7 @@ impl<const D: usize> CutCells<D> {
         let examined: Vec<(CellState, Option<u32>, Option<CutCell<D>>)> = (0..count)
             .into_par_iter()
             .with_min_len(64)
-            .map(|cell| examine(discretisation, (&tree, flats), &rules, cell))
+            .map(|cell| examine(discretisation, &tree, flats, &rules, cell))
             .collect();
         let mut new = Self {
             states: Vec::with_capacity(count),
@@ -122,11 +122,12 @@ impl<const D: usize> CutCells<D> {
 
 fn examine<const D: usize>(
     discretisation: &Discretisation<D>,
-    bodies: (&BallTree<'_, D>, &Flats<D>),
+    tree: &BallTree<'_, D>,
+    flats: &Flats<D>,
     rules: &CutRules<D>,
     cell: usize,
 ) -> (CellState, Option<u32>, Option<CutCell<D>>) {
-    match near(discretisation, bodies, cell) {
+    match near(discretisation, tree, flats, cell) {
         Near::None => (CellState::Fluid, None, None),
         Near::Covered(body) => (CellState::Solid, Some(body), None),
         Near::Cut(cutting) => {
@@ -191,7 +192,8 @@ fn distances<const D: usize>(arm: &Vector<D>, h: f64, shear: f64) -> [f64; 2] {
 /// Bodies that cut a cell. One that only touches it does not, unless a flat of it is a face of the cell.
 fn near<const D: usize>(
     discretisation: &Discretisation<D>,
-    (tree, flats): (&BallTree<'_, D>, &Flats<D>),
+    tree: &BallTree<'_, D>,
+    flats: &Flats<D>,
     cell: usize,
 ) -> Near<D> {
     let (mesh, h) = (&discretisation.mesh, discretisation.cell_size(cell));

@@ -12,14 +12,14 @@ use crate::space::Discretisation;
 const STRAIN_POINTS: usize = 3;
 
 /// A Gauss rule: weights, and the gradients of the velocity functions in a cell with edges of length one.
-type Rule<const D: usize> = Vec<(f64, Vec<Vector<D>>)>;
+type GaussRule<const D: usize> = Vec<(f64, Vec<Vector<D>>)>;
 
 /// Strain energies on one mesh, of velocities `E x + u` with a strain `E` and nodal values `u`.
 pub struct StrainEnergy<'a, const D: usize> {
     discretisation: &'a Discretisation<D>,
     cut: &'a CutCells<D>,
-    whole: Rule<D>,
-    fine: Rule<D>,
+    whole: GaussRule<D>,
+    fine: GaussRule<D>,
 }
 
 impl<'a, const D: usize> StrainEnergy<'a, D>
@@ -29,7 +29,7 @@ where
     /// Those in the fluid that bodies leave of a mesh.
     pub fn new(discretisation: &'a Discretisation<D>, cut: &'a CutCells<D>) -> Self {
         let shear = discretisation.mesh.shear();
-        let rule = |points: usize| -> Rule<D> {
+        let rule = |points: usize| -> GaussRule<D> {
             let of_point = |x: &[f64; D]| (0..node_count::<D>(2)).map(|i| slope(shear, i, x)).collect();
             gauss_cube::<D>(points).iter().map(|(x, weight)| (*weight, of_point(x))).collect()
         };
@@ -58,7 +58,7 @@ where
     fn sum(
         &self,
         cell: usize,
-        rule: &Rule<D>,
+        rule: &GaussRule<D>,
         velocity: &[f64],
         strain: &Matrix<D>,
         weight: impl Fn(usize, f64) -> f64,

@@ -26,9 +26,12 @@ const RULE: usize = 16;
 /// The flows through the films between bodies, which are widened to these heights, in the directions across
 /// each; none through those at walls and where the mesh has no fluid in a film.
 pub fn flows_through_films<const D: usize>(
-    (space, pressure): (&VelocitySpace<D>, &PressureSpace<D>),
+    space: &VelocitySpace<D>,
+    pressure: &PressureSpace<D>,
     cut: &CutCells<D>,
-    (bodies, films, heights): (&[Ball<D>], &[Film<D>], &Heights),
+    bodies: &[Ball<D>],
+    films: &[Film<D>],
+    heights: &Heights,
 ) -> Vec<Vec<FilmFlow<D>>>
 where
     Dim<D>: Space<D>,
@@ -37,15 +40,15 @@ where
     let regions: Vec<Region<D>> =
         films.iter().map(|film| Region::new(film, bodies, film.height(heights), smallest)).collect();
     let cells = cells_in(space, cut, &regions);
-    let fluid = Fluid {
+    let fluid = FluidAround {
         space,
         cut,
-        velocities: Masters::new(
+        velocities: Followers::new(
             space.nodes().node_count(),
             space.nodes().constraints().iter().chain(space.ghosts()),
         ),
-        pressures: Masters::new(pressure.dim(), pressure.constraints().iter()),
-        rule: Rule::new(),
+        pressures: Followers::new(pressure.dim(), pressure.constraints().iter()),
+        rule: CutRule::new(),
     };
     let of_film = |(index, film): (usize, &Film<D>)| {
         if film.partner.is_wall() {
@@ -62,15 +65,15 @@ where
 }
 
 /// The fluid of a mesh around bodies.
-struct Fluid<'a, const D: usize> {
+struct FluidAround<'a, const D: usize> {
     space: &'a VelocitySpace<D>,
     cut: &'a CutCells<D>,
-    velocities: Masters<'a>,
-    pressures: Masters<'a>,
-    rule: Rule<D>,
+    velocities: Followers<'a>,
+    pressures: Followers<'a>,
+    rule: CutRule<D>,
 }
 
-/// Where the flow through a film is measured.
+/// A region in which the flow through a film is measured.
 struct Region<const D: usize> {
     /// A ball around it, whose centre is the middle of the film.
     around: Ball<D>,
@@ -105,7 +108,7 @@ where
     }
 
     /// The mean velocity times the thickness, along each of these directions.
-    fn mean(&self, fluid: &Fluid<'_, D>, cells: &[u32], tangents: &[Vector<D>]) -> Vec<FilmFlow<D>> {
+    fn mean(&self, fluid: &FluidAround<'_, D>, cells: &[u32], tangents: &[Vector<D>]) -> Vec<FilmFlow<D>> {
         let (mut volume, mut place) = (0.0, Vector::<D>::zeros());
         let mut of_nodes = BTreeMap::<u32, f64>::new();
         for &cell in cells {
@@ -139,7 +142,7 @@ where
     /// The mean over sections along the only direction.
     fn through_sections(
         &self,
-        fluid: &Fluid<'_, D>,
+        fluid: &FluidAround<'_, D>,
         cells: &[u32],
         tangents: &[Vector<D>],
     ) -> Vec<FilmFlow<D>> {
@@ -199,13 +202,18 @@ fn weight(square: f64) -> f64 {
     (1.0 - square).max(0.0).powi(2)
 }
 
-impl<const D: usize> Fluid<'_, D>
+impl<const D: usize> FluidAround<'_, D>
 where
     Dim<D>: Space<D>,
 {
     /// Calls `visit` with the points of the rule in a cell, their places from the centre of a ball, and the
     /// volume of the fluid that belongs to them.
-    fn for_each_point(&self, cell: u32, around: &Ball<D>, mut visit: impl FnMut(&Point<D>, &Vector<D>, f64)) {
+    fn for_each_point(
+        &self,
+        cell: u32,
+        around: &Ball<D>,
+        mut visit: impl FnMut(&CutPoint<D>, &Vector<D>, f64),
+    ) {
         let discretisation = self.space.discretisation();
         let mesh = &discretisation.mesh;
         let cell = cell as usize;
@@ -273,7 +281,7 @@ where
 }
 
 /// A point of the rule in cut cells.
-struct Point<const D: usize> {
+struct CutPoint<const D: usize> {
     at: Vector<D>,
     /// Its weight in whole cells.
     weight: f64,
@@ -284,11 +292,11 @@ struct Point<const D: usize> {
 }
 
 /// The points of cut cells.
-struct Rule<const D: usize>(Vec<Point<D>>);
+struct CutRule<const D: usize>(Vec<CutPoint<D>>);
 
-impl<const D: usize> Rule<D> {
+impl<const D: usize> CutRule<D> {
     fn new() -> Self {
-        let point = |(at, weight): ([f64; D], f64)| Point {
+        let point = |(at, weight): ([f64; D], f64)| CutPoint {
             at: Vector::from(at),
             weight,
             shapes: (0..node_count::<D>(2)).map(|i| value::<D>(2, i, &at)).collect(),
@@ -299,13 +307,13 @@ impl<const D: usize> Rule<D> {
 }
 
 /// Nodes that follow others.
-struct Masters<'a> {
+struct Followers<'a> {
     followers: Vec<&'a Constraint>,
     /// Place of each node in these, or `u32::MAX`.
     place: Vec<u32>,
 }
 
-impl<'a> Masters<'a> {
+impl<'a> Followers<'a> {
     fn new(node_count: usize, followers: impl Iterator<Item = &'a Constraint>) -> Self {
         let followers: Vec<&Constraint> = followers.collect();
         let mut place = vec![u32::MAX; node_count];
@@ -371,8 +379,8 @@ mod tests {
         let heights = Lubrication::Deficit.heights::<D>(discretisation.finest_cell_size());
         let films = thin_films(&bodies, &Aabb::unit(), &heights);
         let surfaces = problem.system.surfaces().unwrap();
-        let spaces = (space, &problem.system.pressure);
-        let flows = flows_through_films(spaces, &surfaces.cut, (&bodies, &films, &heights));
+        let pressure = &problem.system.pressure;
+        let flows = flows_through_films(space, pressure, &surfaces.cut, &bodies, &films, &heights);
         assert_eq!(flows[0].len(), D - 1);
         let flow = &flows[0][0];
         let sum: Vector<D> = flow.nodes.iter().map(|node| node.1).sum();

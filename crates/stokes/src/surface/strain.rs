@@ -32,7 +32,7 @@ pub fn add_load_of_strain<const D: usize>(
     Dim<D>: Space<D>,
 {
     let (discretisation, viscosity) = (surfaces.discretisation(), surfaces.viscosity);
-    let rule = Rule::<D>::new(discretisation.mesh.shear());
+    let rule = CellRule::<D>::new(discretisation.mesh.shear());
     let of_cell = |place: usize| {
         vectorised(
             #[inline(always)]
@@ -72,7 +72,7 @@ where
 }
 
 /// The points of a cell and the functions there.
-struct Rule<const D: usize> {
+struct CellRule<const D: usize> {
     shear: f64,
     shapes: Shapes<D>,
     /// Values and components of the slopes of the velocity functions, point by point.
@@ -80,7 +80,7 @@ struct Rule<const D: usize> {
     slopes: Vec<[[f64; MOST_NODES]; D]>,
 }
 
-impl<const D: usize> Rule<D>
+impl<const D: usize> CellRule<D>
 where
     Dim<D>: Space<D>,
 {

@@ -10,7 +10,7 @@ use super::shapes::Shapes;
 use crate::space::{Discretisation, VelocitySpace};
 
 /// A field at a point of a cut cell, and the weights there.
-struct Sample<const D: usize> {
+struct FieldSample<const D: usize> {
     velocity: Vector<D>,
     /// Twice the strain in the unit cube.
     strain: Matrix<D>,
@@ -24,8 +24,8 @@ impl<const D: usize> Shapes<D> {
         cell: usize,
         point: usize,
         [velocity, pressure]: [&[f64]; 2],
-    ) -> Sample<D> {
-        let mut sample = Sample { velocity: Vector::zeros(), strain: Matrix::zeros(), pressure: 0.0 };
+    ) -> FieldSample<D> {
+        let mut sample = FieldSample { velocity: Vector::zeros(), strain: Matrix::zeros(), pressure: 0.0 };
         let nodes = discretisation.velocity.cell(cell);
         for (&node, (shape, slope)) in nodes.iter().zip(&self.velocity[point]) {
             let u = Vector::<D>::from_column_slice(&velocity[node as usize * D..][..D]);
@@ -48,7 +48,8 @@ pub fn first_moments<const D: usize>(
     space: &VelocitySpace<D>,
     bodies: &[Ball<D>],
     viscosity: f64,
-    ([velocity, pressure], undisturbed): ([&[f64]; 2], &Matrix<D>),
+    [velocity, pressure]: [&[f64]; 2],
+    undisturbed: &Matrix<D>,
 ) -> Vec<Matrix<D>>
 where
     Dim<D>: Space<D>,

@@ -15,7 +15,7 @@ use crate::error::StokesError;
 use crate::flow::{Conditions, Flow, FlowSolver, GivenOf, Stress};
 use crate::space::Discretisation;
 
-/// What drives the flow of a configuration.
+/// Conditions that drive the flow of a configuration.
 pub struct Drive<'a, const D: usize>
 where
     Dim<D>: Space<D>,

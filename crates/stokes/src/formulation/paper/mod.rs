@@ -19,7 +19,7 @@ use gluey_geom::{Dim, Space, Twist, Wrench};
 use gluey_levelset::{Ball, Ramp, ViscosityLaw};
 use gluey_linalg::{ChebyshevParams, vector};
 
-use super::problem::{Data, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
+use super::problem::{FlowData, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
 use crate::error::StokesError;
 use crate::operator::{Elements, StokesSystem};
 use crate::precondition::velocity::{LEVEL_SWEEP, Smoothing};
@@ -106,7 +106,7 @@ where
     fn solve(
         &self,
         problem: &Problem<D>,
-        data: &Data<'_>,
+        data: &FlowData<'_>,
         x: &mut [f64],
         solve: &mut LinearSolve<'_>,
     ) -> Result<Multiplier, StokesError> {

@@ -4,7 +4,7 @@ use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
 
 /// Weighted sums over a body.
 #[derive(Clone, Debug)]
-pub struct Moments<const D: usize>
+pub struct BodyMoments<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -15,7 +15,7 @@ where
     angular: Spin<D>,
 }
 
-impl<const D: usize> Moments<D>
+impl<const D: usize> BodyMoments<D>
 where
     Dim<D>: Space<D>,
 {
@@ -47,7 +47,7 @@ where
 
     /// The rigid field `f(r) = A + B x r` of forces per weight that add up to a force and a torque about the
     /// reference point, as [`Twist`]; `None` where the weights do not fix it. By it the force does the work
-    /// of the wrench on the motion that [`Moments::twist`] finds, in any velocity field.
+    /// of the wrench on the motion that [`BodyMoments::twist`] finds, in any velocity field.
     pub fn force_density(&self, wrench: &Wrench<D>) -> Option<Twist<D>> {
         self.accelerated(&wrench.force, &wrench.torque)
     }

@@ -22,7 +22,7 @@ use crate::space::Discretisation;
 /// A sweep with the patches as preconditioner.
 const SWEEP: ChebyshevParams = ChebyshevParams { degree: 2, ratio: 4.0, safety: 1.1, lanczos_steps: 8 };
 
-/// One V-cycle of Galerkin multigrid on the nodes of the solid, or a factorisation.
+/// A V-cycle of Galerkin multigrid on the nodes of the solid, or a factorisation.
 pub struct SolidMultigrid<const D: usize> {
     /// From fine to coarse, without the finest; none where that is factorised.
     coarser: Vec<Coarse<D>>,

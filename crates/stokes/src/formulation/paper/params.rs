@@ -25,7 +25,7 @@ pub struct PaperParams {
     pub particle_velocity: ParticleVelocity,
 }
 
-/// How the motion of a particle is taken from a field that is only nearly rigid inside it.
+/// The way in which the motion of a particle is taken from a field that is only nearly rigid inside it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParticleVelocity {
     /// The rigid motion closest to the field over the particle, weighted with the solid fraction.

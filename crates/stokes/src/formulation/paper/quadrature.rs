@@ -28,7 +28,7 @@ pub struct PointMatrices<const D: usize> {
     pairs: Vec<(usize, usize)>,
 }
 
-/// Whether the first and the second factor of a product are slopes.
+/// A flag for the first and the second factor of a product: whether it is a slope.
 type Slopes = (bool, bool);
 
 impl<const D: usize> PointMatrices<D> {
@@ -75,7 +75,7 @@ impl<const D: usize> PointMatrices<D> {
             for b in 0..=a {
                 let sums = self.sum(&weights, |d| (d == a, d == b), &mut work);
                 for (&(i, j), &sum) in self.pairs.iter().zip(sums) {
-                    add_strain_product::<D>((i * D, j * D), (a, b), sum, &mut matrix);
+                    add_strain_product::<D>(i * D, j * D, a, b, sum, &mut matrix);
                 }
             }
         }
@@ -128,12 +128,7 @@ fn pairs<const D: usize>() -> Vec<(usize, usize)> {
 
 /// Adds what `S[(i,a),(j,b)]` and its mirror image contribute to `K`, for `i` and `j` given by their first
 /// rows.
-fn add_strain_product<const D: usize>(
-    (i, j): (usize, usize),
-    (a, b): (usize, usize),
-    sum: f64,
-    matrix: &mut [f64],
-) {
+fn add_strain_product<const D: usize>(i: usize, j: usize, a: usize, b: usize, sum: f64, matrix: &mut [f64]) {
     let n = ReferenceMatrices::<D>::VELOCITY;
     matrix[(i + b) * n + j + a] += sum;
     if a != b {

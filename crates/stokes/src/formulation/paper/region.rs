@@ -6,7 +6,7 @@ use gluey_fem::NodeMap;
 use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body, Ramp};
 
-use super::moments::Moments;
+use super::moments::BodyMoments;
 use super::quadrature::PointMatrices;
 use crate::error::StokesError;
 use crate::space::Discretisation;
@@ -27,7 +27,7 @@ impl SolidCell {
     }
 }
 
-/// Where the solid is on a mesh.
+/// The solid on a mesh.
 #[derive(Clone, Debug)]
 pub struct SolidRegion<const D: usize> {
     pub(super) cells: Arc<Vec<SolidCell>>,
@@ -99,7 +99,7 @@ where
         matrices: &PointMatrices<D>,
         velocity: &[f64],
     ) -> Result<Vec<Twist<D>>, StokesError> {
-        let mut moments = vec![Moments::<D>::new(); bodies.len()];
+        let mut moments = vec![BodyMoments::<D>::new(); bodies.len()];
         self.for_each_point(discretisation, bodies, matrices, |point| {
             let mut u = Vector::<D>::zeros();
             for (&node, &shape) in point.nodes.iter().zip(point.shapes) {
@@ -125,7 +125,7 @@ where
         matrices: &PointMatrices<D>,
         wrenches: &[Wrench<D>],
     ) -> Result<Vec<f64>, StokesError> {
-        let mut moments = vec![Moments::<D>::new(); bodies.len()];
+        let mut moments = vec![BodyMoments::<D>::new(); bodies.len()];
         self.for_each_point(discretisation, bodies, matrices, |point| {
             moments[point.body].add(point.weight, &point.arm, &Vector::zeros());
         });

@@ -27,7 +27,7 @@ const SWEEP: ChebyshevParams = ChebyshevParams { degree: 4, ratio: 5.0, safety: 
 
 /// The smoother of all nodes around the finest cells.
 pub struct PenalisedSmoother<const D: usize> {
-    sweep: Sweep<CountedOperator<f32, D>, D>,
+    sweep: SolidSweep<CountedOperator<f32, D>, D>,
 }
 
 impl<const D: usize> PenalisedSmoother<D>
@@ -48,7 +48,7 @@ where
         let diagonal = fluid.map_err(StokesError::AroundSolid)?;
         let operator = CountedOperator::within(system, &acting);
         let preconditioner = DiagonalAndPatches::new(diagonal, solid, solid.positions(), matrix)?;
-        let mut sweep = Sweep::new(operator, preconditioner)?;
+        let mut sweep = SolidSweep::new(operator, preconditioner)?;
         sweep.operator.take_applications();
         Ok(Self { sweep })
     }
@@ -72,7 +72,7 @@ where
 
 /// The smoother of the nodes around the films between bodies.
 pub struct FilmSmoother<const D: usize> {
-    sweep: Sweep<Restricted<f32, D>, D>,
+    sweep: SolidSweep<Restricted<f32, D>, D>,
     /// `A` on velocities of the sweep.
     operator: CountedOperator<f64, D>,
     /// Loads and velocities of the sweep.
@@ -103,7 +103,7 @@ where
         let [r, x] = [(); 2].map(|()| vec![0.0; positions.len()]);
         let operator = CountedOperator::within(system, &acting);
         let restricted = Restricted::new(CountedOperator::within(system, &acting), positions);
-        let mut sweep = Sweep::new(restricted, preconditioner)?;
+        let mut sweep = SolidSweep::new(restricted, preconditioner)?;
         sweep.operator.take_applications();
         Ok(Self { sweep, operator, r, x })
     }
@@ -151,7 +151,7 @@ pub fn around_films<const D: usize>(
 }
 
 /// Chebyshev's method from zero: the operator, its preconditioner, load and velocity.
-struct Sweep<A, const D: usize> {
+struct SolidSweep<A, const D: usize> {
     operator: A,
     preconditioner: DiagonalAndPatches<D>,
     chebyshev: Chebyshev<f32>,
@@ -159,7 +159,7 @@ struct Sweep<A, const D: usize> {
     x: Vec<f32>,
 }
 
-impl<A: LinOp<f32>, const D: usize> Sweep<A, D>
+impl<A: LinOp<f32>, const D: usize> SolidSweep<A, D>
 where
     Dim<D>: Space<D>,
 {

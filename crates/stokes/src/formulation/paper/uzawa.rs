@@ -15,7 +15,7 @@ use gluey_linalg::vector;
 use super::params::PaperParams;
 use super::stress::{SolidOperator, SolidStress};
 use crate::error::StokesError;
-use crate::formulation::problem::{Data, LinearSolve, Multiplier, Problem};
+use crate::formulation::problem::{FlowData, LinearSolve, Multiplier, Problem};
 use crate::operator::StokesSystem;
 
 /// The steps of a prediction; `x` holds the last velocity and pressure afterwards.
@@ -23,7 +23,7 @@ pub fn solve<const D: usize>(
     params: &PaperParams,
     stress: &SolidStress<D>,
     problem: &Problem<D>,
-    data: &Data<'_>,
+    data: &FlowData<'_>,
     x: &mut [f64],
     solve: &mut LinearSolve<'_>,
 ) -> Result<Multiplier, StokesError>

@@ -41,7 +41,7 @@ where
     meshes: Vec<Discretisation<D>>,
     first_shared: usize,
     /// On the rank that holds all of the coarsest mesh.
-    whole: Option<Whole<D>>,
+    whole: Option<CoarsestSchur<D>>,
     /// `transfers[l]` joins the pressures of mesh `l` to those of mesh `l + 1`.
     transfers: Vec<Interpolation<D>>,
     /// Pressures on each mesh, and their halos.
@@ -50,7 +50,7 @@ where
 }
 
 /// The correction on the coarsest mesh.
-struct Whole<const D: usize>
+struct CoarsestSchur<const D: usize>
 where
     Dim<D>: Space<D>,
 {
@@ -87,7 +87,7 @@ where
         let Some(all) = with_coarsest.filter(|_| missing[0] == 0.0) else { return Ok(None) };
         let old = before.filter(|old| Arc::ptr_eq(&old.meshes[0].mesh, &all[0].mesh));
         let old = old.and_then(|old| old.whole).filter(|old| old.viscosity == viscosity);
-        let whole = || old.map_or_else(|| Whole::new(&all[0].alone(), viscosity), Ok);
+        let whole = || old.map_or_else(|| CoarsestSchur::new(&all[0].alone(), viscosity), Ok);
         let whole = meshes[0].agreed(holds_all.then(whole).transpose())?;
         let transfers = all.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.pressure));
         let halo = |mesh: &Discretisation<D>| {
@@ -135,7 +135,7 @@ where
     }
 }
 
-impl<const D: usize> Whole<D>
+impl<const D: usize> CoarsestSchur<D>
 where
     Dim<D>: Space<D>,
 {

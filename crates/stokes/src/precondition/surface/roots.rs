@@ -9,7 +9,7 @@ use gluey_linalg::{
 use rayon::prelude::*;
 
 use crate::error::StokesError;
-use crate::operator::{Elements, Source};
+use crate::operator::{Elements, MatrixSource};
 use crate::precondition::assembly::{NodeForms, for_each_matrix};
 use crate::precondition::numbered::NumberedNodes;
 
@@ -27,19 +27,19 @@ struct Batch {
     nodes: Vec<u32>,
 }
 
-/// What cells and pieces add to the rows of numbered nodes.
+/// Contributions of cells and pieces to the rows of numbered nodes.
 struct Contributions<'a, const D: usize>
 where
     Dim<D>: Space<D>,
 {
     elements: &'a Elements<'a, D>,
     forms: NodeForms<'a, D>,
-    sources: Vec<Source>,
+    sources: Vec<MatrixSource>,
     /// Those that add to each row, by their places in `sources`.
     of_node: Jagged<u32>,
 }
 
-/// Why there are none: the first block that is not positive definite, or no matrix.
+/// A reason why there are none: the first block that is not positive definite, or no matrix.
 pub enum ModesError {
     /// A block.
     Patch(PatchError),
@@ -152,7 +152,8 @@ where
         }
         let groups: Vec<&[usize]> = groups.iter().collect();
         let mut matrix = SymmetricBlockMatrix::zeros(&Pattern::from_groups(batch.nodes.len(), &groups)?);
-        let sources: Vec<Source> = touching.iter().map(|&source| self.sources[source as usize]).collect();
+        let sources: Vec<MatrixSource> =
+            touching.iter().map(|&source| self.sources[source as usize]).collect();
         for_each_matrix(self.elements, &sources, |source, dense| {
             self.terms(source, place, &mut terms);
             matrix.add_local(&terms, dense);
@@ -161,7 +162,7 @@ where
     }
 
     /// The terms of a source in the rows of a batch.
-    fn terms(&self, source: Source, place: &[u32], terms: &mut Vec<LocalTerm>) {
+    fn terms(&self, source: MatrixSource, place: &[u32], terms: &mut Vec<LocalTerm>) {
         self.forms.of_cell(source.cell(), terms);
         terms.retain_mut(|term| {
             term.row = place[term.row as usize];

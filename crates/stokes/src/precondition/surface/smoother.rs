@@ -41,7 +41,7 @@ pub struct SurfaceSmoother<const D: usize> {
     diagonal: BlockDiagonal,
     /// The sweep with the diagonal.
     chebyshev: Chebyshev<f32>,
-    blocks: Blocks<D>,
+    blocks: RootBlocks<D>,
     /// Reduced velocities and their loads.
     velocity: Vec<f32>,
     load: Vec<f32>,
@@ -50,7 +50,7 @@ pub struct SurfaceSmoother<const D: usize> {
 }
 
 /// Restricted additive Schwarz on the free nodes of the own roots.
-struct Blocks<const D: usize> {
+struct RootBlocks<const D: usize> {
     inverses: Inverses<D>,
     /// The components of the nodes among the reduced velocities.
     positions: Vec<u32>,
@@ -60,7 +60,7 @@ struct Blocks<const D: usize> {
     z: Vec<f32>,
 }
 
-/// What stands for the inverses of the blocks.
+/// Matrices that stand for the inverses of the blocks.
 enum Inverses<const D: usize> {
     /// Themselves.
     Whole(SchwarzPatches<f32, D>),
@@ -100,8 +100,8 @@ where
         if let Some(here) = &here {
             smoothed.iter_mut().zip(here).for_each(|(smoothed, here)| *smoothed &= here);
         }
-        let (blocks, near_surfaces) = Blocks::new(&nodes, elements, surfaces)?;
-        let nodal = nodal(elements, &smoothed, (&blocks.positions, &near_surfaces))?;
+        let (blocks, near_surfaces) = RootBlocks::new(&nodes, elements, surfaces)?;
+        let nodal = nodal(elements, &smoothed, &blocks.positions, &near_surfaces)?;
         smoothed.iter_mut().zip(&near).for_each(|(smoothed, near)| *smoothed |= near);
         let operator = ViscousOperator::new(system, &smoothed, &near);
         Ok(AssembledSmoother { operator, blocks, nodal, near })
@@ -111,7 +111,7 @@ where
 /// A smoother whose parts do not know of each other yet.
 struct AssembledSmoother<const D: usize> {
     operator: ViscousOperator<D>,
-    blocks: Blocks<D>,
+    blocks: RootBlocks<D>,
     /// The inverse diagonal at the nodes of own cells.
     nodal: Vec<f32>,
     /// Nodes of cut cells and roots.
@@ -249,7 +249,7 @@ where
     near
 }
 
-impl<const D: usize> Blocks<D>
+impl<const D: usize> RootBlocks<D>
 where
     Dim<D>: Space<D>,
 {
@@ -338,7 +338,8 @@ where
 fn nodal<const D: usize>(
     elements: &Elements<'_, D>,
     smoothed: &[bool],
-    (positions, near_surfaces): (&[u32], &[f64]),
+    positions: &[u32],
+    near_surfaces: &[f64],
 ) -> Result<Vec<f32>, StokesError>
 where
     Dim<D>: Space<D>,

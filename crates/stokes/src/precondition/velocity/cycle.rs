@@ -19,7 +19,7 @@ pub struct LevelPlan<const D: usize> {
     pub smoothing: Option<Smoothing>,
 }
 
-/// One V-cycle on the velocity block.
+/// A V-cycle on the velocity block.
 pub struct VCycle<const D: usize>
 where
     Dim<D>: Space<D>,

@@ -11,7 +11,7 @@ use crate::error::DiagonalError;
 use crate::operator::{BlockDiagonal, CountedOperator, DiagonalSums};
 use crate::space::{ActiveCell, VelocitySpace, active_cells, around_finest_cells, cells_touching, own_cells};
 
-/// How a level smooths.
+/// A way in which a level smooths.
 #[derive(Clone, Copy, Debug)]
 pub struct Smoothing {
     /// A sweep with the block diagonal as preconditioner. Its largest eigenvalue is known.
@@ -32,7 +32,7 @@ impl Smoothing {
 pub const LEVEL_SWEEP: ChebyshevParams =
     ChebyshevParams { degree: 5, ratio: 5.0, safety: SAFETY, lanczos_steps: 0 };
 
-/// One level of the multigrid.
+/// A level of the multigrid.
 #[derive(Clone, Debug)]
 pub struct Level<const D: usize>
 where
