@@ -3,10 +3,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use gluey::{Case, RunOptions, Silent, VtkOptions, run_shared};
-use gluey_parallel::{Ranks, Threads};
+use gluey::{
+    Case, Ended, Progress, ProgressState, RecordOptions, ResultPaths, RunError, RunOptions, RunRecord,
+    RunState, Silent, VtkOptions, run_shared,
+};
+use gluey_parallel::{Communicator, Ranks, Threads};
 use gluey_testkit::failing::{Failing, TOLD, within_a_minute};
 use tempfile::TempDir;
 
@@ -149,6 +153,42 @@ fn a_rank_that_fails_anywhere_in_a_run_ends_all() {
         let first = ends[0].0.as_ref().expect_err("the run fails");
         assert!(first.contains(TOLD), "rank and agreement {fault:?}: {first}");
     }
+}
+
+/// One rank is asked to stop: all do after the same step.
+#[test]
+fn all_stop_when_one_is_asked_to() {
+    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.15));
+    let ends = Threads::run(3, |ranks| {
+        let interrupt = Some(Arc::new(AtomicBool::new(ranks.rank() == 1)));
+        let options = RunOptions { interrupt, ..with_checkpoints(folder.path()) };
+        run_shared(&case, &options, &Silent, ranks).err()
+    });
+    for end in ends.expect("no rank panics") {
+        assert!(matches!(end, Some(RunError::Interrupted(Ended { step: 1, steps: 3, .. }))), "{end:?}");
+    }
+}
+
+/// A listener at fault.
+struct Faulty;
+
+impl Progress for Faulty {
+    fn report(&self, state: &ProgressState) {
+        assert!(state.step == 0, "the listener is at fault");
+    }
+}
+
+/// A rank that panics ends the others, who wait for it, and its run is known to have failed.
+#[test]
+fn a_rank_that_panics_ends_all() {
+    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.1));
+    let record = Some(RecordOptions::default());
+    let options = RunOptions { record, ..RunOptions::csv(folder.path().join("t.csv")) };
+    let paths = ResultPaths::of_csv(&options.csv);
+    let run = move || Threads::run(3, |ranks| run_shared(&case, &options, &Faulty, ranks).is_ok());
+    let failure = within_a_minute("a panic", run).expect_err("a rank panics");
+    assert_eq!((failure.rank, &failure.message[..]), (0, "the listener is at fault"));
+    assert_eq!(RunRecord::read(&paths.record()).expect("a record").state, RunState::Failed);
 }
 
 /// A force on the fluid drives a channel with free particles, one of them across its border.

@@ -62,24 +62,14 @@ pub(crate) trait Response<R: JacobianRow> {
     /// See [`DelassusOperator::complete`].
     fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}
 
-    /// See [`DelassusOperator::first`].
-    fn first(&self) -> usize {
-        0
-    }
-
-    /// See [`DelassusOperator::is_shared`].
-    fn is_shared(&self) -> bool {
-        false
-    }
-
-    /// See [`DelassusOperator::gather`].
-    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+    /// See [`DelassusOperator::place`].
+    fn place(&self) -> Option<usize> {
         None
     }
 
-    /// See [`DelassusOperator::scatter`].
-    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
-        Vec::new()
+    /// See [`DelassusOperator::gather`].
+    fn gather(&self, numbers: &[f64]) -> Vec<Vec<f64>> {
+        vec![numbers.to_vec()]
     }
 }
 
@@ -118,19 +108,11 @@ impl<R: JacobianRow, C: Response<R>> DelassusOperator for ScaledDelassus<'_, R, 
         self.response.complete(sums, largest);
     }
 
-    fn first(&self) -> usize {
-        self.response.first()
+    fn place(&self) -> Option<usize> {
+        self.response.place()
     }
 
-    fn is_shared(&self) -> bool {
-        self.response.is_shared()
-    }
-
-    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
-        self.response.gather(words)
-    }
-
-    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
-        self.response.scatter(words)
+    fn gather(&self, numbers: &[f64]) -> Vec<Vec<f64>> {
+        self.response.gather(numbers)
     }
 }

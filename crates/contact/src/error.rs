@@ -1,11 +1,15 @@
 //! Errors of a contact step.
 
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
 use crate::projection::Failure;
 use crate::solver::{ResidualHistory, SolveFailure};
 use crate::{ContactLaw, PairKey, Partner};
 
 /// Why velocities could not be corrected. They are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum ContactError {
     /// The slices of a step disagree.
     #[error(
@@ -255,6 +259,7 @@ impl ContactError {
 
 /// A vector of a particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Quantity {
     /// Centre.
     Position,

@@ -75,24 +75,6 @@ impl<const D: usize> Grid<D> {
         (0..D).any(|d| directions[d] && (place[d] == 0 || place[d] + 2 >= self.counts[d]))
     }
 
-    /// Replaces the value of each cell by what `join` makes of it and of those of the cells around it.
-    pub(crate) fn join_neighbours<T: Copy>(&self, values: &mut [T], join: impl Fn(T, T) -> T) {
-        let mut stride = 1;
-        for count in self.counts {
-            let before = values.to_vec();
-            for (cell, value) in values.iter_mut().enumerate() {
-                let place = cell / stride % count;
-                if place > 0 {
-                    *value = join(*value, before[cell - stride]);
-                }
-                if place + 1 < count {
-                    *value = join(*value, before[cell + stride]);
-                }
-            }
-            stride *= count;
-        }
-    }
-
     /// Calls `visit` with the numbers of each run of neighbouring cells around a point, in increasing order.
     pub(crate) fn for_each_row(&self, x: &Vector<D>, mut visit: impl FnMut(Range<usize>)) {
         let place = self.place(x);

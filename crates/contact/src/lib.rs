@@ -40,7 +40,6 @@
 //! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
 
 pub mod broadphase;
-mod coordinator;
 mod delassus;
 mod domain;
 mod error;

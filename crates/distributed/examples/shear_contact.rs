@@ -21,7 +21,7 @@ use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, ContactReport, Domain, GammaUpdate, PairContact, SolverKind,
     StepGeometry, WithFixed,
 };
-use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
+use gluey_distributed::{ContactLoad, SharedContact};
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_testkit::packing::Packing;
@@ -63,7 +63,7 @@ fn main() {
     on_ranks(&options.ranks, |ranks| run(&options, ranks));
 }
 
-/// The line of a run, on rank zero.
+/// The line of a run, on each rank.
 fn run(options: &Options, ranks: &Ranks) -> String {
     // A rank has one thread, this one.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
@@ -79,28 +79,23 @@ fn steps<const D: usize>(options: &Options, ranks: &Ranks) -> String
 where
     Dim<D>: Space<D>,
 {
-    let mut traffic = Traffic::default();
-    if ranks.rank() > 0 {
-        let mut follower = ContactFollower::<D>::default();
-        let mut worked = 0;
-        for _ in 0..options.steps {
-            let (before, start) = (ranks.traffic(), processor_time());
-            follower.step(ranks).unwrap_or_else(|failure| fail(&failure.to_string()));
-            (traffic, worked) = (ranks.traffic().since(before), processor_time() - start);
-        }
-        ranks.all_gather(&[worked]);
-        TrafficRecord::new(ranks, &traffic);
-        return String::new();
-    }
-    let mut shear = Shear::<D>::new(options, ranks);
-    let (mut report, mut worked) = (ContactReport::default(), 0);
+    let (mut shear, is_first) = (Shear::<D>::new(options, ranks), ranks.rank() == 0);
+    let (mut report, mut traffic, mut worked) = (ContactReport::default(), Traffic::default(), 0);
     for step in 0..options.steps {
         let before = ranks.traffic();
-        (report, worked) = shear.step(step, options);
-        traffic = ranks.traffic().since(before);
+        let (start, start_of_work) = (Instant::now(), processor_time());
+        report = shear.step(step, options);
+        (traffic, worked) = (ranks.traffic().since(before), processor_time() - start_of_work);
+        if is_first {
+            let (seconds, iterations) = (start.elapsed().as_secs_f64(), report.iterations);
+            eprintln!("step {step}: {seconds:.4} s, {iterations} iterations, {:?}", shear.contact.load());
+        }
     }
     let worked = ranks.all_gather(&[worked]).into_iter().map(|time| time as f64 * 1e-9);
-    eprintln!("processor time of each rank: {:.3?} s", worked.collect::<Vec<_>>());
+    let worked: Vec<f64> = worked.collect();
+    if is_first {
+        eprintln!("processor time of each rank: {worked:.3?} s");
+    }
     let traffic = TrafficRecord::new(ranks, &traffic);
     let record = Record::new(options, ranks.size(), &report, (&shear, traffic));
     serde_json::to_string(&record).unwrap_or_else(|error| fail(&error.to_string()))
@@ -139,7 +134,7 @@ where
         Self { positions, radii, drift, side, contact: SharedContact::new(contact, ranks) }
     }
 
-    fn step(&mut self, number: usize, options: &Options) -> (ContactReport, u64) {
+    fn step(&mut self, number: usize, options: &Options) -> ContactReport {
         let tilt_step = self.side * options.dt;
         self.contact.set_sliding(number as f64 * tilt_step, tilt_step);
         let flow = |x: &Vector<D>| Vector::from_fn(|d, _| if d == 0 { x[1] } else { 0.0 });
@@ -147,19 +142,12 @@ where
             self.positions.iter().map(|x| Twist { velocity: flow(x), ..Twist::default() }).collect();
         let (positions, radii, drift) = (&self.positions, &self.radii, &self.drift);
         let step = StepGeometry { positions, radii, drift, velocity_weight: options.dt, dt: options.dt };
-        let (start, start_of_work) = (Instant::now(), processor_time());
         let report = self.contact.correct(&step, &mut twists);
-        let (seconds, worked) = (start.elapsed().as_secs_f64(), processor_time() - start_of_work);
         let report = report.unwrap_or_else(|error| fail(&error.to_string()));
-        eprintln!(
-            "step {number}: {seconds:.4} s, {} iterations, {:?}",
-            report.iterations,
-            self.contact.load()
-        );
         for (x, twist) in self.positions.iter_mut().zip(&twists) {
             *x += twist.velocity * options.dt;
         }
-        (report, worked)
+        report
     }
 }
 

@@ -35,17 +35,15 @@ mod cuts;
 mod flow;
 mod memory;
 mod moving;
-mod orders;
 mod surface;
 mod warm_start;
 
-pub use contact::{ContactFailure, ContactFollower, ContactLoad, SharedContact};
+pub use contact::{ContactLoad, SharedContact};
 pub use cuts::{cuts_of_work, equal_cuts, weighted_cuts};
 pub use flow::{BoxFlow, LocalFlow};
 pub use gluey_stokes::part::LevelSizes;
-pub use memory::Memory;
-pub use moving::{Follower, SharedHydrodynamics, SharedSuspension, SuspensionError};
-pub use orders::{FrameName, ask_for_fields, ask_to_keep};
+pub use memory::FlowMemory;
+pub use moving::{SharedHydrodynamics, SharedSuspension, SuspensionError};
 pub use surface::SurfaceBodies;
 pub use warm_start::{PieceError, SavedPiece};
 

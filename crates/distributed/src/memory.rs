@@ -1,6 +1,6 @@
 //! What a rank keeps of the flows of a suspension, from step to step and for checkpoints.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use gluey_geom::{Dim, Space};
@@ -11,31 +11,24 @@ use crate::warm_start::{KeptFlows, PieceError, SavedPiece};
 
 /// The flows that the next one starts from, as far as they are on this rank, and those that a checkpoint of
 /// the step before would have.
-pub struct Memory<const D: usize> {
+pub struct FlowMemory<const D: usize> {
     pub(crate) last: RefCell<Option<Arc<KeptFlows<D>>>>,
     remembered: RefCell<Option<Arc<KeptFlows<D>>>>,
-    /// Whether something that ranks share has begun and not ended.
-    pub(crate) is_sharing: Cell<bool>,
 }
 
-impl<const D: usize> Default for Memory<D> {
+impl<const D: usize> Default for FlowMemory<D> {
     fn default() -> Self {
-        Self { last: RefCell::default(), remembered: RefCell::default(), is_sharing: Cell::new(false) }
+        Self { last: RefCell::default(), remembered: RefCell::default() }
     }
 }
 
-impl<const D: usize> Memory<D>
+impl<const D: usize> FlowMemory<D>
 where
     Dim<D>: Space<D>,
 {
     /// Keeps what the next flow starts from for a checkpoint.
     pub(crate) fn remember(&self) {
         self.remembered.replace(self.last.borrow().clone());
-    }
-
-    /// Whether a flow or a step of contact was broken off: others wait for what this rank has to say of it.
-    pub fn is_broken(&self) -> bool {
-        self.is_sharing.get()
     }
 
     /// What a checkpoint is to have of this rank; nothing before the first flow. All ranks have something or

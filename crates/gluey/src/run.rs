@@ -14,26 +14,27 @@ mod log;
 mod options;
 mod overwrite_guard;
 #[cfg(feature = "ranks")]
-mod pieces;
-#[cfg(feature = "ranks")]
 mod ranks;
 mod record;
 mod recorder;
 mod removal;
 mod resumption;
+mod rows;
 mod runs_of_folder;
+mod sharing;
 mod stale_files;
 mod start;
 mod stress;
 mod tables;
 
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
 use gluey_geom::{Dim, Space};
+use gluey_parallel::Communicator;
 
 pub use error::RunError;
 pub use last_steps::{Ended, LastSteps};
@@ -47,24 +48,23 @@ pub(crate) use runs_of_folder::TABLE_OF_STUDY;
 pub use runs_of_folder::{FolderError, recorded_runs};
 
 use crate::case::{Case, Hydrodynamics};
-use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::checkpoint::{Checkpoint, CheckpointError, FlowPieces};
 use crate::hydrodynamics::{HydrodynamicsError, pair_mobility, stokes};
-use crate::measures::{self, RunMeasures};
 use crate::output::solver_log::SolverRow;
-use crate::output::{FileError, ResultClaim, ResultPaths};
+use crate::output::{FileError, ResultClaim};
 use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
 use crate::tally::Tally;
-use checkpoint_file::CheckpointFile;
 use contacts::Surrounded;
-use frames::{Frames, Others, StreamOptions};
+use frames::{Frames, StreamOptions};
 use last_step::LastStep;
 use last_steps::{OfRun, locked};
 use log::Log;
 use recorder::Recorder;
+use rows::RowFiles;
+use sharing::RunRanks;
 use start::simulation;
-use tables::{RunTables, earlier_drafts};
 
 /// Part of the radius that particles may stick out of the box: rounding errors of contact with a wall.
 const ROUNDING: f64 = 1e-10;
@@ -73,42 +73,42 @@ const ROUNDING: f64 = 1e-10;
 pub fn run(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
     case.check()?;
     crate::memory::check_within(case, options.memory_limit)?;
-    let _claims = claim_outputs(case, options, progress)?;
-    overwrite_guard::check_free(case, options)?;
-    stale_files::remove(case, options)?;
-    logged(case, options, progress, |log| match case.dimension {
-        2 => run_2d(case, options, log),
-        _ => run_3d(case, options, log),
-    })
+    let (_claims, log) = prepare(case, options, progress)?;
+    let outcome = match case.dimension {
+        2 => run_2d(case, options, &log),
+        _ => run_3d(case, options, &log),
+    };
+    log.end(&outcome);
+    Ok(outcome?.expect("a process without others writes the results"))
 }
 
-/// Does `work` with a log of it beside the results.
-fn logged(
+/// Takes possession of the results, and begins the log beside them.
+fn prepare<'a>(
     case: &Case,
     options: &RunOptions,
-    progress: &dyn Progress,
-    work: impl FnOnce(&Log<'_>) -> Result<RunReport, RunError>,
-) -> Result<RunReport, RunError> {
+    progress: &'a dyn Progress,
+) -> Result<(Vec<ResultClaim>, Log<'a>), RunError> {
+    let claims = claim_outputs(case, options, progress)?;
+    overwrite_guard::check_free(case, options)?;
+    stale_files::remove(case, options)?;
     let log = Log::begin(case, options, progress)?;
     if options.resume.is_none() {
         Notice::of_idle_keys(case).iter().for_each(|notice| log.notice(notice));
     }
-    let outcome = work(&log);
-    log.end(&outcome);
-    outcome
+    Ok((claims, log))
 }
 
-fn run_2d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
+fn run_2d(case: &Case, options: &RunOptions, log: &Log<'_>) -> Result<Option<RunReport>, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::Stokes => run_alone(case, options, progress, stokes::<2>(case)?),
+        Hydrodynamics::Stokes => run_alone(case, options, log, stokes::<2>(case)?),
         Hydrodynamics::PairMobility => Err(HydrodynamicsError::unfit(case).into()),
     }
 }
 
-fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<RunReport, RunError> {
+fn run_3d(case: &Case, options: &RunOptions, log: &Log<'_>) -> Result<Option<RunReport>, RunError> {
     match case.flow.hydrodynamics {
-        Hydrodynamics::PairMobility => run_alone(case, options, progress, pair_mobility(case)),
-        Hydrodynamics::Stokes => run_alone(case, options, progress, stokes::<3>(case)?),
+        Hydrodynamics::PairMobility => run_alone(case, options, log, pair_mobility(case)),
+        Hydrodynamics::Stokes => run_alone(case, options, log, stokes::<3>(case)?),
     }
 }
 
@@ -116,15 +116,16 @@ fn run_3d(case: &Case, options: &RunOptions, progress: &dyn Progress) -> Result<
 fn run_alone<const D: usize, H>(
     case: &Case,
     options: &RunOptions,
-    progress: &dyn Progress,
+    log: &Log<'_>,
     hydrodynamics: H,
-) -> Result<RunReport, RunError>
+) -> Result<Option<RunReport>, RunError>
 where
     Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    RunInProgress::start(case, options, progress, hydrodynamics, contacts::of_case(case), None)?.finish()
+    let contact = contacts::of_case(case);
+    RunInProgress::start(case, options, log, hydrodynamics, contact, &RunRanks::alone())?.finish()
 }
 
 /// Makes sure before the first step that files can be written, and that no other run writes them.
@@ -143,7 +144,7 @@ fn claim_outputs(
     Ok(claims)
 }
 
-/// A run in progress.
+/// A run in progress, on each of the ranks that share it.
 struct RunInProgress<'a, const D: usize, H, C>
 where
     Dim<D>: Space<D>,
@@ -152,13 +153,12 @@ where
     options: &'a RunOptions,
     progress: &'a dyn Progress,
     simulation: Simulation<D, H, C>,
-    measures: RunMeasures<D>,
     tally: Tally,
-    tables: RunTables,
-    frames: Frames<'a, D>,
+    /// On rank zero.
+    rows: Option<RowFiles<D>>,
+    frames: Frames<D>,
     last: Arc<Mutex<LastStep<D>>>,
-    /// The ranks that share the flow.
-    others: Option<&'a dyn Others>,
+    sharing: &'a RunRanks<'a>,
     started: Instant,
     saved: Instant,
     first_step: usize,
@@ -172,44 +172,46 @@ where
     C: Surrounded<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    /// At time 0, or at the checkpoint to resume; `others` share flow and contact.
+    /// At time 0, or at the checkpoint to resume.
     fn start(
         case: &'a Case,
         options: &'a RunOptions,
         progress: &'a dyn Progress,
         hydrodynamics: H,
         contact: C,
-        others: Option<&'a dyn Others>,
+        sharing: &'a RunRanks<'a>,
+    ) -> Result<Self, RunError> {
+        sharing.agreed(Self::start_here(case, options, progress, hydrodynamics, contact, sharing))
+    }
+
+    /// The same on this rank, which neither sends nor waits for messages.
+    fn start_here(
+        case: &'a Case,
+        options: &'a RunOptions,
+        progress: &'a dyn Progress,
+        hydrodynamics: H,
+        contact: C,
+        sharing: &'a RunRanks<'a>,
     ) -> Result<Self, RunError> {
         let mut simulation = simulation(case, hydrodynamics, contact);
-        let (mut measures, mut tally, mut wall_before_s) = (RunMeasures::new(case), Tally::default(), 0.0);
-        let drafts = earlier_drafts(case, &options.csv)?;
-        let file = CheckpointFile::new(options, !drafts.is_empty());
-        let tables = match &options.resume {
-            None => {
-                if !drafts.is_empty() {
-                    let has_checkpoint = options.checkpoint.as_ref().is_some_and(|file| file.exists());
-                    let folder =
-                        has_checkpoint.then(|| ResultPaths::of_csv(&options.csv).folder().to_owned());
-                    progress.notice(&Notice::EarlierDrafts { drafts, folder });
-                }
-                RunTables::create::<D>(case, &options.csv)?
-            }
-            Some(path) => {
-                let checkpoint = Checkpoint::read(case, path)?.on(others.map_or(0, Others::rank_count));
-                (wall_before_s, tally) = (checkpoint.wall_s, checkpoint.tally);
-                *simulation.phases_mut() = checkpoint.phases.clone();
-                let restored = simulation.restore(checkpoint.state.clone()).map_err(RestoreError::widen);
-                restored.map_err(|source| CheckpointError::Unfit { path: path.to_owned(), source })?;
-                let visit = |row: &measures::Instant<D>| measures.add(row);
-                RunTables::resume(&options.csv, &checkpoint, case.particles.len(), visit)?
-            }
-        };
+        let (mut tally, mut wall_before_s, mut checkpoint) = (Tally::default(), 0.0, None);
+        if let Some(path) = &options.resume {
+            let saved = Checkpoint::<D>::read(case, path)?.on(sharing.rank_count());
+            (wall_before_s, tally, *simulation.phases_mut()) =
+                (saved.wall_s, saved.tally, saved.phases.clone());
+            let restored = simulation.restore(saved.state.clone()).map_err(RestoreError::widen);
+            restored.map_err(|source| CheckpointError::Unfit { path: path.clone(), source })?;
+            checkpoint = Some(saved);
+        }
         let first_step = simulation.step_index();
-        let frames = Frames::create(case, options, first_step, others)?;
-        let recorder = Recorder::begin(case, options, first_step, tables.path())?;
-        let last = LastStep::before(case, options, file, recorder, frames.on_their_way(), first_step);
-        if let (Some(list), None) = (&options.last_steps, others) {
+        let opened = || RowFiles::open(case, options, progress, checkpoint.as_ref());
+        let (rows, file) = sharing.is_first().then(opened).transpose()?.unzip();
+        let frames = Frames::create(case, options, first_step, sharing)?;
+        let recorder = |rows: &RowFiles<D>| Recorder::begin(case, options, first_step, rows.tables.path());
+        let recorder = rows.as_ref().map(recorder).transpose()?.flatten();
+        let on_their_way = frames.on_their_way();
+        let last = LastStep::before(case, options, file.flatten(), recorder, on_their_way, first_step);
+        if let (Some(list), None) = (&options.last_steps, sharing.keep_flow) {
             list.add(&(last.clone() as Arc<dyn OfRun>));
         }
         Ok(Self {
@@ -217,12 +219,11 @@ where
             options,
             progress,
             simulation,
-            measures,
             tally,
-            tables,
+            rows,
             frames,
             last,
-            others,
+            sharing,
             started: Instant::now(),
             saved: Instant::now(),
             first_step,
@@ -230,22 +231,32 @@ where
         })
     }
 
-    /// Runs to the end.
-    fn finish(mut self) -> Result<RunReport, RunError> {
+    /// Runs to the end; rank zero has a report.
+    fn finish(mut self) -> Result<Option<RunReport>, RunError> {
         let outcome = self.steps_or_panic().map_err(|error| self.keep_last_good(error));
         if outcome.is_ok() {
             self.keep_for_a_later_end();
         }
         // Until the record says how it ended, the run is there.
         let _last = self.last.clone();
-        let (recorder, step) = {
-            let mut last = self.last();
-            last.is_ending = true;
-            (last.recorder.take(), last.step().unwrap_or(self.simulation.step_index()))
-        };
-        let Some(recorder) = recorder else { return outcome.and_then(|()| self.complete()) };
-        let progress = self.progress;
-        recorder.close(step, outcome.and_then(|()| self.complete()), progress)
+        let (recorder, step, progress) = (self.end_of_record(), self.steps_done(), self.progress);
+        let outcome = outcome.and_then(|()| self.complete());
+        match recorder {
+            Some(recorder) => recorder.close(step, outcome, progress),
+            None => outcome,
+        }
+    }
+
+    /// The record, which nobody else writes any more.
+    fn end_of_record(&self) -> Option<Recorder> {
+        let mut last = self.last();
+        last.is_ending = true;
+        last.recorder.take()
+    }
+
+    /// Steps done at the last whole step, where it is kept.
+    fn steps_done(&self) -> usize {
+        self.last().step().unwrap_or(self.simulation.step_index())
     }
 
     /// Leaves a checkpoint of the last step, from which the run can go on to a later end. That there is no
@@ -258,23 +269,32 @@ where
     }
 
     /// Gives all files their names.
-    fn complete(self) -> Result<RunReport, RunError> {
+    fn complete(self) -> Result<Option<RunReport>, RunError> {
         let wall_s = self.wall_s();
         self.frames.finish()?;
-        self.tables.finish()?;
+        let Some(RowFiles { tables, measures }) = self.rows else { return Ok(None) };
+        tables.finish()?;
         let rheology = tables::means_of_rheology(self.case, &self.options.csv)?;
         let (flow, phases) = (self.simulation.statistics(), self.simulation.phases());
-        let report = RunReport::of(self.case, &self.measures, flow, &self.tally, wall_s, phases);
-        Ok(RunReport { rheology, ..report })
+        let report = RunReport::of(self.case, &measures, flow, &self.tally, wall_s, phases);
+        Ok(Some(RunReport { rheology, ..report }))
     }
 
     /// All steps. A panic of this or any other thread ends them as an error does; what it left half done is
-    /// not used, for checkpoints are of the step before.
+    /// not used, for checkpoints are of the step before. Ranks that wait for this one end by its panic.
     fn steps_or_panic(&mut self) -> Result<(), RunError> {
         let outcome = catch_unwind(AssertUnwindSafe(|| self.all_steps()));
         outcome.unwrap_or_else(|payload| {
             let (step, time) = (self.simulation.step_index(), self.simulation.time());
-            Err(RunError::Panicked { step, time, message: panic_message(payload.as_ref()) })
+            let error = RunError::Panicked { step, time, message: panic_message(payload.as_ref()) };
+            if self.sharing.ranks.size() == 1 {
+                return Err(error);
+            }
+            if let Some(recorder) = self.end_of_record() {
+                // What is told of the run is the panic.
+                let _ = recorder.close(self.steps_done(), Err(error), self.progress);
+            }
+            resume_unwind(payload)
         })
     }
 
@@ -291,7 +311,7 @@ where
         self.observe()?;
         self.log_effort(self.simulation.step_index(), self.simulation.time())?;
         // A frame that could not be written is known now.
-        Ok(self.frames.flush()?)
+        Ok(self.sharing.agreed(self.frames.flush())?)
     }
 
     /// Computes the velocities here and now, and writes them down.
@@ -318,20 +338,16 @@ where
         let before = self.tally;
         self.tally.add(motion, &gaps.films, flow);
         Notice::of_first(&before, &self.tally, &row).iter().for_each(|notice| self.progress.notice(notice));
-        if motion.parts > 0 {
-            self.tables.write_effort(&row)?;
-        }
-        Ok(())
+        let rows = self.rows.as_mut().filter(|_| motion.parts > 0);
+        self.sharing.agreed(rows.map_or(Ok(()), |rows| Ok(rows.tables.write_effort(&row)?)))
     }
 
+    /// Rows first, and the pieces that ranks have of frames; then the frames, which name these.
     fn write(&mut self) -> Result<(), RunError> {
-        let simulation = &self.simulation;
-        let smallest_gap_over_a = self.tables.write(self.case, simulation)?;
-        let (time, particles) = (simulation.time(), simulation.particles());
-        let centers = particles.iter().map(|particle| particle.pose.position).collect();
-        self.measures.add(&measures::Instant { time, centers, smallest_gap_over_a });
-        self.frames.write(self.case, simulation)?;
-        Ok(())
+        let Self { case, simulation, sharing, frames, .. } = self;
+        let rows = self.rows.as_mut().map_or(Ok(()), |rows| rows.write(case, simulation));
+        sharing.agreed(rows.and_then(|()| Ok(frames.write_pieces(case, simulation)?)))?;
+        sharing.agreed(frames.write(case, simulation))
     }
 
     /// Moves the particles, and turns the shear round when it is time.
@@ -371,8 +387,11 @@ where
         let interrupted =
             self.options.interrupt.as_ref().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed));
         let minutes = self.saved.elapsed().as_secs_f64() / 60.0;
-        let due = self.options.checkpoint_every.is_some_and(|every| step.is_multiple_of(every.max(1)))
-            || self.options.checkpoint_minutes.is_some_and(|most| minutes >= most);
+        let late = self.options.checkpoint_minutes.is_some_and(|most| minutes >= most);
+        // One rank that is asked, or late, is enough.
+        let [interrupted, late] = self.sharing.any([interrupted, late]);
+        let due =
+            self.options.checkpoint_every.is_some_and(|every| step.is_multiple_of(every.max(1))) || late;
         if interrupted || due {
             self.save()?;
             self.saved = Instant::now();
@@ -392,13 +411,15 @@ where
         if self.options.checkpoint.is_none() {
             return Ok(());
         }
+        let state = self.simulation.state().map_err(|error| RunError::Store(error.into()))?;
+        let Some(rows) = &self.rows else { return Ok(()) };
         let checkpoint = Checkpoint {
-            state: self.simulation.state().map_err(|error| RunError::Store(error.into()))?,
-            tables: self.tables.marks(),
+            state,
+            tables: rows.tables.marks(),
             tally: self.tally,
             phases: self.simulation.phases().clone(),
             wall_s: self.wall_s(),
-            ranks: self.others.map_or(0, Others::rank_count),
+            ranks: self.sharing.rank_count(),
             pieces: None,
         };
         self.last().checkpoint = Some(checkpoint);
@@ -411,10 +432,26 @@ where
 
     /// Writes what was remembered, after what it counts on.
     fn save(&mut self) -> Result<(), FileError> {
-        self.frames.flush()?;
-        let notices = self.last().save(self.others)?;
-        notices.iter().for_each(|notice| self.progress.notice(notice));
+        let due = self.frames.flush().and_then(|()| self.last().is_due());
+        // Ranks agree on nothing where there is nothing to write.
+        if self.sharing.of_first(u64::from(!matches!(due, Ok(false)))) == 0 {
+            return Ok(());
+        }
+        self.sharing.agreed(due)?;
+        let pieces = self.keep_flow()?;
+        let saved = self.last().save(pieces);
+        self.sharing.agreed(saved)?.iter().for_each(|notice| self.progress.notice(notice));
         Ok(())
+    }
+
+    /// Has each rank that shares the flow write what its next one starts from. All is on disk then.
+    fn keep_flow(&self) -> Result<Option<FlowPieces>, FileError> {
+        let (Some(keep), Some(path)) = (self.sharing.keep_flow, &self.options.checkpoint) else {
+            return Ok(None);
+        };
+        let name = self.last().name();
+        let name = self.sharing.of_first(self.sharing.agreed(name)?);
+        self.sharing.agreed(keep(path, name))
     }
 
     /// After an error that the case or the machine can be cured of, leaves a checkpoint of the last good
@@ -424,8 +461,9 @@ where
             error,
             RunError::Step(_) | RunError::LeftBox { .. } | RunError::Output(_) | RunError::Panicked { .. }
         );
-        let step = self.last().step().unwrap_or(0);
-        let Some(path) = self.options.checkpoint.clone().filter(|_| is_curable && step > 0) else {
+        let step = self.last().step().filter(|_| is_curable).unwrap_or(0);
+        let step = self.sharing.of_first(step as u64) as usize;
+        let Some(path) = self.options.checkpoint.clone().filter(|_| step > 0) else {
             return error;
         };
         match self.save() {

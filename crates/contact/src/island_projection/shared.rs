@@ -91,26 +91,15 @@ impl<const D: usize> Response<NormalRow<D>> for SharedMobility<'_, D> {
         Some(with_rows(Factor::new(0), rows, self.weights, |slot| self.numbers[slot as usize] as usize))
     }
 
-    fn is_shared(&self) -> bool {
-        true
+    fn place(&self) -> Option<usize> {
+        Some(self.partners.rank())
     }
 
-    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
-        self.partners.gather(words)
-    }
-
-    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
-        self.partners.scatter(words)
+    fn gather(&self, numbers: &[f64]) -> Vec<Vec<f64>> {
+        self.partners.gather(numbers)
     }
 
     fn complete(&self, sums: &mut [f64], largest: &mut [f64]) {
         self.partners.complete(sums, largest);
     }
-
-    fn first(&self) -> usize {
-        self.partners.rank() << ROWS_OF_A_RANK
-    }
 }
-
-/// Logarithm of a number of rows that ranks hardly have.
-const ROWS_OF_A_RANK: usize = 20;

@@ -1,7 +1,6 @@
 //! The contact step: find pairs, project, re-linearise, remember.
 
 mod admission;
-mod coordinator;
 mod part;
 mod velocity_correction;
 
@@ -40,7 +39,7 @@ pub struct PairContact<const D: usize, M = StokesDrag> {
 
 /// The motion of the centres in a step of bodies.
 #[derive(Debug, Default)]
-struct Centers<const D: usize> {
+pub struct Centers<const D: usize> {
     positions: Vec<Vector<D>>,
     drift: Vec<Vector<D>>,
 }
@@ -50,7 +49,7 @@ where
     Dim<D>: Space<D>,
 {
     /// The step without its rotations.
-    fn of<'a>(&'a mut self, step: &BodyStep<'a, D>) -> StepGeometry<'a, D> {
+    pub fn of<'a>(&'a mut self, step: &BodyStep<'a, D>) -> StepGeometry<'a, D> {
         self.positions.clear();
         self.positions.extend(step.poses.iter().map(|pose| pose.position));
         self.drift.clear();

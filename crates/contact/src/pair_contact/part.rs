@@ -1,34 +1,49 @@
 //! The contact step of one of several ranks, on its own particles and copies of others.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Space, Twist, Vector};
 
-use super::{Buffers, PairContact, PairMemory, Participation};
+use super::{Buffers, PairContact, PairMemory, Participation, free_moves};
 use crate::island_projection::{IslandWorkspace, SharedContext};
 use crate::islands::{Grouping, Islands, SortedParticles};
 use crate::memory::GammaRule;
+use crate::model::validate;
 use crate::neighbours::{Ownership, PartSearch};
-use crate::part::{PartFailure, PartFrame, PartMemory, PartOutcome, Partners, RankShare};
+use crate::part::partition::{Partitioner, SearchedMoves};
+use crate::part::{PartFailure, PartOutcome, Partners, RankOf, RankShare};
 use crate::projection::Failure;
 use crate::rows::{GROUND, Row};
 use crate::solver::ELSEWHERE;
-use crate::{
-    Contact, ContactError, ContactParams, ContactReport, Mobility, PairKey, PairState, Partner, StepGeometry,
-};
+use crate::{Contact, ContactError, ContactParams, ContactReport, Mobility, PairKey, StepGeometry};
 
-/// Mobilities as they are told.
+/// Mobilities of the particles of a rank.
 #[derive(Clone, Debug, Default)]
-struct ReplicatedMobility(Vec<f64>);
+struct PartMobility(Vec<f64>);
 
-impl<const D: usize> Mobility<D> for ReplicatedMobility {
+impl<const D: usize> Mobility<D> for PartMobility {
     fn own(&self, particle: usize, _radius: f64) -> f64 {
         self.0[particle]
     }
 }
 
-/// Contact of the particles of one rank: see [`crate::part`].
+/// Contact of particles that ranks share, all of which call the same methods: see [`crate::part`].
+///
+/// A step begins with [`PartContact::begin`]. [`PartContact::share`] and [`PartContact::solve`] follow, and
+/// again after [`PartContact::widen`] while the search of some rank had not gone far enough; then
+/// [`PartContact::finish`] takes over what came of it. Contacts and memory change there only.
 #[derive(Debug)]
-pub struct PartContact<const D: usize> {
-    contact: PairContact<D, ReplicatedMobility>,
+pub struct PartContact<const D: usize, M> {
+    /// The model of one process, which has the memory of all contacts.
+    alone: PairContact<D, M>,
+    partitioner: Partitioner<D>,
+    /// Displacements without contact, of all particles.
+    free: Vec<Vector<D>>,
+    searched: SearchedMoves<D>,
+    /// Displacements along a wall's normal up to which walls are candidates, beyond the free ones.
+    wall_slack: f64,
+    /// Residual to reach.
+    tolerance: f64,
+    /// Of this rank.
+    contact: PairContact<D, PartMobility>,
     particles: Particles<D>,
     /// Rows in islands that reach across ranks.
     shared: Islands<D>,
@@ -51,10 +66,20 @@ struct Particles<const D: usize> {
     ownership: Ownership,
 }
 
-impl<const D: usize> Default for PartContact<D> {
-    fn default() -> Self {
+impl<const D: usize, M: Mobility<D>> PartContact<D, M>
+where
+    Dim<D>: Space<D>,
+{
+    /// What `alone` does in one process.
+    pub fn new(alone: PairContact<D, M>) -> Self {
         Self {
-            contact: PairContact::with_mobility(ContactParams::default(), ReplicatedMobility::default()),
+            alone,
+            partitioner: Partitioner::default(),
+            free: Vec::new(),
+            searched: SearchedMoves::default(),
+            wall_slack: 0.0,
+            tolerance: 0.0,
+            contact: PairContact::with_mobility(ContactParams::default(), PartMobility::default()),
             particles: Particles::default(),
             shared: Islands::default(),
             workspace: IslandWorkspace::default(),
@@ -64,41 +89,59 @@ impl<const D: usize> Default for PartContact<D> {
             has_fresh: false,
         }
     }
-}
 
-impl<const D: usize> PartContact<D>
-where
-    Dim<D>: Space<D>,
-{
-    /// Solves for the contacts of a step. All ranks call this with the same frame.
+    /// The model of one process.
+    pub fn alone(&self) -> &PairContact<D, M> {
+        &self.alone
+    }
+
+    /// The same, to change it between steps.
+    pub fn alone_mut(&mut self) -> &mut PairContact<D, M> {
+        &mut self.alone
+    }
+
+    /// Checks a step and what is remembered before it.
     ///
     /// # Errors
-    /// [`PartFailure`], on all ranks.
-    pub fn correct(
-        &mut self,
-        frame: &PartFrame<D>,
-        shares: &RankShare<D>,
-        partners: &dyn Partners<D>,
-    ) -> Result<PartOutcome, PartFailure> {
-        let mut buffers = std::mem::take(&mut self.contact.buffers);
-        let outcome = self.step(frame, shares, partners, &mut buffers);
-        self.contact.buffers = buffers;
-        outcome
+    /// Those of [`PairContact::correct`] that show before anything is solved, on all ranks.
+    pub fn begin(&mut self, step: &StepGeometry<'_, D>, twists: &[Twist<D>]) -> Result<(), ContactError> {
+        let Self { alone, free, searched, .. } = self;
+        validate(step, twists, &alone.domain)?;
+        alone.check_memory(step)?;
+        free.clear();
+        free.extend(free_moves(step, twists));
+        searched.displacements.clone_from(free);
+        (searched.widening, self.wall_slack) = (1.0, 0.0);
+        self.tolerance = alone.tolerance(step, free);
+        self.contact.params = alone.params.clone();
+        self.contact.domain = alone.domain.clone();
+        Ok(())
     }
 
-    /// The contacts of this rank's pairs after the last step, sorted.
-    pub fn contacts(&self) -> &[Contact] {
-        &self.contact.record.contacts
+    /// The share of a rank.
+    ///
+    /// # Errors
+    /// [`ContactError::TooFast`], on all ranks.
+    pub fn share(&mut self, step: &StepGeometry<'_, D>, rank: RankOf) -> Result<RankShare, ContactError> {
+        let Self { alone, searched, .. } = self;
+        self.partitioner.partition(step, &alone.domain, searched, &alone.record.state.pairs, rank)
     }
 
-    /// Changes of the velocities in the last step, one for each particle that was sent here.
-    pub fn changes(&self) -> &[Vector<D>] {
-        &self.contact.buffers.changes
+    /// Has the next search find what the displacements of all particles, by index, close.
+    pub fn widen(&mut self, displacements: impl IntoIterator<Item = (u32, Vector<D>)>) {
+        self.searched.widening *= 2.0;
+        for (index, displacement) in displacements {
+            self.searched.displacements[index as usize] = displacement;
+        }
+        for wall in &self.alone.domain.walls {
+            let along = self.searched.displacements.iter().map(|s| wall.normal.dot(s).abs());
+            self.wall_slack = along.fold(self.wall_slack, f64::max);
+        }
     }
 
-    /// Displacements in the last step, one for each particle that was sent here.
-    pub fn displacements(&self) -> &[Vector<D>] {
-        &self.contact.buffers.displacements
+    /// Takes over the contacts of all ranks, and the memory they leave.
+    pub fn finish(&mut self, contacts: Vec<Contact>) {
+        self.alone.record.replace(|list| *list = contacts);
     }
 
     /// Pairs and walls that the last search found for this rank, and what is remembered besides.
@@ -107,94 +150,78 @@ where
         neighbours.candidates.iter().map(|candidate| neighbours.key(candidate))
     }
 
-    fn step(
+    /// Solves for the contacts of a step.
+    ///
+    /// # Errors
+    /// [`PartFailure`], on all ranks.
+    pub fn solve(
         &mut self,
-        frame: &PartFrame<D>,
-        shares: &RankShare<D>,
+        step: &StepGeometry<'_, D>,
+        share: &RankShare,
         partners: &dyn Partners<D>,
-        buffers: &mut Buffers<D>,
-    ) -> Result<PartOutcome, PartFailure> {
-        self.load(frame, shares);
+    ) -> Result<PartOutcome<D>, PartFailure> {
+        let mut buffers = std::mem::take(&mut self.contact.buffers);
         let mut particles = std::mem::take(&mut self.particles);
+        self.load(step, share, &mut particles);
         let mut ownership = std::mem::take(&mut particles.ownership);
-        let step = StepGeometry {
+        let part = StepGeometry {
             positions: &particles.positions,
             radii: &particles.radii,
             drift: &[],
-            velocity_weight: frame.velocity_weight,
-            dt: frame.dt,
+            velocity_weight: step.velocity_weight,
+            dt: step.dt,
         };
-        let part = PartSearch {
+        let search = PartSearch {
             ownership: &mut ownership,
             free: &particles.free,
             reach: &particles.reach,
-            wall_slack: frame.wall_slack,
+            wall_slack: self.wall_slack,
         };
-        self.contact.neighbours.search_part(&step, &frame.domain, part);
-        let outcome = self.solve(frame, &step, partners, buffers);
+        self.contact.neighbours.search_part(&part, &self.alone.domain, search);
+        let outcome = self.solve_part(&part, share, partners, &mut buffers);
         self.particles = Particles { ownership, ..particles };
+        self.contact.buffers = buffers;
         outcome
     }
 
-    /// Takes over particles and memory, and searches.
-    fn load(&mut self, frame: &PartFrame<D>, shares: &RankShare<D>) {
-        let Self { contact, particles, .. } = self;
-        contact.params = frame.params.clone();
-        contact.domain = frame.domain.clone();
-        let of = &shares.particles;
-        let own = |list: &mut Vec<f64>, value: fn(&crate::part::PartParticle<D>) -> f64| {
-            list.clear();
-            list.extend(of.iter().map(value));
-        };
-        own(&mut particles.radii, |particle| particle.radius);
-        own(&mut particles.reach, |particle| particle.reach);
-        own(&mut contact.mobility.0, |particle| particle.mobility);
-        particles.positions.clear();
-        particles.positions.extend(of.iter().map(|particle| particle.position));
-        particles.free.clear();
-        particles.free.extend(of.iter().map(|particle| particle.free));
-        let Ownership { names, is_own } = &mut particles.ownership;
-        names.clear();
-        names.extend(of.iter().map(|particle| particle.index));
-        is_own.clear();
-        is_own.extend(of.iter().map(|particle| particle.owner == shares.rank));
-        contact.record.contacts.clear();
-        contact.record.state.pairs.clear();
-        let place =
-            |order: u32| of.binary_search_by_key(&order, |particle| particle.order).unwrap_or(0) as u32;
-        let state = |memory: &PartMemory| {
-            let first = place(memory.pair.first) as usize;
-            let pair = match memory.pair.second {
-                Partner::Wall(wall) => PairKey::wall(first, wall as usize),
-                Partner::Particle { index, image } => PairKey::across(first, place(index) as usize, image),
-            };
-            PairState { pair, gamma: memory.gamma, lambda: memory.lambda }
-        };
-        contact.record.state.pairs.extend(shares.memory.iter().map(state));
+    /// Takes over particles and memory.
+    fn load(&mut self, step: &StepGeometry<'_, D>, share: &RankShare, particles: &mut Particles<D>) {
+        let of = || share.particles.iter().map(|particle| particle.index as usize);
+        let Particles { positions, free, radii, reach, ownership: Ownership { names, is_own } } = particles;
+        replace(positions, of().map(|index| step.positions[index]));
+        replace(free, of().map(|index| self.free[index]));
+        replace(radii, of().map(|index| step.radii[index]));
+        replace(reach, share.particles.iter().map(|particle| particle.reach));
+        replace(names, share.particles.iter().map(|particle| particle.index));
+        replace(is_own, share.particles.iter().map(|particle| particle.owner == share.rank));
+        let mobility = &self.alone.mobility;
+        replace(&mut self.contact.mobility.0, of().map(|index| mobility.own(index, step.radii[index])));
+        self.contact.record.contacts.clear();
+        replace(&mut self.contact.record.state.pairs, share.memory.iter().copied());
     }
 
-    fn solve(
+    fn solve_part(
         &mut self,
-        frame: &PartFrame<D>,
         step: &StepGeometry<'_, D>,
+        share: &RankShare,
         partners: &dyn Partners<D>,
         buffers: &mut Buffers<D>,
-    ) -> Result<PartOutcome, PartFailure> {
+    ) -> Result<PartOutcome<D>, PartFailure> {
         let begun = self.contact.begin(step, buffers);
         agree(partners, begun)?;
         let mut report = ContactReport::default();
         let is_complete = loop {
-            let solved = self.solve_own(frame, step, (partners, &mut *buffers), &mut report);
+            let solved = self.solve_own(step, partners, buffers, &mut report);
             agree(partners, solved)?;
-            self.solve_shared(frame, partners, buffers, &mut report)?;
-            self.publish(frame, partners, buffers);
+            self.solve_shared(step, partners, buffers, &mut report)?;
+            self.publish(step.velocity_weight, partners, buffers);
             for part in buffers.takes_part.iter_mut().filter(|part| **part == Participation::Fresh) {
                 *part = Participation::Yes;
             }
-            let neighbours = &self.contact.neighbours;
+            let (neighbours, domain) = (&self.contact.neighbours, &self.contact.domain);
             let complete = |sums: &mut [f64]| partners.complete(sums, &mut []);
             let is_sufficient =
-                neighbours.is_sufficient_here(&frame.domain, frame.dt, &buffers.displacements, complete);
+                neighbours.is_sufficient_here(domain, step.dt, &buffers.displacements, complete);
             let admits = self.contact.admit(step, buffers);
             let mut any = [!is_sufficient, admits].map(|any| f64::from(u8::from(any)));
             partners.complete(&mut [], &mut any);
@@ -202,22 +229,28 @@ where
                 break any[0] == 0.0;
             }
         };
-        let shared_row_count = self.shared_rows.len();
         if !is_complete {
-            return Ok(PartOutcome { is_complete, report, shared_row_count });
+            let moves = share.own().map(|(place, index)| (index, buffers.displacements[place]));
+            return Ok(PartOutcome::Incomplete(moves.collect()));
         }
-        agree(partners, self.contact.check_given_motions(step, frame.tolerance, buffers))?;
+        agree(partners, self.contact.check_given_motions(step, self.tolerance, buffers))?;
         let report = self.contact.summary(report, buffers);
-        self.contact.remember(step, frame.tolerance, buffers);
-        Ok(PartOutcome { is_complete, report, shared_row_count })
+        self.contact.remember(step, self.tolerance, buffers);
+        let changes = share.own().map(|(place, index)| (index, buffers.changes[place]));
+        Ok(PartOutcome::Complete {
+            report,
+            shared_row_count: self.shared_rows.len(),
+            changes: changes.filter(|(_, change)| change.amax() > 0.0).collect(),
+            contacts: self.contact.record.contacts.clone(),
+        })
     }
 
     /// Lists the rows, sets those in islands that reach across ranks apart, and solves the other islands.
     fn solve_own(
         &mut self,
-        frame: &PartFrame<D>,
         step: &StepGeometry<'_, D>,
-        (partners, buffers): (&dyn Partners<D>, &mut Buffers<D>),
+        partners: &dyn Partners<D>,
+        buffers: &mut Buffers<D>,
         report: &mut ContactReport,
     ) -> Result<(), ContactError> {
         let listed = self.contact.list_rows(step, buffers);
@@ -226,7 +259,7 @@ where
         }
         self.find_shared(partners, buffers);
         listed?;
-        let tuning = self.contact.tuning(frame.tolerance);
+        let tuning = self.contact.tuning(self.tolerance);
         self.contact.part_islands(step, &tuning, buffers);
         self.set_apart();
         self.contact.solve_parted(step, tuning, buffers, report)
@@ -270,7 +303,7 @@ where
     /// Solves for the islands that reach across ranks, if some of their contacts are new.
     fn solve_shared(
         &mut self,
-        frame: &PartFrame<D>,
+        step: &StepGeometry<'_, D>,
         partners: &dyn Partners<D>,
         buffers: &mut Buffers<D>,
         report: &mut ContactReport,
@@ -280,8 +313,8 @@ where
         if any[0] == 0.0 {
             return Ok(());
         }
-        let tuning = self.contact.tuning(frame.tolerance);
-        self.gather_shared(frame, buffers);
+        let tuning = self.contact.tuning(self.tolerance);
+        self.gather_shared(step, buffers);
         let place = |place: u32| Some(place).filter(|&place| self.is_shared(place));
         let places: Vec<_> = self.shared.slots.iter().skip(1).map(|slot| place(slot.place)).collect();
         partners.select(Some(&places));
@@ -291,7 +324,7 @@ where
         let context = SharedContext {
             params: &contact.params,
             tuning,
-            velocity_weight: frame.velocity_weight,
+            velocity_weight: step.velocity_weight,
             partners,
             numbers: &numbers,
         };
@@ -299,7 +332,7 @@ where
         partners.select(None);
         match outcome {
             Ok(effort) => report.count_effort(&effort),
-            Err(failure) => return Err(self.explain_shared(&failure, frame.tolerance)),
+            Err(failure) => return Err(self.explain_shared(&failure, self.tolerance)),
         }
         for (row, &force) in self.shared.rows.iter().zip(&self.workspace.forces) {
             buffers.forces[row.candidate as usize] = force;
@@ -312,8 +345,8 @@ where
 
     /// Makes one island of the rows that are set apart, with the particles of this rank on which only others
     /// have rows.
-    fn gather_shared(&mut self, frame: &PartFrame<D>, buffers: &Buffers<D>) {
-        let rule = GammaRule::new(&frame.params, frame.velocity_weight, frame.dt);
+    fn gather_shared(&mut self, step: &StepGeometry<'_, D>, buffers: &Buffers<D>) {
+        let rule = GammaRule::new(&self.contact.params, step.velocity_weight, step.dt);
         let neighbours = &self.contact.neighbours;
         let is_relayed = |&place: &u32| {
             let at = place as usize;
@@ -326,7 +359,7 @@ where
             weights: &buffers.weights,
         };
         self.shared.part(&self.shared_rows, &places, Grouping::Whole(&relayed), |_| true);
-        let scratch_count = frame.params.solver.method().scratch_count();
+        let scratch_count = self.contact.params.solver.method().scratch_count();
         self.workspace.prepare(&self.shared, scratch_count, |row| {
             let PairMemory { gamma, lambda } = buffers.memory[row.candidate as usize];
             (buffers.forces[row.candidate as usize], rule.floor(gamma, lambda))
@@ -334,7 +367,7 @@ where
     }
 
     /// Brings the changes of velocities, each from the rank that found it, to all that hold the particle.
-    fn publish(&mut self, frame: &PartFrame<D>, partners: &dyn Partners<D>, buffers: &mut Buffers<D>) {
+    fn publish(&mut self, velocity_weight: f64, partners: &dyn Partners<D>, buffers: &mut Buffers<D>) {
         let neighbours = &self.contact.neighbours;
         for place in 0..neighbours.count() {
             let is_shared = self.is_shared(place as u32);
@@ -350,7 +383,7 @@ where
         partners.update(&mut buffers.changes);
         let moves = neighbours.free.iter().zip(&buffers.changes);
         for (displacement, (free, change)) in buffers.displacements.iter_mut().zip(moves) {
-            *displacement = free + change * frame.velocity_weight;
+            *displacement = free + change * velocity_weight;
         }
     }
 
@@ -372,6 +405,12 @@ where
             |row: usize| neighbours.key(&neighbours.candidates[self.shared.rows[row].candidate as usize]);
         PartFailure::Here(ContactError::of_projection(failure, tolerance, key, key))
     }
+}
+
+/// Replaces a list by another one.
+fn replace<T>(list: &mut Vec<T>, by: impl Iterator<Item = T>) {
+    list.clear();
+    list.extend(by);
 }
 
 /// The failure of one rank is one of all.

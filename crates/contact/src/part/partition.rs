@@ -1,9 +1,9 @@
 //! The partition of particles among ranks by space: along a Morton curve through the cells of a grid, cut
-//! into equal numbers.
+//! into equal numbers. All ranks find it for themselves.
 
 use gluey_geom::Vector;
 
-use super::{PartMemory, PartParticle, RankShare};
+use super::{PartParticle, RankShare};
 use crate::grid::{Grid, sort_by_key};
 use crate::neighbours::{Moves, SpatialOrder, for_each_image, wrap};
 use crate::{ContactError, Domain, PairKey, PairState, Partner, StepGeometry};
@@ -11,21 +11,25 @@ use crate::{ContactError, Domain, PairKey, PairState, Partner, StepGeometry};
 /// Cells for every particle at most.
 const CELLS_PER_PARTICLE: usize = 2;
 
-/// What particles do in a step.
-pub(crate) struct Motion<'a, const D: usize> {
-    /// Displacements without contact, by particle.
-    pub free: &'a [Vector<D>],
-    /// Displacements to search for, by particle.
-    pub needed: &'a [Vector<D>],
+/// Displacements that a search is to find the pairs of.
+#[derive(Debug, Default)]
+pub(crate) struct SearchedMoves<const D: usize> {
+    /// By particle.
+    pub displacements: Vec<Vector<D>>,
     /// Factor of what these have besides their affine part.
     pub widening: f64,
-    /// Velocity that a unit force gives each particle.
-    pub mobilities: &'a [f64],
-    /// What pairs remember.
-    pub memory: &'a [PairState],
 }
 
-/// Deals particles to ranks.
+/// One rank among those that share a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RankOf {
+    /// Its number, from zero.
+    pub rank: usize,
+    /// How many there are.
+    pub size: usize,
+}
+
+/// The partition of particles, kept from step to step for its vectors.
 #[derive(Debug, Default)]
 pub(crate) struct Partitioner<const D: usize> {
     spatial: SpatialOrder,
@@ -52,95 +56,73 @@ struct Cells {
     members: Vec<u32>,
     /// First and last rank of each cell; none in cells without particles.
     ranks: Vec<[u32; 2]>,
-    /// Ranks of each cell with particles and its neighbours: where they begin, and all.
-    near_starts: Vec<u32>,
-    near: Vec<u32>,
+    /// Whether the rank has particles in a cell or its neighbours.
+    is_near: Vec<bool>,
 }
 
 /// Ranks of a cell without particles.
 const NOBODY: [u32; 2] = [1, 0];
 
 impl Cells {
-    /// Adds the ranks of the cells around a point.
-    fn add_ranks<const D: usize>(&self, grid: &Grid<D>, x: &Vector<D>, ranks: &mut Vec<u32>) {
-        grid.for_each_row(x, |row| {
-            for &[first, last] in &self.ranks[row] {
-                // Neighbours mostly are of one rank.
-                let is_known = ranks.last() == Some(&last) && first == last;
-                if !is_known {
-                    ranks.extend(first..=last);
-                }
-            }
-        });
+    /// Whether a rank has particles in a cell.
+    fn has(&self, cell: usize, rank: u32) -> bool {
+        let [first, last] = self.ranks[cell];
+        (first..=last).contains(&rank)
     }
 
-    /// Finds the ranks of each cell and its neighbours; `point` is that of a place.
-    fn find_near<'a, const D: usize>(&mut self, grid: &Grid<D>, point: impl Fn(u32) -> &'a Vector<D>) {
-        // Around most cells all is of one rank.
-        let mut range = self.ranks.clone();
-        grid.join_neighbours(&mut range, |[a, b], [c, d]| match (b < a, d < c) {
-            (true, _) => [c, d],
-            (_, true) => [a, b],
-            _ => [a.min(c), b.max(d)],
-        });
-        let mut ranks = Vec::new();
-        self.near.clear();
-        self.near_starts.clear();
-        self.near_starts.push(0);
-        for cell in 0..grid.cell_count() {
-            ranks.clear();
-            let [first, end] = [self.starts[cell], self.starts[cell + 1]];
-            if first < end && range[cell][0] == range[cell][1] {
-                ranks.push(range[cell][0]);
-            } else if first < end {
-                self.add_ranks(grid, point(self.members[first as usize]), &mut ranks);
-            }
-            ranks.sort_unstable();
-            ranks.dedup();
-            self.near.extend_from_slice(&ranks);
-            self.near_starts.push(self.near.len() as u32);
+    /// Finds the cells near those of a rank; `point` is that of a place.
+    fn find_near<'a, const D: usize>(
+        &mut self,
+        grid: &Grid<D>,
+        rank: u32,
+        point: impl Fn(u32) -> &'a Vector<D>,
+    ) {
+        let mut is_near = std::mem::take(&mut self.is_near);
+        is_near.clear();
+        is_near.resize(grid.cell_count(), false);
+        for cell in (0..grid.cell_count()).filter(|&cell| self.has(cell, rank)) {
+            let first = self.members[self.starts[cell] as usize];
+            grid.for_each_row(point(first), |row| is_near[row].fill(true));
         }
-    }
-
-    /// The ranks of a cell and its neighbours, sorted.
-    fn near(&self, cell: usize) -> &[u32] {
-        &self.near[self.near_starts[cell] as usize..self.near_starts[cell + 1] as usize]
+        self.is_near = is_near;
     }
 }
 
 impl<const D: usize> Partitioner<D> {
-    /// What each of so many ranks gets.
+    /// What a rank gets of a step, and of what pairs remember.
     pub(crate) fn partition(
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,
-        motion: &Motion<'_, D>,
-        rank_count: usize,
-    ) -> Result<Vec<RankShare<D>>, ContactError> {
-        self.order(step, domain, motion)?;
+        moves: &SearchedMoves<D>,
+        memory: &[PairState],
+        RankOf { rank, size }: RankOf,
+    ) -> Result<RankShare, ContactError> {
+        self.order(step, domain, moves)?;
         let widest = self.reach.iter().copied().fold(0.0, f64::max);
         let grid = Grid::over(&self.wrapped, 2.0 * widest, CELLS_PER_PARTICLE * self.wrapped.len());
-        self.own(&grid, rank_count);
-        let mut holders: Vec<Vec<u32>> = vec![Vec::new(); rank_count];
-        self.hold(&grid, domain, 2.0 * widest, &mut holders);
-        let ranks = 0..rank_count as u32;
-        let mut shares: Vec<RankShare<D>> =
-            ranks.map(|rank| RankShare { rank, ..RankShare::default() }).collect();
-        let mut partners: Vec<Vec<u32>> = vec![Vec::new(); rank_count];
-        for state in motion.memory {
-            let (owner, memory, second) = self.remembered(state);
-            shares[owner].memory.push(memory);
-            partners[owner].extend(second.filter(|place| holders[owner].binary_search(place).is_err()));
-        }
-        for ((places, shares), partners) in holders.iter_mut().zip(&mut shares).zip(&partners) {
-            if !partners.is_empty() {
-                places.extend(partners);
-                places.sort_unstable();
-                places.dedup();
-            }
-            shares.particles.extend(places.iter().map(|&place| self.particle(place, step, motion)));
-        }
-        Ok(shares)
+        self.own(&grid, size);
+        let rank = rank as u32;
+        let mut held = self.held(&grid, domain, 2.0 * widest, rank);
+        let place = |particle: u32| self.places[particle as usize];
+        let owner = |state: &&PairState| self.owners[place(state.pair.first) as usize];
+        let own: Vec<&PairState> = memory.iter().filter(|state| owner(state) == rank).collect();
+        let partner = |state: &&PairState| state.pair.particles().1.map(|second| place(second as u32));
+        held.extend(own.iter().filter_map(partner));
+        held.sort_unstable();
+        held.dedup();
+        let here = |particle: u32| held.binary_search(&place(particle)).unwrap_or(0);
+        let renamed = |state: &PairState| {
+            let first = here(state.pair.first);
+            let pair = match state.pair.second {
+                Partner::Wall(wall) => PairKey::wall(first, wall as usize),
+                Partner::Particle { index, image } => PairKey::across(first, here(index), image),
+            };
+            PairState { pair, ..*state }
+        };
+        let memory = own.into_iter().map(renamed).collect();
+        let particles = held.iter().map(|&place| self.particle(place)).collect();
+        Ok(RankShare { rank, particles, memory })
     }
 
     /// Orders particles by space, and finds how far to search around each.
@@ -148,7 +130,7 @@ impl<const D: usize> Partitioner<D> {
         &mut self,
         step: &StepGeometry<'_, D>,
         domain: &Domain<D>,
-        motion: &Motion<'_, D>,
+        searched: &SearchedMoves<D>,
     ) -> Result<(), ContactError> {
         wrap(step.positions, domain, &mut self.wrapped, &mut self.windings);
         self.spatial.sort(&self.wrapped, &mut self.order);
@@ -158,14 +140,14 @@ impl<const D: usize> Partitioner<D> {
         for (place, &particle) in self.order.iter().enumerate() {
             self.places[particle as usize] = place as u32;
             self.positions.push(step.positions[particle as usize]);
-            self.moves.push(motion.needed[particle as usize]);
+            self.moves.push(searched.displacements[particle as usize]);
         }
         let moves = Moves {
             order: &self.order,
             positions: &self.positions,
             displacements: &self.moves,
             margin: 0.0,
-            widening: motion.widening,
+            widening: searched.widening,
         };
         moves.reach(step.radii, domain, &mut self.reach)
     }
@@ -200,56 +182,33 @@ impl<const D: usize> Partitioner<D> {
         }
     }
 
-    /// Lists for each rank the places of its own particles and of those that come near them, themselves or by
-    /// an image. Particles farther apart than `reach` never meet.
-    fn hold(&mut self, grid: &Grid<D>, domain: &Domain<D>, reach: f64, holders: &mut [Vec<u32>]) {
+    /// Places of a rank's own particles and of those that come near them, themselves or by an image.
+    /// Particles farther apart than `reach` never meet.
+    fn held(&mut self, grid: &Grid<D>, domain: &Domain<D>, reach: f64, rank: u32) -> Vec<u32> {
         let Self { order, wrapped, cells, .. } = self;
-        cells.find_near(grid, |place| &wrapped[order[place as usize] as usize]);
-        let mut beyond = Vec::new();
+        cells.find_near(grid, rank, |place| &wrapped[order[place as usize] as usize]);
         let is_periodic = domain.lattice.periods().map(|period| period.is_some());
-        for (place, &particle) in order.iter().enumerate() {
-            let cell = cells.of_place[place] as usize;
-            let near = cells.near(cell);
-            near.iter().for_each(|&rank| holders[rank as usize].push(place as u32));
-            if grid.is_at_side(cell, &is_periodic) {
-                let x = wrapped[particle as usize];
-                beyond.clear();
-                for_each_image(&x, &domain.lattice, reach, |image| {
-                    cells.add_ranks(grid, &(x + domain.shift(&image)), &mut beyond);
+        let comes_near = |&place: &u32| {
+            let cell = cells.of_place[place as usize] as usize;
+            if cells.is_near[cell] || !grid.is_at_side(cell, &is_periodic) {
+                return cells.is_near[cell];
+            }
+            let (x, mut found) = (&wrapped[order[place as usize] as usize], false);
+            for_each_image(x, &domain.lattice, reach, |image| {
+                grid.for_each_row(&(x + domain.shift(&image)), |mut row| {
+                    found |= row.any(|cell| cells.has(cell, rank));
                 });
-                beyond.sort_unstable();
-                beyond.dedup();
-                let others = beyond.iter().filter(|rank| near.binary_search(rank).is_err());
-                others.for_each(|&rank| holders[rank as usize].push(place as u32));
-            }
-        }
-    }
-
-    /// Who takes what a pair remembers, and the place of its second particle.
-    fn remembered(&self, state: &PairState) -> (usize, PartMemory, Option<u32>) {
-        let first = self.places[state.pair.first as usize];
-        let (second, place) = match state.pair.second {
-            Partner::Wall(wall) => (Partner::Wall(wall), None),
-            Partner::Particle { index, image } => {
-                let place = self.places[index as usize];
-                (Partner::Particle { index: place, image }, Some(place))
-            }
+            });
+            found
         };
-        let pair = PairKey { first, second };
-        let memory = PartMemory { pair, gamma: state.gamma, lambda: state.lambda };
-        (self.owners[first as usize] as usize, memory, place)
+        (0..order.len() as u32).filter(comes_near).collect()
     }
 
-    fn particle(&self, place: u32, step: &StepGeometry<'_, D>, motion: &Motion<'_, D>) -> PartParticle<D> {
-        let particle = self.order[place as usize] as usize;
+    fn particle(&self, place: u32) -> PartParticle {
         PartParticle {
-            index: particle as u32,
+            index: self.order[place as usize],
             order: place,
             owner: self.owners[place as usize],
-            position: step.positions[particle],
-            free: motion.free[particle],
-            radius: step.radii[particle],
-            mobility: motion.mobilities[particle],
             reach: self.reach[place as usize],
         }
     }

@@ -1,11 +1,11 @@
-//! Dealing and searching, without messages.
+//! Partitions and searches, without messages.
 
 use std::collections::BTreeMap;
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 use gluey_testkit::packing::Packing;
 
-use super::{Coordinator, RankShare};
+use super::{PartContact, RankOf, RankShare};
 use crate::neighbours::{NeighbourList, Ownership, PartSearch};
 use crate::{ContactParams, Domain, PairContact, PairKey, StepGeometry, Wall};
 
@@ -64,20 +64,16 @@ where
     }
 
     /// The candidates of a rank.
-    fn of_rank(&self, shares: &RankShare<D>) -> Vec<PairKey> {
+    fn of_rank(&self, shares: &RankShare, free: &[Vector<D>]) -> Vec<PairKey> {
         let of = &shares.particles;
         let mut ownership = Ownership {
             names: of.iter().map(|particle| particle.index).collect(),
             is_own: of.iter().map(|particle| particle.owner == shares.rank).collect(),
         };
-        let [positions, free] = [
-            of.iter().map(|particle| particle.position).collect::<Vec<_>>(),
-            of.iter().map(|particle| particle.free).collect(),
-        ];
-        let [radii, reach] = [
-            of.iter().map(|particle| particle.radius).collect::<Vec<_>>(),
-            of.iter().map(|particle| particle.reach).collect(),
-        ];
+        let [positions, free] = [&self.positions[..], free]
+            .map(|all| of.iter().map(|particle| all[particle.index as usize]).collect::<Vec<_>>());
+        let radii: Vec<f64> = of.iter().map(|particle| self.radii[particle.index as usize]).collect();
+        let reach: Vec<f64> = of.iter().map(|particle| particle.reach).collect();
         let step = StepGeometry { positions: &positions, radii: &radii, drift: &[], ..self.step() };
         let part = PartSearch { ownership: &mut ownership, free: &free, reach: &reach, wall_slack: 0.0 };
         let mut list = NeighbourList::default();
@@ -88,19 +84,25 @@ where
     fn ranks_find_what_one_search_does(&self, what: &str) {
         let (serial, free) = self.serial();
         assert!(serial.len() > 100, "{what}: {} pairs", serial.len());
-        let mut lead =
-            Coordinator::new(PairContact::new(ContactParams::default()).within(self.domain.clone()));
-        for size in SIZES {
-            let shares = lead.begin(&self.step(), &self.twists, size).expect("a good step");
-            assert_eq!(lead.free(), free);
-            let mut found: Vec<_> = shares.iter().flat_map(|shares| self.of_rank(shares)).collect();
+        let alone = PairContact::new(ContactParams::default()).within(self.domain.clone());
+        for (size, shares) in SIZES.into_iter().zip(self.shares(alone, &SIZES)) {
+            let mut found: Vec<_> = shares.iter().flat_map(|shares| self.of_rank(shares, &free)).collect();
             found.sort_unstable();
             assert_eq!(found, serial, "{what}, {size} ranks: each pair once");
             self.particles_are_dealt_evenly(&shares);
         }
     }
 
-    fn particles_are_dealt_evenly(&self, shares: &[RankShare<D>]) {
+    /// What each of so many ranks gets.
+    fn shares(&self, alone: PairContact<D>, sizes: &[usize]) -> Vec<Vec<RankShare>> {
+        let mut contact = PartContact::new(alone);
+        contact.begin(&self.step(), &self.twists).expect("a good step");
+        let mut share =
+            |rank, size| contact.share(&self.step(), RankOf { rank, size }).expect("slow particles");
+        sizes.iter().map(|&size| (0..size).map(|rank| share(rank, size)).collect()).collect()
+    }
+
+    fn particles_are_dealt_evenly(&self, shares: &[RankShare]) {
         let mut owners = BTreeMap::new();
         for RankShare { rank, particles, .. } in shares {
             assert!(particles.is_sorted_by(|a, b| a.order < b.order));
@@ -154,16 +156,13 @@ fn memory_goes_with_the_first_particle() {
     let state = |k: usize| crate::PairState { pair: PairKey::new(k, 199 - k), gamma: -0.1, lambda: k as f64 };
     let pairs = (0..100).map(state).collect();
     crate::ContactModel::resume(&mut contact, crate::ContactState { pairs }).expect("a memory");
-    let shares = Coordinator::new(contact).begin(&cloud.step(), &cloud.twists, 8).expect("a good step");
     let mut found = 0;
-    for RankShare { rank, particles, memory } in &shares {
-        let at = |order: u32| particles.binary_search_by_key(&order, |of| of.order).map(|k| particles[k]);
+    for RankShare { rank, particles, memory } in &cloud.shares(contact, &[8])[0] {
         for of in memory {
-            let (first, second) = of.pair.particles();
-            let (first, second) =
-                (at(first as u32).expect("it is here"), at(second.expect("a particle") as u32));
-            let second = second.expect("it is here");
-            assert_eq!((first.owner, first.index + second.index), (*rank, 199));
+            let (one, other) = of.pair.particles();
+            let of_pair = [particles[one], particles[other.expect("a particle")]];
+            let first = of_pair.iter().min_by_key(|of| of.index).expect("two");
+            assert_eq!((first.owner, of_pair[0].index + of_pair[1].index), (*rank, 199));
             assert_eq!((of.gamma, of.lambda), (-0.1, f64::from(first.index)));
             found += 1;
         }

@@ -16,6 +16,9 @@
 //! | [`Accelerated`] | many contacts, few digits |
 //! | [`ActiveSet`] | many contacts, many digits |
 
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
 mod accelerated;
 mod active_set;
 mod auto;
@@ -52,25 +55,15 @@ pub trait DelassusOperator {
     /// the largest over all, where others hold some of them.
     fn complete(&self, _sums: &mut [f64], _largest: &mut [f64]) {}
 
-    /// Whether others hold some of the contacts. Then columns of [`DelassusOperator::factor`] have the same
-    /// numbers everywhere, of any size.
-    fn is_shared(&self) -> bool {
-        false
-    }
-
-    /// What all who share the problem have, each in its turn, at the first of them.
-    fn gather(&self, _words: &[u64]) -> Option<Vec<Vec<u64>>> {
+    /// The place of this one among those who share the problem; none where nobody else holds contacts. Where
+    /// others do, columns of [`DelassusOperator::factor`] have the same numbers everywhere, of any size.
+    fn place(&self) -> Option<usize> {
         None
     }
 
-    /// What the first of those who share the problem has for this one.
-    fn scatter(&self, _words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
-        Vec::new()
-    }
-
-    /// A number for the first contact here, far from those of contacts elsewhere.
-    fn first(&self) -> usize {
-        0
+    /// The numbers of all who share the problem, in the order of their places.
+    fn gather(&self, numbers: &[f64]) -> Vec<Vec<f64>> {
+        vec![numbers.to_vec()]
     }
 }
 
@@ -140,6 +133,7 @@ impl SolveFailure {
 
 /// Residuals at iterations 1, 2, 4, 8, ... and at the last one.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ResidualHistory {
     /// `(iteration, residual)`, iterations increasing.
     pub entries: Vec<(usize, f64)>,

@@ -1,5 +1,5 @@
-//! Newton steps of a whole problem. Where several ranks hold the contacts the first of them takes the steps
-//! for all, of as many contacts as it can hold.
+//! Newton steps of a whole problem. Where several ranks hold the contacts each of them learns of all, of as
+//! many as one can hold, and takes the same steps.
 
 use super::newton::Newton;
 use super::{DelassusOperator, Factor, Projection, SolveReport};
@@ -14,8 +14,8 @@ pub(super) fn improve(
     norm: f64,
     step_limit: usize,
 ) -> Option<SolveReport> {
-    if problem.operator.is_shared() {
-        return improve_on_ranks(problem, forces, norm, step_limit);
+    if let Some(place) = problem.operator.place() {
+        return improve_with_others(problem, forces, norm, step_limit, place);
     }
     let factor = DelassusOperator::factor(problem.operator)?;
     Some(Newton::new(&factor)?.improve(problem, forces, norm, step_limit))
@@ -23,38 +23,33 @@ pub(super) fn improve(
 
 /// Improves `forces` by Newton steps, on all ranks; `None`, on all, if there are too many contacts or their
 /// system is too large to be factorised.
-fn improve_on_ranks(
+fn improve_with_others(
     problem: &mut Projection<'_>,
     forces: &mut [f64],
     norm: f64,
     step_limit: usize,
+    place: usize,
 ) -> Option<SolveReport> {
     if problem.count(forces.len()) > MOST_CONTACTS {
         return None;
     }
     let factor = problem.operator.factor()?;
-    let gathered = problem.operator.gather(&words_of(&factor, problem, forces));
-    let improved = gathered.map(|all| {
-        let tuning = (problem.tolerance, norm, step_limit);
-        Whole::of(&all).improved(tuning).unwrap_or_else(|| vec![Vec::new(); all.len()])
-    });
-    let own = problem.operator.scatter(improved);
-    let (&[iterations, residual], found) = own.split_first_chunk::<2>()?;
-    for (force, found) in forces.iter_mut().zip(found) {
-        *force = f64::from_bits(*found);
-    }
-    Some(SolveReport { iterations: iterations as usize, residual: f64::from_bits(residual) })
+    let all = problem.operator.gather(&numbers_of(&factor, problem, forces));
+    let mut whole = Whole::of(&all);
+    let report = whole.improve(problem.tolerance, norm, step_limit)?;
+    let first: usize = whole.counts[..place].iter().sum();
+    forces.copy_from_slice(&whole.forces[first..][..forces.len()]);
+    Some(report)
 }
 
 /// Contacts as numbers: how many entries their row has, free gap, floor and force, then the row.
-fn words_of(factor: &Factor, problem: &Projection<'_>, forces: &[f64]) -> Vec<u64> {
-    let mut words = Vec::new();
-    for (k, force) in forces.iter().enumerate() {
-        words.push(factor.row(k).count() as u64);
-        words.extend([problem.free_gaps[k], problem.floors[k], *force].map(f64::to_bits));
-        words.extend(factor.row(k).flat_map(|(coordinate, value)| [coordinate as u64, value.to_bits()]));
+fn numbers_of(factor: &Factor, problem: &Projection<'_>, forces: &[f64]) -> Vec<f64> {
+    let mut numbers = Vec::new();
+    for (k, &force) in forces.iter().enumerate() {
+        numbers.extend([factor.row(k).count() as f64, problem.free_gaps[k], problem.floors[k], force]);
+        numbers.extend(factor.row(k).flat_map(|(coordinate, value)| [coordinate as f64, value]));
     }
-    words
+    numbers
 }
 
 /// The problem of all ranks.
@@ -69,19 +64,19 @@ struct Whole {
 }
 
 impl Whole {
-    fn of(words: &[Vec<u64>]) -> Self {
+    fn of(numbers: &[Vec<f64>]) -> Self {
         let mut rows: Vec<Vec<(u64, f64)>> = Vec::new();
         let mut whole = Self::default();
-        for words in words {
-            let (before, mut rest) = (rows.len(), &words[..]);
-            while let Some((&[entry_count, numbers @ ..], after)) = rest.split_first_chunk::<4>() {
-                let [free_gap, floor, force] = numbers.map(f64::from_bits);
+        for numbers in numbers {
+            let (before, mut rest) = (rows.len(), &numbers[..]);
+            while let Some((&[entry_count, free_gap, floor, force], after)) = rest.split_first_chunk::<4>() {
                 whole.free_gaps.push(free_gap);
                 whole.floors.push(floor);
                 whole.forces.push(force);
                 let (row, after) = after.split_at(2 * entry_count as usize);
-                let entries = row.as_chunks::<2>().0.iter();
-                rows.push(entries.map(|&[column, value]| (column, f64::from_bits(value))).collect());
+                rows.push(
+                    row.as_chunks::<2>().0.iter().map(|&[column, value]| (column as u64, value)).collect(),
+                );
                 rest = after;
             }
             whole.counts.push(rows.len() - before);
@@ -97,8 +92,8 @@ impl Whole {
         whole
     }
 
-    /// Iterations, residual and better forces for each rank.
-    fn improved(mut self, (tolerance, norm, step_limit): (f64, f64, usize)) -> Option<Vec<Vec<u64>>> {
+    /// Replaces the forces by better ones.
+    fn improve(&mut self, tolerance: f64, norm: f64, step_limit: usize) -> Option<SolveReport> {
         let mut newton = Newton::new(&self.factor)?;
         let mut operator = OfFactor { factor: &self.factor, y: vec![0.0; self.factor.coordinate_count()] };
         let mut problem = Projection {
@@ -108,15 +103,7 @@ impl Whole {
             tolerance,
             iteration_limit: step_limit,
         };
-        let report = newton.improve(&mut problem, &mut self.forces, norm, step_limit);
-        let head = [report.iterations as u64, report.residual.to_bits()];
-        let mut rest = &self.forces[..];
-        let of_rank = |&count: &usize| {
-            let (own, others) = rest.split_at(count);
-            rest = others;
-            head.into_iter().chain(own.iter().map(|force| force.to_bits())).collect()
-        };
-        Some(self.counts.iter().map(of_rank).collect())
+        Some(newton.improve(&mut problem, &mut self.forces, norm, step_limit))
     }
 }
 

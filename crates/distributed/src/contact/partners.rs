@@ -5,13 +5,13 @@ use std::cell::RefCell;
 use gluey_contact::part::{Partners, RankShare};
 use gluey_geom::Vector;
 use gluey_parallel::{Communicator, GhostPlan, Ranks, Wanted};
-
-use super::messages::{collect, scatter};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// The ranks that share a step.
 pub(super) struct Sharers<'a, const D: usize> {
     ranks: &'a Ranks,
-    /// Of all particles that were sent, and of those selected.
+    /// Of all particles here, and of those selected.
     all: RefCell<Border>,
     selected: RefCell<Option<Border>>,
     /// Values by particle.
@@ -39,7 +39,7 @@ impl Border {
 
 impl<'a, const D: usize> Sharers<'a, D> {
     /// Finds out who has copies of which particles. All ranks call this.
-    pub fn new(ranks: &'a Ranks, shares: &RankShare<D>) -> Self {
+    pub fn new(ranks: &'a Ranks, shares: &RankShare) -> Self {
         let particles = &shares.particles;
         let copies = (0u32..).zip(particles).filter(|(_, particle)| particle.owner != shares.rank);
         let wanted = copies.map(|(place, particle)| Wanted {
@@ -85,12 +85,8 @@ impl<const D: usize> Partners<D> for Sharers<'_, D> {
         self.ranks.first_failure(own).map(|failure| failure.message)
     }
 
-    fn gather(&self, words: &[u64]) -> Option<Vec<Vec<u64>>> {
-        collect(self.ranks, words)
-    }
-
-    fn scatter(&self, words: Option<Vec<Vec<u64>>>) -> Vec<u64> {
-        scatter(self.ranks, words)
+    fn gather(&self, numbers: &[f64]) -> Vec<Vec<f64>> {
+        all_of(self.ranks, &numbers.to_vec())
     }
 
     fn accumulate(&self, values: &mut [Vector<D>]) {
@@ -113,4 +109,15 @@ impl<const D: usize> Partners<D> for Sharers<'_, D> {
         });
         self.selected.replace(selected);
     }
+}
+
+/// The values of all ranks, in their order.
+pub(super) fn all_of<T: Serialize + DeserializeOwned>(ranks: &Ranks, own: &T) -> Vec<T> {
+    const WHY: &str = "what was encoded by the same program in memory is whole";
+    let mut bytes = postcard::to_stdvec(own).expect(WHY);
+    let most = ranks.all_gather(&[bytes.len().div_ceil(8) as u64]).into_iter().max().unwrap_or(0) as usize;
+    bytes.resize(8 * most, 0);
+    let words: Vec<u64> = bytes.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+    let all: Vec<u8> = ranks.all_gather(&words).into_iter().flat_map(u64::to_le_bytes).collect();
+    all.chunks_exact((8 * most).max(1)).map(|bytes| postcard::from_bytes(bytes).expect(WHY)).collect()
 }

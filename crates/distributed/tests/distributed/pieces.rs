@@ -2,14 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use gluey_distributed::{
-    BoxFlow, FrameName, SharedHydrodynamics, SharedSuspension, SuspensionError, ask_for_fields,
-};
+use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension, SuspensionError};
 use gluey_fem::element::{multi_index, value};
 use gluey_geom::{Dim, Particle, Space, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Configuration, Fields, Hydrodynamics};
-use gluey_parallel::Communicator;
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind,
 };
@@ -19,7 +16,6 @@ use crate::support::{self, on_ranks};
 /// Places and radii; the third lies across the border of the box in the first direction.
 const BODIES: [([f64; 3], f64); 3] =
     [([0.4, 0.35, 0.52], 0.14), ([0.5, 0.76, 0.7], 0.1), ([0.98, 0.6, 0.4], 0.16)];
-const FRAME: FrameName = FrameName { stream: 3, step: 70 };
 
 fn suspension<const D: usize>(lubrication: Lubrication) -> SharedSuspension<D>
 where
@@ -62,23 +58,14 @@ where
     FlowSolver::new(params).unwrap().solve_under(mesh, &balls, &Conditions::boundary(&shear)).unwrap()
 }
 
-/// The fields of all ranks, of which rank zero alone is told where the particles are.
+/// The fields of all ranks.
 fn shown<const D: usize>(suspension: &SharedSuspension<D>, size: usize) -> Vec<Fields<D>>
 where
     Dim<D>: Space<D>,
 {
     let found = on_ranks(size, |ranks| {
-        if ranks.rank() > 0 {
-            let mut seen = None;
-            suspension.follow_and_show(ranks, &mut |frame, fields| {
-                assert_eq!(frame, FRAME, "what rank zero asks for");
-                seen = fields;
-            });
-            return seen.unwrap();
-        }
-        let mut flow = SharedHydrodynamics::leading(suspension, ranks);
+        let mut flow = SharedHydrodynamics::new(suspension, ranks);
         flow.predict(&Configuration::at(0.0, &particles())).unwrap();
-        ask_for_fields(ranks, FRAME);
         flow.fields().unwrap()
     });
     found.unwrap()
@@ -181,16 +168,10 @@ fn a_flow_that_failed_has_no_fields() {
     let mut suspension = suspension::<2>(Lubrication::Deficit);
     suspension.suspension.radii = vec![0.001; 3];
     let found = on_ranks(2, |ranks| {
-        if ranks.rank() > 0 {
-            let mut seen = Vec::new();
-            suspension.follow_and_show(ranks, &mut |_, fields| seen.push(fields.is_some()));
-            return seen;
-        }
-        let mut flow = SharedHydrodynamics::leading(&suspension, ranks);
+        let mut flow = SharedHydrodynamics::new(&suspension, ranks);
         let error = flow.predict(&Configuration::at(0.0, &particles())).unwrap_err();
         assert!(matches!(error, SuspensionError::Flow(_)), "{error}");
-        ask_for_fields(ranks, FRAME);
-        vec![flow.fields().is_some()]
+        flow.fields().is_some()
     });
-    assert_eq!(found.unwrap(), [[false], [false]]);
+    assert_eq!(found.unwrap(), [false, false]);
 }

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use gluey_distributed::{BoxFlow, Memory, SavedPiece, SharedHydrodynamics, SharedSuspension};
+use gluey_distributed::{BoxFlow, FlowMemory, SavedPiece, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Hydrodynamics, MeanStress};
@@ -114,14 +114,12 @@ where
     Dim<D>: Space<D>,
 {
     let found = on_ranks(ranks, |ranks| {
-        if ranks.rank() > 0 {
-            suspension.follow(ranks);
-            return None;
-        }
-        let mut flow = SharedHydrodynamics::leading(suspension, ranks);
-        Some(strains().map(|strain| predict(&mut flow, strain)).collect())
+        let mut flow = SharedHydrodynamics::new(suspension, ranks);
+        strains().map(|strain| predict(&mut flow, strain)).collect::<Vec<_>>()
     });
-    found.unwrap().remove(0).unwrap()
+    let mut found = found.unwrap();
+    assert!(found.iter().all(|of_rank| *of_rank == found[0]), "ranks agree");
+    found.remove(0)
 }
 
 fn ranks_shear_as_the_serial_solver_does<const D: usize>(level: u8, sizes: &[usize], limits: [[f64; 2]; 2])
@@ -185,8 +183,8 @@ where
     for (from, sizes) in [(3, &[3, 2][..]), (2, &[5]), (4, &[1])] {
         let last = strains().last().unwrap();
         let before = on_ranks(from, |ranks| {
-            let memory = Rc::new(Memory::default());
-            let mut flow = SharedHydrodynamics::beside(&suspension, ranks).remembering(memory.clone());
+            let memory = Rc::new(FlowMemory::default());
+            let mut flow = SharedHydrodynamics::new(&suspension, ranks).remembering(memory.clone());
             strains().take(FLOWS - 1).for_each(|strain| drop(predict(&mut flow, strain)));
             flow.checkpoint().unwrap();
             let found = predict(&mut flow, last);
@@ -203,9 +201,9 @@ where
                 if own.is_empty() {
                     own.push(pieces[0].clone());
                 }
-                let memory = Rc::new(Memory::default());
+                let memory = Rc::new(FlowMemory::default());
                 memory.restore(&suspension.suspension, ranks, own).unwrap();
-                predict(&mut SharedHydrodynamics::beside(&suspension, ranks).remembering(memory), last)
+                predict(&mut SharedHydrodynamics::new(&suspension, ranks).remembering(memory), last)
             });
             let (before, after) = (&before[0].1, &after.unwrap()[0]);
             if from == to {
@@ -230,8 +228,8 @@ fn flows_go_on_from_the_pieces_of_others() {
 fn pieces_of_something_else_are_refused() {
     let suspension = suspension::<2>(5);
     let errors = on_ranks(1, |ranks| {
-        let memory = Rc::new(Memory::default());
-        let mut flow = SharedHydrodynamics::beside(&suspension, ranks).remembering(memory.clone());
+        let memory = Rc::new(FlowMemory::default());
+        let mut flow = SharedHydrodynamics::new(&suspension, ranks).remembering(memory.clone());
         predict(&mut flow, STRAIN);
         assert_eq!(memory.saved(), [], "nothing was to be kept");
         flow.checkpoint().unwrap();

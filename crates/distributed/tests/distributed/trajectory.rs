@@ -6,7 +6,6 @@ use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Particle, Space, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
-use gluey_parallel::Communicator;
 use gluey_stokes::{
     Conditions, FlowParams, FlowSolver, Formulation, Lubrication, Refinement, SolverKind, StokesError,
     Suspension,
@@ -163,19 +162,10 @@ where
     let serial = trajectory(meeting, Serial::new(&suspension));
     for &size in sizes {
         let run = || {
-            // Every second number of ranks is led by rank zero, which alone knows particles and contacts.
-            on_ranks(size, |ranks| match (size % 2, ranks.rank()) {
-                (0, 0) => Some(trajectory(meeting, SharedHydrodynamics::leading(&suspension, ranks))),
-                (0, _) => {
-                    suspension.follow(ranks);
-                    None
-                }
-                _ => Some(trajectory(meeting, SharedHydrodynamics::beside(&suspension, ranks))),
-            })
-            .unwrap()
+            let of_rank = |ranks: &_| trajectory(meeting, SharedHydrodynamics::new(&suspension, ranks));
+            on_ranks(size, of_rank).unwrap()
         };
-        let found: Vec<_> = run().into_iter().flatten().collect();
-        assert_eq!(found.len(), if size % 2 == 0 { 1 } else { size });
+        let found = run();
         assert!(found.iter().all(|trajectory| *trajectory == found[0]), "ranks agree");
         let places = serial.places.iter().zip(&found[0].places);
         let difference = places.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
@@ -185,7 +175,7 @@ where
         assert!(pairs.all(|(a, b)| a.abs_diff(*b) <= meeting.slack), "{size} ranks: {iterations:?}");
         assert!(iterations[0][1..3].iter().all(|later| *later < iterations[0][0]), "{iterations:?}");
         assert!(difference < limit, "{size} ranks: {difference:e}");
-        assert_eq!(run()[0].as_ref(), Some(&found[0]), "the same bits");
+        assert_eq!(run()[0], found[0], "the same bits");
     }
     serial.touched
 }
@@ -214,19 +204,15 @@ fn ranks_take_particles_where_the_serial_solver_does_in_3d() {
     assert!(!take((pair, Lubrication::Deficit), &[3], 6.5e-14), "films keep particles apart");
 }
 
-/// The others end with rank zero, whatever ends it.
+/// All end with the same error.
 #[test]
-fn followers_end_when_the_leader_fails() {
+fn a_flow_that_fails_ends_all() {
     let mut suspension = suspension::<2>(PAIR, Lubrication::Deficit);
     suspension.suspension.radii = vec![0.001; 2];
     let errors = on_ranks(3, |ranks| {
-        if ranks.rank() > 0 {
-            suspension.follow(ranks);
-            return None;
-        }
-        let mut flow = SharedHydrodynamics::leading(&suspension, ranks);
-        flow.predict(&Configuration::at(0.0, &particles(PAIR))).err().map(|error| error.to_string())
+        let mut flow = SharedHydrodynamics::new(&suspension, ranks);
+        flow.predict(&Configuration::at(0.0, &particles(PAIR))).unwrap_err().to_string()
     });
-    let first = errors.unwrap()[0].clone().unwrap();
-    assert!(first.starts_with("body 1 has a radius"), "{first}");
+    let errors = errors.unwrap();
+    assert!(errors.iter().all(|error| error.starts_with("body 1 has a radius")), "{errors:?}");
 }

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 
 use gluey_geom::{Dim, Space};
 
-use super::frames::Others;
 use super::options::RunOptions;
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
@@ -75,24 +74,19 @@ impl CheckpointFile {
         &self.path
     }
 
-    /// Writes a checkpoint, with the flow of the ranks that share it, and gives what should be known of files
-    /// that were in its way. There is a whole one under one of the two names at every moment.
+    /// Writes a checkpoint, whose pieces of the flow are there, and gives what should be known of files that
+    /// were in its way. There is a whole one under one of the two names at every moment.
     pub fn write<const D: usize>(
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
-        others: Option<&dyn Others>,
     ) -> Result<Vec<Notice>, FileError>
     where
         Dim<D>: Space<D>,
     {
-        let Some(others) = others else { return self.write_alone(checkpoint, case) };
-        let encode = |error| FileError::new(&self.path, "encode the checkpoint", io::Error::other(error));
-        let digest = blake3::hash(&postcard::to_stdvec(&checkpoint.state).map_err(encode)?);
-        let name = digest.as_bytes()[..8].iter().fold(0, |name, &byte| name << 8 | u64::from(byte));
-        let pieces = others.write_flow(&self.path, name)?;
-        let notices = self.write_alone(&Checkpoint { pieces: pieces.clone(), ..checkpoint.clone() }, case)?;
-        self.pieces.push_back(pieces);
+        let notices = self.keep_the_last()?;
+        checkpoint.write(case, &self.path)?;
+        self.pieces.push_back(checkpoint.pieces.clone());
         self.remove_old_pieces().map(|()| notices)
     }
 
@@ -111,15 +105,8 @@ impl CheckpointFile {
         Ok(())
     }
 
-    /// Writes the one file.
-    fn write_alone<const D: usize>(
-        &mut self,
-        checkpoint: &Checkpoint<D>,
-        case: &Case,
-    ) -> Result<Vec<Notice>, FileError>
-    where
-        Dim<D>: Space<D>,
-    {
+    /// Makes room for another checkpoint.
+    fn keep_the_last(&mut self) -> Result<Vec<Notice>, FileError> {
         let older = ResultPaths::previous(&self.path);
         let failed = |error| FileError::new(&older, "keep the checkpoint before the last", error);
         let away: &[&PathBuf] = match std::mem::replace(&mut self.found, Found::Own) {
@@ -140,7 +127,7 @@ impl CheckpointFile {
                 notices.push(Notice::CheckpointSetAside { from: (*from).clone(), to });
             }
         }
-        checkpoint.write(case, &self.path).map(|()| notices)
+        Ok(notices)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use gluey_parallel::RankFailure;
 use thiserror::Error;
 
 use super::last_steps::Ended;
@@ -45,6 +46,9 @@ pub enum RunError {
         /// What the case or the options ask for.
         what: &'static str,
     },
+    /// Another rank of those that share the run failed.
+    #[error(transparent)]
+    Elsewhere(RankFailure),
     /// The flow could not be set up.
     #[error("the flow could not be set up")]
     Flow(#[from] HydrodynamicsError),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gluey_distributed::{Memory, SavedPiece, SharedSuspension};
+use gluey_distributed::{FlowMemory, SavedPiece, SharedSuspension};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
@@ -41,7 +41,7 @@ pub(super) fn restore<const D: usize>(
     checkpoint: &Path,
     suspension: &SharedSuspension<D>,
     ranks: &Ranks,
-    memory: &Memory<D>,
+    memory: &FlowMemory<D>,
 ) -> Result<(), CheckpointError>
 where
     Dim<D>: Space<D>,

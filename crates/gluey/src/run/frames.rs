@@ -4,31 +4,18 @@ use std::path::{Path, PathBuf};
 
 use gluey_contact::ContactLaw;
 use gluey_geom::{Dim, Space, Vector};
+use gluey_parallel::Communicator;
 use gluey_suspension::Container;
 
 use super::contacts::Surrounded;
 use super::error::RunError;
 use super::options::{RunOptions, VtkOptions, XyzOptions};
+use super::sharing::RunRanks;
 use crate::case::{Case, Interval, OutputKind};
-use crate::checkpoint::FlowPieces;
-use crate::output::vtk::{FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkFrame, VtkWriter};
+use crate::output::vtk::{FrameWriter, OnTheirWay, ShownBox, VtkEncoding, VtkFrame, VtkWriter, write_piece};
 use crate::output::xyz::{XyzFrame, XyzWriter};
 use crate::output::{FileError, ResultPaths};
 use crate::simulation::{Simulation, StepError};
-
-/// The other ranks that share the flow of a run.
-pub(super) trait Others {
-    /// Number of ranks, this one among them.
-    fn rank_count(&self) -> usize;
-
-    /// Has them write the fields in their cells at a step, as one of the streams of the run. All are on disk
-    /// then.
-    fn write_fields(&self, stream: usize, step: usize) -> Result<(), FileError>;
-
-    /// Writes, with them, what the flow after the last step that was remembered starts from, in files for a
-    /// checkpoint that is to be written next; none if it starts from nothing. All are on disk then.
-    fn write_flow(&self, checkpoint: &Path, name: u64) -> Result<Option<FlowPieces>, FileError>;
-}
 
 /// A stream of frames that a run is to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,15 +52,6 @@ impl StreamOptions {
         others.chain(asked.iter().cloned()).collect()
     }
 
-    /// How numbers are stored in the files for ParaView, if it has such.
-    #[cfg(feature = "ranks")]
-    pub fn encoding(&self) -> Option<VtkEncoding> {
-        match self.format {
-            FrameFormat::Vtk { encoding, .. } => Some(encoding),
-            FrameFormat::Xyz { .. } => None,
-        }
-    }
-
     fn vtk(options: &VtkOptions) -> Self {
         let format = FrameFormat::Vtk { encoding: options.encoding, with_fields: true };
         Self { folder: options.folder.clone(), interval: Interval::Steps(options.every), format }
@@ -86,12 +64,13 @@ impl StreamOptions {
 }
 
 /// The streams of a run that is going on.
-pub(super) struct Frames<'a, const D: usize>
+pub(super) struct Frames<const D: usize>
 where
     Dim<D>: Space<D>,
 {
     streams: Vec<(Interval, Stream<D>)>,
-    others: Option<&'a dyn Others>,
+    /// Number of this rank among those that share the flow.
+    rank: usize,
     on_their_way: OnTheirWay,
 }
 
@@ -99,11 +78,19 @@ enum Stream<const D: usize>
 where
     Dim<D>: Space<D>,
 {
-    Vtk { writer: FrameWriter<D>, with_fields: bool },
+    Vtk {
+        writer: FrameWriter<D>,
+        with_fields: bool,
+    },
     Xyz(XyzWriter),
+    /// On ranks other than zero, whose fields the frames of rank zero name.
+    Piece {
+        folder: PathBuf,
+        encoding: VtkEncoding,
+    },
 }
 
-impl<'a, const D: usize> Frames<'a, D>
+impl<const D: usize> Frames<D>
 where
     Dim<D>: Space<D>,
 {
@@ -112,26 +99,30 @@ where
         case: &Case,
         options: &RunOptions,
         step: usize,
-        others: Option<&'a dyn Others>,
+        sharing: &RunRanks<'_>,
     ) -> Result<Self, FileError> {
-        let on_their_way = OnTheirWay::default();
-        let stream = |stream: StreamOptions| {
-            let StreamOptions { folder, interval, format } = stream;
+        let (rank, on_their_way) = (sharing.ranks.rank(), OnTheirWay::default());
+        let stream = |StreamOptions { folder, interval, format }: StreamOptions| {
             let opened = match format {
+                FrameFormat::Vtk { encoding, with_fields: true } if rank > 0 => {
+                    Stream::Piece { folder, encoding }
+                }
+                _ if rank > 0 => return Ok(None),
                 FrameFormat::Xyz { gzip } => Stream::Xyz(XyzWriter::create(&folder, gzip)?),
                 FrameFormat::Vtk { encoding, with_fields } => {
                     let writer = vtk_writer(case, &folder, interval, step)?.encoded(encoding);
-                    let writer = match others {
-                        Some(others) => writer.in_pieces(others.rank_count()),
-                        None => writer,
+                    let writer = match sharing.rank_count() {
+                        0 => writer,
+                        count => writer.in_pieces(count),
                     };
                     Stream::Vtk { writer: FrameWriter::new(writer, on_their_way.clone())?, with_fields }
                 }
             };
-            Ok((interval, opened))
+            Ok(Some((interval, opened)))
         };
         let streams = StreamOptions::of_run(case, options).into_iter().map(stream);
-        Ok(Self { streams: streams.collect::<Result<_, _>>()?, others, on_their_way })
+        let streams = streams.filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        Ok(Self { streams, rank, on_their_way })
     }
 
     /// The frames that are not on disk yet.
@@ -139,7 +130,22 @@ where
         self.on_their_way.clone()
     }
 
-    /// Writes what is due of the simulation as it is.
+    /// Writes the fields in the cells of this rank into the pieces that are due, unless it is rank zero.
+    pub fn write_pieces<H, C>(&self, case: &Case, simulation: &Simulation<D, H, C>) -> Result<(), FileError>
+    where
+        H: gluey_motion::Hydrodynamics<D>,
+        C: Surrounded<D>,
+    {
+        let step = simulation.step_index();
+        for (_, stream) in self.streams.iter().filter(|(interval, _)| is_due(case, interval, step)) {
+            if let (Stream::Piece { folder, encoding }, Some(fields)) = (stream, simulation.fields()) {
+                write_piece(folder, step, self.rank, &fields, *encoding)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is due of the simulation as it is, when the pieces of other ranks are there.
     pub fn write<H, C>(&mut self, case: &Case, simulation: &Simulation<D, H, C>) -> Result<(), RunError>
     where
         H: gluey_motion::Hydrodynamics<D>,
@@ -147,14 +153,9 @@ where
     {
         let (step, time) = (simulation.step_index(), simulation.time());
         let (particles, twists) = (simulation.particles(), simulation.twists());
-        let due =
-            |interval: &Interval| interval.is_due(step, case.shear_rate * case.time.step, case.time.step);
-        for (index, (_, stream)) in self.streams.iter_mut().enumerate().filter(|(_, (every, _))| due(every)) {
+        for (_, stream) in self.streams.iter_mut().filter(|(interval, _)| is_due(case, interval, step)) {
             match stream {
                 Stream::Vtk { writer, with_fields } => {
-                    if let (true, Some(others)) = (*with_fields, self.others) {
-                        others.write_fields(index, step)?;
-                    }
                     let domain = simulation.contact().domain().clone();
                     let shown =
                         || ShownBox { container: container(case, simulation), slide: simulation.slide() };
@@ -179,6 +180,7 @@ where
                     };
                     writer.write(step, &frame)?;
                 }
+                Stream::Piece { .. } => {}
             }
         }
         Ok(())
@@ -188,7 +190,7 @@ where
     pub fn flush(&mut self) -> Result<(), FileError> {
         self.streams.iter_mut().try_for_each(|(_, stream)| match stream {
             Stream::Vtk { writer, .. } => writer.flush(),
-            Stream::Xyz(_) => Ok(()),
+            Stream::Xyz(_) | Stream::Piece { .. } => Ok(()),
         })
     }
 
@@ -196,7 +198,7 @@ where
     pub fn finish(self) -> Result<(), FileError> {
         self.streams.into_iter().try_for_each(|(_, stream)| match stream {
             Stream::Vtk { writer, .. } => writer.finish(),
-            Stream::Xyz(_) => Ok(()),
+            Stream::Xyz(_) | Stream::Piece { .. } => Ok(()),
         })
     }
 }
@@ -230,9 +232,13 @@ where
     container.tilted(simulation.strain() * container.bounds().extent()[1])
 }
 
+/// Whether a step of a case has a frame.
+fn is_due(case: &Case, interval: &Interval, step: usize) -> bool {
+    interval.is_due(step, case.shear_rate * case.time.step, case.time.step)
+}
+
 fn vtk_writer(case: &Case, folder: &Path, interval: Interval, step: usize) -> Result<VtkWriter, FileError> {
-    let strain = case.shear_rate * case.time.step;
-    let done = (0..step).filter(|&step| interval.is_due(step, strain, case.time.step));
+    let done = (0..step).filter(|&step| is_due(case, &interval, step));
     let done: Vec<(usize, f64)> = done.map(|step| (step, step as f64 * case.time.step)).collect();
     VtkWriter::create(folder, &done)
 }

@@ -1,19 +1,19 @@
 //! The last whole step of a run: what a checkpoint holds. It can be saved at any moment, also from another
 //! thread than that of the run, which may be busy for long.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use gluey_geom::{Dim, Space};
 
 use super::checkpoint_file::CheckpointFile;
-use super::frames::Others;
 use super::last_steps::{Ended, OfRun, locked};
 use super::log;
 use super::options::RunOptions;
 use super::recorder::Recorder;
 use crate::case::Case;
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::{Checkpoint, FlowPieces};
 use crate::output::vtk::OnTheirWay;
 use crate::output::{FileError, ResultPaths, sync_drafts};
 use crate::progress::Notice;
@@ -62,19 +62,36 @@ where
         self.checkpoint.as_ref().map(|checkpoint| checkpoint.state.step)
     }
 
-    /// Writes a checkpoint after what it counts on, if that was not done, and gives what should be known.
-    pub fn save(&mut self, others: Option<&dyn Others>) -> Result<Vec<Notice>, FileError> {
-        let (Some(file), Some(checkpoint)) = (&mut self.file, &self.checkpoint) else {
-            return Ok(Vec::new());
-        };
-        let step = checkpoint.state.step;
+    /// Whether there is a checkpoint to write; what it counts on is on disk then.
+    pub fn is_due(&self) -> Result<bool, FileError> {
+        let (Some(file), Some(step)) = (&self.file, self.step()) else { return Ok(false) };
         // Before the first step there is nothing to lose that is worth more than another run's checkpoint.
         if self.saved == Some(step) || (step == 0 && file.is_wanted()) {
-            return Ok(Vec::new());
+            return Ok(false);
         }
         sync_drafts(&self.paths.tables())?;
         self.frames.wait();
-        let notices = file.write(checkpoint, &self.case, others)?;
+        Ok(true)
+    }
+
+    /// A name for files of the checkpoint, by its content.
+    pub fn name(&self) -> Result<u64, FileError> {
+        let Some(checkpoint) = &self.checkpoint else { return Ok(0) };
+        let path = self.file.as_ref().map_or(Path::new(""), CheckpointFile::path);
+        let encode = |error| FileError::new(path, "encode the checkpoint", io::Error::other(error));
+        let digest = blake3::hash(&postcard::to_stdvec(&checkpoint.state).map_err(encode)?);
+        Ok(digest.as_bytes()[..8].iter().fold(0, |name, &byte| name << 8 | u64::from(byte)))
+    }
+
+    /// Writes a checkpoint with these pieces of the flow, if one is due, and gives what should be known.
+    pub fn save(&mut self, pieces: Option<FlowPieces>) -> Result<Vec<Notice>, FileError> {
+        let is_due = self.is_due()?;
+        let (true, Some(file), Some(checkpoint)) = (is_due, &mut self.file, &mut self.checkpoint) else {
+            return Ok(Vec::new());
+        };
+        let step = checkpoint.state.step;
+        checkpoint.pieces = pieces;
+        let notices = file.write(checkpoint, &self.case)?;
         self.saved = Some(step);
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.reached(step)).map(|()| notices)
     }

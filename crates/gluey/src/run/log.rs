@@ -57,15 +57,15 @@ impl<'a> Log<'a> {
     }
 
     /// Writes what came out, and how the run ended.
-    pub fn end(&self, outcome: &Result<RunReport, RunError>) {
-        if let Ok(report) = outcome {
+    pub fn end(&self, outcome: &Result<Option<RunReport>, RunError>) {
+        if let Ok(Some(report)) = outcome {
             // What the first line says is told at the end.
             report.to_string().lines().skip(1).for_each(|line| self.add(line.trim_start()));
+            self.add(&ending(report));
         }
-        self.add(&match outcome {
-            Ok(report) => ending(report),
-            Err(error) => in_full(error),
-        });
+        if let Err(error) = outcome {
+            self.add(&in_full(error));
+        }
     }
 
     fn add(&self, line: &str) {

@@ -1,29 +1,27 @@
 //! Cases whose flow and contact are shared by ranks: which can be, and what becomes of them.
 
+use std::path::Path;
 use std::rc::Rc;
 
-use gluey_distributed::{BoxFlow, Memory, SharedContact, SharedHydrodynamics, SharedSuspension};
+use gluey_distributed::{BoxFlow, FlowMemory, SharedContact, SharedHydrodynamics, SharedSuspension};
 use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
 use super::contacts;
-use super::frames::StreamOptions;
-use super::pieces::{Follows, OtherRanks};
-use super::{
-    RunError, RunInProgress, RunOptions, claim_outputs, flow_pieces, logged, overwrite_guard, stale_files,
-};
+use super::sharing::RunRanks;
+use super::{RunError, RunInProgress, RunOptions, flow_pieces, prepare};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
 use crate::flow::suspension;
 use crate::hydrodynamics::HydrodynamicsError;
 use crate::memory::{Sharing, available};
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::report::RunReport;
 
 /// Iterations after which a flow is given up.
 const MOST_ITERATIONS: usize = 500;
 
-/// Runs `case` like [`super::run`] with flow and contact that `ranks` share. All ranks call this; rank zero
-/// moves the particles, writes the results and returns a report.
+/// Runs `case` like [`super::run`] with flow and contact that `ranks` share. All ranks call this and do the
+/// same steps; rank zero writes the results and returns a report.
 pub fn run_shared(
     case: &Case,
     options: &RunOptions,
@@ -51,30 +49,26 @@ where
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
     let flow = BoxFlow { viscosity: 1.0, tolerance: case.flow.tolerance, max_iterations: MOST_ITERATIONS };
     let suspension = SharedSuspension { flow, suspension };
-    let memory = Rc::new(Memory::default());
+    let memory = Rc::new(FlowMemory::default());
     if let Some(checkpoint) = &options.resume {
         flow_pieces::restore(case, checkpoint, &suspension, ranks, &memory)?;
     }
-    if ranks.rank() > 0 {
-        let (streams, checkpoint) = (StreamOptions::of_run(case, options), options.checkpoint.clone());
-        suspension.follow_for(ranks, &memory, &mut Follows { ranks, streams, checkpoint });
-        return Ok(None);
-    }
-    // However this ends, the others learn of it when the leader is dropped.
-    let leader = SharedHydrodynamics::leading(&suspension, ranks).remembering(memory.clone());
-    let contact = SharedContact::leading(contacts::of_case(case), ranks, memory.clone());
-    let others = OtherRanks { ranks, memory };
-    let _claims = claim_outputs(case, options, progress)?;
-    overwrite_guard::check_free(case, options)?;
-    stale_files::remove(case, options)?;
-    let report = logged(case, options, progress, |log| {
-        RunInProgress::start(case, options, log, leader, contact, Some(&others))?.finish()
-    })?;
-    Ok(Some(report))
+    let flow = SharedHydrodynamics::new(&suspension, ranks).remembering(memory.clone());
+    let contact = SharedContact::new(contacts::of_case(case), ranks);
+    let keep_flow = |checkpoint: &Path, name| flow_pieces::write(checkpoint, name, &memory.saved());
+    let sharing = RunRanks { ranks: ranks.clone(), keep_flow: Some(&keep_flow) };
+    let prepared = sharing.is_first().then(|| prepare(case, options, progress)).transpose();
+    let prepared = sharing.agreed(prepared)?;
+    let log = prepared.as_ref().map(|(_, log)| log);
+    let listener = log.map_or(&Silent as &dyn Progress, |log| log);
+    let outcome = RunInProgress::start(case, options, listener, flow, contact, &sharing)
+        .and_then(RunInProgress::finish);
+    log.into_iter().for_each(|log| log.end(&outcome));
+    outcome
 }
 
-/// How many ranks there are, and what memory there is for each: those on one machine, by its name, share what
-/// is left there. All of them come to the same answer.
+/// Number of ranks and the memory there is for each: those on one machine, by its name, share what is left
+/// there. All of them come to the same answer.
 fn sharing(ranks: &Ranks) -> Sharing {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let machine = name.bytes().fold(0u64, |hash, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)));

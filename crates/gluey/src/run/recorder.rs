@@ -71,13 +71,13 @@ impl Recorder {
     pub fn close(
         mut self,
         step: usize,
-        outcome: Result<RunReport, RunError>,
+        outcome: Result<Option<RunReport>, RunError>,
         progress: &dyn Progress,
-    ) -> Result<RunReport, RunError> {
+    ) -> Result<Option<RunReport>, RunError> {
         match &outcome {
             Ok(report) => {
-                self.record.end(RunState::Complete, report.steps);
-                (self.record.report, self.record.rows) = (Some(report.clone()), None);
+                self.record.end(RunState::Complete, report.as_ref().map_or(step, |report| report.steps));
+                (self.record.report, self.record.rows) = (report.clone(), None);
                 self.record.write(&self.path)?;
             }
             Err(error) => {

@@ -4,9 +4,8 @@ use gluey_contact::{
     Contact, ContactError, ContactModel, ContactParams, ContactReport, ContactState, Domain, GammaUpdate,
     PairContact, StepGeometry, Wall, WithFixed,
 };
-use gluey_distributed::{ContactFollower, ContactLoad, SharedContact};
+use gluey_distributed::{ContactLoad, SharedContact};
 use gluey_geom::{Dim, Space, Twist, Vector};
-use gluey_parallel::Communicator;
 use gluey_testkit::packing::Packing;
 
 use crate::support::on_ranks;
@@ -198,22 +197,12 @@ where
         Course { positions, velocities, contacts, memory, reports, error, loads }
     }
 
-    /// On so many ranks: the course of rank zero, and how contact failed on the others.
-    pub fn on(&self, size: usize) -> (Course<D>, Vec<Option<String>>) {
-        let ends = on_ranks(size, |ranks| {
-            if ranks.rank() == 0 {
-                return (Some(self.run(&mut SharedContact::new(self.alone(), ranks))), None);
-            }
-            let mut follower = ContactFollower::default();
-            let failure = (0..self.steps).find_map(|_| follower.step(ranks).err());
-            (None, failure.map(|failure| failure.to_string()))
-        });
-        let (mut courses, mut failures) = (Vec::new(), Vec::new());
-        for (course, failure) in ends.unwrap() {
-            courses.extend(course);
-            failures.push(failure);
-        }
-        (courses.swap_remove(0), failures.split_off(1))
+    /// The course on each of so many ranks: the same, to the bit.
+    pub fn on(&self, size: usize) -> Course<D> {
+        let courses = on_ranks(size, |ranks| self.run(&mut SharedContact::new(self.alone(), ranks)));
+        let mut courses = courses.unwrap();
+        assert!(courses.iter().all(|course| *course == courses[0]), "{size} ranks know the same");
+        courses.swap_remove(0)
     }
 }
 
