@@ -130,76 +130,55 @@ struct IslandSlice<'a, const D: usize> {
 /// Slices with fewer rows are not worth another thread.
 const ROWS_PER_TASK: usize = 512;
 
-impl<'a, const D: usize> IslandSlice<'a, D> {
-    fn solve<M: Mobility<D>>(self, context: &SolveContext<'_, M>) {
-        if self.islands.len() > 1 && self.rows.len() > ROWS_PER_TASK {
-            let (left, right) = self.halve();
-            parallel::join(|| left.solve(context), || right.solve(context));
-        } else {
-            self.solve_in_turn(context);
+impl<const D: usize> IslandSlice<'_, D> {
+    fn solve<M: Mobility<D>>(mut self, context: &SolveContext<'_, M>) {
+        match self.take_half() {
+            Some(half) => parallel::join(|| half.solve(context), || self.solve(context)),
+            None => self.solve_in_turn(context),
         }
     }
 
     fn solve_in_turn<M: Mobility<D>>(mut self, context: &SolveContext<'_, M>) {
-        while !self.islands.is_empty() {
-            let (mut first, rest) = self.split(1);
+        while let Some(mut first) = self.take(1) {
             if first.islands[0].is_fresh {
                 first.outcomes[0] = first.solve_one(context);
             }
-            self = rest;
         }
     }
 
-    /// Two slices with about as many rows each.
-    fn halve(self) -> (Self, Self) {
-        let base = self.islands[0].rows.start;
-        let middle = base + self.rows.len() / 2;
+    /// The first islands, with about half of the rows, if these are worth another thread.
+    fn take_half(&mut self) -> Option<Self> {
+        if self.islands.len() < 2 || self.rows.len() <= ROWS_PER_TASK {
+            return None;
+        }
+        let middle = self.islands[0].rows.start + self.rows.len() / 2;
         let count = self.islands.partition_point(|island| island.rows.end <= middle);
         let most = self.islands.len() - 1;
-        self.split(count.clamp(1, most))
+        self.take(count.clamp(1, most))
     }
 
-    /// The first `count` islands, and the others.
-    fn split(self, count: usize) -> (Self, Self) {
-        let (row_start, slot_start) = (self.islands[0].rows.start, self.islands[0].slots.start);
-        let last = &self.islands[count - 1];
-        let (row_count, slot_count) = (last.rows.end - row_start, last.slots.end - slot_start);
-        let islands = self.islands.split_at(count);
-        let outcomes = self.outcomes.split_at_mut(count);
-        let rows = self.rows.split_at(row_count);
-        let ends = self.ends.split_at(row_count);
-        let forces = self.forces.split_at_mut(row_count);
-        let floors = self.floors.split_at_mut(row_count);
-        let free_gaps = self.free_gaps.split_at_mut(row_count);
-        let scales = self.scales.split_at_mut(row_count);
-        let scaled_rows = self.scaled_rows.split_at_mut(row_count);
-        let scratch = self.scratch.split_at_mut(row_count * self.scratch_count);
-        let slots = self.slots.split_at(slot_count);
-        let weights = self.weights.split_at(slot_count);
-        let changes = self.changes.split_at_mut(slot_count);
-        let moved = self.moved.split_at_mut(slot_count);
-        macro_rules! side {
-            ($place:tt) => {
-                IslandSlice {
-                    islands: islands.$place,
-                    rows: rows.$place,
-                    ends: ends.$place,
-                    slots: slots.$place,
-                    weights: weights.$place,
-                    forces: forces.$place,
-                    floors: floors.$place,
-                    free_gaps: free_gaps.$place,
-                    scales: scales.$place,
-                    scaled_rows: scaled_rows.$place,
-                    changes: changes.$place,
-                    moved: moved.$place,
-                    scratch: scratch.$place,
-                    outcomes: outcomes.$place,
-                    scratch_count: self.scratch_count,
-                }
-            };
-        }
-        (side!(0), side!(1))
+    /// The first `count` islands, if there are so many; at least one.
+    fn take(&mut self, count: usize) -> Option<Self> {
+        let islands = self.islands.split_off(..count)?;
+        let (first, last) = (&islands[0], &islands[count - 1]);
+        let (row_count, slot_count) = (last.rows.end - first.rows.start, last.slots.end - first.slots.start);
+        Some(Self {
+            islands,
+            rows: self.rows.split_off(..row_count)?,
+            ends: self.ends.split_off(..row_count)?,
+            slots: self.slots.split_off(..slot_count)?,
+            weights: self.weights.split_off(..slot_count)?,
+            forces: self.forces.split_off_mut(..row_count)?,
+            floors: self.floors.split_off_mut(..row_count)?,
+            free_gaps: self.free_gaps.split_off_mut(..row_count)?,
+            scales: self.scales.split_off_mut(..row_count)?,
+            scaled_rows: self.scaled_rows.split_off_mut(..row_count)?,
+            changes: self.changes.split_off_mut(..slot_count)?,
+            moved: self.moved.split_off_mut(..slot_count)?,
+            scratch: self.scratch.split_off_mut(..row_count * self.scratch_count)?,
+            outcomes: self.outcomes.split_off_mut(..count)?,
+            scratch_count: self.scratch_count,
+        })
     }
 
     /// Solves the only island of the slice.
