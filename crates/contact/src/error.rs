@@ -238,7 +238,7 @@ impl ContactError {
     }
 
     /// The error that the failure of a solver means; `key` names its rows.
-    fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
+    pub(crate) fn of_solve(failure: &SolveFailure, tolerance: f64, key: impl Fn(usize) -> PairKey) -> Self {
         match &failure.infeasible {
             Some(rows) => {
                 let mut pairs: Vec<_> = rows.iter().map(|&row| key(row)).collect();

@@ -8,17 +8,7 @@
 use gluey_geom::Vector;
 
 use crate::rows::{GROUND, Row};
-use crate::solver::ResidualHistory;
-
-/// When the pushing ends.
-pub(crate) struct PushParams {
-    /// Gap to keep, relative to the mean radius of a pair (to half the radius, for a wall).
-    pub threshold: f64,
-    /// Shortfall that is left, in units of length.
-    pub tolerance: f64,
-    /// Most sweeps over all pairs.
-    pub sweep_limit: usize,
-}
+use crate::solver::{ResidualHistory, SolveFailure, SolveReport};
 
 /// Particles that are pushed.
 pub(crate) struct Pushed<'a, const D: usize> {
@@ -29,28 +19,23 @@ pub(crate) struct Pushed<'a, const D: usize> {
     pub displacements: &'a mut [Vector<D>],
 }
 
-/// Pushing did not end.
-pub(crate) struct Unsettled {
-    pub residual: f64,
-    pub history: ResidualHistory,
-    /// Row with the largest shortfall.
-    pub worst: usize,
-}
-
-/// Pushes until all gaps are at the threshold; adds to `forces` what the pushes amount to.
-/// Returns the number of sweeps and the largest shortfall left.
+/// Pushes until all gaps are at the threshold, relative to the mean radius of a pair (to half the radius, for
+/// a wall), but for a shortfall of the `tolerance`, a length; in so many sweeps over all pairs at most. Adds
+/// to `forces` what the pushes amount to.
 pub(crate) fn push_apart<const D: usize>(
     rows: &[Row<D>],
     pushed: &mut Pushed<'_, D>,
     forces: &mut [f64],
-    params: &PushParams,
-) -> Result<(usize, f64), Unsettled> {
+    threshold: f64,
+    tolerance: f64,
+    sweep_limit: usize,
+) -> Result<SolveReport, SolveFailure> {
     let mut history = ResidualHistory::default();
     let mut worst = (0, 0.0);
-    for sweep in 1..=params.sweep_limit {
+    for sweep in 1..=sweep_limit {
         worst = (0, 0.0);
         for (k, (row, force)) in rows.iter().zip(&mut *forces).enumerate() {
-            let shortfall = push(row, pushed, force, params.threshold);
+            let shortfall = push(row, pushed, force, threshold);
             // What is not a number is farthest from where it should be.
             if shortfall > worst.1 || shortfall.is_nan() {
                 worst = (k, if shortfall.is_nan() { f64::INFINITY } else { shortfall });
@@ -59,11 +44,12 @@ pub(crate) fn push_apart<const D: usize>(
         if sweep.is_power_of_two() {
             history.entries.push((sweep, worst.1));
         }
-        if worst.1 <= params.tolerance {
-            return Ok((sweep, worst.1));
+        if worst.1 <= tolerance {
+            return Ok(SolveReport { iterations: sweep, residual: worst.1 });
         }
     }
-    Err(Unsettled { residual: worst.1, history, worst: worst.0 })
+    let report = SolveReport { iterations: sweep_limit, residual: worst.1 };
+    Err(SolveFailure { report, history, worst: worst.0, infeasible: None })
 }
 
 /// Pushes one pair; returns by how much its gap was too small.
