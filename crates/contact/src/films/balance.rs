@@ -30,46 +30,35 @@ const ACCEPTED: f64 = 1e-6;
 /// Linearisations of the gaps at most. Steps in which particles move far around each other would take more.
 const MOST_PASSES: usize = 50;
 
-/// Films in balance.
-pub(super) struct Balanced<const D: usize> {
-    /// Displacements of the particles, and how far they are from the free ones.
-    pub moved: Vec<Vector<D>>,
-    pub changes: Vec<Vector<D>>,
-    /// Those that films have.
-    pub impulses: Vec<f64>,
-}
-
 /// Displaces particles so that impulses balance.
 ///
 /// # Errors
 /// [`FilmError`].
-pub(super) fn balance<const D: usize>(
+pub(super) fn balance<'a, const D: usize>(
     step: &BodyStep<'_, D>,
-    free: &[Vector<D>],
-    laws: Vec<FilmLaw<'_, D>>,
-) -> Result<Balanced<D>, FilmError>
+    free: &'a [Vector<D>],
+    laws: Vec<FilmLaw<'a, D>>,
+) -> Result<Balance<'a, D>, FilmError>
 where
     Dim<D>: Space<D>,
 {
     let params = ContactParams { exact_gap: true, pass_limit: MOST_PASSES, ..ContactParams::default() };
     let (mut problem, mut effort) = (Balance::new(step, free, laws), Effort::default());
-    projection::solve(&mut problem, &params, &mut effort)
-        .map_err(|failure| problem.explain(&failure, effort.iterations, step.radii))?;
-    let Balance { laws, moved, mut changes, loads, .. } = problem;
-    let impulses = laws.iter().zip(loads.loads).map(|(law, load)| law.asked - load).collect();
-    changes.remove(0);
-    Ok(Balanced { moved, changes, impulses })
+    match projection::solve(&mut problem, &params, &mut effort) {
+        Ok(()) => Ok(problem),
+        Err(failure) => Err(problem.explain(&failure, effort.iterations, step.radii)),
+    }
 }
 
 /// Films whose gaps are linear in the displacements of their particles.
-struct Balance<'a, const D: usize> {
+pub(super) struct Balance<'a, const D: usize> {
     laws: Vec<FilmLaw<'a, D>>,
     rows: Vec<Row<D>>,
     /// Displacements of the particles without loads, and with them.
     free: &'a [Vector<D>],
-    moved: Vec<Vector<D>>,
+    pub moved: Vec<Vector<D>>,
     /// By how much they differ; the first is that of walls.
-    changes: Vec<Vector<D>>,
+    pub changes: Vec<Vector<D>>,
     /// `1/a` of each particle; zero for those that are held, and for walls.
     weights: Vec<f64>,
     /// Gaps without loads.
@@ -101,6 +90,11 @@ impl<'a, const D: usize> Balance<'a, D> {
             loads: Loads::new(laws.iter().map(|law| law.film.gap).collect()),
             laws,
         }
+    }
+
+    /// Impulses that the films have.
+    pub(super) fn impulses(&self) -> impl Iterator<Item = f64> {
+        self.laws.iter().zip(&self.loads.loads).map(|(law, load)| law.asked - load)
     }
 
     /// Gap of a film where the particles are now.

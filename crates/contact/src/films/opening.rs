@@ -35,7 +35,7 @@ where
         is_near(k, free, 1.0) || (is_wanted && !films[k].is_given())
     };
     let mut is_in: Vec<bool> = (0..films.len()).map(concerns).collect();
-    let (chosen, found) = loop {
+    let (chosen, mut found) = loop {
         let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
         let laws = chosen.iter().map(|&k| FilmLaw { film: &films[k], asked: states[k].gamma });
         let found = balance(step, free, laws.collect())?;
@@ -47,11 +47,11 @@ where
             break (chosen, found);
         }
     };
-    chosen.into_iter().zip(found.impulses).for_each(|(k, impulse)| states[k].gamma = impulse);
+    chosen.into_iter().zip(found.impulses()).for_each(|(k, impulse)| states[k].gamma = impulse);
     for (k, film) in films.iter().enumerate() {
         check(film, gap(k, &found.moved), step.radii)?;
     }
-    Ok(found.changes)
+    Ok(found.changes.split_off(1))
 }
 
 /// Refuses what closes a film by more than rounding, such as given motions.
