@@ -53,7 +53,7 @@ pub enum ContactError {
         /// Index of the particle, from 0; messages count from 1.
         particle: usize,
         /// Which of its quantities.
-        quantity: Quantity,
+        quantity: String,
     },
     /// Two centres so close that the line through them has no direction.
     #[error("the centres of {pair} coincide")]
@@ -254,34 +254,6 @@ impl ContactError {
                 worst: key(failure.worst),
             },
         }
-    }
-}
-
-/// A vector of a particle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-pub enum Quantity {
-    /// Centre.
-    Position,
-    /// Orientation.
-    Orientation,
-    /// Predicted velocity.
-    Velocity,
-    /// Predicted spin.
-    Spin,
-    /// Displacement known before the velocity.
-    Drift,
-}
-
-impl std::fmt::Display for Quantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Position => "position",
-            Self::Orientation => "orientation",
-            Self::Velocity => "velocity",
-            Self::Spin => "spin",
-            Self::Drift => "drift",
-        })
     }
 }
 

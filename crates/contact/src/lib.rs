@@ -37,6 +37,8 @@
 //! `delta = lambda / c`, its gamma ours over `c`: only the unit differs (its text around eq. 24 has the
 //! factor in `M`), and the duration of contacts does not depend on it.
 //!
+//! Where lubrication acts, [`FilmMemory`] keeps films open before contact is corrected for.
+//!
 //! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
 
 pub mod broadphase;
@@ -69,7 +71,7 @@ pub mod solver;
 pub use gluey_geom as geom;
 
 pub use domain::{Domain, Wall};
-pub use error::{ContactError, Quantity};
+pub use error::ContactError;
 pub use films::{Film, FilmError, FilmMemory, FilmReport, GapReport, film_reach};
 pub use key::{PairKey, Partner};
 pub use memory::{ContactState, MemoryError, PairState};
@@ -77,7 +79,7 @@ pub use mobility::{Mobility, StokesDrag, WithFixed};
 pub use model::{BodyStep, Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
-pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownLaw, UnknownSolver};
+pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownName};
 
 /// The examples of the README.
 #[cfg(doctest)]

@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Pose, Space, Twist, Vector};
 use serde::{Deserialize, Serialize};
 
 use crate::projection::Effort;
-use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Quantity, Wall};
+use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
@@ -177,12 +177,12 @@ where
             return Err(ContactError::BadRadius { particle, radius });
         }
         for (vector, quantity) in [
-            (&step.positions[particle], Quantity::Position),
-            (&twists[particle].velocity, Quantity::Velocity),
-            (&step.drift[particle], Quantity::Drift),
+            (&step.positions[particle], "position"),
+            (&twists[particle].velocity, "velocity"),
+            (&step.drift[particle], "drift"),
         ] {
             if !vector.iter().all(|x| x.is_finite()) {
-                return Err(ContactError::NotFinite { particle, quantity });
+                return Err(ContactError::NotFinite { particle, quantity: quantity.to_owned() });
             }
         }
     }

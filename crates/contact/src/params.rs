@@ -40,22 +40,22 @@ impl fmt::Display for ContactLaw {
     }
 }
 
-/// A name of no contact law.
+/// A name of no contact law, or of no solver.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown contact law `{name}`: expected `none`, `velocity-correction`, `inelastic` or `gluey`")]
-pub struct UnknownLaw {
-    /// The name as it was given.
-    pub name: String,
+#[error("unknown contact {what} `{name}`: expected {expected}")]
+pub struct UnknownName {
+    what: &'static str,
+    name: String,
+    expected: &'static str,
 }
 
 impl FromStr for ContactLaw {
-    type Err = UnknownLaw;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, UnknownLaw> {
-        Self::ALL
-            .into_iter()
-            .find(|law| law.to_string() == name)
-            .ok_or_else(|| UnknownLaw { name: name.to_owned() })
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let expected = "`none`, `velocity-correction`, `inelastic` or `gluey`";
+        let found = Self::ALL.into_iter().find(|law| law.to_string() == name);
+        found.ok_or_else(|| UnknownName { what: "law", name: name.to_owned(), expected })
     }
 }
 
@@ -117,22 +117,13 @@ impl fmt::Display for SolverKind {
     }
 }
 
-/// A name of no solver.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown contact solver `{name}`: expected `auto`, `uzawa`, `accelerated` or `active-set`")]
-pub struct UnknownSolver {
-    /// The name as it was given.
-    pub name: String,
-}
-
 impl FromStr for SolverKind {
-    type Err = UnknownSolver;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, UnknownSolver> {
-        Self::ALL
-            .into_iter()
-            .find(|solver| solver.to_string() == name)
-            .ok_or_else(|| UnknownSolver { name: name.to_owned() })
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let expected = "`auto`, `uzawa`, `accelerated` or `active-set`";
+        let found = Self::ALL.into_iter().find(|solver| solver.to_string() == name);
+        found.ok_or_else(|| UnknownName { what: "solver", name: name.to_owned(), expected })
     }
 }
 

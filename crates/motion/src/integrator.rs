@@ -4,7 +4,7 @@
 //! DOI 10.3166/REMN.16.365-383): Euler has `c = dt`, `drift = 0`; Adams-Bashforth 2 has `c = 3 dt/2`,
 //! `drift = -(dt/2) u^{n-1}`. A contact model corrects `u^n` knowing only `c` and `drift`.
 
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use gluey_contact::BodyStep;
 use gluey_geom::{Dim, Particle, Space, Twist, Vector};
@@ -29,25 +29,6 @@ impl fmt::Display for Scheme {
             Self::Euler => "euler",
             Self::AdamsBashforth2 => "adams-bashforth-2",
         })
-    }
-}
-
-/// A name that is no time scheme.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown time scheme `{name}`: expected `euler` or `adams-bashforth-2`")]
-pub struct UnknownScheme {
-    /// The name as it was given.
-    pub name: String,
-}
-
-impl FromStr for Scheme {
-    type Err = UnknownScheme;
-
-    fn from_str(name: &str) -> Result<Self, UnknownScheme> {
-        [Self::Euler, Self::AdamsBashforth2]
-            .into_iter()
-            .find(|scheme| scheme.to_string() == name)
-            .ok_or_else(|| UnknownScheme { name: name.to_owned() })
     }
 }
 

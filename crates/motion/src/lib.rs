@@ -39,7 +39,7 @@ pub use hydrodynamics::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
     ResumeError,
 };
-pub use integrator::{Integrator, Scheme, UnknownScheme};
+pub use integrator::{Integrator, Scheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};
 pub use mobility_table::{MobilityTable, PairCoefficients};
 pub use pair_mobility::{PairMobility, PairMobilityError};

@@ -140,7 +140,7 @@ where
         law: parameters
             .law
             .parse()
-            .map_err(|error: gluey_contact::UnknownLaw| value_error(error.to_string()))?,
+            .map_err(|error: gluey_contact::UnknownName| value_error(error.to_string()))?,
         exact_gap: parameters.exact_gap,
         gamma_update: match parameters.memory.as_str() {
             "paper" => GammaUpdate::Paper,
@@ -156,7 +156,7 @@ where
         solver: parameters
             .solver
             .parse()
-            .map_err(|error: gluey_contact::UnknownSolver| value_error(error.to_string()))?,
+            .map_err(|error: gluey_contact::UnknownName| value_error(error.to_string()))?,
         tolerance: parameters.tolerance,
         iteration_limit: parameters.iteration_limit,
         ..ContactParams::default()

@@ -11,7 +11,7 @@ use crate::model::{is_positive, validate_sizes};
 use crate::record::ContactRecord;
 use crate::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
-    MemoryError, Mobility, PairKey, PairState, Partner, Quantity, StokesDrag,
+    MemoryError, Mobility, PairKey, PairState, Partner, StokesDrag,
 };
 
 /// Contacts between shapes by one of the contact laws `none`, `inelastic` and `gluey`.
@@ -168,7 +168,7 @@ where
             return Err(ContactError::BadRadius { particle, radius });
         }
         if let Some(quantity) = not_finite(&step.poses[particle], &twists[particle], &step.drift[particle]) {
-            return Err(ContactError::NotFinite { particle, quantity });
+            return Err(ContactError::NotFinite { particle, quantity: quantity.to_owned() });
         }
     }
     let nobody = |pair: PairKey| pair.particles().1.is_none_or(|second| second >= count);
@@ -179,18 +179,18 @@ where
 }
 
 /// The first quantity of a body that is infinite or not a number.
-fn not_finite<const D: usize>(pose: &Pose<D>, twist: &Twist<D>, drift: &Twist<D>) -> Option<Quantity>
+fn not_finite<const D: usize>(pose: &Pose<D>, twist: &Twist<D>, drift: &Twist<D>) -> Option<&'static str>
 where
     Dim<D>: Space<D>,
 {
     let linear = |x: &Vector<D>| x.iter().all(|x| x.is_finite());
     let angular = |twist: &Twist<D>| Dim::<D>::spin_slice(&twist.spin).iter().all(|x| x.is_finite());
     let quantities = [
-        (linear(&pose.position), Quantity::Position),
-        (frame(&pose.orientation).iter().all(|x| x.is_finite()), Quantity::Orientation),
-        (linear(&twist.velocity), Quantity::Velocity),
-        (angular(twist), Quantity::Spin),
-        (linear(&drift.velocity) && angular(drift), Quantity::Drift),
+        (linear(&pose.position), "position"),
+        (frame(&pose.orientation).iter().all(|x| x.is_finite()), "orientation"),
+        (linear(&twist.velocity), "velocity"),
+        (angular(twist), "spin"),
+        (linear(&drift.velocity) && angular(drift), "drift"),
     ];
     quantities.into_iter().find_map(|(is_finite, quantity)| (!is_finite).then_some(quantity))
 }

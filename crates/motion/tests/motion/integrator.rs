@@ -151,10 +151,8 @@ fn a_checkpoint_resumes_bit_for_bit() {
 
 #[test]
 fn schemes_have_names() {
-    for scheme in [Scheme::Euler, Scheme::AdamsBashforth2] {
-        assert_eq!(scheme.to_string().parse(), Ok(scheme));
-    }
-    assert!("leapfrog".parse::<Scheme>().is_err());
+    let names = [Scheme::Euler, Scheme::AdamsBashforth2].map(|scheme| scheme.to_string());
+    assert_eq!(names, ["euler", "adams-bashforth-2"]);
 }
 
 fn check_shear<const D: usize>()
