@@ -40,6 +40,22 @@ const MOST_PUSHED: f64 = 1.0;
 
 /// Forces and impulses of films at the last step, remembered like those of contacts: `lambda = -F`,
 /// `gamma = Phi`.
+///
+/// ```
+/// use gluey_contact::{BodyStep, Film, FilmMemory, PairKey};
+/// use gluey_geom::{Pose, Twist, Vector};
+///
+/// // Two spheres that would overlap by 0.3 after the step.
+/// let along = |x: f64| Vector::<3>::new(x, 0.0, 0.0);
+/// let (pair, branch, slide) = (PairKey::new(0, 1), along(2.1), Vector::zeros());
+/// let film = Film { pair, branch, slide, is_held: [false; 2], gap: 0.1, curvature_radius: 1.0 };
+/// let (poses, drift, dt) = ([0.0, 2.1].map(|x| Pose::at(along(x))), [Twist::default(); 2], 1.0);
+/// let step = BodyStep { poses: &poses, radii: &[1.0; 2], drift: &drift, velocity_weight: dt, dt };
+/// let mut twists = [0.2, -0.2].map(|x| Twist { velocity: along(x), ..Twist::default() });
+/// FilmMemory::default().open(&step, &[film], &mut twists)?;
+/// assert!(0.1 + dt * (twists[1].velocity.x - twists[0].velocity.x) > 0.0);
+/// # Ok::<(), gluey_contact::FilmError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct FilmMemory(ContactState);
