@@ -7,7 +7,7 @@ use crate::projection::Failure;
 use crate::solver::{ResidualHistory, SolveFailure};
 use crate::{ContactLaw, PairKey, Partner};
 
-/// Why velocities could not be corrected. They are left as they were.
+/// Failure to correct velocities, which are left as they were.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum ContactError {

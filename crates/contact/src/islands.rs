@@ -46,7 +46,7 @@ pub(crate) struct Islands<const D: usize> {
     slot_of: Vec<u32>,
 }
 
-/// How contacts are parted.
+/// A way to part contacts.
 #[derive(Clone, Copy)]
 pub(crate) enum Grouping<'a> {
     /// Into connected components.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ContactLaw, ContactParams, GammaUpdate, PairKey};
 
-/// One pair's memory.
+/// Memory of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct PairState {

@@ -77,7 +77,7 @@ pub enum GammaUpdate {
     Consistent,
 }
 
-/// Which method solves the projection; all give the same velocities.
+/// Method that solves the projection; all give the same velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]

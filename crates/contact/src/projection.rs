@@ -16,7 +16,7 @@ pub(crate) struct Effort {
     pub residual: f64,
 }
 
-/// Why a projection failed. Contacts are numbered as the problem numbers them.
+/// Failure of a projection. Contacts are numbered as the problem numbers them.
 #[derive(Clone, Debug)]
 pub(crate) enum Failure {
     Solve(SolveFailure),

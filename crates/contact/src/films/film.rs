@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Space, Twist, Vector};
 
-use crate::neighbours::{AffineFit, Frame};
+use crate::neighbours::{AffineFit, KnownMotion};
 use crate::rows::{GROUND, Row};
 use crate::solver::GapLaw;
 use crate::{BodyStep, PairKey};
@@ -53,7 +53,7 @@ where
     let shear = rate * step.dt;
     let centers: Vec<Vector<D>> = step.poses.iter().map(|pose| pose.position).collect();
     let moves = step.moves(twists);
-    let lattice = AffineFit::new(&centers, &moves, &Frame { free: [false; D], shear });
+    let lattice = AffineFit::new(&centers, &moves, &KnownMotion { free: [false; D], shear });
     let farthest = centers.iter().zip(&moves).map(|(x, s)| lattice.rest(x, s)).fold(0.0, f64::max);
     let largest = step.radii.iter().copied().fold(0.0, f64::max);
     // A wall has `A = 2 a`.

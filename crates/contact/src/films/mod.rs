@@ -60,7 +60,7 @@ const MOST_PUSHED: f64 = 1.0;
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct FilmMemory(ContactState);
 
-/// What films did in a step.
+/// Report on the films of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FilmReport {
     /// Films that are closed before the step: their gaps, 0.5e-9 to 1e-9 `A`, are a floor and no measurement.

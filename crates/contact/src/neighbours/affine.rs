@@ -9,16 +9,16 @@
 
 use gluey_geom::{Matrix, Vector};
 
-/// What is known of an affine motion.
+/// Known part of an affine motion.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame<const D: usize> {
+pub(crate) struct KnownMotion<const D: usize> {
     /// Directions without a period.
     pub free: [bool; D],
     /// Shear strain of the lattice: displacement of images along `x` per unit of `y`.
     pub shear: f64,
 }
 
-impl<const D: usize> Frame<D> {
+impl<const D: usize> KnownMotion<D> {
     /// `L` of the lattice.
     fn gradient(&self) -> Matrix<D> {
         Matrix::from_fn(|i, j| if (i, j) == (0, 1) { self.shear } else { 0.0 })
@@ -41,7 +41,7 @@ const LARGEST_STRAIN: f64 = 0.5;
 impl<const D: usize> AffineFit<D> {
     /// Fits `displacements` at `positions`: besides the motion of the `frame`, `L` is fitted on the
     /// directions that are free.
-    pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], frame: &Frame<D>) -> Self {
+    pub(crate) fn new(positions: &[Vector<D>], displacements: &[Vector<D>], frame: &KnownMotion<D>) -> Self {
         Self::completed(positions, displacements, frame, |_| {})
     }
 
@@ -50,7 +50,7 @@ impl<const D: usize> AffineFit<D> {
     pub(crate) fn completed(
         positions: &[Vector<D>],
         displacements: &[Vector<D>],
-        frame: &Frame<D>,
+        frame: &KnownMotion<D>,
         complete: impl Fn(&mut [f64]),
     ) -> Self {
         let sliding = frame.gradient();
@@ -123,12 +123,12 @@ mod tests {
         let positions: Vec<_> = (0..100).map(point).collect();
         let moves: Vec<_> =
             positions.iter().map(|x| gradient * x + Vector::<3>::new(3.0, 2.0, 1.0)).collect();
-        let fit = AffineFit::new(&positions, &moves, &Frame { free: [true; 3], shear: 0.0 });
+        let fit = AffineFit::new(&positions, &moves, &KnownMotion { free: [true; 3], shear: 0.0 });
         assert!((fit.gradient - gradient).norm() < 1e-12 && fit.strain >= gradient.norm() - 1e-12);
         assert!(positions.iter().zip(&moves).all(|(x, s)| fit.rest(x, s) < 1e-12));
         let flat: Vec<_> = positions.iter().map(|x| Vector::<3>::new(x.x, 0.0, x.z)).collect();
         let moves: Vec<_> = flat.iter().map(|x| gradient * x).collect();
-        let fit = AffineFit::new(&flat, &moves, &Frame { free: [true, true, false], shear: 0.0 });
+        let fit = AffineFit::new(&flat, &moves, &KnownMotion { free: [true, true, false], shear: 0.0 });
         assert_eq!((fit.gradient.column(1).norm(), fit.gradient.column(2).norm()), (0.0, 0.0));
     }
 
@@ -138,7 +138,7 @@ mod tests {
         let point = |i: usize| Vector::<3>::from_fn(|d, _| (i as f64 * [0.7548, 0.5698, 0.4301][d]).fract());
         let positions: Vec<_> = (0..100).map(point).collect();
         let moves: Vec<_> = positions.iter().map(|x| gradient * x).collect();
-        let fit = AffineFit::new(&positions, &moves, &Frame { free: [false, false, true], shear: 0.7 });
+        let fit = AffineFit::new(&positions, &moves, &KnownMotion { free: [false, false, true], shear: 0.7 });
         assert!((fit.gradient - gradient).norm() < 1e-12 && fit.strain >= 0.7);
         assert!(positions.iter().zip(&moves).all(|(x, s)| fit.rest(x, s) < 1e-12));
     }

@@ -11,7 +11,7 @@ use gluey_geom::{Lattice, Vector};
 
 use crate::broadphase::BestOf;
 use crate::{ContactError, Domain, PairKey, Partner, StepGeometry, Wall};
-pub(crate) use affine::{AffineFit, Frame};
+pub(crate) use affine::{AffineFit, KnownMotion};
 pub(crate) use images::{for_each_image, wrap};
 pub(crate) use order::SpatialOrder;
 pub(crate) use ownership::Ownership;
@@ -353,7 +353,7 @@ impl<const D: usize> NeighbourList<D> {
         moved.clear();
         moved.extend(self.positions.iter().zip(&self.reference).map(|(x, before)| x - before));
         let shear = domain.lattice.shear() - self.reference_lattice.shear();
-        let past = AffineFit::new(&self.reference, moved, &Frame { shear, ..frame_of_step(domain) });
+        let past = AffineFit::new(&self.reference, moved, &KnownMotion { shear, ..frame_of_step(domain) });
         let rests = self.reference.iter().zip(moved).map(|(x, moved)| past.rest(x, moved));
         self.remaining_reach.clear();
         self.remaining_reach
@@ -415,8 +415,8 @@ impl<const D: usize> Moves<'_, D> {
 }
 
 /// The motion of the lattice in the step.
-fn frame_of_step<const D: usize>(domain: &Domain<D>) -> Frame<D> {
-    Frame { free: domain.lattice.periods().map(|period| period.is_none()), shear: domain.strain_step() }
+fn frame_of_step<const D: usize>(domain: &Domain<D>) -> KnownMotion<D> {
+    KnownMotion { free: domain.lattice.periods().map(|period| period.is_none()), shear: domain.strain_step() }
 }
 
 #[cfg(test)]

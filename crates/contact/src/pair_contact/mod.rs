@@ -76,7 +76,7 @@ struct Buffers<const D: usize> {
     displacements: Vec<Vector<D>>,
 }
 
-/// Whether a candidate takes part in a step.
+/// Participation of a candidate in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Participation {
     No,
@@ -198,7 +198,7 @@ where
     }
 }
 
-/// Whether the search went far enough.
+/// Reach of the search: whether it went far enough.
 enum Coverage {
     Complete,
     Incomplete,

@@ -6,7 +6,7 @@ use gluey_geom::Vector;
 
 use super::Shape;
 
-/// All points within `radius` of the segment from `-half_axis` to `half_axis`.
+/// The points within `radius` of the segment from `-half_axis` to `half_axis`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule<const D: usize> {
     /// Half of the segment, in the frame of the body; zero for a disc or sphere.

@@ -5,7 +5,7 @@ use gluey_geom::{Dim, Pose, Space, Twist, Vector};
 use super::Shape;
 use super::bodies::Bodies;
 use super::closest::frame;
-use super::problem::Problem;
+use super::problem::ShapeProjection;
 use crate::broadphase::{BestOf, Broadphase};
 use crate::model::{is_positive, validate_sizes};
 use crate::record::ContactRecord;
@@ -81,7 +81,7 @@ where
         let bodies = Bodies::new(&self.shapes, step, &free, &self.mobility);
         let (problem, report) = loop {
             let pairs = near(&mut self.broadphase, &bodies, &self.record.state, &slacks);
-            let mut problem = Problem::new(&bodies, &self.params, &pairs, &self.record.state)?;
+            let mut problem = ShapeProjection::new(&bodies, &self.params, &pairs, &self.record.state)?;
             let report = problem.solve()?;
             if !widen(&mut slacks, &problem.moved) {
                 break (problem, report);

@@ -29,7 +29,7 @@ const FIRST_PASSES: usize = 10;
 
 /// Two bodies that may touch.
 #[derive(Clone, Debug)]
-struct Pair<const D: usize> {
+struct ShapePair<const D: usize> {
     bodies: [usize; 2],
     /// From the first to the second at the beginning of the step.
     normal: Vector<D>,
@@ -50,7 +50,7 @@ struct Pair<const D: usize> {
 
 /// A point of contact of a pair.
 #[derive(Clone, Debug)]
-struct Point<const D: usize> {
+struct ContactPoint<const D: usize> {
     pair: usize,
     /// Points of the cores in the frames of their bodies.
     points: [Vector<D>; 2],
@@ -62,7 +62,7 @@ struct Point<const D: usize> {
 }
 
 /// The projection of one step.
-pub(super) struct Problem<'a, const D: usize, S>
+pub(super) struct ShapeProjection<'a, const D: usize, S>
 where
     Dim<D>: Space<D>,
 {
@@ -70,8 +70,8 @@ where
     params: &'a ContactParams,
     rule: GammaRule,
     tuning: Tuning,
-    pairs: Vec<Pair<D>>,
-    points: Vec<Point<D>>,
+    pairs: Vec<ShapePair<D>>,
+    points: Vec<ContactPoint<D>>,
     /// Displacements, and the frames they turn the bodies to.
     pub moved: Vec<Twist<D>>,
     frames: Vec<Matrix<D>>,
@@ -79,13 +79,13 @@ where
     pub changes: Vec<Twist<D>>,
 }
 
-impl<const D: usize> Pair<D> {
+impl<const D: usize> ShapePair<D> {
     fn key(&self) -> PairKey {
         PairKey::new(self.bodies[0], self.bodies[1])
     }
 }
 
-impl<'a, const D: usize, S: Shape<D>> Problem<'a, D, S>
+impl<'a, const D: usize, S: Shape<D>> ShapeProjection<'a, D, S>
 where
     Dim<D>: Space<D>,
 {
@@ -121,13 +121,13 @@ where
         Ok(problem)
     }
 
-    fn pair(&self, bodies: [usize; 2], state: &ContactState) -> Result<Pair<D>, ContactError> {
+    fn pair(&self, bodies: [usize; 2], state: &ContactState) -> Result<ShapePair<D>, ContactError> {
         let key = PairKey::new(bodies[0], bodies[1]);
         let arms = self.closest(bodies).ok_or(ContactError::Entangled { pair: key })?;
         let separation = self.separation(bodies, &arms);
         let rest = bodies.iter().map(|&body| self.bodies.shapes[body].rounding()).sum();
         let PairState { gamma, lambda, .. } = state.get(key);
-        Ok(Pair {
+        Ok(ShapePair {
             bodies,
             normal: separation.normalize(),
             arms,
@@ -170,8 +170,8 @@ where
         changed
     }
 
-    fn closes(&self, pair: &Pair<D>) -> bool {
-        let Pair { normal, arms, bodies, .. } = *pair;
+    fn closes(&self, pair: &ShapePair<D>) -> bool {
+        let ShapePair { normal, arms, bodies, .. } = *pair;
         let linear = pair.gap + PointRow { normal, arms, bodies }.opening(&self.moved);
         linear < 0.0 || self.params.exact_gap && self.gap_now(pair, &pair.arms).0 < -self.tuning.tolerance
     }
@@ -209,7 +209,7 @@ where
 
     /// Gap of a pair where the bodies are now, and the closest points from the centres. Where the cores have
     /// passed each other the gap is that along the normal, between points known before.
-    fn gap_now(&self, pair: &Pair<D>, known: &[Vector<D>; 2]) -> (f64, [Vector<D>; 2]) {
+    fn gap_now(&self, pair: &ShapePair<D>, known: &[Vector<D>; 2]) -> (f64, [Vector<D>; 2]) {
         let is_ahead = |arms: &[Vector<D>; 2]| self.separation(pair.bodies, arms).dot(&pair.normal) > 0.0;
         match self.closest(pair.bodies).filter(is_ahead) {
             Some(arms) => (self.separation(pair.bodies, &arms).norm() - pair.rest, arms),
@@ -220,15 +220,15 @@ where
     /// Moves the known points of contact with their bodies.
     fn carry_points(&mut self) {
         for k in 0..self.points.len() {
-            let Point { pair, points, .. } = &self.points[k];
+            let ContactPoint { pair, points, .. } = &self.points[k];
             let bodies = self.pairs[*pair].bodies;
             self.points[k].arms = [0, 1].map(|side| self.frames[bodies[side]] * points[side]);
         }
     }
 
     /// How far a pair whose gap is `gap` is from what it should be.
-    fn defect(&self, pair: &Pair<D>, gap: f64) -> f64 {
-        let slack = |point: &Point<D>| {
+    fn defect(&self, pair: &ShapePair<D>, gap: f64) -> f64 {
+        let slack = |point: &ContactPoint<D>| {
             let compliance = self.row(point).compliance(&self.bodies.weights);
             compliance * (point.force - pair.floor)
         };
@@ -239,7 +239,7 @@ where
     /// [`crate::PairContact`].
     fn turn_normals(&mut self) {
         for k in 0..self.points.len() {
-            let Point { pair, arms, .. } = &self.points[k];
+            let ContactPoint { pair, arms, .. } = &self.points[k];
             if arms.iter().any(|arm| arm.norm() > 0.0) {
                 self.points[k].normal = self.separation(self.pairs[*pair].bodies, arms).normalize();
             }
@@ -248,10 +248,10 @@ where
 
     /// The point of contact of a pair at these arms, moved there from nearby or new.
     fn point_at(&mut self, pair: usize, arms: [Vector<D>; 2], pass: usize) -> usize {
-        let Pair { bodies, rest, last, main, normal, .. } = self.pairs[pair];
+        let ShapePair { bodies, rest, last, main, normal, .. } = self.pairs[pair];
         let points = [0, 1].map(|side| self.frames[bodies[side]].tr_mul(&arms[side]));
         let same = SAME_POINT.0 * SAME_POINT.1.powi(pass as i32 - 1);
-        let is_near = |point: &Point<D>| {
+        let is_near = |point: &ContactPoint<D>| {
             let distance = (point.points[0] - points[0]).norm() + (point.points[1] - points[1]).norm();
             point.pair == pair && distance <= same * rest
         };
@@ -262,11 +262,11 @@ where
         }
         // The first point starts with the last force.
         let force = if main == usize::MAX { last } else { 0.0 };
-        self.points.push(Point { pair, points, arms, normal, force });
+        self.points.push(ContactPoint { pair, points, arms, normal, force });
         at
     }
 
-    fn row(&self, point: &Point<D>) -> PointRow<D> {
+    fn row(&self, point: &ContactPoint<D>) -> PointRow<D> {
         PointRow { normal: point.normal, arms: point.arms, bodies: self.pairs[point.pair].bodies }
     }
 

@@ -8,7 +8,7 @@
 
 use super::infeasibility::{InfeasibilityMonitor, MONITOR_VECTOR_COUNT};
 use super::{
-    ConvergenceLog, Measures, Projection, ProjectionSolver, SolveFailure, SolveReport, dot, gaps_under,
+    ConvergenceLog, Projection, ProjectionSolver, ResidualSums, SolveFailure, SolveReport, dot, gaps_under,
     largest_eigenvalue, residual, split,
 };
 
@@ -24,7 +24,7 @@ const NULL: f64 = 1e-13;
 pub struct ActiveSet;
 
 /// Vectors of one solve.
-struct State<'a> {
+struct ActiveSetState<'a> {
     /// `w`, the gradient of the dual function.
     gaps: &'a mut [f64],
     /// Gradient of the forces above their floor.
@@ -52,7 +52,7 @@ impl ProjectionSolver for ActiveSet {
         let [gaps, free, chopped, direction, image, mark, ray, mapped] = split(scratch, forces.len());
         let norm = largest_eigenvalue(problem.operator, ray, mapped);
         let mut monitor = InfeasibilityMonitor::new([mark, ray, mapped], problem, forces);
-        let mut state = State { gaps, free, chopped, direction, image, moved: 0.0 };
+        let mut state = ActiveSetState { gaps, free, chopped, direction, image, moved: 0.0 };
         let mut log = ConvergenceLog::new();
         let refresh = REFRESH + 2 * problem.count(forces.len());
         state.begin(problem, forces);
@@ -76,7 +76,7 @@ impl ProjectionSolver for ActiveSet {
     }
 }
 
-impl State<'_> {
+impl ActiveSetState<'_> {
     /// Starts conjugate gradients anew from `forces`.
     fn begin(&mut self, problem: &mut Projection<'_>, forces: &mut [f64]) {
         for (force, floor) in forces.iter_mut().zip(problem.floors) {
@@ -98,9 +98,9 @@ impl State<'_> {
 
     /// The residual, the square of the chopped gradient, and the product of the free one with its part that
     /// a step can follow.
-    fn measures(&self, problem: &Projection<'_>, forces: &[f64], norm: f64) -> Measures<2> {
+    fn measures(&self, problem: &Projection<'_>, forces: &[f64], norm: f64) -> ResidualSums<2> {
         let sums = [dot(self.chopped, self.chopped), self.reduced(forces, problem.floors, norm)];
-        Measures { here: residual(self.gaps, forces, problem.floors, norm), sums }
+        ResidualSums { here: residual(self.gaps, forces, problem.floors, norm), sums }
     }
 
     /// A step; `proportional` where forces at their floors are not worse than the others.

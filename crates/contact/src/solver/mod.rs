@@ -70,7 +70,7 @@ pub trait DelassusOperator {
 /// Stands for a contact that is not among those here.
 pub(crate) const ELSEWHERE: usize = usize::MAX;
 
-/// One projection problem.
+/// A projection problem.
 pub struct Projection<'a> {
     /// `A`.
     pub operator: &'a mut dyn DelassusOperator,
@@ -155,12 +155,12 @@ impl ConvergenceLog {
         Self { history: [0.0; HISTORY_LENGTH], iteration: 0, residual: f64::INFINITY, worst: 0 }
     }
 
-    /// Records the residual of the next iteration.
-    fn record(&mut self, (worst, residual): (usize, f64)) {
+    /// Records the residual of the next iteration, and of which contact it is.
+    fn record(&mut self, worst: (usize, f64)) {
         self.iteration += 1;
-        (self.worst, self.residual) = (worst, residual);
+        (self.worst, self.residual) = worst;
         if self.iteration.is_power_of_two() {
-            self.history[(self.iteration.ilog2() as usize).min(HISTORY_LENGTH - 1)] = residual;
+            self.history[(self.iteration.ilog2() as usize).min(HISTORY_LENGTH - 1)] = self.residual;
         }
     }
 
@@ -195,25 +195,25 @@ impl Projection<'_> {
 
     /// [`residual`] over all contacts.
     fn residual(&self, gaps: &[f64], forces: &[f64], norm: f64) -> (usize, f64) {
-        let mut measures = Measures::<0>::of(self, gaps, forces, norm);
+        let mut measures = ResidualSums::<0>::of(self, gaps, forces, norm);
         measures.complete(self)
     }
 }
 
-/// What is to be summed over all contacts together with their residual, for it takes one message.
-struct Measures<const N: usize> {
+/// Sums over all contacts that are made together with their residual, for it takes one message.
+struct ResidualSums<const N: usize> {
     /// The contact with the largest residual here, and that residual.
     here: (usize, f64),
     sums: [f64; N],
 }
 
-impl Measures<0> {
+impl ResidualSums<0> {
     fn of(problem: &Projection<'_>, gaps: &[f64], forces: &[f64], norm: f64) -> Self {
         Self { here: residual(gaps, forces, problem.floors, norm), sums: [] }
     }
 }
 
-impl<const N: usize> Measures<N> {
+impl<const N: usize> ResidualSums<N> {
     /// Completes the sums; the contact with the largest residual of all, and that residual.
     fn complete(&mut self, problem: &Projection<'_>) -> (usize, f64) {
         let (worst, own) = self.here;

@@ -35,7 +35,7 @@ fn improve_with_others(
     }
     let factor = problem.operator.factor()?;
     let all = problem.operator.gather(&numbers_of(&factor, problem, forces));
-    let mut whole = Whole::of(&all);
+    let mut whole = GatheredProblem::of(&all);
     let report = whole.improve(problem.tolerance, norm, step_limit)?;
     let first: usize = whole.counts[..place].iter().sum();
     forces.copy_from_slice(&whole.forces[first..][..forces.len()]);
@@ -54,7 +54,7 @@ fn numbers_of(factor: &Factor, problem: &Projection<'_>, forces: &[f64]) -> Vec<
 
 /// The problem of all ranks.
 #[derive(Default)]
-struct Whole {
+struct GatheredProblem {
     factor: Factor,
     free_gaps: Vec<f64>,
     floors: Vec<f64>,
@@ -63,7 +63,7 @@ struct Whole {
     counts: Vec<usize>,
 }
 
-impl Whole {
+impl GatheredProblem {
     fn of(numbers: &[Vec<f64>]) -> Self {
         let mut rows: Vec<Vec<(u64, f64)>> = Vec::new();
         let mut whole = Self::default();

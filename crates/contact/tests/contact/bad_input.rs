@@ -81,7 +81,7 @@ fn messages_count_from_one() {
     let pair = PairKey::new(0, 6);
     for (text, expected) in [
         (message(ContactError::BadRadius { particle: 0, radius: -1.0 }), "particle 1 has the radius -1"),
-        (message(not_finite(2, "drift")), "particle 3: its drift"),
+        (message(ContactError::NotFinite { particle: 2, quantity: "drift".to_owned() }), "particle 3: its drift"),
         (message(ContactError::BadWall { wall: 1 }), "wall 2 needs"),
         (message(ContactError::BadPeriod { direction: 2, period: 0.0 }), "the period 0 along z"),
         (

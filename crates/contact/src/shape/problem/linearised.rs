@@ -3,14 +3,14 @@
 
 use gluey_geom::{Dim, Space, Twist};
 
-use super::{FIRST_PASSES, Problem};
+use super::{FIRST_PASSES, ShapeProjection};
 use crate::delassus::{ScaledDelassus, scale_rows};
 use crate::projection::{LinearProblem, Linearised};
 use crate::shape::Shape;
 use crate::shape::points::{OwnDrag, PointRow};
 use crate::solver::{SolveFailure, SolveReport};
 
-impl<const D: usize, S: Shape<D>> Problem<'_, D, S>
+impl<const D: usize, S: Shape<D>> ShapeProjection<'_, D, S>
 where
     Dim<D>: Space<D>,
 {
@@ -29,7 +29,7 @@ where
     }
 }
 
-impl<const D: usize, S: Shape<D>> Linearised for Problem<'_, D, S>
+impl<const D: usize, S: Shape<D>> Linearised for ShapeProjection<'_, D, S>
 where
     Dim<D>: Space<D>,
 {
