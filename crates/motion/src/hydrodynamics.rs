@@ -4,7 +4,7 @@ use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
 
 use gluey_contact::Film;
 
-/// What velocities are predicted from.
+/// A state that velocities are predicted from.
 ///
 /// ```
 /// use gluey_geom::{Particle, Vector};
@@ -57,7 +57,7 @@ where
     }
 }
 
-/// What a model says of a configuration.
+/// Answer of a model to a configuration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction<const D: usize>
 where
@@ -128,7 +128,7 @@ where
     }
 }
 
-/// What holds or drives particles that move as they are told.
+/// Support of particles that move as they are told: what holds or drives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Holding<const D: usize>
 where

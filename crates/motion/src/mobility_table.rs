@@ -23,8 +23,8 @@ pub struct PairCoefficients {
     pub spin: f64,
 }
 
-/// One row in the variables in which it is interpolated: all three are smooth in `ln xi` and nearly straight
-/// at both ends.
+/// A row in the variables in which it is interpolated: all three are smooth in `ln xi` and nearly straight at
+/// both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Separation {
     /// `ln xi`, `xi` the gap in radii.

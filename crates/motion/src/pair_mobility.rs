@@ -11,7 +11,7 @@ use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
 
 use crate::{Configuration, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
 
-/// Why a pair has no velocities.
+/// Reason why a pair has no velocities.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PairMobilityError {
     /// The model knows two spheres.
